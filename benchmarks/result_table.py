@@ -47,9 +47,18 @@ def provenance() -> dict[str, str]:
     return {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "commit": _commit(),
-        "cpu": cpu(),
+        "cpu": f"{cpu()}, {vector_unit()}",
         **{name: versions()[name] for name in ("python", "numba", "numpy")},
     }
+
+
+def vector_unit() -> str:
+    """The widest vector instructions of this processor: times depend on them."""
+    try:
+        flags = Path("/proc/cpuinfo").read_text("utf-8").partition("\nflags")[2].partition("\n")[0].split()
+    except OSError:
+        flags = []
+    return next((name for flag, name in (("avx512f", "AVX-512"), ("avx2", "AVX2")) if flag in flags), "no AVX2 known")
 
 
 def _commit() -> str:

@@ -89,24 +89,24 @@ def integrators() -> str:
     return _table(("name", "order", "evaluations a step", "doesn't support", "good for, and what breaks it"), rows)
 
 
-def masses(short: bool = False) -> str:
-    """Mass properties here and elsewhere, from the last benchmark's own numbers. short: the README's choice of tools and errors."""
+def _measured_masses() -> dict[tuple[str, str, str], dict[str, str]]:
+    """Rows of the last benchmark by tool, mesh and place."""
     with (ROOT / "benchmarks" / "results" / "mass_properties.csv").open(encoding="utf-8", newline="") as file:
         measured = [row for row in csv.DictReader(file) if row["what"] == "mass properties"]
-    found = {
+    return {
         (row["tool"], row["mesh"].split(",")[0], row["place"]): row for row in measured if "shuffled" not in row["mesh"]
     }
+
+
+def masses() -> str:
+    """Mass properties here and elsewhere, from the last benchmark's own numbers."""
+    found = _measured_masses()
     rows = []
-    for tool in dict.fromkeys(row["tool"] for row in measured):
-        if short and tool not in _SHORT_MASSES:
-            continue
+    for tool in dict.fromkeys(tool for tool, _, _ in found):
         place = found[tool, "ellipsoid 100k", "base"]
         errors = [found[tool, mesh, at]["inertia_error"] for mesh, at in _INERTIA_ERRORS]
         time = f"{float(place['ns_per_triangle']):,.0f}"
         rows.append((tool, place["version"], time, *(_error(error) for error in errors)))
-    if short:
-        head = ("tool", "ns per triangle", "error at the origin", "moved by 10³", "moved by 10⁶")
-        return _table(head, ((tool, *cells[1:5]) for tool, *cells in rows))
     sentence = f"Measured {place['date'][:10]} on one {place['cpu']}, in one process, medians."
     head = (
         "tool",
@@ -119,8 +119,6 @@ def masses(short: bool = False) -> str:
     )
     return f"{sentence}\n\n{_table(head, rows)}"
 
-
-_SHORT_MASSES = ("rigid_proto", "trimesh", "igl.moments", "MuJoCo compile, exact", "Drake")
 
 _INERTIA_ERRORS = (
     ("ellipsoid 100k", "base"),
@@ -164,24 +162,34 @@ def _measured_motions() -> list[dict[str, str]]:
         return [row for row in csv.DictReader(file) if row["problem"] in _MOTIONS]
 
 
-def motions_at_equal_error() -> str:
-    """Motion here and elsewhere: the time that each tool takes to our error, by its best integrator; where it doesn't reach
-    that, its most accurate run."""
-    measured, ours = _measured_motions(), "rigid_proto, auto"
+def figures() -> str:
+    """The README's: the inertia of a mesh far from the origin, and the time that each tool takes to our error of a motion, by
+    its best integrator; where it doesn't reach that, its most accurate run.
+    """
+    masses, measured = _measured_masses(), _measured_motions()
     default = {
         row["problem"]: row
         for row in measured
         if (row["tool"], row["integrator"], row["step_or_tolerance"]) == ("ours", "auto", "1e-09")
     }
-    tools = list(dict.fromkeys(row["tool"] for row in measured if not row["tool"].startswith("ours")))
-    rows = [[ours, *(_milliseconds(float(default[problem]["median_s"])) for problem in _MOTIONS)]]
-    for tool in tools:
-        rows.append([_TOOLS[tool].partition(",")[0]])
+    rows = []
+    for tool in dict.fromkeys(row["tool"] for row in measured if row["tool"] in ("ours", *_TOOLS)):
+        name = "rigid_proto" if tool == "ours" else _TOOLS[tool].partition(",")[0]
+        inertia = masses.get((_WEIGHS.get(name, name), "ellipsoid 100k", "+1e6"))
+        cells = [_error(inertia["inertia_error"]) if inertia else ""]
         for problem in _MOTIONS:
             runs = [row for row in measured if (row["tool"], row["problem"]) == (tool, problem)]
-            rows[-1].append(_at_error(runs, _attitude_error(default[problem])))
+            own = _milliseconds(float(default[problem]["median_s"]))
+            cells.append(own if tool == "ours" else _at_error(runs, _attitude_error(default[problem])))
+        rows.append((name, *cells))
+    for tool in ("trimesh", "igl.moments"):
+        rows.append((tool, _error(masses[tool, "ellipsoid 100k", "+1e6"]["inertia_error"]), "", "", ""))
     heads = (f"{title}, to {_attitude_error(default[problem]):.0e} rad" for problem, title in _MOTIONS.items())
-    return _table(("tool", *heads), rows)
+    return _table(("tool", "error of the inertia of a mesh 10⁶ m off", *heads), rows)
+
+
+_WEIGHS = {"MuJoCo": "MuJoCo compile, exact"}
+"""What a tool that moves bodies is called where it weighs them."""
 
 
 def _at_error(runs: list[dict[str, str]], target: float) -> str:
@@ -286,12 +294,11 @@ TABLES = {
     "parameters": parameters,
     "integrators": integrators,
     "masses": masses,
-    "masses_short": lambda: masses(short=True),
     "readers": readers,
     "bodies": bodies,
     "lessons": lesson_table,
     "motions": motions,
-    "motions_at_equal_error": motions_at_equal_error,
+    "figures": figures,
 }
 
 
