@@ -82,10 +82,10 @@ PARAMETERS = (*NUMBERS, "string_attached", "string_bilateral")
 
 EXPLICIT, ORDINARY, SHELL = range(3)
 
-TIE, MOVE, UNTIE = range(fl.CLEAR + 1, fl.CLEAR + 4)
+TIE, MOVE, UNTIE, CUT = range(fl.CLEAR + 1, fl.CLEAR + 5)
 """Commands in a table of loads that act between two calls of the compiled flight. TIE: load holds the target (3,) [m,
 world], the knot (3,) [mesh coordinates] and whether that counts, or the row's own. MOVE: the target, which the free end
-reaches after duration_ns.
+reaches after duration_ns. CUT: nothing but that another segment begins.
 """
 
 CERTAIN = 0.999
@@ -290,9 +290,9 @@ def _pulls_within(flight: np.record, x: float, y: float, z: float) -> bool:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _act_on_string(own: np.record, flight: np.record, command: np.record) -> bool:
-    """Apply TIE, MOVE or UNTIE now; False when the simulation must say whether that can be."""
-    if command.kind == UNTIE:
-        flight.tied = False
+    """Apply TIE, MOVE, UNTIE or CUT now; False when the simulation must say whether that can be."""
+    if command.kind >= UNTIE:
+        flight.tied = flight.tied and command.kind == CUT
         return True
     target = command.load[:3]
     if command.kind == TIE:

@@ -7,7 +7,6 @@ one by one by ``Simulation``, which is what a row is by definition, with the sam
 
 from __future__ import annotations
 
-from collections import ChainMap
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -27,7 +26,7 @@ from ..simulation.simulation import Simulation
 from .rows import Group, NotBatchable, is_structural
 from .sampling import VERTEX, Draw, as_text
 from .study import Study
-from .variation import Variation, apply, body_mesh_of, plain, vertex_number
+from .variation import Variation, apply, body_mesh_of, parameters_of, plain, vertex_number
 
 GROUPS_KEPT = 512
 """Groups of rows that a process keeps ready."""
@@ -106,12 +105,15 @@ def _sides(study: Study, key: tuple[Any, ...]) -> list[Group | None]:
     return [_group(study, key, False)] + ([_group(study, key, True)] if study.reference is not None else [])
 
 
+def _structural(study: Study, key: tuple[Any, ...]) -> dict[str, Value]:
+    """The values in a key by name."""
+    return dict(zip([v.target.name for v in study.vary if is_structural(v)], key, strict=True))
+
+
 @lru_cache(maxsize=GROUPS_KEPT)
 def _group(study: Study, key: tuple[Any, ...], with_reference: bool) -> Group | None:
-    names = [v.target.name for v in study.vary if is_structural(v)]
-    structural = dict(zip(names, key, strict=True))
     try:
-        return Group(study, structural, study.reference if with_reference else None)
+        return Group(study, _structural(study, key), study.reference if with_reference else None)
     except (NotBatchable, InputError):
         return None
 
@@ -236,17 +238,13 @@ def _as_objects(column: np.ndarray) -> np.ndarray:
     return text
 
 
-def _vertices(study: Study, columns: list[np.ndarray], column: np.ndarray) -> np.ndarray:
-    """Vertex numbers (n,): they depend on each row's mesh."""
-    structural = [(v, c) for v, c in zip(study.vary, columns, strict=True) if is_structural(v)]
-    numbers = np.empty(len(column), np.int64)
-    named = study.parameters.named()
-    for i, uniform in enumerate(column):
-        changes: dict[str, Value] = {}
+def _vertices(study: Study, columns: list[np.ndarray], uniforms: np.ndarray) -> NDArray[np.int64]:
+    """Vertex numbers (n,) that uniform numbers (n,) choose: they depend on each row's mesh."""
+    numbers = np.full(len(uniforms), -1)
+    for key, members in _groups(study, columns, len(uniforms)):
         try:
-            for vary, own in structural:
-                vary.target.put(ChainMap(changes, named), [], plain(own[i]))
-            numbers[i] = vertex_number(uniform, body_mesh_of(study.parameters.replaced(changes)))
+            body_mesh = body_mesh_of(parameters_of(study, _structural(study, key)))
         except InputError:
-            numbers[i] = -1
+            continue
+        numbers[members] = [vertex_number(uniform, body_mesh) for uniform in uniforms[members]]
     return numbers

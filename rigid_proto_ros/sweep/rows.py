@@ -8,7 +8,6 @@ poke acts, or how often, is read row by row.
 from __future__ import annotations
 
 import copy
-from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from ..base.errors import InputError, MeshError
 from ..motion.integrators import check_supported
 from ..motion.integrators.integrator import ANGULAR_DAMPING
+from ..motion.loads import Load
 from ..motion.string import RAMP_NS
 from ..scene.declaration import HUGE, Value
 from ..scene.parameters import Parameters, parameter_named, with_mass_of_density
@@ -44,7 +44,7 @@ from ..simulation.simulation import thrusts
 from ..simulation.thrusters import ThrusterControl
 from .sampling import VERTEX, Draw
 from .study import Study, Vary, script_entries
-from .variation import body_mesh_of, plain, vertex_number
+from .variation import body_mesh_of, parameters_of, plain, vertex_number
 
 MAX_COMMANDS = 2000
 """Of a script in the compiled batch; longer ones are rare, and rows of them are the simulation's."""
@@ -149,8 +149,11 @@ class _Plan:
             if self.release_ns == due_ns:
                 self.put(self.untied(due_ns))
             if self.thrusters.due_ns == due_ns:
-                loads, _ = self.thrusters.end_due(due_ns, self.setup.wrench_timeout_ns)
-                self.put(*thrusts(loads, due_ns))
+                self.thrust(due_ns, self.thrusters.end_due(due_ns, self.setup.wrench_timeout_ns)[0])
+
+    def thrust(self, at_ns: int, loads: list[tuple[int, Load]]) -> None:
+        """Thrusters, by number, push otherwise."""
+        self.put(*(thrusts(loads, at_ns) or [Pending(at_ns, ClearWrench(), kind=batch.CUT)]))
 
     def untied(self, at_ns: int) -> Pending:
         """The string lets go."""
@@ -168,7 +171,7 @@ class _Plan:
         self.release_ns = at_ns + timeout_ns if timeout_ns else fl.NEVER
         return row
 
-    def attach(self, command: TieString) -> None:
+    def attached(self, at_ns: int, command: TieString) -> Pending:
         """The string will be tied elsewhere."""
         if self.tied or command.axes != "mesh":
             raise NotBatchable
@@ -176,6 +179,7 @@ class _Plan:
             surface = self.setup.surface
             self.knots[command.point] = tuple(surface.nearest_point(command.point)) if surface else command.point
         self.knot = self.knots[command.point]
+        return Pending(at_ns, command, kind=batch.CUT)
 
     @property
     def timetable(self) -> Timetable:
@@ -207,9 +211,9 @@ def timetable(commands: list[Command], setup: Setup, knots: Knots) -> Timetable:
             pending.set_load(command, row, setup)
             plan.put(pending, entry=entry)
         elif isinstance(command, ThrusterCommand):
-            plan.put(*thrusts(plan.thrusters.command(command.forces, at_ns, setup.wrench_timeout_ns), at_ns))
+            plan.thrust(at_ns, plan.thrusters.command(command.forces, at_ns, setup.wrench_timeout_ns))
         elif isinstance(command, TieString):
-            plan.attach(command)
+            plan.put(plan.attached(at_ns, command), entry=entry)
         elif isinstance(command, MoveString):
             plan.put(plan.moved(at_ns, command), entry=entry)
         elif isinstance(command, ReleaseString):
@@ -234,15 +238,8 @@ class Group:
     """
 
     def __init__(self, study: Study, structural: Mapping[str, Value], reference: Mapping[str, Value] | None) -> None:
-        changes: dict[str, Value] = {}
-        values = ChainMap(changes, study.parameters.named())
-        for vary in study.vary:
-            if is_structural(vary):
-                vary.target.put(values, [], plain(structural[vary.target.name]))
-        if study.density_decides:
-            changes["mass"] = 0.0
         self._study, self._reference = study, with_mass_of_density(reference or {})
-        parameters = study.parameters.replaced(changes).replaced(self._reference)
+        parameters = parameters_of(study, structural).replaced(self._reference)
         self._body_mesh = body_mesh_of(parameters)
         self._setup = setup = build_scenario(parameters, self._body_mesh).setup
         check_start(setup)

@@ -97,7 +97,7 @@ def _goes_in_batches(study: Study) -> bool:
 def _here(study: Study, parts: Parts, workers: int) -> Chunks:
     """A few chunks ahead of whoever takes them."""
     pool = ThreadPoolExecutor(workers) if _goes_in_batches(study) else in_processes(workers)
-    pending: dict[Future, int] = {}
+    pending: dict[Future[Chunk], int] = {}
     waiting = parts.missing()
     try:
         while True:

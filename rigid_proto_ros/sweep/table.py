@@ -77,7 +77,7 @@ class Parts:
     def _manifest(self) -> dict[str, Any]:
         return {"fingerprint": self.study.fingerprint, "rows": self.study.rows, "chunk_rows": self.chunk_rows}
 
-    def _continue(self, manifest: dict, resume: bool) -> None:
+    def _continue(self, manifest: dict[str, Any], resume: bool) -> None:
         if not resume:
             accepted = f"--resume to go on with it, or the folder {self.folder} deleted"
             raise InputError("-o", f"{self.folder}: an unfinished run", accepted)

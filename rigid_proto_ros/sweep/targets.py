@@ -33,7 +33,7 @@ class Target:
     entry: int = 0
     path: tuple[Any, ...] = ()
 
-    def put(self, values: MutableMapping[str, Value], entries: list, value: Any) -> None:
+    def put(self, values: MutableMapping[str, Value], entries: list[Any], value: Any) -> None:
         """Set the varied value in parameters (complete ones) or in the script's entries."""
         if self.parameter:
             whole = _with_component(values[self.parameter], self.path[0], value) if self.path else value

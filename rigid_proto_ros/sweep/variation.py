@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 import shlex
 from collections import ChainMap
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -73,6 +74,18 @@ def apply(study: Study, chosen: list[Any]) -> Variation:
         body_mesh = body_mesh_of(study.parameters.replaced(changes))
         vary.target.put(values, entries, {"vertex": vertex_number(value, body_mesh)})
     return Variation(study.parameters.replaced(changes), script)
+
+
+def parameters_of(study: Study, values: Mapping[str, Value]) -> Parameters:
+    """The study's parameters with these values of some that vary, by name."""
+    changes: dict[str, Value] = {}
+    named = ChainMap(changes, study.parameters.named())
+    for vary in study.vary:
+        if vary.target.name in values:
+            vary.target.put(named, [], plain(values[vary.target.name]))
+    if study.density_decides:
+        changes["mass"] = 0.0
+    return study.parameters.replaced(changes)
 
 
 def vertex_number(uniform: float, body_mesh: BodyMesh | None) -> int:
