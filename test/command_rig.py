@@ -31,11 +31,10 @@ TYPES = {
     "applied": "WrenchStamped",
     "events": "String",
     "scene": "String",
-    "robot_description": "String",
 }
 COMMANDS = ("wrench", "poke", "string/target", "string/attach", "inertia/set", "schedule")
 STATES = ("pose", "twist")
-LATCHED = ("inertia", "scene", "robot_description")
+LATCHED = ("inertia", "scene")
 
 
 def stamped(stamp_ns: int, frame_id: str, **content) -> dict:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 import time
 from collections import Counter
@@ -15,8 +14,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import String
+from rclpy.qos import QoSProfile
 
 from rigid_proto_ros.live.warm_up import warm_up
 from rigid_proto_ros.messages import cdr
@@ -39,9 +37,6 @@ def main(scenario: str) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     listener = rclpy.create_node("listener")
-    if scenario == "described":
-        print(json.dumps(descriptions(node, executor, listener, counts)), flush=True)
-        os._exit(0)
     publisher = listener.create_publisher(WrenchStamped, "/rigid_body/wrench", QoSProfile(depth=100))
     if scenario == "listened_to":
         for message_type, topic in ((PoseStamped, "pose"), (TwistStamped, "twist"), (Odometry, "odom")):
@@ -77,48 +72,6 @@ def main(scenario: str) -> None:
     node.destroy_node()
     listener.destroy_node()
     rclpy.try_shutdown()
-
-
-def descriptions(node, executor, listener, counts: Counter) -> dict:
-    """Masses in the robot descriptions that subscribers who come and go get, and the publish calls after each."""
-    topic = "/rigid_body/robot_description"
-    latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    heard: list[float] = []
-    masses, calls = [], []
-    executor.add_node(listener)
-    node.live.start()
-
-    def until(condition) -> None:
-        deadline = time.monotonic() + 60.0
-        while not condition():
-            assert time.monotonic() < deadline, (masses, calls, heard)
-            executor.spin_once(timeout_sec=0.05)
-
-    def change(mass: float) -> None:
-        answer = node.set_parameters_atomically([rclpy.parameter.Parameter("mass", value=mass)])
-        assert answer.successful, answer.reason
-        until(lambda: node.call(lambda: node.loop.simulation.setup.body.mass) == mass)
-        # Whatever that made ready for the executor is served.
-        for _ in range(20):
-            executor.spin_once(timeout_sec=0.0)
-
-    for mass in (1.0, 10.0, 100.0):
-        change(mass)
-        change(mass + 1.0)
-        subscription = listener.create_subscription(
-            String, topic, lambda m: heard.append(float(m.data.split('mass value="')[1].split('"')[0])), latched
-        )
-        until(lambda: heard)
-        calls.append(counts[topic])
-        change(mass + 2.0)
-        until(lambda mass=mass: heard[-1] == mass + 2.0)
-        calls.append(counts[topic])
-        masses.append(heard.copy())
-        listener.destroy_subscription(subscription)
-        until(lambda: not subscribers(node)(topic))
-        heard.clear()
-    node.live.stop()
-    return {"masses": masses, "calls": calls}
 
 
 def subscribers(node: RigidBodyNode) -> Callable[[str], int]:

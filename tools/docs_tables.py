@@ -19,6 +19,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from node_interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
 from rigid_proto_ros import __version__
 from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.mass.from_mesh import mesh_body
@@ -34,7 +35,6 @@ from rigid_proto_ros.motion.integrators.integrator import (
     STRING,
     WORLD_TORQUE,
 )
-from rigid_proto_ros.ros.interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
 from rigid_proto_ros.scene.declaration import LIVE, READ_ONLY, Parameter
 from rigid_proto_ros.scene.lessons import lesson, lessons
 from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS

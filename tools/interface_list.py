@@ -18,10 +18,10 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import node_interface
 from rigid_proto_ros.base import bundled
 from rigid_proto_ros.cli import main as cli
 from rigid_proto_ros.live import diagnostics
-from rigid_proto_ros.ros import interface as ros_interface
 from rigid_proto_ros.ros import poke_client
 from rigid_proto_ros.ros.arguments import own_arguments
 from rigid_proto_ros.scene import parameters, script
@@ -63,7 +63,7 @@ def declared_parameters() -> Iterator[str]:
 
 def topics_and_services() -> Iterator[str]:
     """Topics, services and the keys of /diagnostics that count refusals."""
-    for interface in ros_interface.INTERFACES:
+    for interface in node_interface.INTERFACES:
         on_request = f", on {interface.on_request}" if interface.on_request else ""
         yield f"{interface.direction} {interface.name} {interface.type}{on_request}"
     for reason in diagnostics.REFUSAL_REASONS:

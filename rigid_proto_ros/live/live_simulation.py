@@ -178,13 +178,13 @@ class LiveSimulation:
             time.sleep(LOOK_S)
         return self.loop.simulation.time_ns
 
-    def steps(self, periods: int | None = None) -> Iterator[None]:
-        """The same on the physics thread, by default as far as the parameters say; yields between ticks."""
+    def steps(self, periods: int = 1) -> Iterator[None]:
+        """The same on the physics thread; yields between ticks."""
         if self.paused:
             yield from self._take_lists(self.loop.take_commands)
         if not self.paused:
             raise InputError("step", "the simulation is running; pause it first")
-        yield from self.loop.steps(periods or self.loop.periods_of_a_step)
+        yield from self.loop.steps(periods)
 
     def _take_lists(self, take_commands: Callable[[], None]) -> Generator[None, None, None]:
         """Before time goes on: a list sent while it stood acts then, though it has a mesh to be loaded. Yields while

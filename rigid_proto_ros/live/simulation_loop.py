@@ -158,11 +158,6 @@ class SimulationLoop(ScenarioRun):
         self._step_on()
         return not self.stepping
 
-    @property
-    def periods_of_a_step(self) -> int:
-        """How many publications a step makes, as the parameters say."""
-        return self.scenario.parameters.step_periods
-
     def steps(self, periods: int) -> Iterator[None]:
         """While paused, advance over so many publications; yields while the thread's ticks make them.
 
@@ -292,7 +287,7 @@ class SimulationLoop(ScenarioRun):
         self._commands_come = self._take_commands(now_ns, False)
         if self._steps_requested and not self.stepping:
             self._steps_requested -= 1
-            self.step(self.periods_of_a_step)
+            self.step()
         self._steps_expected = self.endpoints.serve_steps(now_ns)
         if now_ns >= self._paused_publication_ns and not self.stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from rclpy.node import Node
@@ -20,7 +20,6 @@ from ..messages.session_messages import applied_bytes
 from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Refused, SceneChanged
 from . import qos
 from .frames_on_body import FramesOnBody
-from .robot_description import RobotDescription
 
 WARNING_S = 1.0
 """Between two warnings of one reason, wall time."""
@@ -35,7 +34,6 @@ class EventPublisher(Observer):
         self,
         node: Node,
         body_frame: str,
-        mesh_path: Callable[[], str],
         contacts: Mapping[str, Vector],
     ) -> None:
         def publisher(message_type: type, topic: str, profile: QoSProfile) -> Publisher:
@@ -50,7 +48,6 @@ class EventPublisher(Observer):
         self._mesh_frame = f"{body_frame}/mesh"
         self._inertia = publisher(InertiaStamped, "inertia", qos.LATCHED)
         self._scene = publisher(String, "scene", qos.LATCHED)
-        self._description = RobotDescription(node, body_frame, mesh_path)
         self._applied = publisher(WrenchStamped, "applied", qos.EVENT)
         self._events = publisher(String, "events", qos.EVENT)
         self._warned: dict[str, float] = {}
@@ -87,7 +84,6 @@ class EventPublisher(Observer):
         inertia.ixx, inertia.ixy, inertia.ixz = float(I[0, 0]), float(I[0, 1]), float(I[0, 2])
         inertia.iyy, inertia.iyz, inertia.izz = float(I[1, 1]), float(I[1, 2]), float(I[2, 2])
         self._inertia.publish(message)
-        self._description.body_changed(body)
         self._frames_on_body.publish(self.stamps.of(time_ns), body)
 
     def _publish_applied(self, event: Applied) -> None:

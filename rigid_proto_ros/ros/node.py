@@ -51,7 +51,7 @@ class RigidBodyNode(Node):
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
         frames = frame_names(scenario.parameters, self.get_name())
-        events = EventPublisher(self, frames[1], self._mesh_path, scenario.setup.contacts)
+        events = EventPublisher(self, frames[1], scenario.setup.contacts)
         viewer = make_viewer(scenario, self.get_name())
         self._endpoints = RosEndpoints(self)
         clock = self._followed_clock(scenario)
@@ -88,10 +88,6 @@ class RigidBodyNode(Node):
         body = simulation.setup.body
         point = body.point(simulation.setup.contacts[contact]).tolist() if contact else (0.0, 0.0, 0.0)
         return simulation.specific_force(point)
-
-    def _mesh_path(self) -> str:
-        mesh = self.loop.scenario.body_mesh
-        return mesh.mesh.path if mesh else ""
 
     # On the executor's thread
 

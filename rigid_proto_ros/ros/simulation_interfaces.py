@@ -1,22 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""The standard simulator services (simulation_interfaces), where that package is installed.
+"""The standard simulator services (simulation_interfaces), where that package is installed: the typed interface, which
+answers every request with a result code.
 
-Only what this simulator does is offered and listed: reset, pause and play, single and multiple steps, also as an
-action (step_action.py), and what there is to know of the body and to set of its state (entity_services.py). There is
-one body and no world, so nothing is spawned, loaded or deleted.
+Only what this simulator does is offered and listed: reset, pause and play, steps, and the state of its one body, read
+and set. There is no world, so nothing is spawned, loaded or deleted.
 """
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from rclpy.node import Node
 
-from ..base.errors import InputError
+from ..base.errors import CommandRefused, InputError
 from ..live.live_simulation import LiveSimulation
-from . import entity_services
-from .entity_services import EntityServices
-from .step_action import StepAction
+from ..simulation.commands import SetState
 
 SERVICES = (
     ("GetSimulatorFeatures", "get_simulator_features"),
@@ -24,27 +23,29 @@ SERVICES = (
     ("GetSimulationState", "get_simulation_state"),
     ("SetSimulationState", "set_simulation_state"),
     ("StepSimulation", "step_simulation"),
+    ("GetEntities", "get_entities"),
+    ("GetEntityState", "get_entity_state"),
+    ("SetEntityState", "set_entity_state"),
 )
 MAX_STEPS = 1_000_000
 """Publications that one call may step over."""
 
 
 class SimulationInterfaces:
-    """Answers the standard services for one node; call ``offer`` once."""
+    """Answers the standard services for one node; call ``offer`` once. messages: simulation_interfaces.msg."""
 
-    def __init__(self, live: LiveSimulation, messages: Any, entity: EntityServices) -> None:
+    def __init__(self, live: LiveSimulation, messages: Any) -> None:
         self._live = live
         self._loop = live.loop
         self._messages = messages
-        self._entity = entity
         self._stopped = False
 
     def offer(self, node: Node, services: Any) -> None:
         """Create the services, private to the node."""
         for service_type, name in SERVICES:
             node.create_service(getattr(services, service_type), f"~/{name}", getattr(self, name))
-        for service_type, name in entity_services.SERVICES:
-            node.create_service(getattr(services, service_type), f"~/{name}", self._entity.answers[name])
+
+    # The simulation
 
     def get_simulator_features(self, _: Any, response: Any) -> Any:
         """What is really supported, and nothing else: a feature of a single scope would mean that a reset
@@ -52,14 +53,14 @@ class SimulationInterfaces:
         """
         features = self._messages.SimulatorFeatures
         response.features.features = [
-            *self._entity.features(),
+            features.ENTITY_STATE_GETTING,
+            features.ENTITY_STATE_SETTING,
             features.SIMULATION_RESET,
             features.SIMULATION_STATE_GETTING,
             features.SIMULATION_STATE_SETTING,
             features.SIMULATION_STATE_PAUSE,
             features.STEP_SIMULATION_SINGLE,
             features.STEP_SIMULATION_MULTIPLE,
-            features.STEP_SIMULATION_ACTION,
         ]
         response.features.spawn_formats = []
         response.features.custom_info = (
@@ -76,7 +77,7 @@ class SimulationInterfaces:
         self._live.reset()
         return self._done(response)
 
-    def _state(self) -> int:
+    def _simulation_state(self) -> int:
         """Stopped is paused at time 0 after a request to stop: nothing else tells the two apart."""
         states, loop = self._messages.SimulationState, self._loop
         if not loop.timekeeping.paused:
@@ -86,7 +87,7 @@ class SimulationInterfaces:
 
     def get_simulation_state(self, _: Any, response: Any) -> Any:
         """Playing, paused or stopped."""
-        response.state.state = self._state()
+        response.state.state = self._simulation_state()
         return self._done(response)
 
     def set_simulation_state(self, request: Any, response: Any) -> Any:
@@ -96,9 +97,8 @@ class SimulationInterfaces:
         if wanted not in (states.STATE_STOPPED, states.STATE_PLAYING, states.STATE_PAUSED):
             accepted = "0 stopped, 1 playing or 2 paused; end the node by a signal"
             return self._unsupported(response, f"state {wanted}: {accepted}")
-        if wanted == self._state():
-            response.result.result = response.ALREADY_IN_TARGET_STATE
-            return response
+        if wanted == self._simulation_state():
+            return _ended(response, response.ALREADY_IN_TARGET_STATE)
         self._stopped = wanted == states.STATE_STOPPED
         if self._stopped:
             self._live.call(self._stop)
@@ -112,40 +112,103 @@ class SimulationInterfaces:
 
     def step_simulation(self, request: Any, response: Any) -> Any:
         """Step over publications, while paused."""
-        loop, results = self._loop, self._messages.Result
-        if not loop.timekeeping.paused:
-            response.result.result = results.RESULT_OPERATION_FAILED
-            response.result.error_message = "the simulation is running; pause it first"
-        elif not 1 <= request.steps <= MAX_STEPS:
-            response.result.result = results.RESULT_OPERATION_FAILED
-            response.result.error_message = f"{request.steps} steps: 1 to {MAX_STEPS}"
-        else:
-            try:
-                self._live.step(request.steps)
-            except InputError as error:
-                response.result.result = results.RESULT_OPERATION_FAILED
-                response.result.error_message = str(error)
-                return response
-            return self._done(response)
+        if not 1 <= request.steps <= MAX_STEPS:
+            return self._failed(response, f"{request.steps} steps: 1 to {MAX_STEPS}")
+        try:
+            self._live.step(request.steps)
+        except InputError as error:
+            return self._failed(response, str(error))
+        return self._done(response)
+
+    # The body
+
+    def get_entities(self, request: Any, response: Any) -> Any:
+        """The body's name, where the filter, a regular expression, lets it through."""
+        filters = request.filters
+        if filters.tags.tags or filters.categories or filters.bounds.type != self._messages.Bounds.TYPE_EMPTY:
+            return self._unsupported(response, "filters: by name alone")
+        try:
+            response.entities = [self._live.name] if re.search(filters.filter, self._live.name) else []
+        except re.error as error:
+            return self._failed(response, f"filter {filters.filter!r}: {error}")
+        return self._done(response)
+
+    def get_entity_state(self, request: Any, response: Any) -> Any:
+        """True pose, twist and acceleration, in world axes."""
+        if not self._is_known(request.entity, response):
+            return response
+        simulation, message = self._loop.simulation, response.state
+        state, (linear, angular) = self._live.call(lambda: (simulation.state, simulation.accelerations()))
+        message.header.frame_id = self._live.frames[0]
+        message.header.stamp.sec, message.header.stamp.nanosec = self._loop.stamps.of(state.time_ns)
+        q = message.pose.orientation
+        q.x, q.y, q.z, q.w = state.orientation_xyzw.tolist()
+        for vector, values in (
+            (message.pose.position, state.position),
+            (message.twist.linear, state.linear_velocity),
+            (message.twist.angular, state.angular_velocity),
+            (message.acceleration.linear, linear),
+            (message.acceleration.angular, angular),
+        ):
+            vector.x, vector.y, vector.z = values.tolist()
         return response
+
+    def set_entity_state(self, request: Any, response: Any) -> Any:
+        """Put the body elsewhere, as a command that is logged and replayed; accelerations follow from the loads."""
+        if not self._is_known(request.entity, response):
+            return response
+        frame, world = request.state.header.frame_id, self._live.frames[0]
+        # The releases for Jazzy and Kilted have no switches: pose and twist are meant, the acceleration may be ignored.
+        accelerates = getattr(request, "set_acceleration", False)
+        if accelerates or frame not in ("", "world", world):
+            what = "set_acceleration" if accelerates else f"frame {frame!r}"
+            return self._unsupported(response, f"{what}: pose and twist in {world}")
+        values: dict[str, tuple[float, ...]] = {}
+        if getattr(request, "set_pose", True):
+            p, q = request.state.pose.position, request.state.pose.orientation
+            values |= {"position": (p.x, p.y, p.z), "orientation_xyzw": (q.x, q.y, q.z, q.w)}
+        if getattr(request, "set_twist", True):
+            v, w = request.state.twist.linear, request.state.twist.angular
+            values |= {"linear_velocity": (v.x, v.y, v.z), "angular_velocity": (w.x, w.y, w.z)}
+        try:
+            command = SetState(values)
+        except CommandRefused as refusal:
+            failed = self._messages.Result.RESULT_OPERATION_FAILED
+            return _ended(response, getattr(response, "INVALID_POSE", failed), str(refusal))
+        if values:
+            self._live.call(lambda: self._loop.simulation.submit(command))
+        return self._done(response)
+
+    def _is_known(self, entity: str, response: Any) -> bool:
+        if entity == self._live.name:
+            self._done(response)
+            return True
+        message = f"there is no {entity!r}; the only entity is {self._live.name!r}"
+        _ended(response, self._messages.Result.RESULT_NOT_FOUND, message)
+        return False
+
+    # Answers
 
     def _done(self, response: Any) -> Any:
-        response.result.result = self._messages.Result.RESULT_OK
-        return response
+        return _ended(response, self._messages.Result.RESULT_OK)
+
+    def _failed(self, response: Any, message: str) -> Any:
+        return _ended(response, self._messages.Result.RESULT_OPERATION_FAILED, message)
 
     def _unsupported(self, response: Any, message: str) -> Any:
-        response.result.result = self._messages.Result.RESULT_FEATURE_UNSUPPORTED
-        response.result.error_message = message
-        return response
+        return _ended(response, self._messages.Result.RESULT_FEATURE_UNSUPPORTED, message)
+
+
+def _ended(response: Any, result: int, message: str = "") -> Any:
+    response.result.result, response.result.error_message = result, message
+    return response
 
 
 def offer_simulation_interfaces(node: Node, live: LiveSimulation) -> bool:
     """Offer the standard services on the node; False where simulation_interfaces isn't installed."""
     try:
-        from simulation_interfaces import action, msg, srv
+        from simulation_interfaces import msg, srv
     except ImportError:
         return False
-    entity = EntityServices(live, msg)
-    SimulationInterfaces(live, msg, entity).offer(node, srv)
-    StepAction(live, msg, action.SimulateSteps).offer(node)
+    SimulationInterfaces(live, msg).offer(node, srv)
     return True

@@ -65,8 +65,6 @@ WORDS: Names = ("world", "body")
 def frame_names(parameters: Parameters, node_name: str) -> Names:
     """What the node of this name calls the world's frame and the body's."""
     world, body = parameters.world_frame, parameters.body_frame
-    if parameters.frames == "rep105":
-        return "odom" if world == "world" else world, body or "base_link"
     return world, body or node_name.rpartition("/")[2] or "rigid_body"
 
 

@@ -33,10 +33,15 @@ GONE = {
     "imu_noise.": _PROFILES,
     "pose_noise.": _PROFILES,
     "noise_seed": "noise.seed",
-    "step_until": "step_periods",
+    "step_until": "~/step_simulation, with a number of steps",
+    "step_periods": "~/step_simulation, with a number of steps",
+    "frames": "world_frame and body_frame",
     "initial.flight": "replay --at T --as-scene writes a scene and a script",
 }
 """Parameters of earlier versions, and what takes their place; a name ending in a dot is a prefix."""
+
+GONE_DEFAULTS = {"step_periods": 1, "frames": "own"}
+"""Of those among them whose default isn't empty or 0."""
 
 
 def instead_of(name: str) -> str:

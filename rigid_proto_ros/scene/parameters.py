@@ -239,7 +239,6 @@ class Parameters:
     real_time_factor: float = number(
         1.0, "Simulated seconds per second of the wall clock; 0 runs as fast as possible.", lower=0.0, upper=1e6
     )
-    step_periods: int = whole(1, "Publication periods that ~/step advances by.", lower=1, upper=1_000_000)
     lockstep: bool = switch(
         False,
         "While paused, each message taken from ~/wrench or ~/thrusters steps the simulation, as ~/step does; "
@@ -263,12 +262,6 @@ class Parameters:
     imu_contact: str = text("", "Contact at which ~/imu measures; empty means the centre of mass.")
     noise: NoiseParameters = NoiseParameters()
     ghost: GhostParameters = GhostParameters()
-    frames: str = text(
-        "own",
-        "rep105 calls the frames odom and base_link, as REP-105 does, where world_frame and body_frame say no other.",
-        choices=("own", "rep105"),
-        changes=READ_ONLY,
-    )
     world_frame: str = text("world", "Name of the world frame in published messages.", changes=READ_ONLY)
     body_frame: str = text(
         "", "Name of the body's frame in published messages; empty means the node's name.", changes=READ_ONLY

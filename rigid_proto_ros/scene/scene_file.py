@@ -17,7 +17,7 @@ import yaml
 
 from ..base.bundled import scene_names, scene_path
 from ..base.errors import InputError, did_you_mean
-from .declaration import instead_of
+from .declaration import GONE_DEFAULTS, instead_of
 from .yaml_text import compose_yaml, read_text, scalar
 
 
@@ -88,7 +88,7 @@ def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFi
     for name in [name for name in scene.values if instead_of(name)]:
         value = scene.values.pop(name)
         # A recorded scene holds all parameters of its version: what had no effect is left out.
-        if any(value) if isinstance(value, list) else value:
+        if (any(value) if isinstance(value, list) else value) and value != GONE_DEFAULTS.get(name):
             raise InputError(f"{path}, {name}", f"it was a parameter of an earlier version; use {instead_of(name)}")
     scene.wildcard = scene.values.keys() - named
     return scene

@@ -214,10 +214,6 @@ def test_in_lockstep_every_command_acts_at_the_time_that_it_was_sent_for(rig, co
     assert received == list(range(rig.sent - count + 1, rig.sent + 1))
     pokes = rig.until(lambda: len(p := [e for e in rig.events() if e["kind"] == "poke"]) == count and p, "the events")
     assert [event["time_ns"] for event in pokes] == [k * MS for k in range(count)]
-    rig.set(step_periods=25)
-    rig.trigger("step")
-    rig.until(lambda: rig.heard("twist", stamp=(count + 25) * MS), "the last of 25 periods")
-    assert rig.heard_count("twist") >= 25
 
 
 @pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.stress)])

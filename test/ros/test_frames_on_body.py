@@ -13,8 +13,6 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from rigid_proto_ros.scene.command_codec import frame_names
-from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -36,9 +34,3 @@ def test_mesh_and_contacts_go_out_at_the_body(monkeypatch) -> None:
     assert [face.x, face.y, face.z] == pytest.approx(setup.body.point((0.1, 0.0, 0.3)).tolist(), abs=1e-15)
     mesh = sent["base_link/mesh"].transform.translation
     assert [mesh.x, mesh.y, mesh.z] == (-setup.body.center_of_mass).tolist()
-
-
-def test_one_setting_names_the_frames_as_rep_105_does() -> None:
-    assert frame_names(Parameters(), "lab/drone") == ("world", "drone")
-    assert frame_names(Parameters(frames="rep105"), "lab/drone") == ("odom", "base_link")
-    assert frame_names(Parameters(frames="rep105", world_frame="map", body_frame="tool"), "drone") == ("map", "tool")

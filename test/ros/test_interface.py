@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import pytest
 from ros_process import running_node
 
-from rigid_proto_ros.ros.interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
+from node_interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
 from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS
 
 pytest.importorskip("rclpy")

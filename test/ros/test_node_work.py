@@ -62,9 +62,3 @@ def test_the_steady_state_makes_no_message_objects(counted):
     assert published["/rigid_body/imu"] == 0
     assert work["wrenches"] >= 30
     assert work["message_objects"] == {}
-
-
-def test_a_robot_description_is_made_for_subscribers_alone_and_the_first_that_one_gets_is_the_present_one(counted):
-    work = counted("described")
-    assert work["masses"] == [[2.0, 3.0], [11.0, 12.0], [101.0, 102.0]]
-    assert work["calls"] == [1, 2, 3, 4, 5, 6]

@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What robot people expect beside pose and twist: an IMU at a contact, a robot description with the mesh, /tf."""
 
-import itertools
 import sys
-from pathlib import Path
 from types import SimpleNamespace
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -13,7 +10,6 @@ from command_rig import stamp_ns, wrench_message
 from scipy.spatial.transform import Rotation
 
 from rigid_proto_ros.live.pacing import Stamps
-from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.scene.scenario import make_scenario
 
 SECOND = 10**9
@@ -66,32 +62,6 @@ def test_the_imu_feels_the_exact_specific_force_at_its_contact_and_turns_at_the_
     now = int(rig.diagnostics()["sim_time_ns"])
     rig.until(lambda: stamp_ns(rig.heard("imu", last=1)[0]) > now + SECOND // 10, "the COM's")
     assert np.abs(numbers(rig.heard("imu", last=1)[0]["linear_acceleration"])).max() == 0.0
-
-
-def test_the_robot_description_is_latched_draws_the_mesh_about_the_com_and_follows_changes(rig):
-    rig.do("listen", topic=rig.name("robot_description"), type="String", latched=True)
-    first = rig.until(lambda: rig.heard("robot_description"), "the description")[-1]["data"]
-    rig.set(scale=[2.0, 1.0, 0.5], mass=3.0)
-    text = rig.until(
-        lambda: (heard := rig.heard("robot_description", last=1)[0]["data"]) != first and heard, "the new description"
-    )
-    scenario = make_scenario({**rig.scene, "scale": [2.0, 1.0, 0.5], "mass": 3.0})
-    robot = ElementTree.fromstring(text)
-    (link,) = robot.findall("link")
-    assert robot.get("name") == link.get("name") == "rigid_body"
-    body = scenario.setup.body
-    assert float(link.find("inertial/mass").get("value")) == body.mass
-    inertia = {name: float(value) for name, value in link.find("inertial/inertia").attrib.items()}
-    for (i, a), (j, b) in itertools.combinations_with_replacement(enumerate("xyz"), 2):
-        assert inertia[f"i{a}{b}"] == body.inertia[i, j]
-    # The link's origin is the COM, the mesh's vertices are the file's own.
-    mesh = link.find("visual/geometry/mesh")
-    path = Path(mesh.get("filename").removeprefix("file://"))
-    scale = np.array([float(x) for x in mesh.get("scale").split()])
-    origin = np.array([float(x) for x in link.find("visual/origin").get("xyz").split()])
-    drawn = load_mesh(str(path)).vertices * scale + origin
-    placed = np.array([body.point(v) for v in scenario.setup.surface.vertices])
-    assert drawn == pytest.approx(placed, abs=1e-15)
 
 
 def test_the_transform_is_the_pose(monkeypatch):

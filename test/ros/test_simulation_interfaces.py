@@ -14,24 +14,18 @@ pytest.importorskip("rclpy")
 
 MESSAGES = SimpleNamespace(
     SimulatorFeatures=SimpleNamespace(
-        ENTITY_BOUNDS=5,
-        ENTITY_CATEGORIES=8,
         ENTITY_STATE_GETTING=10,
         ENTITY_STATE_SETTING=11,
-        ENTITY_INFO_GETTING=12,
         SIMULATION_RESET=20,
         SIMULATION_STATE_GETTING=24,
         SIMULATION_STATE_SETTING=25,
         SIMULATION_STATE_PAUSE=26,
         STEP_SIMULATION_SINGLE=31,
         STEP_SIMULATION_MULTIPLE=32,
-        STEP_SIMULATION_ACTION=33,
     ),
     SimulationState=SimpleNamespace(STATE_STOPPED=0, STATE_PLAYING=1, STATE_PAUSED=2, STATE_QUITTING=3),
     Result=SimpleNamespace(RESULT_FEATURE_UNSUPPORTED=0, RESULT_OK=1, RESULT_NOT_FOUND=2, RESULT_OPERATION_FAILED=4),
-    EntityCategory=SimpleNamespace(CATEGORY_DYNAMIC_OBJECT=4),
     Bounds=SimpleNamespace(TYPE_EMPTY=0, TYPE_BOX=1, TYPE_CONVEX_HULL=2, TYPE_SPHERE=3),
-    EntityState=lambda: entity_state(),
 )
 OK, UNSUPPORTED, NOT_FOUND, FAILED, ALREADY, INVALID_POSE = 1, 0, 2, 4, 101, 101
 SCOPES = {"SCOPE_DEFAULT": 0, "SCOPE_TIME": 1, "SCOPE_STATE": 2, "SCOPE_SPAWNED": 4, "SCOPE_ALL": 255}
@@ -42,7 +36,6 @@ def services():
     """The services of a flight on a real physics thread, without ROS."""
     from rigid_proto_ros.live.live_simulation import LiveSimulation
     from rigid_proto_ros.live.warm_up import warm_up
-    from rigid_proto_ros.ros.entity_services import EntityServices
     from rigid_proto_ros.ros.simulation_interfaces import SimulationInterfaces
     from rigid_proto_ros.scene.scenario import make_scenario
 
@@ -51,7 +44,7 @@ def services():
     # As the node does: a kernel that compiles would hold the first request up for longer than it waits.
     warm_up(live.scenario.setup)
     live.start()
-    yield SimulationInterfaces(live, MESSAGES, EntityServices(live, MESSAGES)), live
+    yield SimulationInterfaces(live, MESSAGES), live
     live.stop()
 
 
@@ -62,8 +55,7 @@ def response():
         features=SimpleNamespace(),
         ALREADY_IN_TARGET_STATE=ALREADY,
         INVALID_POSE=INVALID_POSE,
-        bounds=SimpleNamespace(type=None, points=[]),
-        info=SimpleNamespace(category=SimpleNamespace(category=None)),
+        entities=[],
     )
 
 
@@ -115,13 +107,8 @@ def test_what_is_listed_is_served_and_nothing_else_is(services):
 
     # What a client that finds the feature listed may call, by the package's definition of the feature.
     calls = {
-        5: lambda: answer._entity.get_entity_bounds(asked(), response()),
-        8: lambda: answer._entity.get_entities(filtered(categories=[4]), response()),
-        10: lambda: answer._entity.get_entity_state(
-            asked(), SimpleNamespace(**vars(response()) | {"state": entity_state()})
-        ),
-        11: lambda: answer._entity.set_entity_state(asked(state=entity_state()), response()),
-        12: lambda: answer._entity.get_entity_info(asked(), response()),
+        10: lambda: answer.get_entity_state(asked(), SimpleNamespace(**vars(response()) | {"state": entity_state()})),
+        11: lambda: answer.set_entity_state(asked(state=entity_state()), response()),
         20: lambda: reset(SCOPES["SCOPE_ALL"]),
         21: lambda: reset(SCOPES["SCOPE_TIME"]),
         22: lambda: reset(SCOPES["SCOPE_STATE"]),
@@ -131,63 +118,8 @@ def test_what_is_listed_is_served_and_nothing_else_is(services):
         26: lambda: set_state(2),
         31: lambda: step(1),
         32: lambda: step(3),
-        33: lambda: carried_out(node, Goal(2)),
     }
     assert [feature for feature, call in calls.items() if call().result.result == OK] == listed.features
-
-
-class Goal:
-    """Stands in for rclpy's handle of a goal; cancelled after so many steps."""
-
-    def __init__(self, steps: int, cancelled_after: int | None = None) -> None:
-        self.request = SimpleNamespace(steps=steps)
-        self.feedback: list[tuple[int, int]] = []
-        self.end = ""
-        self._cancelled_after = cancelled_after
-
-    @property
-    def is_cancel_requested(self) -> bool:
-        return len(self.feedback) == self._cancelled_after
-
-    def publish_feedback(self, feedback) -> None:
-        self.feedback.append((feedback.completed_steps, feedback.remaining_steps))
-
-    def execute(self, callback) -> None:
-        self.result = callback(self)
-
-    def succeed(self) -> None:
-        self.end = "succeeded"
-
-    def canceled(self) -> None:
-        self.end = "canceled"
-
-    def abort(self) -> None:
-        self.end = "aborted"
-
-
-def carried_out(node, goal: Goal):
-    """The result of an action's goal."""
-    from rigid_proto_ros.ros.step_action import StepAction
-
-    action = SimpleNamespace(Result=response, Feedback=SimpleNamespace)
-    StepAction(node, MESSAGES, action).accepted(goal).join()
-    return goal.result
-
-
-def test_the_action_tells_of_each_step_and_ends_when_cancelled_or_when_time_runs(services):
-    answer, node = services
-    goal = Goal(3)
-    assert carried_out(node, goal).result.result == OK
-    assert (goal.end, goal.feedback) == ("succeeded", [(1, 2), (2, 1), (3, 0)])
-    assert node.loop.simulation.time_ns == 30_000_000
-    goal = Goal(5, cancelled_after=2)
-    assert carried_out(node, goal).result.result == OK
-    assert (goal.end, node.loop.simulation.time_ns) == ("canceled", 50_000_000)
-    answer.set_simulation_state(state(1), response())
-    goal = Goal(5)
-    result = carried_out(node, goal).result
-    assert (goal.end, goal.feedback, result.result) == ("aborted", [], FAILED)
-    assert "pause" in result.error_message
 
 
 def test_steps_are_publications_and_need_a_pause(services):
@@ -241,7 +173,7 @@ def test_a_state_that_is_set_acts_as_a_command_that_replays_to_the_bit(services)
     from rigid_proto_ros.session.replay import Resimulation
 
     answer, node = services
-    entity, told = answer._entity, EventLines()
+    entity, told = answer, EventLines()
     node.call(lambda: node.loop.watch(told))
     wanted = entity_state((1.0, 2.0, 3.0), (0.0, 0.0, 3.0, 4.0), (0.5, 0.0, 0.0), (0.0, 0.0, 2.0))
     pose = SimpleNamespace(**vars(asked(state=wanted)) | {"set_pose": True})
@@ -266,27 +198,20 @@ def test_a_state_that_is_set_acts_as_a_command_that_replays_to_the_bit(services)
 def test_a_request_of_a_release_without_switches_sets_pose_and_twist(services):
     answer, node = services
     wanted = entity_state((1.0, 2.0, 3.0), linear=(0.5, 0.0, 0.0))
-    said = answer._entity.set_entity_state(SimpleNamespace(entity="tool", state=wanted), response())
+    said = answer.set_entity_state(SimpleNamespace(entity="tool", state=wanted), response())
     assert said.result.result == OK
     answer.step_simulation(SimpleNamespace(steps=10), response())
     assert node.loop.simulation.state.position == pytest.approx([1.05, 2.0, 3.0])
     # Those for Jazzy up to 1.2 have no word for a broken pose either.
     broken = SimpleNamespace(entity="tool", state=entity_state(orientation=(0.0,) * 4))
     plain = SimpleNamespace(result=response().result)
-    assert answer._entity.set_entity_state(broken, plain).result.result == FAILED
+    assert answer.set_entity_state(broken, plain).result.result == FAILED
 
 
-def test_the_only_entity_is_found_by_name_category_and_place(services):
-    answer, node = services
-    find = lambda **filters: answer._entity.get_entities(filtered(**filters), response())  # noqa: E731 (one line, used in the next ones)
+def test_the_only_entity_is_found_by_name(services):
+    answer, _ = services
+    find = lambda **filters: answer.get_entities(filtered(**filters), response())  # noqa: E731 (one line, used in the next ones)
     assert [find(filter=text).entities for text in ("", "^to+l$", "chair")] == [["tool"], ["tool"], []]
-    assert find(categories=[1]).entities == [] and find(categories=[1, 4]).entities == ["tool"]
-    assert find(tags=["red"]).result.result == UNSUPPORTED and find(bounds=1).result.result == UNSUPPORTED
+    for other in ({"categories": [4]}, {"tags": ["red"]}, {"bounds": 1}):
+        assert find(**other).result.result == UNSUPPORTED
     assert find(filter="(").result.result == FAILED
-    box = answer._entity.get_entity_bounds(asked(), response()).bounds
-    upper, lower = box.points
-    assert box.type == 1 and lower.x < 0.0 < upper.x and upper.z - lower.z > 0.05
-    place = SimpleNamespace(x=upper.x + 0.1, y=0.0, z=0.0)
-    for radius, found in ((0.09, []), (0.11, ["tool"])):
-        points = [place, SimpleNamespace(x=radius, y=0.0, z=0.0)]
-        assert find(bounds=3, points=points).entities == found

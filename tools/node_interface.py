@@ -124,12 +124,6 @@ INTERFACES = (
     ),
     _topic(
         PUBLISHED,
-        "~/robot_description",
-        "std_msgs/String",
-        "latched: URDF with mesh and inertia, for other viewers",
-    ),
-    _topic(
-        PUBLISHED,
         "/diagnostics",
         "diagnostic_msgs/DiagnosticArray",
         "once a second: counters, energies, |L| and its drift, what was refused and why",
@@ -155,8 +149,8 @@ INTERFACES = (
     _service(
         "~/step",
         "Trigger",
-        "while paused: takes all commands that have arrived, advances `step_periods` publications and answers when "
-        "they are published",
+        "while paused: takes all commands that have arrived, advances one publication period and answers when "
+        "its state is published",
     ),
     _service("~/clear_wrench", "Trigger", "ends the held wrench and the running pulses"),
     _service("~/string/release", "Trigger", "releases the string"),
