@@ -210,7 +210,7 @@ def test_what_acts_ends_in_a_branch_when_it_would_have_ended():
 
 def test_a_scene_with_a_parameter_that_went_is_read_where_it_says_nothing_and_else_refused():
     head = "/**:\n  ros__parameters:\n    initial.flight: "
-    assert not read_scene_text(f'{head}""\n').values
+    assert not read_scene_text(f'{head}""\n    frames: own\n    step_periods: 1\n    step_until: 0.0\n').values
     with pytest.raises(InputError, match="initial.flight.*parameter of an earlier version"):
         read_scene_text(f'{head}"{{began_ns: -1}}"\n')
 
