@@ -44,7 +44,19 @@ KNOBS = [10.0 ** (-k / 2) for k in range(4, 29)]
 FLIGHTS, ROWS, IN_A_ROW = 8, 1024, 10
 SHARES = {"heyoka batch": FLIGHTS, "sweep": ROWS}
 """Flights in a run."""
-COLUMNS = ("problem", "what", "error_rad", "us", "heyoka_us", "ratio")
+COLUMNS = (
+    "problem",
+    "what",
+    "error_rad",
+    "us",
+    "whole_us",
+    "heyoka_us",
+    "heyoka_whole_us",
+    "ratio",
+    "whole_ratio",
+    "vectors",
+)
+"""us: the flight alone. whole_us: set back and, of ours, commands submitted, then flown; nan of a kernel alone."""
 
 
 @njit(error_model="numpy")
@@ -169,15 +181,29 @@ def curves(problem: Problem, seconds: float) -> dict[str, list[dict]]:
         for what, run, _, restart, times in known:
             # Several in a row: code and data are then where they are while one tool is used.
             for _ in range(1 if what == "sweep" else IN_A_ROW):
+                first = time.perf_counter()
                 restart()
                 begin = time.perf_counter()
                 run()
-                times.append(time.perf_counter() - begin)
+                end = time.perf_counter()
+                times.append((end - begin, end - first))
     found: dict[str, list[dict]] = {what: [] for what in CURVES}
     for what, _, error, _, times in known:
         share = SHARES.get(what, 1)
-        found[what].append({"median_s": min(times) / share, "attitude_error_rad": error})
+        alone, whole_s = min(run for run, _ in times) / share, min(both for _, both in times) / share
+        found[what].append({"median_s": alone, "whole_s": whole_s, "attitude_error_rad": error})
     return {what: sorted(rows, key=lambda r: r["median_s"]) for what, rows in found.items() if rows}
+
+
+def vector_unit() -> str:
+    """The widest vectors of doubles that this processor has, as Linux names them."""
+    flags = next((line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags")), "")
+    return next((name for name in ("avx512f", "avx2", "sse2") if name in flags.split()), "unknown")
+
+
+def whole_at_error(rows: list[dict], target: float) -> float:
+    """``time_at_error`` of all that a flight takes."""
+    return time_at_error([{**row, "median_s": row["whole_s"]} for row in rows], target)
 
 
 def main() -> None:
@@ -189,13 +215,16 @@ def main() -> None:
     for name in options.only.split(","):
         found = curves(PROBLEMS[name], options.seconds)
         for target in TARGETS:
-            theirs = time_at_error(found["heyoka"], target)
+            theirs, all_theirs = time_at_error(found["heyoka"], target), whole_at_error(found["heyoka"], target)
             for what, rows in found.items():
                 mine = time_at_error(rows, target)
-                row = {"problem": name, "what": what, "error_rad": target, "us": 1e6 * mine}
-                table.add({**row, "heyoka_us": 1e6 * theirs, "ratio": theirs / mine})
+                all_mine = float("nan") if what == "kernel" else whole_at_error(rows, target)
+                row = {"problem": name, "what": what, "error_rad": target, "us": 1e6 * mine, "whole_us": 1e6 * all_mine}
+                row |= {"heyoka_us": 1e6 * theirs, "heyoka_whole_us": 1e6 * all_theirs, "ratio": theirs / mine}
+                table.add({**row, "whole_ratio": all_theirs / all_mine, "vectors": vector_unit()})
                 print(
-                    f"{name} at {target:g} rad: {what} {1e6 * mine:.2f} us, heyoka {1e6 * theirs:.2f} us: {theirs / mine:.2f}",
+                    f"{name} at {target:g} rad: {what} {1e6 * mine:.2f} us, heyoka {1e6 * theirs:.2f} us: "
+                    f"{theirs / mine:.2f}; set back and submitted too {all_theirs / all_mine:.2f}",
                     flush=True,
                 )
     table.write()
