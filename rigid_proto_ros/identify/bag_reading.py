@@ -13,13 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError, is_missing
-from ..base.rotation import vector
 from ..motion.frames import parse_frame
-from ..motion.loads import Load
 from . import measurements as ms
+from .wrench_messages import WRENCH_TIMEOUT_NS, wrench_history
 
-WRENCH_TIMEOUT_NS = 1_500_000_000
-"""A wrench holds until the next message, and at most as long as the node's own default."""
 EARTH = (0.0, 0.0, -9.81)
 
 TRANSFORMS = ("geometry_msgs/msg/TransformStamped", "tf2_msgs/msg/TFMessage")
@@ -31,13 +28,6 @@ KINDS = {
     "wrench": ("geometry_msgs/msg/WrenchStamped",),
 }
 """Options, and the types of message that each takes."""
-
-STEADY = 0.5
-"""Gaps between messages that differ from the usual one by less than this part of it are of one rate."""
-FEWEST_SAMPLED = 20
-"""Messages of a wrench that is called sampled."""
-LEAST_JUMP, MOST_CHANGES = 0.03, 16
-"""A sampled load's jump counts where it is more than this part of the largest force or torque, and so many do."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +81,10 @@ def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     series = [part for part in (one.within(*window) for one in series) if len(part.times_ns)]
     if not series:
         raise InputError("--from", choice.first_s, f"a window with samples of {path} in it")
-    loads = _load_history(chosen["wrench"], chosen) if "wrench" in chosen else ms.no_loads()
+    loads = ms.no_loads()
+    if "wrench" in chosen:
+        wrench = chosen["wrench"]
+        loads = wrench_history(wrench.name, wrench.times_ns, wrench.numbers(0, 6), *_wrench_frame(wrench, chosen))
     where = "assumed, as no --gravity was given" if choice.gravity is None else "from --gravity"
     return ms.MeasuredFlight(str(path), tuple(series), loads, choice.gravity or EARTH, gravity_from=where)
 
@@ -279,59 +272,6 @@ def _check_clocks(chosen: dict[str, _Topic], choice: Choice) -> None:
                 "clocks",
                 f"{name} begins {apart:.6g} s after {first[0]} and they have no time in common; give --offset {name}=S",
             )
-
-
-def _load_history(topic: _Topic, chosen: dict[str, _Topic]) -> ms.LoadHistory:
-    """A wrench's messages, each held until the next; axes alone mean the origin of the tracked frame."""
-    axes, where = _wrench_frame(topic, chosen)
-    times, numbers = topic.times_ns, topic.numbers(0, 6)
-    acts, same = numbers.any(axis=1), np.append(False, np.all(numbers[1:] == numbers[:-1], axis=1))
-    begins, sds_s = _begins(times, acts)
-    ends = np.minimum(np.append(begins[1:], times[-1] + WRENCH_TIMEOUT_NS), times + WRENCH_TIMEOUT_NS)
-    rows: list[tuple[int, int, np.ndarray]] = []
-    before, which = np.full(len(times), -1), np.full(len(times), -1)
-    for k in range(len(times)):
-        before[k] = which[k - 1] if k and ends[k - 1] == begins[k] else -1
-        if not acts[k]:
-            continue
-        if same[k] and before[k] >= 0:
-            rows[-1] = (rows[-1][0], int(ends[k]), rows[-1][2])
-        else:
-            load = Load(axes, where, vector(numbers[k, :3]), vector(numbers[k, 3:]))
-            rows.append((int(begins[k]), int(ends[k]), load.row))
-        which[k] = len(rows) - 1
-    sds_s *= _sharpness(numbers)
-    counted = np.sort(np.argsort(-sds_s)[:MOST_CHANGES])
-    counted = counted[sds_s[counted] > 0.0]
-    changes = ms.SampledChanges(before[counted], which[counted], sds_s[counted])
-    return replace(ms.load_history(rows), topic=topic.name, changes=changes)
-
-
-def _sharpness(numbers: np.ndarray) -> np.ndarray:
-    """Which part of each change to the loads (m, 6) is a jump (m,): what changes steadily is known in between."""
-    forces, torques = numbers[:, :3], numbers[:, 3:]
-    parts = [part / max(float(np.linalg.norm(part, axis=1).max()), 1e-300) for part in (forces, torques)]
-    steps = np.diff(np.hstack(parts), axis=0, prepend=np.hstack(parts)[:1])
-    around = 0.5 * (np.vstack([steps[1:], steps[-1:]]) + np.vstack([steps[:1], steps[:-1]]))
-    sizes, sharp = np.linalg.norm(steps, axis=1), np.linalg.norm(steps - around, axis=1)
-    return np.where((sizes > 0.0) & (sharp > LEAST_JUMP), np.minimum(sharp / np.maximum(sizes, 1e-300), 1.0), 0.0)
-
-
-def _begins(times_ns: np.ndarray, acts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """When the loads of messages at times_ns (m,) begin (m,), and how well that is known (m,) [s].
-
-    A command acts from its stamp on. A wrench at a steady rate that is also sent while nothing acts was sampled: it
-    changed at any time since the message before, on average in the middle.
-    """
-    gaps = np.diff(times_ns)
-    if len(times_ns) < FEWEST_SAMPLED or not np.any(~acts[:-1] & acts[1:]):
-        return times_ns, np.zeros(len(times_ns))
-    usual = float(np.median(gaps))
-    steady = np.append(False, np.abs(gaps - usual) < STEADY * usual)
-    if steady.mean() < 0.5:
-        return times_ns, np.zeros(len(times_ns))
-    waited = np.where(steady, np.append(0, gaps), 0)
-    return times_ns - waited // 2, 1e-9 * waited / np.sqrt(12.0)
 
 
 def _wrench_frame(topic: _Topic, chosen: dict[str, _Topic]) -> tuple[str, tuple[float, float, float] | None]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def _conversions(
             yield (
                 cause,
                 f"multiply them by {factor:.6g}",
-                _changed(flights, scaled, lambda v, f=factor: f * v),
+                _changed(flights, scaled, partial(np.multiply, factor)),
                 values.gravity,
             )
     for direction in _DIRECTIONS:
@@ -57,7 +58,7 @@ def _conversions(
             yield f"gravity is {text} m/s²", f"--gravity {text}", list(flights), gravity
     if values.gravity.any():
         yield "there is no gravity", "--gravity 0 0 0", list(flights), np.zeros(3)
-    reordered = _changed(flights, (ATTITUDE,), lambda q: np.roll(q, -1, axis=1))
+    reordered = _changed(flights, (ATTITUDE,), partial(np.roll, shift=-1, axis=1))
     yield "quaternions begin with w", "reorder them to x y z w", reordered, values.gravity
 
 

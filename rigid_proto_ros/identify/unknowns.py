@@ -74,8 +74,8 @@ class Unknowns:
     def scales(self, values: Values) -> np.ndarray:
         """What counts as a large change of each unknown."""
         mass, size = values.mass, values.size
-        large = {"com": size, "damping": (10.0 * mass, 10.0 * mass * size**2 / 3.0)}
-        return np.array([_entry(large.get(group, 1.0), index) for group, index in self.slots])
+        large = {"com": [size] * 3, "damping": [10.0 * mass, 10.0 * mass * size**2 / 3.0]}
+        return np.array([large[group][index] if group in large else 1.0 for group, index in self.slots])
 
     def moved(self, values: Values, change: np.ndarray) -> Values:
         """``values`` with the unknowns changed (n,): the mass by a factor e^change, the tensor as ``moved_tensor``
@@ -125,10 +125,6 @@ _SIZES = {
     "accel_bias": 3,
     "imu_place": 3,
 }
-
-
-def _entry(large: float | tuple[float, ...], index: Any) -> float:
-    return large[index] if isinstance(large, tuple) else large
 
 
 def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:
