@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from rigid_proto_ros.messages import cdr
+from rigid_proto_ros.scene import cdr
 
 SPIN = (0.05, 0.1, 12.0)
 

@@ -80,7 +80,7 @@ def packing() -> tuple[float, float]:
     from geometry_msgs.msg import PoseStamped, TwistStamped
     from rclpy.serialization import serialize_message
 
-    from rigid_proto_ros.messages import cdr
+    from rigid_proto_ros.scene import cdr
 
     row = setup("auto").initial.tolist()
     pose_template, twist_template = cdr.StampedTemplate("world", 7), cdr.StampedTemplate("world", 6)

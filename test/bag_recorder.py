@@ -18,7 +18,7 @@ import yaml
 import zstandard
 from mcap.writer import CompressionType, Writer
 
-from rigid_proto_ros.messages.session_messages import DEFINITIONS, TOPICS
+from rigid_proto_ros.session.messages import DEFINITIONS, TOPICS
 
 ODOMETRY = "nav_msgs/msg/Odometry"
 RECORDED = {**TOPICS, "odom": ODOMETRY}

@@ -7,10 +7,10 @@ import numpy as np
 from flights import EventLines
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.messages.session_messages import PROJECTIONS
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.command_codec import string_attach, string_target
 from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
+from rigid_proto_ros.session.messages import PROJECTIONS
 from rigid_proto_ros.session.recorded_session import RecordedSession, scene_sha256
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, ReleaseString, WrenchCommand
 from rigid_proto_ros.simulation.observer import Reset

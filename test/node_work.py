@@ -17,8 +17,8 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from rigid_proto_ros.live.warm_up import warm_up
-from rigid_proto_ros.messages import cdr
 from rigid_proto_ros.ros.node import RigidBodyNode
+from rigid_proto_ros.scene import cdr
 
 SPIN = {"initial.angular_velocity": [0.05, 0.1, 12.0], "publish_rate": 500.0}
 STATES = ("/rigid_body/pose", "/rigid_body/twist", "/rigid_body/odom", "/rigid_body/imu")

@@ -19,7 +19,7 @@ MODULES = {
     for path in sorted(ROOT.rglob("*.py"))
 }
 ORDER = (
-    *("base", "mesh", "mass", "motion", "simulation", "messages", "scene", "session"),
+    *("base", "mesh", "mass", "motion", "simulation", "scene", "session"),
     *("picture", "rerun_view", "export", "live", "workbench", "ros", "sweep", "identify", "robots", "cli"),
 )
 """Folders in the order of imports: each knows only those before it."""
@@ -29,7 +29,6 @@ STRANGERS = {
     "robots": (
         "motion",
         "simulation",
-        "messages",
         "scene",
         "session",
         "rerun_view",

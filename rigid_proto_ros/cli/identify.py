@@ -153,6 +153,8 @@ def has_scene(path: Path) -> bool:
     """Whether a bag says what was flown, as ours do."""
     from ..session.bag import read_bag
 
+    if path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3"))):
+        return False
     content = read_bag(path, lambda topic: topic.endswith("/scene"))
     return any(topic.endswith("/scene") for topic in content.messages)
 

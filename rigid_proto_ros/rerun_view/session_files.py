@@ -81,8 +81,6 @@ def repair(path: str | Path, repaired: str | Path) -> None:
     files = bags.bag_files(path)
     if len(files) > 1:
         raise InputError("--repair", f"the bag has {len(files)} files; name one of them")
-    if bags.is_sqlite(files[0]):
-        raise InputError("--repair", str(files[0]), "an .mcap or .rrd file; repair a .db3 with sqlite3's .recover")
     bags.repair_mcap(bags.bag_bytes(files[0]), repaired, str(files[0]))
 
 

@@ -15,8 +15,8 @@ from std_msgs.msg import String
 
 from ..base.rotation import Vector
 from ..live.pacing import Stamps
-from ..messages import cdr
-from ..messages.session_messages import applied_bytes
+from ..scene import cdr
+from ..session.messages import applied_bytes
 from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Refused, SceneChanged
 from . import qos
 from .frames_on_body import FramesOnBody

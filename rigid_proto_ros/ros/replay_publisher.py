@@ -19,10 +19,10 @@ from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from ..base.errors import InputError
-from ..messages import cdr
-from ..messages.session_messages import PROJECTIONS, StampedRows
+from ..scene import cdr
 from ..scene.command_codec import frame_names, in_words, of_event
 from ..scene.sensor_noise import sensor_noise
+from ..session.messages import PROJECTIONS, StampedRows
 from ..session.playback import sorted_states
 from ..session.recorded_session import RecordedSession
 from ..session.replay import recorded_parameters

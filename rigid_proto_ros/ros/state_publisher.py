@@ -16,8 +16,8 @@ from sensor_msgs.msg import Imu
 
 from ..base.rotation import rotate
 from ..live.pacing import Stamps
-from ..messages import cdr
 from ..motion.state import State
+from ..scene import cdr
 from ..scene.parameters import Parameters
 from ..scene.sensor_noise import (
     ACCELEROMETER,

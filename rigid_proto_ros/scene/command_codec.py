@@ -19,7 +19,6 @@ from typing import Any
 
 from ..base.errors import CommandRefused, InputError
 from ..base.rotation import Vector, vector
-from ..messages import cdr
 from ..motion.frames import parse_frame
 from ..simulation.commands import (
     Change,
@@ -32,6 +31,7 @@ from ..simulation.commands import (
     TieString,
     WrenchCommand,
 )
+from . import cdr
 from .parameters import Parameters
 from .yaml_text import flow
 

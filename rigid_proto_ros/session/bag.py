@@ -1,14 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Bags of ``ros2 bag record``: a folder with metadata.yaml, or a bare .mcap, whole or split, compressed or not, or the
-.db3 files of rosbag2's sqlite3 storage.
-"""
+"""Bags of ``ros2 bag record``: a folder with metadata.yaml, or a bare .mcap, whole or split, compressed or not."""
 
 from __future__ import annotations
 
 import re
-import sqlite3
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 
 import zstandard
@@ -22,14 +18,13 @@ __all__ = ["bag_bytes", "bag_files", "read_bag", "repair_mcap"]
 METADATA = "metadata.yaml"
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-SQLITE_MAGIC = b"SQLite format 3\0"
 
 
 def read_bag(path: Path, wanted: Callable[[str], bool]) -> BagContent:
     """All that is whole in a bag, of the topics that are ``wanted``; raises InputError."""
     whole = BagContent(complete=True)
     for file in bag_files(path):
-        part = _read_sqlite(file, wanted) if is_sqlite(file) else read_mcap(bag_bytes(file), str(file), wanted)
+        part = read_mcap(bag_bytes(file), str(file), wanted)
         for topic, messages in part.messages.items():
             plain = [(log_time, _plain(data, topic)) for log_time, data in messages]
             whole.messages.setdefault(topic, []).extend(plain)
@@ -52,10 +47,10 @@ def bag_files(path: Path) -> list[Path]:
         found = [next((f for f in (path / n, path / f"{n}.zstd") if f.is_file()), path / n) for n in names]
     else:
         # metadata.yaml is written at the end: a bag whose recorder was killed has none.
-        found = [f for f in path.iterdir() if ".mcap" in f.suffixes or f.suffix == ".db3"]
+        found = [f for f in path.iterdir() if ".mcap" in f.suffixes]
         found.sort(key=lambda f: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", f.name)])
     if not found:
-        raise InputError("session", str(path), "a folder that ros2 bag record wrote, with .mcap or .db3 files in it")
+        raise InputError("session", str(path), "a folder that ros2 bag record wrote, with .mcap files in it")
     return found
 
 
@@ -82,10 +77,8 @@ def _listed(metadata: Path) -> list[str]:
         names = [str(name) for name in names]
     except (KeyError, TypeError):
         raise InputError(str(metadata), "not readable as the metadata that rosbag2 writes") from None
-    if storage not in ("mcap", "sqlite3"):
-        raise InputError("storage", storage, "mcap or sqlite3; ros2 bag convert makes one of another")
-    if storage == "sqlite3" and compression:
-        raise InputError("compression_format", compression, "none, for sqlite3; ros2 bag convert makes such a bag")
+    if storage != "mcap":
+        raise InputError("storage", storage, "mcap; ros2 bag convert makes one of another")
     if compression not in ("", "zstd", None):
         raise InputError("compression_format", compression, "zstd, or none")
     return names
@@ -107,37 +100,3 @@ def _decompressed(data: bytes) -> bytes:
         return zstandard.ZstdDecompressor().decompressobj().decompress(data)
     except zstandard.ZstdError as error:
         raise ValueError(str(error)) from None
-
-
-def is_sqlite(file: Path) -> bool:
-    """Whether a file begins as an SQLite database does."""
-    try:
-        with open(file, "rb") as stream:
-            return stream.read(len(SQLITE_MAGIC)) == SQLITE_MAGIC
-    except OSError:
-        return False
-
-
-def _read_sqlite(file: Path, wanted: Callable[[str], bool]) -> BagContent:
-    """Messages in the order of their times, of the topics that are ``wanted(topic)``; raises InputError.
-
-    A journal that lies beside the file is read with it; what a killed recorder hadn't committed is lost.
-    """
-    size = file.stat().st_size
-    content = BagContent(complete=True, readable_bytes=size, file_bytes=size)
-    try:
-        # Read only: a journal beside it is read, and nothing is written.
-        with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as bag:
-            topics = bag.execute("SELECT id, name, type, serialization_format FROM topics").fetchall()
-            for number, name, message_type, serialization in topics:
-                if serialization != "cdr":
-                    raise InputError(str(file), f"messages of {name} as {serialization}; only cdr is supported")
-                content.types[name] = message_type
-                if wanted(name):
-                    query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp, id"
-                    messages = [(int(time_ns), bytes(data)) for time_ns, data in bag.execute(query, (number,))]
-                    if messages:
-                        content.messages[name] = messages
-    except (sqlite3.Error, TypeError) as error:
-        raise InputError("session", str(file), f"a bag of rosbag2's sqlite3 storage ({error})") from None
-    return content

@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import InputError
-from ..messages.session_messages import PROJECTIONS
 from ..scene.scenario import Scenario, make_scenario
 from ..scene.yaml_text import flow
 from ..simulation.commands import slot_name
 from ..simulation.flight import HELD_WRENCH, NEVER, UNNAMED_SLOT
 from ..simulation.flight_arrays import ActingLoad
 from ..simulation.simulation import Simulation
+from .messages import PROJECTIONS
 from .recorded_session import RecordedSession
 from .replay import Resimulation, mesh_finder, session_scenario
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from ..base.errors import CommandRefused, InputError
 from ..base.provenance import cpu, versions
-from ..messages.session_messages import FIELDS, PROJECTIONS
 from ..simulation.event_log import EventLog
 from ..simulation.observer import Event, Logged, Observer
+from .messages import FIELDS, PROJECTIONS
 from .recorded_session import RecordedSession
 from .replay import Resimulation, as_published, mesh_finder, resimulation, session_scenario
 from .runs import decode_event

@@ -19,7 +19,7 @@ from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.provenance import cpu, versions
 from ..mesh.locate import resolve_mesh
-from ..messages import cdr, session_messages
+from ..scene import cdr
 from ..scene.command_codec import frame_names
 from ..scene.parameters import Parameters
 from ..scene.scene_file import read_scene_text
@@ -36,6 +36,7 @@ from ..simulation.observer import (
     SceneChanged,
     Started,
 )
+from . import messages as session_messages
 from .recorded_session import file_sha256, scene_sha256
 from .runs import MADE_WITH, floor_name
 

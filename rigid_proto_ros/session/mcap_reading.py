@@ -80,7 +80,7 @@ def whole_records(data: bytes, name: str) -> Iterator[tuple[records.McapRecord, 
     if data[: len(MCAP0_MAGIC)] != MCAP0_MAGIC:
         if MCAP0_MAGIC.startswith(data):
             raise InputError("session", name, "a recording with data; this one is empty")
-        raise InputError("session", name, "an MCAP file")
+        raise InputError("session", name, "an MCAP file; ros2 bag convert makes one of a .db3")
     stream, end = io.BytesIO(data), len(MCAP0_MAGIC)
     try:
         for record in StreamReader(stream, validate_crcs=True).records:

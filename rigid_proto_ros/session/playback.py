@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ..base.errors import InputError
-from ..messages.session_messages import PROJECTIONS
 from ..scene.offline import notify_start
 from ..scene.scenario import Scenario
 from ..simulation.notifier import snapshot
 from ..simulation.observer import BodyChanged, GhostChanged, GhostPublished, Observer, Published
+from .messages import PROJECTIONS
 from .recorded_session import RecordedSession
 from .replay import resimulation
 

@@ -17,7 +17,7 @@ import numpy as np
 from ..base.bundled import body_names
 from ..base.errors import InputError, MeshError
 from ..mesh.reading import Mesh, load_mesh
-from ..messages.session_messages import StampedRows
+from .messages import StampedRows
 
 _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.rotation import rotate, rotate_inverse
-from ..messages.session_messages import PROJECTIONS, READ, StampedRows, read_state, read_string, simulated_time
+from .messages import PROJECTIONS, READ, StampedRows, read_state, read_string, simulated_time
 from .recorded_session import RecordedSession, scene_sha256
 
 if TYPE_CHECKING:

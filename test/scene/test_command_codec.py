@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.messages.session_messages import read_string
 from rigid_proto_ros.motion.frames import Frame
 from rigid_proto_ros.scene.command_codec import (
     MARKS,
@@ -28,6 +27,7 @@ from rigid_proto_ros.scene.command_codec import (
 )
 from rigid_proto_ros.scene.script import expand_schedule, expand_script, read_schedule
 from rigid_proto_ros.scene.yaml_text import flow, load_json, load_plain_yaml
+from rigid_proto_ros.session.messages import read_string
 from rigid_proto_ros.simulation.commands import (
     Change,
     ClearWrench,

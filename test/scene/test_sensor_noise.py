@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from rigid_proto_ros.base.rotation import rotate
-from rigid_proto_ros.messages.session_messages import PROJECTIONS
 from rigid_proto_ros.scene.parameters import NoiseParameters
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.sensor_noise import (
@@ -19,6 +18,7 @@ from rigid_proto_ros.scene.sensor_noise import (
     SensorNoise,
     sensor_noise,
 )
+from rigid_proto_ros.session.messages import PROJECTIONS
 
 ROW = [1.0, -2.0, 3.0, 0.5, 0.5, -0.5, 0.5, 4.0, 5.0, -6.0, 0.1, 0.2, -0.3]
 RATE = 100.0

@@ -8,7 +8,6 @@ import yaml
 from hand_session import SCENE, HandSession, random_hand_session
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.messages.session_messages import read_string
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.scene.command_codec import load_command, outgoing
 from rigid_proto_ros.scene.offline import OfflineRun
@@ -16,6 +15,7 @@ from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule
 from rigid_proto_ros.scene.yaml_text import flow
+from rigid_proto_ros.session.messages import read_string
 from rigid_proto_ros.session.script_of_session import SavedScript, script_of_session
 
 SECOND = 10**9

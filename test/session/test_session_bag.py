@@ -26,10 +26,10 @@ from ros_process import running_node
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mesh.locate import resolve_mesh
-from rigid_proto_ros.messages import cdr
-from rigid_proto_ros.messages.session_messages import read_string
 from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.scene import cdr
 from rigid_proto_ros.session.check import verify
+from rigid_proto_ros.session.messages import read_string
 
 
 @pytest.fixture(scope="module")

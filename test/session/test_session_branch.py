@@ -10,13 +10,13 @@ pytest.importorskip("mcap")
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.messages.session_messages import PROJECTIONS
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script, read_script
 from rigid_proto_ros.session.branch import branch_at
+from rigid_proto_ros.session.messages import PROJECTIONS
 from rigid_proto_ros.session.recorded_session import RecordedSession, scene_sha256
 from rigid_proto_ros.session.replay import resimulation
 from rigid_proto_ros.simulation.observer import Logged, Observer

@@ -19,12 +19,12 @@ from scripts import EVERY_KIND
 from rigid_proto_ros.base.bundled import example_names, example_path, scene_names
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.messages.session_messages import FIELDS
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import Difference, broken_link, verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
+from rigid_proto_ros.session.messages import FIELDS
 from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.simulation.event_log import EventLog
 

@@ -18,8 +18,8 @@ from ..base.errors import InputError
 from ..base.rotation import cross, rotate, rotate_inverse, vector
 from ..motion.body import Body
 from ..motion.loads import Load
+from ..scene import cdr
 from ..simulation.observer import STATE_FIELDS
-from . import cdr
 
 _TIME = "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec"
 _HEADER = "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id"

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rigid_proto_ros.messages import cdr
+from rigid_proto_ros.scene import cdr
 
 pytest.importorskip("rclpy")
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped

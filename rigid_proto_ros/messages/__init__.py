@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""Messages as bytes, both ways, without ROS."""
