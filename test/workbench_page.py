@@ -44,10 +44,10 @@ SEE_THROUGH = ".mantine-Notifications-root, .mantine-Notifications-root * {opaci
 class Flown:
     """A body that flies in real time, and its workbench. lesson: one that begins as the first browser is there."""
 
-    def __init__(self, scene: str = "t_handle", lesson: str = "", port: int | None = None) -> None:
+    def __init__(self, scene: str = "t_handle", lesson: str = "", port: int | None = None, endpoints=None) -> None:
         scenario = read_scene(scene)
         warm_up(scenario.setup)
-        self.live = LiveSimulation(scenario)
+        self.live = LiveSimulation(scenario, endpoints=endpoints)
         self.workbench = Workbench(self.live, port, lesson=lesson, anew=True)
         self.page, self.server = self.workbench.page, self.workbench.page.server
         self.live.announce()

@@ -24,8 +24,6 @@ from .streams import FileStream, Stream
 ELLIPSOIDS = "ellipsoids"
 REPORT = "report"
 FOUND_COLOUR, OTHERS_COLOUR = style.GHOST_COLOUR, style.ORANGE
-APART = 2.6
-"""Of ellipsoids side by side, in the largest semi-axis of all."""
 TRACK_SAMPLES_MAX = 20_000
 """Points of a drawn path."""
 
@@ -81,7 +79,7 @@ def record_identification(
     """
     stream = FileStream(Path(path), str(uuid.uuid4()), "identified from motion")
     try:
-        stream.recording.send_blueprint(_blueprint(flights, tensors))
+        stream.recording.send_blueprint(_blueprint(flights))
         stream.log_static(style.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         stream.log_static(REPORT, rr.TextDocument(f"```\n{report}\n```", media_type="text/markdown"))
         size = _size(tensors, mesh)
@@ -145,27 +143,18 @@ def _send_body(
 
 
 def _send_ellipsoids(stream: Stream, tensors: Sequence[DrawnTensor]) -> None:
-    """The found one over each of the others, these side by side: so each pair can be compared and its label read."""
+    """One in the other, where they lie in the tracked frame."""
     stream.log_static(ELLIPSOIDS, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    if not tensors:
-        return
-    found, *given = tensors
-    if not given:
-        _send_ellipsoid(stream, f"{ELLIPSOIDS}/0", found, np.zeros(3), FOUND_COLOUR)
-    apart = APART * max(_reach(tensor) for tensor in tensors)
-    for number, tensor in enumerate(given, 1):
-        place = np.array([0.0, apart * (number - 1), 0.0])
-        _send_ellipsoid(stream, f"{ELLIPSOIDS}/{number}", tensor, place, OTHERS_COLOUR)
-        _send_ellipsoid(stream, f"{ELLIPSOIDS}/found_over_{number}", found, place, FOUND_COLOUR, is_named=number == 1)
-        label = rr.Points3D(
-            # By turns lower, as names are wider than ellipsoids.
-            [place + tensor.center_of_mass - np.array([0.0, 0.0, (0.5, 0.75)[number % 2] * apart])],
-            labels=[tensor.label],
-            show_labels=True,
-            colors=[OTHERS_COLOUR],
-            radii=[0.001 * apart],
-        )
-        stream.log_static(f"{ELLIPSOIDS}/label_{number}", label)
+    for number, tensor in enumerate(tensors):
+        semi_axes, axes = _ellipsoid(tensor)
+        entity, colour = f"{ELLIPSOIDS}/{number}", OTHERS_COLOUR if number else FOUND_COLOUR
+        place = rr.Transform3D(translation=tensor.center_of_mass, mat3x3=axes)
+        shape = rr.Ellipsoids3D(half_sizes=[semi_axes], colors=[colour], fill_mode="majorwireframe")
+        stream.log_static(entity, place, shape)
+        # Names one below the other, beside all of them.
+        beside = np.array([0.0, 1.2, -0.2 * number]) * max(map(_reach, tensors))
+        name = rr.Points3D([beside], labels=[tensor.label], show_labels=True, colors=[colour], radii=[0.0])
+        stream.log_static(f"{ELLIPSOIDS}/name_{number}", name)
 
 
 def _reach(tensor: DrawnTensor) -> float:
@@ -179,44 +168,11 @@ def _ellipsoid(tensor: DrawnTensor) -> tuple[np.ndarray, np.ndarray]:
     return equimomental_shapes(tensor.mass, moments)[1], axes
 
 
-def _send_ellipsoid(
-    stream: Stream,
-    entity: str,
-    tensor: DrawnTensor,
-    place: np.ndarray,
-    colour: tuple[int, ...],
-    is_named: bool = True,
-) -> None:
-    semi_axes, axes = _ellipsoid(tensor)
-    stream.log_static(entity, rr.Transform3D(translation=tensor.center_of_mass + place, mat3x3=axes))
-    is_found = colour == FOUND_COLOUR
-    shape = rr.Ellipsoids3D(
-        half_sizes=[semi_axes],
-        colors=[colour],
-        fill_mode="majorwireframe",
-        labels=[tensor.label] if is_found else None,
-        show_labels=is_found and is_named,
-    )
-    stream.log_static(entity, shape)
-
-
 def _plot(flight: int, series: int) -> str:
     return f"residuals/{flight}_{series + 1}"
 
 
-def _before_the_row(tensors: Sequence[DrawnTensor]) -> rrb.EyeControls3D | None:
-    """Where all ellipsoids are seen side by side."""
-    if not tensors:
-        return None
-    reach = max(_reach(tensor) for tensor in tensors)
-    others = max(len(tensors) - 1, 1)
-    middle = tensors[0].center_of_mass + np.array([0.0, 0.5 * APART * reach * (others - 1), 0.0])
-    return rrb.EyeControls3D(
-        position=middle + APART * reach * np.array([0.7 + 0.32 * others, 0.0, 0.1]), look_target=middle
-    )
-
-
-def _blueprint(flights: Sequence[TrackedFlight], tensors: Sequence[DrawnTensor]) -> rrb.Blueprint:
+def _blueprint(flights: Sequence[TrackedFlight]) -> rrb.Blueprint:
     plots = [
         rrb.Horizontal(
             *(
@@ -232,11 +188,7 @@ def _blueprint(flights: Sequence[TrackedFlight], tensors: Sequence[DrawnTensor])
             rrb.Horizontal(
                 rrb.Spatial3DView(origin="/" + style.WORLD, name="Measured motion, and the fitted one as a ghost"),
                 rrb.Vertical(
-                    rrb.Spatial3DView(
-                        origin="/" + ELLIPSOIDS,
-                        name="Inertia ellipsoids in the tracked frame",
-                        eye_controls=_before_the_row(tensors),
-                    ),
+                    rrb.Spatial3DView(origin="/" + ELLIPSOIDS, name="Inertia ellipsoids in the tracked frame"),
                     rrb.TextDocumentView(origin="/" + REPORT, name="Mass properties identified"),
                 ),
                 column_shares=[1, 1],

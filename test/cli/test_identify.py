@@ -122,7 +122,7 @@ def test_a_recording_shows_measured_and_fitted_flight_what_is_left_and_both_tens
         "/world/measured_1/mesh",
         "/world/fitted_1/mesh",
         "/ellipsoids/1",
-        "/ellipsoids/found_over_1",
+        "/ellipsoids/0",
         "/report",
     } <= set(rows)
     shown = [rows[entity] for entity in ("/world/measured_1", "/world/fitted_1", "/residuals/1_1", "/residuals/1_2")]
