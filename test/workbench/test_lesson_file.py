@@ -76,6 +76,9 @@ def test_in_a_browser_the_body_moves_without_a_server_and_without_the_network(tm
             time.sleep(1.0)
             first = looks()
         assert (np.ptp(first, axis=(0, 1)) > 60).any(), "nothing is drawn"
+        # Its colour is a light one, with more red than blue; without light it would be next to black.
+        body = (first[..., 0] - first[..., 2] > 8) & (first[..., 0] > 110)
+        assert body.mean() > 0.01, "the body isn't lit"
         moved = 0.0
         while time.monotonic() < deadline and moved < 0.01:
             time.sleep(1.0)

@@ -277,5 +277,22 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
         assert backend._nodes[style.STRING_LINE].visible
 
 
+def test_one_light_throws_shadows(flown: FlownPage) -> None:
+    # viser's directional light is several, each with a shadow of its own.
+    lights = [node for node in flown.server.scene._handle_from_node_name.values() if "Light" in type(node).__name__]
+    assert [type(light).__name__ for light in lights if getattr(light, "cast_shadow", False)] == ["SpotLightHandle"]
+
+
+def test_what_is_switched_on_while_time_stands_is_drawn(flown: FlownPage) -> None:
+    flown.do(lambda: flown.page.flight.pause(True))
+    flown.until(lambda: flown.live.paused, "pause")
+    assert not flown.page.backend._nodes.get(style.OMEGA)
+    flown.set("Angular velocity ω", True)
+    node = flown.until(lambda: flown.page.backend._nodes.get(style.OMEGA), "arrow of ω")
+    assert node.visible
+    flown.set("Angular velocity ω", False)
+    flown.do(lambda: flown.page.flight.pause(False))
+
+
 def test_every_lesson_has_its_scene_text() -> None:
     assert all(lesson(name).path == scene_path(name) for name in ("book", "teapot"))
