@@ -81,7 +81,9 @@ def row_summary(study: Study, row: int) -> dict[str, object]:
 
 
 def is_batchable(study: Study, rows: NDArray[np.int64]) -> bool:
-    """Whether the compiled batch can fly any of these rows (n,)."""
+    """Whether the compiled batch can fly any of these rows (n,), many at once."""
+    if any(is_structural(v) and isinstance(v.form, Draw) for v in study.vary):
+        return False  # a batch for each
     return any(all(_sides(study, key)) for key, _ in _groups(study, study.columns(rows), len(rows)))
 
 
