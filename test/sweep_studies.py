@@ -137,15 +137,20 @@ TIED = {
         {"t": 0.53, "wrench": {"force": [0.01, 0.0, 0.0]}},
         {"t": 0.6, "string": "release"},
         {"t": 0.7, "service": "clear_wrench"},
+        {"t": 0.72, "set": {"mass": 0.25, "gravity": [0.0, 0.1, -9.0]}},
         {"t": 0.75, "thrusters": [0.01, 0.0, 0.02, 0.0]},
         {"t": 0.8, "string": {"target": [0.0, 0.1, 0.4]}},
         {"t": 0.83, "string": {"target": [0.1, 0.1, 0.4]}},
+        {"t": 0.9, "wrench": {"at": "tip", "force": [0.01, 0.0, 0.0]}},
+        {"t": 1.0, "set": {"density": 3000.0, "angular_damping": 1e-5}},
+        {"t": 1.0, "set": {"explicit_inertia.mass": 0.3, "scale": [1.1]}},
     ],
     "duration": 1.5,
     "samples": 12,
     "watch": 20,
     "set": {
         "gravity": [0, 0, -9.81],
+        "ballast.tip": [0.01, 0, 0, 0.07],
         "wrench_timeout": 0.2,
         "thruster": {"minimum_on_time": 0.05},
         "string": {"attach": [0.0, 0.0, 0.07], "timeout": 0.4, "frequency": 20.0, "rest_length": 0.1},
@@ -155,12 +160,12 @@ TIED = {
         "string.frequency": {"uniform": [5.0, 60.0]},
         "script.1.string.target": {"direction": 0.5},
         "script.3.impulse.x": {"uniform": [0.0, 0.02]},
-        "script.13.string.target.x": {"uniform": [-0.3, 0.3]},
+        "script.14.string.target.x": {"uniform": [-0.3, 0.3]},
         "initial.angular_velocity": {"direction": 4.0},
     },
     "measure": {"final": ["position", "orientation", "energy"], "max": ["potential_energy"], "min": ["energy"]},
 }
-"""A string tied, pulled, let go by command and timeout, tied elsewhere; thrusters by command and timeout."""
+"""A string tied, pulled, let go by command and timeout, tied elsewhere; thrusters by command and timeout; changes."""
 
 HONEY = {
     **POKES,

@@ -20,15 +20,15 @@ from ..base.borrowed_views import borrowed, copy_numbers
 from ..base.compilation import njit
 from ..base.exact_arithmetic import exact_quotient
 from ..base.records import record_type
-from ..base.rotation import Vector
+from ..base.rotation import Vector, matrix_elements
 from ..base.simd import aligned
 from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
-from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, arm, fill_body
+from ..motion.body import AXES, BODY_SCALE, COM, INERTIA, LENGTH, MASS, MOMENTS, arm, fill_body
 from ..motion.integrators.auto import FASTEST
 from ..motion.integrators.stepping import provide_kernel
-from ..motion.loads import MAX_ACCELERATION, is_within_magnitude
+from ..motion.loads import MAX_ACCELERATION, accumulate_load, is_within_magnitude
 from ..motion.problem import KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_body
 from ..motion.state import fill_initial_row
 from ..motion.string import effective_mass, energy_of, most_yielding, span_of, spring_of
@@ -82,10 +82,11 @@ PARAMETERS = (*NUMBERS, "string_attached", "string_bilateral")
 
 EXPLICIT, ORDINARY, SHELL = range(3)
 
-TIE, MOVE, UNTIE, CUT = range(fl.CLEAR + 1, fl.CLEAR + 5)
+TIE, MOVE, UNTIE, CUT, CHANGE = range(fl.CLEAR + 1, fl.CLEAR + 6)
 """Commands in a table of loads that act between two calls of the compiled flight. TIE: load holds the target (3,) [m,
 world], the knot (3,) [mesh coordinates] and whether that counts, or the row's own. MOVE: the target, which the free end
-reaches after duration_ns. CUT: nothing but that another segment begins.
+reaches after duration_ns. CUT: nothing but that another segment begins. CHANGE: the row's numbers are those of its next
+stage.
 """
 
 CERTAIN = 0.999
@@ -98,8 +99,9 @@ _Side = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 @dataclass
 class Batch:
-    """rows (n,) ROW, ballast (k, 4) with masses [kg] above 0 and mesh coordinates, setup of the scene that they vary.
-    commands (n or 1, c) LOAD_ROW: in the order in which they act, those beyond a row's number at NEVER.
+    """rows (n, s) ROW: at first, and after each of s − 1 changes in flight. ballast (k, 4): masses [kg] above 0, and
+    where they are [mesh coordinates]. setup: of the scene. commands (n or 1, c) LOAD_ROW: in the order in which they
+    act, those beyond a row's number at NEVER.
     """
 
     rows: NDArray[np.void]
@@ -253,30 +255,38 @@ def _most_yielding(body: np.ndarray, x: float, y: float, z: float) -> float:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _tie(own: np.record, flight: np.record, knot: np.ndarray, target: np.ndarray) -> bool:
-    """Tie the string at ``knot`` (3,) [mesh coordinates] with its free end at ``target`` (3,) [m, world]; False when
-    its rates may be beyond what the integrator follows.
+def _take_spring(own: np.record, flight: np.record) -> bool:
+    """Stiffness and damping of the string anew, by the body as it is; False when its rates may be beyond what the
+    integrator follows.
     """
     string, body = flight.string, flight.body
-    for k in range(3):
-        string[KNOT + k] = knot[k]
-        string[ORIGIN + k] = string[TARGET + k] = target[k]
     stiffness, frequency, ratio = own.string_stiffness, own.string_frequency, own.string_damping_ratio
     rest = own.string_rest_length
     if flight.chooses:
-        yields = _most_yielding(body, knot[0], knot[1], knot[2])
+        yields = _most_yielding(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
         # No point shows more than the whole mass.
         largest, damping = spring_of(body[MASS], stiffness, frequency, ratio)
         if math.sqrt(largest * yields) > CERTAIN * FASTEST or damping * yields > CERTAIN * FASTEST:
             return False
-    rx, ry, rz = arm(body, knot[0], knot[1], knot[2])
-    span = _span_to(flight, target[0], target[1], target[2])
-    mass = effective_mass(body, rx, ry, rz, flight.row, span, rest)
+    rx, ry, rz = arm(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
+    mass = effective_mass(body, rx, ry, rz, flight.row, _span_to(flight, *_free_end(flight)), rest)
     string[K], string[C] = spring_of(mass, stiffness, frequency, ratio)
     string[REST], string[PUSHES] = rest, 1.0 if own.string_bilateral else 0.0
+    return True
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _tie(own: np.record, flight: np.record, knot: np.ndarray, target: np.ndarray) -> bool:
+    """Tie the string at ``knot`` (3,) [mesh coordinates] with its free end at ``target`` (3,) [m, world]; as
+    ``_take_spring`` returns.
+    """
+    string = flight.string
+    for k in range(3):
+        string[KNOT + k] = knot[k]
+        string[ORIGIN + k] = string[TARGET + k] = target[k]
     flight.tied = True
     flight.string_begin_ns = flight.string_end_ns = flight.now_ns
-    return True
+    return _take_spring(own, flight)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -310,41 +320,83 @@ def _act_on_string(own: np.record, flight: np.record, command: np.record) -> boo
 # A row's flight
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.ndarray, loads: np.ndarray) -> bool:
-    """Time 0 of a row, in a copy of its setup's flight; fills loads. False: the simulation must do it."""
+@njit(cache=True, error_model="numpy")
+def _take_body(own: np.record, ballast: np.ndarray, flight: np.record) -> bool:
+    """Body, gravity and damping are the row's from now on; False when the simulation must do it."""
     body = flight.body
-    attitude, velocity, spin = own.initial_orientation_xyzw, own.initial_linear_velocity, own.initial_angular_velocity
     if not _make_body(own, ballast, body):
         return False
-    if not fill_initial_row(own.initial_position, attitude, velocity, spin, flight.row):
-        return False
     linear, angular = own.linear_damping / body[MASS], own.angular_damping / body[MOMENTS]
-    if flight.chooses and (linear > FASTEST or angular > FASTEST):
-        return False
-    copy_numbers(flight.row, flight.start)
     gyroscopic = flight.common.gyroscopic
     begin_body(flight.common, body, own.gravity, own.linear_damping, own.angular_damping, gyroscopic)
-    if own.string_attached and not _tie(own, flight, own.string_attach, own.string_target):
-        return False
-    for c in range(commands.shape[0]):
+    return not flight.chooses or (linear <= FASTEST and angular <= FASTEST)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _are_within_magnitude(commands: np.ndarray, first: int, body: np.ndarray) -> bool:
+    for c in range(first, commands.shape[0]):
         if commands[c].kind < fl.CLEAR and not is_within_magnitude(commands[c].load, body):
             return False
-        loads[c] = commands[c]
     return True
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(cache=True, error_model="numpy")
+def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.ndarray, loads: np.ndarray) -> bool:
+    """Time 0 of a row, in a copy of its setup's flight; fills loads. False: the simulation must do it."""
+    attitude, velocity, spin = own.initial_orientation_xyzw, own.initial_linear_velocity, own.initial_angular_velocity
+    if not _take_body(own, ballast, flight) or not _are_within_magnitude(commands, 0, flight.body):
+        return False
+    if not fill_initial_row(own.initial_position, attitude, velocity, spin, flight.row):
+        return False
+    copy_numbers(flight.row, flight.start)
+    for c in range(commands.shape[0]):
+        loads[c] = commands[c]
+    return not own.string_attached or _tie(own, flight, own.string_attach, own.string_target)
+
+
+@njit(cache=True, error_model="numpy")
+def _change(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.ndarray, loads: np.ndarray) -> bool:
+    """Take other numbers in flight, as ``Simulation`` takes another setup: where the mesh keeps its size it stays where
+    it is, so a COM that moves within it takes position and velocity along.
+    """
+    body, row = flight.body, flight.row
+    x, y, z = body[COM], body[COM + 1], body[COM + 2]
+    a, b, c = body[BODY_SCALE], body[BODY_SCALE + 1], body[BODY_SCALE + 2]
+    if not _take_body(own, ballast, flight) or not _are_within_magnitude(commands, flight.due, body):
+        return False
+    x, y, z = body[COM] - x, body[COM + 1] - y, body[COM + 2] - z
+    kept = body[BODY_SCALE] == a and body[BODY_SCALE + 1] == b and body[BODY_SCALE + 2] == c
+    if kept and (x != 0.0 or y != 0.0 or z != 0.0):
+        R = matrix_elements(row[3], row[4], row[5], row[6])
+        x, y, z = R[0] * x + R[1] * y + R[2] * z, R[3] * x + R[4] * y + R[5] * z, R[6] * x + R[7] * y + R[8] * z
+        a, b, c = row[10], row[11], row[12]
+        a, b, c = R[0] * a + R[1] * b + R[2] * c, R[3] * a + R[4] * b + R[5] * c, R[6] * a + R[7] * b + R[8] * c
+        row[0], row[1], row[2] = row[0] + x, row[1] + y, row[2] + z
+        row[7], row[8], row[9] = row[7] + (b * z - c * y), row[8] + (c * x - a * z), row[9] + (a * y - b * x)
+    for k in range(flight.acting):
+        accumulate_load(loads[k].load, body, loads[k].share)
+    return not flight.tied or _take_spring(own, flight)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _advance(
-    own: np.record, flight: np.record, commands: np.ndarray, until_ns: int, methods: np.ndarray, tables: tuple[Any, ...]
+    stages: np.ndarray,
+    ballast: np.ndarray,
+    flight: np.record,
+    commands: np.ndarray,
+    until_ns: int,
+    methods: np.ndarray,
+    tables: tuple[Any, ...],
 ) -> bool:
     """Carry the body to ``until_ns``, before what acts at that very time; False when the simulation must do it.
 
-    As ``Simulation.advance`` does: the compiled flight takes all commands but those on the string; at such a one all
-    that acts at this instant acts, in its order.
+    As ``Simulation.advance`` does: the compiled flight takes all loads; at any other command all that acts at this
+    instant acts, in its order. stages (s,): the row, at first and after each change.
     """
     loads, events, room = tables
-    count = commands.shape[0]
+    count, stage = commands.shape[0], 0
+    for c in range(flight.due):
+        stage += commands[c].kind == CHANGE
     while True:
         first = flight.due
         act = first
@@ -362,9 +414,14 @@ def _advance(
         flight.events = 0
         fl.end_due(flight, loads, events)
         while flight.due < count and commands[flight.due].at_ns == event_ns:
-            if commands[flight.due].kind < TIE:
+            kind = commands[flight.due].kind
+            if kind < TIE:
                 fl.apply(flight, loads, events, flight.due)
-            elif not _act_on_string(own, flight, commands[flight.due]):
+            elif kind == CHANGE:
+                stage += 1
+                if not _change(stages[stage], ballast, flight, commands, loads):
+                    return False
+            elif not _act_on_string(stages[stage], flight, commands[flight.due]):
                 return False
             flight.due += 1
         fl.cut_segment(flight, loads, methods, room)
@@ -390,8 +447,8 @@ def _fly_row(
     stops (k, 3): the flight ends at the first sample at which one holds. context: simulation/quantities.py, filled
     here. Returns how many samples it reached, and which stop held or −1; 0 samples: the simulation must do it.
     """
-    own = rows[i]
-    due = commands[i if commands.shape[0] > 1 else 0]
+    stages = rows[i]
+    own, due = stages[0], commands[i if commands.shape[0] > 1 else 0]
     flights[0] = start[0]
     flight, (loads, _, room) = flights[0], tables
     if not _begin(own, ballast, flight, due, loads):
@@ -402,7 +459,7 @@ def _fly_row(
     begin(body[MASS], body[INERTIA : INERTIA + 9], own.gravity, states[0], context)
     fl.begin_segment(flight, loads, methods, room)
     for sample in range(sample_ns.shape[0]):
-        if not _advance(own, flight, due, sample_ns[sample], methods, tables):
+        if not _advance(stages, ballast, flight, due, sample_ns[sample], methods, tables):
             return 0, -1
         copy_numbers(flight.row, states[sample, :13])
         states[sample, 13] = _string_energy(flight)

@@ -34,7 +34,6 @@ from ..simulation.commands import (
     MoveString,
     Pending,
     ReleaseString,
-    SetState,
     ThrusterCommand,
     TieString,
     WrenchCommand,
@@ -51,6 +50,11 @@ MAX_COMMANDS = 2000
 
 DIRECT = {"t", "duration", "force", "impulse", "torque", "angular_impulse", "push", "target", "wrench", "string"}
 """Names on the way to a field of the script whose number a table of commands may have as it is."""
+
+CHANGED = {"mass", "density", "scale", "gravity", "linear_damping", "angular_damping"} | {
+    name for name in batch.NUMBERS if name.startswith("explicit")
+}
+"""Fields of a row that may change in flight."""
 
 _BOUNDS = {"at_ns": (0.0, MAX_TIME_S), "duration_ns": (1e-9, MAX_TIME_S), "load": (-HUGE, HUGE)}
 """Of numbers written into a table of commands [s, N, N m, m], by its fields."""
@@ -105,10 +109,13 @@ Knots = dict[tuple[float, ...], tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Timetable:
-    """What acts, rows (c,) LOAD_ROW, and the entries of the script that it comes from (c,)."""
+    """What acts, rows (c,) LOAD_ROW, and the entries of the script that it comes from (c,); the parameters that are
+    changed on the way.
+    """
 
     rows: NDArray[np.void]
     entries: NDArray[np.int64]
+    changes: list[Mapping[str, Any]]
 
     @property
     def has_loads_alone(self) -> bool:
@@ -119,7 +126,7 @@ class Timetable:
     def by_entry(self) -> Timetable:
         """In the order of the script."""
         order = np.argsort(self.entries, kind="stable")
-        return Timetable(self.rows[order], self.entries[order])
+        return Timetable(self.rows[order], self.entries[order], self.changes)
 
 
 @dataclass
@@ -137,6 +144,7 @@ class _Plan:
     release_ns: int = fl.NEVER
     rows: list[Pending] = field(default_factory=list)
     entries: list[int] = field(default_factory=list)
+    changes: list[Mapping[str, Any]] = field(default_factory=list)
 
     def put(self, *rows: Pending, entry: int = 0) -> None:
         """Behind what is there."""
@@ -190,7 +198,7 @@ class _Plan:
             row["kind"], row["slot"] = pending.kind, pending.slot
             if pending.row:
                 row["load"] = np.frombuffer(pending.row)
-        return Timetable(rows, np.array(self.entries, np.int64))
+        return Timetable(rows, np.array(self.entries, np.int64), self.changes)
 
 
 def timetable(commands: list[Command], setup: Setup, knots: Knots) -> Timetable:
@@ -199,8 +207,6 @@ def timetable(commands: list[Command], setup: Setup, knots: Knots) -> Timetable:
         raise NotBatchable
     plan = _Plan(setup, knots, ThrusterControl(setup.thrusters), setup.string.attached)
     for command in with_contacts(commands, setup.contacts):
-        if isinstance(command, Change | SetState):
-            raise NotBatchable
         at_ns, entry = command.stamp_ns, command.entry
         row = check_command(command, setup)
         plan.pass_until(at_ns)
@@ -221,6 +227,11 @@ def timetable(commands: list[Command], setup: Setup, knots: Knots) -> Timetable:
         elif isinstance(command, ClearWrench):
             plan.thrusters.clear()
             plan.put(Pending(at_ns, command), entry=entry)
+        elif isinstance(command, Change):
+            plan.changes.append(command.content)
+            plan.put(Pending(at_ns, command, kind=batch.CHANGE), entry=entry)
+        else:
+            raise NotBatchable
     plan.pass_until(fl.NEVER - 1)
     return plan.timetable
 
@@ -247,16 +258,29 @@ class Group:
             check_supported(setup.integrator, frozenset({ANGULAR_DAMPING}))
         if setup.string.attached and setup.initial_string_mass:
             raise NotBatchable
-        self._row = new_row(parameters, self._body_mesh)
         self._ballast = np.array([m for m in parameters.point_masses if m[0] > 0.0], dtype=float).reshape(-1, 4)
         self._knots: Knots = {}
         self._of_script = [k for k, vary in enumerate(study.vary) if vary.target.entry]
+        self._changes = self._read([]).changes
         self._table, self._numbers = self._find_numbers()
+        self._stages = self._find_stages(parameters)
+
+    def _find_stages(self, parameters: Parameters) -> list[tuple[NDArray[np.void], set[str]]]:
+        """The row at first and after each change in flight, and the parameters that are no longer the study's."""
+        others = set(self._reference)
+        stages = [(new_row(parameters, self._body_mesh), others)]
+        for changes in map(with_mass_of_density, self._changes):
+            parameters, others = parameters.replaced(changes), {*others, *changes}
+            if not all(_field_of(name) in CHANGED for name in changes):
+                raise NotBatchable
+            check_start(build_scenario(parameters, self._body_mesh).setup)
+            stages.append((new_row(parameters, self._body_mesh), others))
+        return stages
 
     def batch(self, columns: list[np.ndarray], count: int) -> tuple[batch.Batch, NDArray[np.bool_]]:
         """``count`` rows with these values of what varies, and which of them the batch may check (n,)."""
         good = np.ones(count, bool)
-        rows = np.repeat(self._row, count)
+        rows = np.repeat(np.concatenate([row for row, _ in self._stages])[None], count, axis=0)
         for vary, column in zip(self._study.vary, columns, strict=True):
             parameter = vary.target.parameter
             if not parameter or is_structural(vary) or parameter in self._reference:
@@ -264,11 +288,14 @@ class Group:
             declared = parameter_named(parameter)
             _keep(good, (column > declared.lower if declared.above else column >= declared.lower))
             _keep(good, column <= declared.upper)
-            own = rows[_field_of(parameter)]
-            if vary.target.path:
-                own[:, vary.target.path[0]] = column
-            else:
-                own[:] = column[:, None] if own.ndim > column.ndim else column
+            for stage, (_, others) in enumerate(self._stages):
+                own = rows[_field_of(parameter)][:, stage]
+                if parameter in others:
+                    continue
+                if vary.target.path:
+                    own[:, vary.target.path[0]] = column
+                else:
+                    own[:] = column[:, None] if own.ndim > column.ndim else column
         commands = self._read_by_row(columns, good) if self._numbers is None else self._written(columns, good)
         return batch.Batch(rows, self._ballast, self._setup, commands), good
 
@@ -280,7 +307,10 @@ class Group:
             if isinstance(vary.form, Draw) and vary.form.shape == VERTEX:
                 value = {"vertex": vertex_number(value, self._body_mesh)}
             vary.target.put({}, script_entries(script), plain(value))
-        return timetable(expand_script(script, "script"), self._setup, self._knots)
+        found = timetable(expand_script(script, "script"), self._setup, self._knots)
+        if values and found.changes != self._changes:
+            raise NotBatchable
+        return found
 
     def _read_by_row(self, columns: list[np.ndarray], good: NDArray[np.bool_]) -> NDArray[np.void]:
         """Tables of commands (n, c), padded with some that never come."""

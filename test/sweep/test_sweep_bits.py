@@ -114,7 +114,8 @@ def test_a_floor_of_accuracy_is_in_the_table_whoever_flew_the_row() -> None:
         "accuracy": {"list": [1e-9, 1e-12]},
     }
     flown = study({"scene": "t_handle", "duration": 0.01, "samples": 1, "vary": vary})
-    by_simulation = study({**PULLED, "duration": 0.01, "samples": 1, "vary": vary})
+    moved = [{"t": 0.005, "state": {"position": [0.0, 0.0, 1.0]}}]
+    by_simulation = study({"scene": "t_handle", "script": moved, "duration": 0.01, "samples": 1, "vary": vary})
     for own, simulated in ((flown, 0), (by_simulation, 2)):
         chunk = run_chunk(own, 0, own.rows)
         assert chunk.simulated == simulated
