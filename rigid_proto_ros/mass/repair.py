@@ -14,7 +14,7 @@ from ..base.errors import MeshError
 from ..base.rotation import length, times
 from ..mesh.holes import fan, rims
 from ..mesh.nesting import component_nesting
-from ..mesh.topology import Topology, component_sums, mesh_topology, referenced_extent, surplus_copies
+from ..mesh.topology import Topology, component_sums, joined_sets, mesh_topology, referenced_extent, surplus_copies
 from ..mesh.union import counted_once, united
 from .verdict import MAX_NESTED_COMPONENTS, counted
 
@@ -182,58 +182,29 @@ def unite_components(
     return vertices, surface.triangles, surface.polygon_starts, done
 
 
-@njit(cache=True, nogil=True)
-def _parities(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, int]:
-    """Whether to turn each triangle (m,) so that neighbours agree, its patch (m,), and the number of contradictions.
+def _turns(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Whether to turn each triangle (m,) so that neighbours agree with the first one of their patch, that one (m,), and
+    whether all can; edges (e, 6) as in Topology, those of two triangles alone.
 
-    A union-find whose links carry a parity; edges (e, 6) as in Topology, those of two triangles alone.
+    Each triangle is there twice, as it is and turned; those that agree across an edge are of one set.
     """
-    parent = np.arange(count)
-    parity = np.zeros(count, np.bool_)
-    contradictions = 0
-    for e in range(edges.shape[0]):
-        if edges[e, 2] + edges[e, 3] != 2 or edges[e, 4] == edges[e, 5]:
-            continue
-        turn = edges[e, 2] != 1
-        root = np.empty(2, np.int64)
-        side = np.zeros(2, np.bool_)
-        for k in range(2):
-            i = edges[e, 4 + k]
-            while parent[i] != i:
-                side[k] ^= parity[i]
-                up = parent[i]
-                if parent[up] != up:  # halve the path
-                    parity[i] ^= parity[up]
-                    parent[i] = parent[up]
-                    side[k] ^= parity[up]
-                    i = parent[i]
-                else:
-                    i = up
-            root[k] = i
-        if root[0] == root[1]:
-            contradictions += side[0] ^ side[1] ^ turn
-        else:
-            parent[root[1]] = root[0]
-            parity[root[1]] = side[0] ^ side[1] ^ turn
-    for i in range(count):
-        flip = False
-        j = i
-        while parent[j] != j:
-            flip ^= parity[j]
-            j = parent[j]
-        # Roots keep their place and their parity False, so rewriting i alone leaves the others' paths valid.
-        parent[i] = j
-        parity[i] = flip
-    return parity, parent, contradictions
+    edges = edges[(edges[:, 2] + edges[:, 3] == 2) & (edges[:, 4] != edges[:, 5])]
+    one, other = edges[:, 4].astype(np.int64), edges[:, 5].astype(np.int64)
+    agrees = edges[:, 2] == 1
+    first = np.concatenate([one, one + count])
+    second = np.concatenate([np.where(agrees, other, other + count), np.where(agrees, other + count, other)])
+    sets = joined_sets(first, second, 2 * count).reshape(2, count)
+    patch = sets.min(axis=0)
+    return sets[0] != patch, patch, bool(np.all(sets[0] != sets[1]))
 
 
 def _orient(surface: RepairedSurface) -> list[str]:
     topology = surface.topology()
     if topology.flipped == 0:
         return []
-    turn, patch, contradictions = _parities(topology.edges, len(surface.triangles))
-    if contradictions:
-        return [f"could not orient it: {contradictions} edges contradict, as on a Moebius strip"]
+    turn, patch, possible = _turns(topology.edges, len(surface.triangles))
+    if not possible:
+        return ["could not orient it: it has only one side, as a Moebius strip"]
     turned = np.bincount(patch, weights=turn, minlength=len(turn))
     size = np.bincount(patch, minlength=len(turn))
     turn ^= (turned > 0.5 * size)[patch]  # keep the way that most of a patch has
