@@ -41,9 +41,9 @@ def word_position(text: bytes, count: int) -> int:
     return len(text) if word is None else word.start()
 
 
-def error_at(data: bytes, position: int, name: str, accepted: str) -> MeshError:
+def error_at(data: bytes, position: int, name: str, accepted: str, first_line: int = 1) -> MeshError:
     """The refusal of what stands at byte ``position``: file, line, the text there, and what is accepted."""
-    line = data.count(b"\n", 0, position) + 1
+    line = data.count(b"\n", 0, position) + first_line
     return MeshError(f"{name} line {line}", excerpt(data, position), accepted)
 
 

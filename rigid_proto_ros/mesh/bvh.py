@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.compilation import njit
 
-LEAF = 4
+LEAF = 8
 """Triangles in a leaf: fewer cost more boxes, more cost tests in vain."""
 _CELLS = 1 << 20
 """Places along each axis that the curve tells apart."""

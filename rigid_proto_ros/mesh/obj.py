@@ -9,80 +9,63 @@ materials) are skipped, and so is a byte order mark, which would hide the first 
 from __future__ import annotations
 
 import codecs
+import itertools
 import re
 
 import numpy as np
 
 from ..base.errors import MeshError
-from .ascii_floats import as_numbers, excerpt
+from .ascii_floats import as_numbers, error_at
 
-PIECE = 4_000_000
-"""Bytes of text at a time: their words take some ten times as much memory as the arrays that become of them."""
 _VERTEX = "v with three coordinates"
 _FACE = "f with nonzero integer vertex numbers, negative ones counted back from the last vertex"
+_BLANK = rb"[ \t\v\f\r]"
+_INDENTED = re.compile(rb"\n" + _BLANK + rb"+")
+_V = re.compile(rb"\nv" + _BLANK + rb"+(\S+" + _BLANK + rb"+\S+" + _BLANK + rb"+\S+)")
+_F = re.compile(rb"\nf" + _BLANK + rb"([^\n]*)")
+_EITHER = re.compile(rb"\n([vf])" + _BLANK)
 
 
-class _Surface:
-    """What has been read of the file ``name``: parts of the vertices (n, 3) and of the polygons' corners."""
+def _error(text: bytes, letter: bytes, number: int, name: str, accepted: str) -> MeshError:
+    """The refusal of a line: of those that begin with that letter, the one of that number from 0 on."""
+    lines = (match.start() + 1 for match in _EITHER.finditer(text) if match[1] == letter)
+    return error_at(text, next(itertools.islice(lines, number, None), 0), name, accepted, first_line=0)
 
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.points: list[np.ndarray] = []
-        self.corners: list[np.ndarray] = []
-        self.sizes: list[np.ndarray] = []
-        self.lines = self.vertices = self.triangles = 0
 
-    def add(self, text: bytes) -> None:
-        """Read whole lines."""
-        lines = text.split(b"\n")
-        vertex_lines: list[int] = []
-        coordinates: list[bytes] = []
-        face_lines: list[int] = []
-        corners: list[bytes] = []
-        sizes: list[int] = []
-        known: list[int] = []
-        for number, line in enumerate(lines):
-            words = line.split()
-            if not words:
-                continue
-            if words[0] == b"v":
-                if len(words) < 4:
-                    raise self.refusal(number, line, _VERTEX)
-                vertex_lines.append(number)
-                coordinates += words[1:4]
-            elif words[0] == b"f":
-                if b"#" in line:
-                    words = line.partition(b"#")[0].split()
-                if len(words) < 4:
-                    raise self.refusal(number, line, "f with three or more corners")
-                face_lines.append(number)
-                corners += words[1:]
-                sizes.append(len(words) - 1)
-                known.append(self.vertices + len(vertex_lines))
-        points, whole = as_numbers(b" ".join(coordinates), len(coordinates))
-        if not whole:
-            bad = vertex_lines[len(points) // 3]
-            raise self.refusal(bad, lines[bad], _VERTEX)
-        text = b" ".join(corners)
-        if b"/" in text:
-            text = re.sub(rb"/\S*", b"", text)  # of a corner as v/vt/vn the vertex counts
-        numbers, whole = as_numbers(text, len(corners), int)
-        before = np.repeat(np.array(known, np.int64), sizes)[: len(numbers)]
-        wrong = np.flatnonzero((numbers == 0) | (numbers < -before))
-        if not whole or len(wrong):
-            first = int(wrong[0]) if len(wrong) else len(numbers)
-            bad = face_lines[int(np.searchsorted(np.cumsum(sizes), first, side="right"))]
-            raise self.refusal(bad, lines[bad], _FACE)
-        self.points.append(points.reshape(-1, 3))
-        self.corners.append(np.where(numbers < 0, numbers + before, numbers - 1))
-        self.sizes.append(np.array(sizes, np.int64))
-        self.vertices += len(vertex_lines)
-        self.triangles += len(corners) - 2 * len(sizes)
-        self.lines += len(lines) - 1
+def _vertices(text: bytes, name: str) -> np.ndarray:
+    """Vertices (n, 3)."""
+    found = _V.findall(text)
+    count = len(re.findall(rb"\nv" + _BLANK, text))
+    points, whole = as_numbers(b"\n".join(found), 3 * count)
+    if not whole or len(found) < count:
+        rows = [match.split()[1:4] for match in re.findall(rb"\nv" + _BLANK + rb"[^\n]*", text)]
+        bad = next(k for k, row in enumerate(rows) if not as_numbers(b" ".join(row), 3)[1])
+        raise _error(text, b"v", bad, name, _VERTEX)
+    return points.reshape(-1, 3)
 
-    def refusal(self, line: int, text: bytes, accepted: str) -> MeshError:
-        """The error about a line of the present piece."""
-        return MeshError(f"{self.name} line {self.lines + line + 1}", excerpt(text.strip(), 0), accepted)
+
+def _faces(text: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Vertex numbers (c,) as they are written, and how many each face has (p,)."""
+    found = _F.findall(text)
+    sizes = np.array([len(line.split()) for line in found], np.int64)
+    if len(sizes) and sizes.min() < 3:
+        raise _error(text, b"f", int(np.argmin(sizes)), name, "f with three or more corners")
+    corners = b" ".join(found)
+    if b"/" in corners:
+        corners = re.sub(rb"/\S*", b"", corners)  # of a corner as v/vt/vn the vertex counts
+    numbers, whole = as_numbers(corners, int(sizes.sum()), int)
+    wrong = np.flatnonzero(numbers == 0)
+    if not whole or len(wrong):
+        first = int(wrong[0]) if len(wrong) else len(numbers)
+        bad = int(np.searchsorted(np.cumsum(sizes), first, side="right"))
+        raise _error(text, b"f", min(bad, len(sizes) - 1), name, _FACE)
+    return numbers, sizes
+
+
+def _known(text: bytes) -> np.ndarray:
+    """How many vertices stand before each face (p,)."""
+    letters = np.frombuffer(b"".join(_EITHER.findall(text)), np.uint8)
+    return np.cumsum(letters == ord("v"))[letters == ord("f")]
 
 
 def read_obj(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -97,18 +80,23 @@ def read_obj(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
         data = data.replace(b"\\\r\n", b"   ").replace(b"\\\n", b"  ")
     if b"\n" not in data and b"\r" in data:
         data = data.replace(b"\r", b"\n")
-    surface = _Surface(name)
-    start = 0
-    while start < len(data):
-        end = data.find(b"\n", start + PIECE) + 1 or len(data)
-        surface.add(data[start:end])
-        start = end
-        if surface.triangles > max_triangles:
-            received = f"{surface.triangles} triangles or more are more than {max_triangles}"
-            raise MeshError(name, f"{received}; --max-triangles raises the limit")
-    vertices = np.concatenate(surface.points or [np.empty((0, 3))])
-    corners = np.concatenate(surface.corners or [np.empty(0, np.int64)])
-    starts = np.cumsum(np.concatenate([np.zeros(1, np.int64), *surface.sizes]))
+    text = b"\n" + data
+    if b"#" in text:
+        text = re.sub(rb"#[^\n]*", b"", text)
+    text = _INDENTED.sub(b"\n", text)
+    vertices = _vertices(text, name)
+    numbers, sizes = _faces(text, name)
+    if len(numbers) - 2 * len(sizes) > max_triangles:
+        received = f"{len(numbers) - 2 * len(sizes)} triangles are more than {max_triangles}"
+        raise MeshError(name, f"{received}; --max-triangles raises the limit")
+    starts = np.cumsum(np.concatenate([np.zeros(1, np.int64), sizes]))
+    corners = numbers - 1
+    if len(numbers) and numbers.min() < 0:
+        known = np.repeat(_known(text), sizes)
+        corners = np.where(numbers < 0, numbers + known, corners)
+        if corners.min() < 0:
+            bad = int(np.searchsorted(starts, np.flatnonzero(corners < 0)[0], side="right")) - 1
+            raise _error(text, b"f", bad, name, _FACE)
     beyond = np.flatnonzero(corners >= len(vertices))
     if len(beyond):
         face = int(np.searchsorted(starts, beyond[0], side="right"))
