@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..base.errors import InputError
-from ..simulation.mailbox import Block, Mailbox, Note
+from ..session.mailbox import Block, Mailbox, Note
 from ..simulation.observer import Reset
 from .rerun_internals import forget_closed_recordings
 from .streams import (

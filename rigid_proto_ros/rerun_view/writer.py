@@ -14,7 +14,7 @@ import rerun as rr
 from ..picture import style
 from ..picture.picture import Picture, skewed
 from ..picture.plots import plot_range, with_two_ticks
-from ..simulation.mailbox import Block, Note
+from ..session.mailbox import Block, Note
 from ..simulation.observer import (
     AccuracyFloor,
     BodyChanged,

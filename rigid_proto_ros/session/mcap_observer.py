@@ -23,7 +23,6 @@ from ..scene import cdr
 from ..scene.command_codec import frame_names
 from ..scene.parameters import Parameters
 from ..scene.scene_file import read_scene_text
-from ..simulation.mailbox import Block, Mailbox, Note
 from ..simulation.observer import (
     AccuracyFloor,
     Applied,
@@ -37,6 +36,7 @@ from ..simulation.observer import (
     Started,
 )
 from . import messages as session_messages
+from .mailbox import Block, Mailbox, Note
 from .recorded_session import file_sha256, scene_sha256
 from .runs import MADE_WITH, floor_name
 

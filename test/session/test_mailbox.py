@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_proto_ros.simulation import mailbox
-from rigid_proto_ros.simulation.mailbox import BLOCK_ROWS, BLOCKS_WAITING_MAX, Mailbox
+from rigid_proto_ros.session import mailbox
+from rigid_proto_ros.session.mailbox import BLOCK_ROWS, BLOCKS_WAITING_MAX, Mailbox
 
 
 def test_rows_and_notes_come_out_in_the_order_in_which_they_went_in():
