@@ -7,22 +7,14 @@ Products and the matrix form follow Diebel, "Representing Attitude" (2006), sect
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from .compilation import njit
 from .elementary import sine_cosine
-
-Numbers = Sequence[float] | np.ndarray
-"""Components of a vector or a quaternion, as they may be given."""
-Vector = tuple[float, float, float]
-
-
-def vector(numbers: Numbers) -> Vector:
-    """Three given components."""
-    x, y, z = numbers
-    return float(x), float(y), float(z)
+from .vectors import Numbers
+from .vectors import Vector as Vector
+from .vectors import vector as vector
 
 
 def cross(a: Numbers, b: Numbers) -> np.ndarray:

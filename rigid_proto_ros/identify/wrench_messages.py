@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.rotation import vector
+from ..base.vectors import vector
 from ..motion.loads import Load
 from .measurements import LoadHistory, SampledChanges, load_history
 

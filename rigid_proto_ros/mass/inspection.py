@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import InputError
+from . import INERTIA_MODELS
 from .exact_moments import exact_solid_moments, relative_errors
 from .from_mesh import MeshBody
 from .model_difference import ModelDifference, model_difference
 from .moments import referenced_vertices
-from .properties import INERTIA_MODELS, MassProperties, scale_vector
+from .properties import MassProperties, scale_vector
 from .tensor import degenerate_pairs, equimomental_shapes, principal_axes
 from .verdict import WARNING, Finding, stated_unit, unit_suspicion
 

@@ -11,17 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import InputError, MeshError, TensorError
+from . import INERTIA_MODELS, MODEL_COMS
 from .closed_form import given_mass, is_plainly_good, spread_mass
 from .moments import Moments, box_moments, point_moments, shell_moments, solid_moments
 from .tensor import check_tensor, tensor_from_six
 
-INERTIA_MODELS = ("solid", "shell", "points", "bounding_box", "explicit")
-"""How mass is spread: exact polyhedron, uniform surface, equal point masses at the referenced vertices, the bounding
-box's cuboid, or given numbers."""
-MODEL_COMS = ("model", "solid")
-"""Where a model's centre of mass is taken from: the model's own, or the solid's, so that two tensors can
-be compared alone.
-"""
 SCALE_LIMITS = (1e-9, 1e9)
 Surface = tuple[np.ndarray, np.ndarray]
 """Vertices (n, 3) and triangles (m, 3)."""

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import Numbers, quaternion_of_axes
+from ..base.rotation import quaternion_of_axes
+from ..base.vectors import Numbers
 from ..mass.closed_form import Principal
 from ..mass.tensor import principal_axes_kernel
 

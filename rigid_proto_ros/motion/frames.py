@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from ..base.errors import CommandRefused, did_you_mean
-from ..base.rotation import Vector, vector
+from ..base.vectors import Vector, vector
 
 AXES = ("world", "body", "normal")
 FIXED_POINTS = ("com", "origin")

@@ -22,7 +22,8 @@ from numba import boolean, float64
 from ..base.compilation import njit
 from ..base.errors import CommandRefused
 from ..base.function_pointers import entry_of
-from ..base.rotation import Numbers, Vector, matrix_elements, transposed_times, vector
+from ..base.rotation import matrix_elements, transposed_times
+from ..base.vectors import Numbers, Vector, vector
 from . import body as of_body
 from .body import Body
 from .frames import Frame, contact_point, point_text

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import Numbers, matrix_elements, matrix_from_quaternion, rotate, times, to_unit
+from ..base.rotation import matrix_elements, matrix_from_quaternion, rotate, times, to_unit
+from ..base.vectors import Numbers
 
 
 @dataclass(slots=True)

@@ -19,7 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import Numbers, Vector, matrix_elements, vector
+from ..base.rotation import matrix_elements
+from ..base.vectors import Numbers, Vector, vector
 from .body import MASS, Body, angular_acceleration
 from .state import State
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.elementary import inverse_tangent_of
-from ..base.rotation import Numbers, length
+from ..base.rotation import length
+from ..base.vectors import Numbers
 
 
 @dataclass(frozen=True)

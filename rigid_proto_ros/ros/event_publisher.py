@@ -13,7 +13,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from ..base.rotation import Vector
+from ..base.vectors import Vector
 from ..live.pacing import Stamps
 from ..scene import cdr
 from ..session.messages import applied_bytes

@@ -9,7 +9,7 @@ from typing import Any
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 
-from ..base.rotation import Vector
+from ..base.vectors import Vector
 from ..simulation.observer import BodySnapshot
 from . import qos
 

@@ -24,9 +24,8 @@ from std_srvs.srv import SetBool, Trigger
 from ..base.errors import InputError
 from ..scene.command_codec import outgoing, topic_of
 from ..scene.parameters import PARAMETERS
-from ..scene.scenario import nanoseconds
 from ..scene.script import with_contacts
-from ..simulation.commands import Command, TieString
+from ..simulation.commands import Command, TieString, nanoseconds
 from . import qos
 
 MAX_UNCONFIRMED = 500

@@ -18,7 +18,7 @@ from itertools import groupby
 from typing import Any
 
 from ..base.errors import CommandRefused, InputError
-from ..base.rotation import Vector, vector
+from ..base.vectors import Vector, vector
 from ..motion.frames import parse_frame
 from ..simulation.commands import (
     Change,

@@ -23,6 +23,7 @@ from ..motion.state import fill_initial_row
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
 from ..simulation.checks import check_start
+from ..simulation.commands import nanoseconds
 from ..simulation.setup import Setup
 from ..simulation.thrusters import make_thruster
 from .declaration import READ_ONLY, Value
@@ -245,11 +246,6 @@ def check_inertia(scenario: Scenario, content: Mapping) -> Scenario:
         return scenario.with_inertia(content["mass"], content["com"], content["tensor"], content["relative"])
     except InputError as error:
         raise CommandRefused("tensor", error.field, error.received, error.accepted) from None
-
-
-def nanoseconds(seconds: float) -> int:
-    """Seconds to whole nanoseconds, to the nearest."""
-    return round(seconds * 1e9)
 
 
 def publication_ns(k: int, publish_rate: float) -> int:

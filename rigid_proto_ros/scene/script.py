@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..base.errors import CommandRefused, InputError, did_you_mean
-from ..base.rotation import Vector
+from ..base.vectors import Vector
 from ..motion.frames import CONTACT_NAME, FIXED_POINTS, RESERVED_WORDS, SLOT_NAME, Frame
 from ..simulation.commands import (
     STATE_VALUES,
@@ -27,10 +27,10 @@ from ..simulation.commands import (
     ThrusterCommand,
     TieString,
     WrenchCommand,
+    nanoseconds,
 )
 from .command_codec import MAX_SCHEDULED, MESH_FRAME
 from .parameters import ZERO
-from .scenario import nanoseconds
 from .yaml_text import load_json, load_plain_yaml, read_text
 
 Stamp = dict[str, int]

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.rotation import cross, rotate, rotate_inverse, vector
+from ..base.rotation import cross, rotate, rotate_inverse
+from ..base.vectors import vector
 from ..motion.body import Body
 from ..motion.loads import Load
 from ..scene import cdr

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ..base.errors import InputError
-from ..base.rotation import vector
+from ..base.vectors import vector
 from ..motion.body import Body
 from ..motion.frames import Frame
 from ..motion.loads import Load

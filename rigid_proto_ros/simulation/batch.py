@@ -20,8 +20,9 @@ from ..base.borrowed_views import borrowed, copy_numbers
 from ..base.compilation import njit
 from ..base.exact_arithmetic import exact_quotient
 from ..base.records import record_type
-from ..base.rotation import Vector, matrix_elements
+from ..base.rotation import matrix_elements
 from ..base.simd import aligned
+from ..base.vectors import Vector
 from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel

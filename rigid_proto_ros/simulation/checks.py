@@ -7,7 +7,8 @@ import math
 from collections.abc import Iterable
 
 from ..base.errors import CommandRefused
-from ..base.rotation import Vector, transposed_times
+from ..base.rotation import transposed_times
+from ..base.vectors import Vector
 from ..motion.integrators import check_supported
 from ..motion.integrators.auto import FASTEST
 from ..motion.integrators.integrator import (

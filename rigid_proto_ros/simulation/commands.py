@@ -10,17 +10,23 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.errors import CommandRefused
-from ..base.rotation import Vector
+from ..base.vectors import Vector
 from ..motion.frames import Frame
-from ..motion.loads import Load, load_of_bytes
-from .flight import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE, UNNAMED_SLOT
-from .setup import Setup
+from .command_kinds import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE, UNNAMED_SLOT
+
+if TYPE_CHECKING:
+    from .setup import Setup
 
 FARTHEST = 1e100
 """Metres: a place beyond it has no squared distance in a double."""
+
+
+def nanoseconds(seconds: float) -> int:
+    """Seconds to whole nanoseconds, to the nearest."""
+    return round(seconds * 1e9)
 
 
 class Rank(IntEnum):
@@ -83,7 +89,7 @@ class WrenchCommand(Stamped):
     def duration_ns(self) -> int:
         """Of a command that says how long it lasts, else −1."""
         seconds = self.frame.duration_s
-        return -1 if seconds is None else round(seconds * 1e9)
+        return -1 if seconds is None else nanoseconds(seconds)
 
     @property
     def flight_kind(self) -> int:
@@ -290,11 +296,6 @@ class Pending:
     duration_ns: int = -1
     slot: int = NO_SLOT
     row: bytes = b""
-
-    @property
-    def load(self) -> Load | None:
-        """The load, where it is resolved."""
-        return load_of_bytes(self.row) if self.row else None
 
     def set_load(self, command: WrenchCommand, row: bytes, setup: Setup) -> None:
         """The load of the command, a wrench or poke, was resolved under this setup."""

@@ -26,6 +26,7 @@ from ..motion.integrators.stepping import commit, is_provided, reach
 from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
 from ..motion.problem import PROBLEM, STRING, begin_problem, begin_string
 from ..motion.variables import HAND_WORK, HEAT, STORED, to_good_row, to_variables
+from .command_kinds import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE
 
 FLIGHT = record_type(
     [
@@ -103,10 +104,6 @@ EVENT = record_type(
     ]
 )
 """Something became of a load."""
-
-NO_SLOT, UNNAMED_SLOT = 0, 1
-HELD_WRENCH, PULSE, IMPULSE, CLEAR = range(4)
-"""Kinds of commands."""
 
 APPLIED, BEGAN, ENDED, DONE, TIMED_OUT = range(5)
 """What became of it. APPLIED: a command acts, before what it ends and begins. DONE: after that. TIMED_OUT: a held

@@ -9,7 +9,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..base.rotation import Numbers, Vector, cross, dot, length, times, transposed_times
+from ..base.rotation import cross, dot, length, times, transposed_times
+from ..base.vectors import Numbers, Vector
 from ..motion.loads import LoadSum
 from ..motion.state import State
 from ..motion.string import StringState

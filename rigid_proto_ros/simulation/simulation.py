@@ -263,7 +263,7 @@ class Simulation(Observables):
             if what == fl.DONE:
                 self._log_command(command)
                 continue
-            load = pending.load
+            load = load_of_bytes(pending.row) if pending.row else None
             if load is None or not isinstance(command, WrenchCommand):
                 continue
             if what == fl.APPLIED:

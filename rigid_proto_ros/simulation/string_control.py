@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import CommandRefused
-from ..base.rotation import Vector, transposed_times, vector
+from ..base.rotation import transposed_times
+from ..base.vectors import Vector, vector
 from ..motion.body import Body
 from ..motion.loads import MAX_ACCELERATION
 from ..motion.state import State

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ..base.errors import CommandRefused, InputError
-from ..base.rotation import Vector
+from ..base.vectors import Vector
 from ..motion.body import Body
 from ..motion.loads import Load
 from .flight import NEVER

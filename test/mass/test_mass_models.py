@@ -6,8 +6,9 @@ import pytest
 from mass_solids import box, circle, moved, prism, sphere
 
 from rigid_proto_ros.base.errors import InputError, MeshError, TensorError
+from rigid_proto_ros.mass import INERTIA_MODELS
 from rigid_proto_ros.mass.moments import Moments, point_moments, shell_moments, solid_moments
-from rigid_proto_ros.mass.properties import INERTIA_MODELS, MeshMoments, explicit_mass_properties
+from rigid_proto_ros.mass.properties import MeshMoments, explicit_mass_properties
 
 COMPUTED = ("solid", "shell", "points", "bounding_box")
 SCALES = ((2.0, 2.0, 2.0), (0.5, 3.0, 1.25), (-1.0, 1.0, 1.0), (-2.0, 0.3, -1.0), (1e-9, 1e-9, 1e-9), (-1e9, 1e9, 1e9))

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mass import INERTIA_MODELS
 from rigid_proto_ros.mass.model_difference import model_difference
-from rigid_proto_ros.mass.properties import INERTIA_MODELS, MassProperties, MeshMoments
+from rigid_proto_ros.mass.properties import MassProperties, MeshMoments
 from rigid_proto_ros.scene.offline import read_scene
 from rigid_proto_ros.workbench.body_tab import comparison
 

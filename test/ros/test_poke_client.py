@@ -3,6 +3,7 @@
 
 import signal
 import subprocess
+import sys
 import threading
 import time
 
@@ -12,6 +13,7 @@ from command_rig import stamp_ns
 from conftest import held_domain
 from ros_process import READY_S, RosProcess, catches, command, from_source, run, running_node
 
+from rigid_proto_ros.base.bundled import example_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.rotation import rotate
 from rigid_proto_ros.ros.poke_client import main as poke_client
@@ -302,3 +304,26 @@ def test_a_client_without_a_time_limit_waits_for_a_node_that_starts_later(ros_en
         with running_node(environment=environment, log=tmp_path / "node"):
             assert client.process.wait(READY_S) == 0, client.errors
         assert "sent 1 poke; 0 late, 0 refused" in client.output
+
+
+LOADED = """
+import sys
+from rigid_proto_ros.cli.executables import poke_client
+status = poke_client()
+print(status, [module for module in ("numba", "scipy") if module in sys.modules])
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [
+        ([example_path("flip_and_poke"), "--dry-run"], 0),
+        ([example_path("ballast_in_flight"), "--dry-run"], 0),
+        # Everything is there when it has looked for a node in vain.
+        ([example_path("pull_on_string"), "--node", "/nobody", "--timeout", "0.1"], 2),
+    ],
+)
+def test_a_client_starts_without_numba_and_scipy(arguments, status, ros_environment):
+    command = [sys.executable, "-c", LOADED, *map(str, arguments)]
+    done = subprocess.run(command, env=from_source(ros_environment), capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines()[-1] == f"{status} []", done.stderr

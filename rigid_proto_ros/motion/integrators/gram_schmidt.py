@@ -14,7 +14,8 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from ...base.rotation import Vector, matrix_elements
+from ...base.rotation import matrix_elements
+from ...base.vectors import Vector
 from .equations import accelerations
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator
 from .runge_kutta import repeated
