@@ -5,7 +5,7 @@ loads.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -142,41 +142,39 @@ def _messages(message_type: str, message: Any, logged_ns: int) -> list[_Message]
     """What a message of one of KINDS holds: one, but any number in a TFMessage."""
     if message_type == "tf2_msgs/msg/TFMessage":
         return [one for part in message.transforms for one in _messages(TRANSFORMS[0], part, logged_ns)]
-    header, child = message.header, getattr(message, "child_frame_id", "")
-    if message_type == "nav_msgs/msg/Odometry":
-        numbers = (*_pose(message.pose.pose), *_pair(message.twist.twist.linear, message.twist.twist.angular))
-    elif message_type == TRANSFORMS[0]:
-        numbers = (
-            *_xyz(message.transform.translation),
-            *_xyz(message.transform.rotation),
-            message.transform.rotation.w,
-        )
-    elif message_type == "geometry_msgs/msg/TwistStamped":
-        numbers = _pair(message.twist.linear, message.twist.angular)
-    elif message_type == "geometry_msgs/msg/WrenchStamped":
-        numbers = _pair(message.wrench.force, message.wrench.torque)
-    elif message_type == "sensor_msgs/msg/Imu":
-        # A covariance that begins with -1 says that its quantity isn't measured (sensor_msgs/msg/Imu).
-        none = (np.nan, np.nan, np.nan)
-        rate = none if message.angular_velocity_covariance[0] == -1.0 else _xyz(message.angular_velocity)
-        felt = none if message.linear_acceleration_covariance[0] == -1.0 else _xyz(message.linear_acceleration)
-        numbers = (*rate, *felt)
-    else:
-        numbers = _pose(message.pose.pose if hasattr(message.pose, "covariance") else message.pose)
+    header = message.header
     stamp_ns = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
-    return [_Message(stamp_ns or logged_ns, header.frame_id, child, numbers)]
-
-
-def _xyz(v: Any) -> tuple[float, float, float]:
-    return v.x, v.y, v.z
+    child = getattr(message, "child_frame_id", "")
+    return [_Message(stamp_ns or logged_ns, header.frame_id, child, _NUMBERS[message_type](message))]
 
 
 def _pair(one: Any, other: Any) -> tuple[float, ...]:
-    return (*_xyz(one), *_xyz(other))
+    """Of two vectors, or of a position and an orientation xyzw."""
+    numbers = (one.x, one.y, one.z, other.x, other.y, other.z)
+    return (*numbers, other.w) if hasattr(other, "w") else numbers
 
 
 def _pose(pose: Any) -> tuple[float, ...]:
-    return (*_pair(pose.position, pose.orientation), pose.orientation.w)
+    return _pair(pose.position, pose.orientation)
+
+
+def _imu(m: Any) -> tuple[float, ...]:
+    """A covariance that begins with -1 says that its quantity isn't measured (sensor_msgs/msg/Imu)."""
+    numbers = _pair(m.angular_velocity, m.linear_acceleration)
+    has_rate, has_felt = m.angular_velocity_covariance[0] != -1.0, m.linear_acceleration_covariance[0] != -1.0
+    none = (np.nan, np.nan, np.nan)
+    return (numbers[:3] if has_rate else none) + (numbers[3:] if has_felt else none)
+
+
+_NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
+    "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
+    "geometry_msgs/msg/TransformStamped": lambda m: _pair(m.transform.translation, m.transform.rotation),
+    "geometry_msgs/msg/TwistStamped": lambda m: _pair(m.twist.linear, m.twist.angular),
+    "geometry_msgs/msg/WrenchStamped": lambda m: _pair(m.wrench.force, m.wrench.torque),
+    "nav_msgs/msg/Odometry": lambda m: (*_pose(m.pose.pose), *_pair(m.twist.twist.linear, m.twist.twist.angular)),
+    "sensor_msgs/msg/Imu": _imu,
+}
 
 
 def _topic(messages: list[_Message], name: str, message_type: str, frame: str) -> _Topic:

@@ -12,49 +12,10 @@ import numpy as np
 from mcap_ros2.writer import Writer as McapWriter
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 
-TIME = "builtin_interfaces/Time stamp\nstring frame_id\n"
-SEPARATOR = "=" * 80 + "\n"
-PARTS = {
-    "std_msgs/Header": TIME,
-    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
-    "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
-    "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z\n",
-    "geometry_msgs/Quaternion": "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
-    "geometry_msgs/Pose": "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
-    "geometry_msgs/Twist": "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n",
-    "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n",
-    "geometry_msgs/Transform": "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n",
-    "geometry_msgs/TransformStamped": (
-        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"
-    ),
-    "geometry_msgs/PoseWithCovariance": "geometry_msgs/Pose pose\nfloat64[36] covariance\n",
-    "geometry_msgs/TwistWithCovariance": "geometry_msgs/Twist twist\nfloat64[36] covariance\n",
-}
-TYPES = {
-    "geometry_msgs/msg/PoseStamped": "std_msgs/Header header\ngeometry_msgs/Pose pose\n",
-    "geometry_msgs/msg/TwistStamped": "std_msgs/Header header\ngeometry_msgs/Twist twist\n",
-    "geometry_msgs/msg/TransformStamped": (
-        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"
-    ),
-    "geometry_msgs/msg/WrenchStamped": "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n",
-    "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
-    "nav_msgs/msg/Odometry": (
-        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\n"
-        "geometry_msgs/TwistWithCovariance twist\n"
-    ),
-    "sensor_msgs/msg/Imu": (
-        "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
-        "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
-        "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n"
-    ),
-}
+STORE = get_typestore(Stores.ROS2_JAZZY)
 EPOCH_NS = 1_760_000_000_000_000_000
-
-
-def definition(message_type: str) -> str:
-    """With every part that it may need behind it."""
-    return TYPES[message_type] + "".join(f"{SEPARATOR}MSG: {name}\n{text}" for name, text in PARTS.items())
 
 
 def xyz(vector: Any) -> dict:
@@ -113,7 +74,7 @@ def write(path: Path, topics: dict[str, tuple[str, list[tuple[int, dict]]]]) -> 
     with open(path, "wb") as stream:
         writer = McapWriter(stream)
         for topic, (message_type, messages) in topics.items():
-            schema = writer.register_msgdef(message_type, definition(message_type))
+            schema = writer.register_msgdef(message_type, STORE.generate_msgdef(message_type, ros_version=2)[0])
             for number, (time_ns, message) in enumerate(messages):
                 stamp = EPOCH_NS + int(time_ns)
                 writer.write_message(topic, schema, message, stamp, stamp, number)
