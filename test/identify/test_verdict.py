@@ -91,6 +91,13 @@ def test_without_a_clue_of_gravity_a_throw_says_what_it_assumed() -> None:
     assert any(line.startswith("gravity") for line in found.assumed)
 
 
+def test_a_flight_without_poses_is_refused() -> None:
+    truth = mf.values_of(0.5, (0.01, -0.02, 0.03), INERTIA)
+    flight = mf.with_imu(truth, mf.tumbling(), np.random.default_rng(1), 1.0)
+    with pytest.raises(InputError, match="has no poses"):
+        identify([replace(flight, series=flight.series[2:])])
+
+
 def _with(flight, kinds, convert):
     series = [replace(one, values=convert(one.values)) if one.kind in kinds else one for one in flight.series]
     return replace(flight, series=tuple(series))
