@@ -147,9 +147,11 @@ def readers() -> str:
         rows.append((f"`{ending}`", name, *cells))
     row = measured[0]
     versions = {row["tool"]: row["version"] for row in measured}
-    sentence = f"Measured {row['date'][:10]} on one {row['cpu']}, in one process, shortest of seven; {int(float(row['triangles'])):,}"
+    sentence = f"Measured {row['date'][:10]} on one {row['cpu']}, in one process"
+    if row["what"] == "time":
+        sentence += f", shortest of seven; {int(float(row['triangles'])):,} triangles where a time stands"
     head = ("format", "file", "rigid_proto", f"trimesh {versions['trimesh']}")
-    return f"{sentence} triangles where a time stands.\n\n{_table(head, rows)}"
+    return f"{sentence}.\n\n{_table(head, rows)}"
 
 
 def _error(text: str) -> str:
