@@ -270,7 +270,7 @@ def _submit(run: OfflineRun, topic: str, message) -> None:
     simulation, frame_id = run.simulation, message.header.frame_id
     if topic == "string/target":
         point = message.point
-        simulation.submit(string_target(0, frame_id, (point.x, point.y, point.z)))
+        simulation.submit(string_target(frame_id, (point.x, point.y, point.z)))
         return
     frame = parse_frame(frame_id)
     force, torque = ((v.x, v.y, v.z) for v in (message.wrench.force, message.wrench.torque))

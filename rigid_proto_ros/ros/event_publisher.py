@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""What happened to the body, as messages: inertia and scene (latched), applied commands, the event log."""
+"""What happened to the body, as messages: inertia, scene and the frames fixed to it (latched), applied commands and the
+event log.
+"""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Mapping
+from typing import Any
 
-from geometry_msgs.msg import InertiaStamped, WrenchStamped
+from geometry_msgs.msg import InertiaStamped, TransformStamped, WrenchStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
@@ -17,9 +20,8 @@ from ..base.vectors import Vector
 from ..live.pacing import Stamps
 from ..scene import cdr
 from ..session.messages import applied_bytes
-from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Refused, SceneChanged
+from ..simulation.observer import Applied, BodyChanged, BodySnapshot, Event, Logged, Observer, Refused, SceneChanged
 from . import qos
-from .frames_on_body import FramesOnBody
 
 WARNING_S = 1.0
 """Between two warnings of one reason, wall time."""
@@ -103,3 +105,35 @@ class EventPublisher(Observer):
         if now >= self._warned.get(reason, -math.inf) + WARNING_S:
             self._warned[reason] = now
             self._logger.warning(f"refused: {message}")
+
+
+class FramesOnBody:
+    """contacts: in mesh coordinates, by name."""
+
+    def __init__(self, node: Node, body_frame: str, contacts: Mapping[str, Vector]) -> None:
+        self._body_frame = body_frame
+        self._contacts = contacts
+        self._publisher: Any = None
+        try:
+            from tf2_msgs.msg import TFMessage
+        except ImportError:
+            return
+        self._message_type = TFMessage
+        self._publisher = node.create_publisher(TFMessage, "/tf_static", qos.own(qos.LATCHED))
+
+    def publish(self, stamp: tuple[int, int], body: BodySnapshot) -> None:
+        """Mesh and contacts lie like this about the COM from now on; stamp: seconds and nanoseconds."""
+        if self._publisher is None:
+            return
+        origins = {"mesh": (-body.center_of_mass).tolist()}
+        for name, point in self._contacts.items():
+            origins[name] = (body.scale * point - body.center_of_mass).tolist()
+        transforms = []
+        for name, origin in origins.items():
+            transform = TransformStamped()
+            transform.header.stamp.sec, transform.header.stamp.nanosec = stamp
+            transform.header.frame_id, transform.child_frame_id = self._body_frame, f"{self._body_frame}/{name}"
+            translation = transform.transform.translation
+            translation.x, translation.y, translation.z = (x + 0.0 for x in origin)
+            transforms.append(transform)
+        self._publisher.publish(self._message_type(transforms=transforms))

@@ -25,12 +25,10 @@ from .command_queue import ManualCallbackGroup
 from .command_subscriber import CommandSubscriber
 from .diagnostics import Diagnostics
 from .event_publisher import EventPublisher
-from .live_parameters import LiveParameters
-from .parameter_server import declare_parameters
-from .services import Services
+from .parameters import LiveParameters, declare_parameters
+from .services import Services, StepService
 from .simulation_interfaces import offer_simulation_interfaces
 from .state_publisher import StatePublisher
-from .step_service import StepService
 
 
 class RigidBodyNode(Node):

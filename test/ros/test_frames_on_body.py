@@ -18,7 +18,7 @@ from rigid_proto_ros.simulation.simulation import Simulation
 
 
 def test_mesh_and_contacts_go_out_at_the_body(monkeypatch) -> None:
-    from rigid_proto_ros.ros.frames_on_body import FramesOnBody
+    from rigid_proto_ros.ros.event_publisher import FramesOnBody
 
     messages = SimpleNamespace(TFMessage=lambda transforms: SimpleNamespace(transforms=transforms))
     monkeypatch.setitem(sys.modules, "tf2_msgs", SimpleNamespace(msg=messages))

@@ -69,8 +69,7 @@ def test_an_outside_dds_client_sees_the_offline_motion_bit_for_bit(ros_environme
     for topic, ns, frame, *values in commands:
         if topic.startswith("string"):
             read_string = {"string/attach": string_attach, "string/target": string_target}[topic]
-            names = ("world", "rigid_body") if topic == "string/attach" else ("world",)
-            offline.simulation.submit(read_string(ns, frame, values[0], *names), ns)
+            offline.simulation.submit(read_string(frame, values[0], ("world", "rigid_body"), stamp_ns=ns), ns)
             continue
         force, torque = values
         read = parse_frame(frame)

@@ -282,7 +282,7 @@ def test_reset_ties_the_string_as_its_parameters_say():
 )
 def test_odd_string_messages_are_refused_with_their_reason(read, frame, point, reason):
     with pytest.raises(CommandRefused) as refused:
-        read(0, frame, point)
+        read(frame, point)
     assert refused.value.reason == reason
 
 

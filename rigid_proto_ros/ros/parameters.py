@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""The declared parameters on a ROS node: descriptors, and values converted before rclpy sees them.
+
+Changes in flight are checked together and handed to the physics thread; what commands changed, the ROS parameters
+follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, ParameterType, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+
+from ..base.errors import InputError
+from ..live.live_simulation import LiveSimulation
+from ..scene.declaration import LIVE, READ_ONLY, Parameter
+from ..scene.parameters import PARAMETERS, is_ros_parameter, parameter_named, with_mass_of_density
+from .state_publisher import StatePublisher
+
+_TYPES = {
+    "double": ParameterType.PARAMETER_DOUBLE,
+    "doubles": ParameterType.PARAMETER_DOUBLE_ARRAY,
+    "integer": ParameterType.PARAMETER_INTEGER,
+    "bool": ParameterType.PARAMETER_BOOL,
+    "string": ParameterType.PARAMETER_STRING,
+}
+_ROS_TYPES = {name: RosParameter.Type(value) for name, value in _TYPES.items()}
+_SEVERAL_TYPES = "bool or string"
+
+
+def descriptor(parameter: Parameter) -> ParameterDescriptor:
+    """The ROS descriptor of a declared parameter."""
+    when = {READ_ONLY: "Set at start only."}.get(parameter.changes, f"Changes take effect {parameter.changes}.")
+    if parameter.changes == LIVE:
+        when = "Can be changed while the simulation runs."
+    result = ParameterDescriptor(
+        name=parameter.name,
+        type=_TYPES.get(parameter.type, ParameterType.PARAMETER_NOT_SET),
+        dynamic_typing=parameter.type == _SEVERAL_TYPES,
+        description=f"{parameter.description} {when}",
+        additional_constraints=parameter.accepted,
+        read_only=parameter.changes == READ_ONLY,
+    )
+    bounded = abs(parameter.lower) < float("inf") and abs(parameter.upper) < float("inf")
+    if parameter.type == "double" and bounded:
+        result.floating_point_range = [FloatingPointRange(from_value=parameter.lower, to_value=parameter.upper)]
+    if parameter.type == "integer" and bounded:
+        result.integer_range = [IntegerRange(from_value=int(parameter.lower), to_value=int(parameter.upper), step=1)]
+    return result
+
+
+def declare_parameters(node: Node, given: Mapping[str, object]) -> dict[str, Any]:
+    """Declare all parameters on the node, those ``given`` at start with their values, and return them all, converted.
+
+    What rcl has read from the same files and arguments is ignored: rclpy would refuse an integer where a double is
+    declared. Raises InputError.
+    """
+    values = {}
+    for name in dict.fromkeys([*PARAMETERS, *given]):
+        parameter = parameter_named(name)
+        values[name] = parameter.convert(given[name]) if name in given else parameter.default
+        node.declare_parameter(name, values[name], descriptor(parameter), ignore_override=True)
+    return values
+
+
+def ros_parameter(parameter: Parameter, value: object) -> RosParameter:
+    """A converted value as rclpy's parameter."""
+    own = "bool" if isinstance(value, bool) else "string"
+    return RosParameter(parameter.name, _ROS_TYPES[own if parameter.type == _SEVERAL_TYPES else parameter.type], value)
+
+
+def converted(changes: list[RosParameter]) -> list[RosParameter]:
+    """Parameters as a client sent them, each in its declared type; raises InputError."""
+    result = []
+    for change in changes:
+        if is_ros_parameter(change.name):
+            if change.name == "use_sim_time" and not isinstance(change.value, bool):
+                raise InputError(change.name, change.value, "true or false")
+            result.append(change)
+            continue
+        parameter = parameter_named(change.name)
+        result.append(ros_parameter(parameter, parameter.convert(change.value)))
+    return result
+
+
+def is_read_only(name: str) -> bool:
+    """Whether a parameter counts at start only, ours or one that every rclpy node has."""
+    return is_ros_parameter(name) or parameter_named(name).changes == READ_ONLY
+
+
+Store = Callable[[list[RosParameter]], SetParametersResult]
+"""rclpy's own way to set parameters atomically."""
+
+
+class LiveParameters:
+    """The parameters of a node. All but ``changed`` runs on the executor's thread."""
+
+    def __init__(self, node: Node, store: Store, live: LiveSimulation, states: StatePublisher) -> None:
+        self._node = node
+        self._store_in_ros = store
+        self._live = live
+        self._states = states
+        self._behind = node.create_guard_condition(self._follow)
+
+    def changed(self) -> None:
+        """From any thread: a command has changed what parameters say."""
+        self._behind.trigger()
+
+    def set_together(self, parameters: list[RosParameter]) -> SetParametersResult:
+        """Convert, check together, and hand over to the physics thread; a refusal leaves all as it was."""
+        try:
+            parameters = converted(parameters)
+        except InputError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        named = {p.name: p for p in parameters}
+        for name in with_mass_of_density(named).keys() - named.keys():
+            named |= {p.name: p for p in _as_ros({name: 0.0})}
+        # What is so already is no change: a dump of this very node can be loaded.
+        changed = [p for p in named.values() if not self._is_in_force(p)]
+        fixed = [p.name for p in changed if is_read_only(p.name)]
+        if fixed:
+            return SetParametersResult(successful=False, reason=f"{', '.join(fixed)}: can be set at start only")
+        if not changed:
+            return SetParametersResult(successful=True)
+        changes = {p.name: p.value for p in changed}
+        try:
+            self._live.set_parameters(changes)
+        except InputError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        self._states.configure(self._live.scenario.parameters)
+        return self._store(changed, changes)
+
+    def _follow(self) -> None:
+        """Set the ROS parameters to what scheduled commands and inertia messages have changed, and to no recording
+        where one has stopped.
+        """
+        self._live.give_up_failed_recording()
+        now = self._live.scenario.parameters
+        behind = {
+            name: value
+            for name, value in now.named().items()
+            if not is_read_only(name) and not self._is_in_force(_as_ros({name: value})[0])
+        }
+        if behind:
+            self._store(_as_ros(behind), behind)
+            self._states.configure(now)
+
+    def _store(self, parameters: list[RosParameter], values: dict) -> SetParametersResult:
+        """Into rclpy's table, which tells /parameter_events; a ballast that comes along in flight is declared."""
+        for name, value in values.items():
+            if not self._node.has_parameter(name):
+                self._node.declare_parameter(name, value, descriptor(parameter_named(name)), ignore_override=True)
+        return self._store_in_ros(parameters)
+
+    def _is_in_force(self, parameter: RosParameter) -> bool:
+        """Whether the node has that parameter, with that value."""
+        name = parameter.name
+        return self._node.has_parameter(name) and _plain(self._node.get_parameter(name).value) == _plain(
+            parameter.value
+        )
+
+
+def _as_ros(values: dict) -> list[RosParameter]:
+    return [ros_parameter(parameter_named(name), value) for name, value in values.items()]
+
+
+def _plain(value: Any) -> Any:
+    """rclpy keeps arrays of doubles as array.array."""
+    return value if isinstance(value, (str, bool, int, float)) else list(value)
