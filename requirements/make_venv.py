@@ -11,6 +11,7 @@ is missing or too old there comes from pip. Elsewhere rclpy comes from PyPI.
 Written for any Python 3.6 or newer, so that an unsupported one can say so itself.
 """
 
+import fcntl
 import hashlib
 import os
 import re
@@ -299,8 +300,19 @@ def await_kernels(progress, compiling):
             stop("kernels ({}): {}".format(part, (output.strip().splitlines() or ["failed"])[-1]))
 
 
+def wait_for_others():
+    """Have .venv to itself until this process ends: of two makes at once in one clone the second goes on then."""
+    folder = os.open(str(ROOT / "requirements"), os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        print("waiting for another make, which makes .venv", flush=True)
+        fcntl.flock(folder, fcntl.LOCK_EX)
+
+
 def main(stage):
     """Bring .venv up to the pins of a stage, or do nothing when it is."""
+    wait_for_others()
     setup = ros_setup()
     if setup is not None:
         enter(setup)

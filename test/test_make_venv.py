@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import importlib.util
 import os
 import shutil
@@ -148,3 +149,19 @@ def test_ctrl_c_ends_the_set_up_in_one_line(tmp_path: Path) -> None:
         told = made.communicate(timeout=60)[1]
     assert made.returncode == 130
     assert told.strip().splitlines() == ["make setup: interrupted; the next make begins anew"]
+
+
+def test_two_makes_at_once_in_one_clone_take_turns(tmp_path: Path) -> None:
+    (tmp_path / "requirements").mkdir()
+    shutil.copy(SCRIPT, tmp_path / "requirements")
+    command = [sys.executable, tmp_path / "requirements" / "make_venv.py", "run"]
+    environment = {**os.environ, "PYTHON": "/nowhere/python", "AMENT_PREFIX_PATH": "/nowhere"}
+    folder = os.open(tmp_path / "requirements", os.O_RDONLY)
+    fcntl.flock(folder, fcntl.LOCK_EX)
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as second:
+        assert second.stdout.readline() == "waiting for another make, which makes .venv\n"
+        os.close(folder)
+        assert "/nowhere/python" in second.communicate(timeout=60)[1]
+    assert second.returncode == 1
