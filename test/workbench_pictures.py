@@ -2,7 +2,7 @@
 """The page's own pictures, drawn anew in headless Chromium: ``python test/workbench_pictures.py docs`` writes flight.gif,
 workbench.png and true_against_box.png there; ``--lessons FOLDER`` one picture of each lesson.
 
-Time goes so slowly meanwhile that a browser without a graphics card keeps up.
+Time stands between two pictures, and isn't said to: a browser without a graphics card takes seconds for each.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ from workbench_page import SOFTWARE_GL, Browser, Flown, chromium
 
 from rigid_proto_ros.rerun_view.ports import any_free_port
 from rigid_proto_ros.scene.lessons import Lesson, lesson, lessons
+from rigid_proto_ros.workbench.flight import Flight
+from rigid_proto_ros.workbench.status import motion_words
 
 SIZE, MOVING_SIZE = (1400, 800), (800, 450)
 RATE = 10
 """[1/s] Pictures of the moving one, and of simulated time, which is shown as fast as it is."""
-COLOURS = 128
+DRAWN_MS = 300
 
-SLOW = 0.015
-"""Simulated seconds per second."""
+PAUSED = Flight.paused
 
 
 def main() -> None:
@@ -35,24 +36,29 @@ def main() -> None:
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
     flown = Flown("t_handle", port=any_free_port())
+    shown = flown.page
+    shown._words = lambda: motion_words(shown._scenario, {**shown._tracks, "motion": ""}, len(shown._loads))
     try:
         with chromium(SOFTWARE_GL) as started:
             if args.lessons:
-                page = Browser(started, flown, SIZE)
+                page = Browser(started, flown, SIZE, DRAWN_MS)
                 for each in lessons():
                     begin(page, each)
                     page.page.screenshot(path=args.folder / f"{each.name}_asked.png")
-                    hurry(page, 1.0)
+                    answer(page)
+                    play(page, 1.0)
                     page.page.screenshot(path=args.folder / f"{each.name}.png")
                 return
-            page = Browser(started, flown, MOVING_SIZE)
+            page = Browser(started, flown, MOVING_SIZE, DRAWN_MS)
             draw_moving(page, args.folder / "flight.gif")
             page.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
             begin(page, lesson("true_or_box_tensor"))
-            hurry(page, 3.0)
+            answer(page)
+            play(page, 3.0)
             page.page.screenshot(path=args.folder / "true_against_box.png")
             begin(page, lesson("t_handle"))
-            hurry(page, 3.4)
+            answer(page)
+            play(page, 3.4)
             pull(page, steps=3)
             page.page.screenshot(path=args.folder / "workbench.png")
     finally:
@@ -60,41 +66,41 @@ def main() -> None:
 
 
 def begin(page: Browser, shown: Lesson, ghost: str = "") -> None:
-    """A lesson with its question, slow; then it is played from its beginning. ghost: its inertia model."""
+    """A lesson with its question. ghost: its inertia model."""
     flown = page.flown
+    Flight.paused = PAUSED
     flown.page.lessons.name(shown.name)
     asyncio.run_coroutine_threadsafe(flown.page.lessons.begin(), flown.page.loop).result(60.0)
     page.until(lambda: shown.question in page.text, "question")
-    flown.live.set_parameters(
-        {"real_time_factor": SLOW, "ghost.inertia_model": ghost} if ghost else {"real_time_factor": SLOW}
-    )
-    flown.live.reset()
+    if ghost:
+        flown.live.set_parameters({"ghost.inertia_model": ghost})
+        flown.live.reset()
     time.sleep(1.0)
     page.drawn()
 
 
-def play(page: Browser, seconds: float) -> list[Image.Image]:
-    """Let time go on so far; the pictures on the way."""
-    flown, pictures = page.flown, []
+def answer(page: Browser) -> None:
+    """Show the steps, and let time stand again at once."""
+    flown = page.flown
     flown.page.loop.call_soon_threadsafe(flown.page.lessons.answer, None)
-    start_s = flown.live.state.time_ns * 1e-9
-    for k in range(1, round(seconds * RATE) + 1):
-        page.until(lambda due_s=start_s + k / RATE: flown.page.state.time_ns * 1e-9 >= due_s, "time that goes on")
+    page.until(lambda: not flown.live.paused, "motion")
+    flown.live.pause(True)
+    # The bar looks as it does while time goes on.
+    Flight.paused = property(lambda _: False)
+
+
+def play(page: Browser, seconds: float, count: int = 1) -> list[Image.Image]:
+    """Let time go on so far; so many pictures on the way."""
+    flown, pictures = page.flown, []
+    rate = float(flown.live.scenario.parameters.publish_rate)
+    for _ in range(count):
+        flown.live.step(round(rate * seconds / count))
+        page.until(lambda: flown.page.state.time_ns == flown.live.state.time_ns, "state on the page")
         page.drawn()
         with Image.open(io.BytesIO(page.page.screenshot())) as image:
             pictures.append(image.convert("RGB"))
         print(f"{flown.live.state.time_ns * 1e-9:.2f} s", flush=True)
     return pictures
-
-
-def hurry(page: Browser, seconds: float) -> None:
-    """Go on so far without pictures."""
-    flown = page.flown
-    flown.page.loop.call_soon_threadsafe(flown.page.lessons.answer, None)
-    flown.live.set_parameters({"real_time_factor": 0.3})
-    page.until(lambda: flown.page.state.time_ns * 1e-9 >= seconds, "time that goes on")
-    flown.live.set_parameters({"real_time_factor": SLOW})
-    page.drawn()
 
 
 def com(page: Browser) -> tuple[float, float]:
@@ -110,6 +116,7 @@ def pull(page: Browser, steps: int) -> list[Image.Image]:
     pictures = []
     for k in range(1, steps + 1):
         page.page.mouse.move(x - 130.0 * k / steps, y - 60.0 * k / steps)
+        time.sleep(0.15)  # a page says at most every 0.05 s where the pointer is
         pictures += play(page, 1.0 / RATE)
     return pictures
 
@@ -117,18 +124,22 @@ def pull(page: Browser, steps: int) -> list[Image.Image]:
 def draw_moving(page: Browser, file: Path) -> None:
     """The T-handle turns over, its ghost with the box's tensor doesn't; then a poke, and a pull on the string."""
     begin(page, lesson("t_handle"), "bounding_box")
-    pictures = play(page, 2.6)
+    answer(page)
+    pictures = play(page, 2.4, 24)
     page.click(*com(page))
-    pictures += play(page, 0.8)
-    pictures += pull(page, steps=12)
+    time.sleep(0.3)
+    pictures += play(page, 0.6, 6)
+    pictures += pull(page, steps=10)
     page.release()
-    pictures += play(page, 0.7)
-    width, height = pictures[0].size
+    time.sleep(0.3)
+    pictures += play(page, 0.6, 6)
     # Colours of all that is seen at some time.
-    sheet = Image.new("RGB", (width, height * len(pictures)))
-    for k, each in enumerate(pictures):
+    width, height = pictures[0].size
+    chosen = pictures[::5]
+    sheet = Image.new("RGB", (width, height * len(chosen)))
+    for k, each in enumerate(chosen):
         sheet.paste(each, (0, k * height))
-    palette = sheet.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
+    palette = sheet.quantize(256)
     frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=round(1000 / RATE), loop=0, optimize=True)
 

@@ -286,10 +286,15 @@ def test_one_light_throws_shadows(flown: FlownPage) -> None:
 def test_what_is_switched_on_while_time_stands_is_drawn(flown: FlownPage) -> None:
     flown.do(lambda: flown.page.flight.pause(True))
     flown.until(lambda: flown.live.paused, "pause")
-    assert not flown.page.backend._nodes.get(style.OMEGA)
+    flown.set("Angular velocity ω", False)
+
+    def drawn() -> bool:
+        node = flown.page.backend._nodes.get(style.OMEGA)
+        return node is not None and node.visible
+
+    assert not drawn()
     flown.set("Angular velocity ω", True)
-    node = flown.until(lambda: flown.page.backend._nodes.get(style.OMEGA), "arrow of ω")
-    assert node.visible
+    flown.until(drawn, "arrow of ω")
     flown.set("Angular velocity ω", False)
     flown.do(lambda: flown.page.flight.pause(False))
 
