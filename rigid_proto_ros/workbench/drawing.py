@@ -57,6 +57,7 @@ class ViserBackend(Backend):
         self.is_new = True
         self._seen_into = False
         self._nodes: dict[str, Any] = {}
+        self._meshes = 0
         self._there: set[str] = set()
         self._labels: list[Any] = []
         self._labels_of: dict[str, list[tuple[str, np.ndarray, str]]] = {}
@@ -127,8 +128,10 @@ class ViserBackend(Backend):
             return
         look = style.STYLES[name]
         solid = look.opacity >= 1.0
+        # A name of its own: browsers give a node the pose of the one that had its name before.
+        self._meshes += 1
         self._nodes[name] = self._scene.add_mesh_simple(
-            f"/{name}",
+            f"/{name}_{self._meshes}",
             surface.vertices,
             surface.triangles,
             color=look.colours[0],

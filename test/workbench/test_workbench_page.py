@@ -144,6 +144,22 @@ def test_a_click_pokes_where_it_points_and_a_shift_click_pushes_inward(page) -> 
         page.until(lambda: re.search(r"speed of the COM\s+(?!0 m/s)[\d.e-]+ m/s", page.text), "speed in the readouts")
 
 
+def test_a_body_is_drawn_where_it_is_also_after_another_one_with_its_centre_elsewhere(page) -> None:
+    fly(page, {"mesh": "hammer"})
+    fly(page, {"mesh": "hollow_box"})
+    body, mesh = page.flown.live.scenario.setup.body, page.flown.page.backend._nodes[style.BODY_MESH]
+    vertices = page.flown.live.scenario.body_mesh.mesh.vertices
+    pixels = np.array([page.pixel(body.point(vertex) / page.flown.page.backend.unit) for vertex in vertices])
+    with_it = page.look()
+    mesh.visible = False
+    page.drawn(3)
+    drawn = np.argwhere(np.abs(with_it - page.look()).max(axis=-1) > 20)
+    mesh.visible = True
+    # The shadow, which goes with it, lies lower and farther left.
+    assert abs(drawn[:, 0].min() - pixels[:, 1].min()) < NEAR
+    assert abs(drawn[:, 1].max() - pixels[:, 0].max()) < NEAR
+
+
 def test_a_drag_beside_the_body_turns_the_camera_and_touches_nothing(page) -> None:
     before, logged = np.array(page.client.camera.position), len(commands(page))
     box = page.canvas
