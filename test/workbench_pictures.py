@@ -125,7 +125,7 @@ def draw_moving(page: Browser, file: Path) -> None:
     """The T-handle turns over, its ghost with the box's tensor doesn't; then a poke, and a pull on the string."""
     begin(page, lesson("t_handle"), "bounding_box")
     answer(page)
-    pictures = play(page, 2.4, 24)
+    pictures = play(page, 2.2, 22)
     page.click(*com(page))
     time.sleep(0.3)
     pictures += play(page, 0.6, 6)

@@ -48,7 +48,7 @@ TRAIL = "world/trail"
 COM_TRAIL = "world/com_trail"
 STRING = "world/string"
 HAND = "world/string/hand"
-STRING_LINE = "world/string/line"
+STRING_LINE = "world/string_line"
 """The line of a string that pulls, on through the body."""
 
 POINSOT = "poinsot"

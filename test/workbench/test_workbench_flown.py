@@ -273,8 +273,8 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
     assert 3 <= len(page.lessons.course.numbers) <= 5
     opacity = backend._nodes[style.BODY_MESH].opacity
     assert (opacity is not None) == (SEE_INTO in page.lessons.course.shows)
-    if style.STRING_LINE in page.lessons.course.shows:
-        assert backend._nodes[style.STRING_LINE].visible
+    line = backend._nodes.get(style.STRING_LINE)
+    assert (line is not None and line.visible) == (style.STRING_LINE in page.lessons.course.shows)
 
 
 def test_one_light_throws_shadows(flown: FlownPage) -> None:
