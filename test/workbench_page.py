@@ -135,14 +135,14 @@ class Browser:
         """Of three.js; the plots have others."""
         return self.page.locator("canvas[data-engine]").first.bounding_box()
 
-    def pixel(self, point) -> tuple[float, float]:
-        """Where a point (3,) of the picture, in its units, is drawn, by pinhole geometry."""
+    def pixel(self, point) -> np.ndarray:
+        """Where points (..., 3) of the picture, in its units, are drawn (..., 2), by pinhole geometry."""
         camera, box = self.client.camera, self.canvas
         w, x, y, z = camera.wxyz
-        across, down, away = matrix_from_quaternion(np.array([x, y, z, w])).T @ (np.asarray(point) - camera.position)
+        seen = (np.asarray(point, dtype=float) - camera.position) @ matrix_from_quaternion(np.array([x, y, z, w]))
         focal = 0.5 * box["height"] / math.tan(0.5 * camera.fov)
-        middle = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
-        return middle[0] + focal * across / away, middle[1] + focal * down / away
+        middle = np.array([box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]])
+        return middle + focal * seen[..., :2] / seen[..., 2:]
 
     def look(self):
         """The page as it is drawn, (height, width, 3)."""
