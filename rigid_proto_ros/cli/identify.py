@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..mass.from_mesh import MeshBody
 
 EXAMPLES = (
-    ("rigid_proto identify out/flight.mcap", "what a recorded flight identifies of the body, and what it doesn't"),
+    ("rigid_proto identify out/flight.mcap", "what recorded motion identifies of the body, and what it doesn't"),
     ("rigid_proto identify throws/*.mcap --mass 1.2 --urdf", "several throws of a weighed body, as a URDF <inertial>"),
     ("rigid_proto identify throw.mcap --mesh hammer", "is it solid, a shell, or as its bounding box says?"),
     (
@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--record",
         metavar="FILE.rrd",
-        help="for Rerun: measured tracks, fitted flights, residuals and tensors",
+        help="for Rerun: measured tracks, fitted motions, residuals and tensors",
     )
 
 

@@ -133,7 +133,7 @@ def frames(record: FlightRecord, source: Source | None, fps: float) -> tuple[Fli
     start_ns, end_ns = int(record.times_ns[0]), int(record.times_ns[-1])
     count = int((end_ns - start_ns) * 1e-9 * fps) + 1
     if count > FRAMES_MAX:
-        raise InputError("--fps", fps, f"at most {FRAMES_MAX} pictures of the flight")
+        raise InputError("--fps", fps, f"at most {FRAMES_MAX} frames of the simulation")
     times = {start_ns + publication_ns(k, fps) for k in range(count)} | {end_ns}
     for event in record.changes:
         if isinstance(event, LoadBegan) and event.load.kind == "impulse":

@@ -79,7 +79,7 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
         return []
     times = "once" if changes == 1 else f"{changes} times"
     return [
-        f"mass or tensor change {times} in flight: they are time samples, of which a physics engine takes the first"
+        f"mass or tensor change {times} during the simulation: they are time samples, of which a physics engine takes the first"
     ]
 
 

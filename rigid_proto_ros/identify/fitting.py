@@ -56,7 +56,7 @@ GROWN = 1.5
 class CannotFlyError(InputError):
     """An estimate with which a flight can't be simulated."""
 
-    def __init__(self, cause: str = "--from and --to exclude parts that are no free flight") -> None:
+    def __init__(self, cause: str = "--from and --to exclude parts that are no free motion") -> None:
         super().__init__("identify", f"the estimate can't be simulated; {cause}")
 
 

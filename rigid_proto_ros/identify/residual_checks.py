@@ -125,7 +125,7 @@ def remarks(checks: Sequence[ResidualCheck]) -> list[str]:
             continue
         if check.worst_s is not None:
             found.append(
-                f"{where}: the model doesn't fit about {check.worst_s:.3g} s after the start of the flight:"
+                f"{where}: the model doesn't fit about {check.worst_s:.3g} s after the start of the motion:"
                 " a contact, or a wrench that isn't in the bag; --from and --to exclude it"
             )
         else:

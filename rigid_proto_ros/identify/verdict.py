@@ -34,7 +34,7 @@ LEAST_RISE = 4.0
 """Of the sum of squares there, where sixteen is expected."""
 
 POKE = "one poke of a known force beside the centre of mass"
-TUMBLE = "a flight that tumbles about several axes"
+TUMBLE = "a motion that tumbles about several axes"
 _REMEDIES = {
     "mass": "one poke of a known force, or --mass",
     "size of the tensor": f"{POKE}, or a known torque",
@@ -140,7 +140,7 @@ class Identifiability:
             return "a spin about an axis at right angles to it"
         if what.startswith(("ratio", "turn")):
             return TUMBLE
-        return "a longer flight, or a given value"
+        return "a longer recording, or a given value"
 
     def count_identified(self, count: int) -> int:
         """How many of the directions among the first ``count`` coordinates are identified."""

@@ -423,4 +423,4 @@ class Simulation(Observables):
 
 
 def _no_change(command: Change) -> Setup:
-    raise InputError(command.kind, command.content, "a change with a setup of its own: no parameters fly here")
+    raise InputError(command.kind, command.content, "a change with a setup of its own: there are no parameters here")

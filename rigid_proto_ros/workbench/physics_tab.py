@@ -120,7 +120,7 @@ class PhysicsTab:
             hint = "Frequency of the effective mass (string.frequency)"
             strength = gui.add_slider("Strength [rad/s]", 1.0, 40.0, 0.5, tools.frequency, hint=hint)
             hint = "Light and heavy bodies then respond alike"
-            scaled = gui.add_checkbox("Scaled by effective mass", True, hint=hint)
+            scaled = gui.add_checkbox("Same feel for any mass", True, hint=hint)
             controls.number("string.stiffness", "Stiffness [N/m]")
             controls.slider("string.damping_ratio", "Damping ratio", 0.0, 2.0, 0.05)
             controls.number("string.rest_length", "Rest length [m]")

@@ -135,7 +135,7 @@ def _methods(_integrator: Integrator) -> tuple[Method, ...]:
         ASLEEP: Method(NOTHING, None, _constant("auto: sleeping, nothing moves or acts"), sleeps=True),
         COASTING: Method(NOTHING, None, _constant("auto: closed form, nothing turns the body")),
         STEADY: Method(ONE_STEP, steady_steps, _constant("auto: closed form, nothing changes the spin"), 1),
-        FREE: Method(ONE_STEP, free_body_steps, _constant("auto: free_body, one exact step without torque"), 1),
+        FREE: Method(ONE_STEP, free_body_steps, _constant("auto: free_body, free rotation, exact"), 1),
         TURNING_LOADS: Method(
             ADAPTIVE,
             spin_steps,
