@@ -78,9 +78,7 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
     if not changes:
         return []
     times = "once" if changes == 1 else f"{changes} times"
-    return [
-        f"mass or tensor change {times} during the simulation: they are time samples, of which a physics engine takes the first"
-    ]
+    return [f"mass or tensor change {times}: they are time samples, of which a physics engine takes the first"]
 
 
 @dataclass(frozen=True)
