@@ -71,9 +71,7 @@ def _check(flights: Sequence[MeasuredFlight]) -> None:
     """Raises InputError where a flight has no poses, or too few for its start and anything else."""
     for flight in flights:
         if flight.pose is None:
-            raise InputError(
-                "session", f"{flight.name} has no positions with attitudes", "poses, transforms or odometry"
-            )
+            raise InputError("session", f"{flight.name} has no poses", "poses, transforms or odometry")
         count = len(flight.pose[0].times_ns)
         if count < FEWEST:
             raise InputError("session", f"{flight.name} has {count} samples", f"at least {FEWEST} poses")
