@@ -28,7 +28,7 @@ SOFTWARE_GL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swift
 FLAGS = [*SOFTWARE_GL, "--webgl-antialiasing-mode=none", "--disable-gpu-compositing"]
 """For tests: without a graphics card, smooth edges and a page that WebGL puts together double the cost of a picture."""
 
-PATIENCE_S = 60.0
+PATIENCE_S = 150.0
 """[s] Software WebGL compiles its shaders first, and on a busy machine nothing else moves meanwhile."""
 
 DRAWN_MS = 100
