@@ -70,10 +70,10 @@ def run_chunk(study: Study, first: int, last: int) -> Chunk:
     return Chunk(_table(study, rows, columns, flown), flown.simulated)
 
 
-def row_summary(study: Study, row: int) -> dict[str, object]:
+def row_summary(study: Study, row: int) -> dict[str, Any]:
     """The row of the table by column, as JSON has it."""
     columns = run_chunk(study, row, row + 1).columns
-    found: dict[str, object] = {}
+    found: dict[str, Any] = {}
     for name, column in columns.items():
         value = column[0] if column.dtype == object else column[0].item()
         found[name] = None if value != value else value
