@@ -114,6 +114,8 @@ def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
     )
     listing = listing.replace("        FREE_BODY_STRANG,\n", "        FREE_BODY_STRANG,\n        HEUN,\n")
     (folder / "__init__.py").write_text(listing, "utf-8")
+    names = (folder.parent / "__init__.py").read_text("utf-8")
+    (folder.parent / "__init__.py").write_text(names.replace('    "rk4",\n', '    "rk4",\n    "heun",\n'), "utf-8")
     done = subprocess.run(
         [sys.executable, "-c", FLY], cwd=tmp_path, env=_only(tmp_path), capture_output=True, text=True, check=False
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from command_rig import NodeProcess, RosClient
-from ros_process import MODULES, READY_S, SOURCE, from_source
+from ros_process import READY_S, SOURCE, from_source
 
 from rigid_proto_ros.base.bundled import scene_path
 
@@ -21,7 +21,8 @@ EXAMPLES = sorted((SOURCE / "msg_examples").glob("[0-9]*"))
 @pytest.fixture
 def environment(ros_environment: dict[str, str], tmp_path: Path) -> dict[str, str]:
     """With our executables, and a stand-in for ``ros2`` where there is none, on the path."""
-    programs = {name: f"-m {module}" for name, module in MODULES.items()}
+    installed = ("rigid_proto", "rigid_body_node", "poke_client")
+    programs = {name: f"-m rigid_proto_ros.cli.executables {name}" for name in installed}
     if shutil.which("ros2") is None:
         programs["ros2"] = str(SOURCE / "test" / "ros2_stand_in.py")
     folder = tmp_path / "bin"

@@ -73,6 +73,8 @@ def main(argv: list[str] | None = None) -> int:
         return interrupts.run(lambda: _run(args), lambda error: _tell(args.command, error))
     try:
         return args.run(args)
+    except KeyboardInterrupt:
+        return 130
     except Exception as error:
         return _tell(args.command, error)
 

@@ -319,7 +319,7 @@ def test_what_ros_itself_hands_a_node_is_no_mistake():
 @pytest.mark.parametrize("name", ["my part #2.obj", "[v2].obj", 'it\'s: "é" \\1.obj', "- *a.obj", "!x %y.obj"])
 def test_a_mesh_of_any_name_reaches_the_node_that_up_starts(name, tmp_path, monkeypatch, capfd):
     started = []
-    monkeypatch.setattr("rigid_proto_ros.ros.main.main", lambda argv: started.append(argv) or 0)
+    monkeypatch.setattr("rigid_proto_ros.ros.main.main", lambda argv, as_job: started.append(argv) or 0)
     monkeypatch.chdir(tmp_path)
     Path(name).write_text(TETRAHEDRON)
     assert rigid_proto(["up", "--mesh", name, "--viewer", "none"]) == 0
