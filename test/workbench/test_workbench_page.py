@@ -145,30 +145,6 @@ def test_a_click_pokes_where_it_points_and_a_shift_click_pushes_inward(page) -> 
         page.until(lambda: re.search(r"speed of the COM\s+(?!0 m/s)[\d.e-]+ m/s", page.text), "speed in the readouts")
 
 
-def test_a_body_is_drawn_where_it_is_also_after_another_one_with_its_centre_elsewhere(page) -> None:
-    fly(page, {"mesh": "hammer"})
-    fly(page, {"mesh": "hollow_box"})
-    body, mesh = page.flown.live.scenario.setup.body, page.flown.page.backend._nodes[style.BODY_MESH]
-    vertices = page.flown.live.scenario.body_mesh.mesh.vertices
-    pixels = page.pixel((vertices * body.scale - body.center_of_mass) / page.flown.page.backend.unit)
-
-    def fits() -> bool:
-        mesh.visible = True
-        page.drawn(3)
-        with_it = page.look()
-        mesh.visible = False
-        page.drawn(3)
-        drawn = np.argwhere(np.abs(with_it - page.look()).max(axis=-1) > 20)
-        # The shadow, which goes with it, lies lower and farther left.
-        top, right = (drawn[:, 0].min(), drawn[:, 1].max()) if len(drawn) else (0, 0)
-        return abs(top - pixels[:, 1].min()) < NEAR and abs(right - pixels[:, 0].max()) < NEAR
-
-    try:
-        page.until(fits, "body where it is", 60.0)
-    finally:
-        mesh.visible = True
-
-
 def test_a_drag_beside_the_body_turns_the_camera_and_touches_nothing(page) -> None:
     before, logged = np.array(page.client.camera.position), len(commands(page))
     box = page.canvas
