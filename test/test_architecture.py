@@ -27,7 +27,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, Integrator
-from .runge_kutta import advance, is_good, rates, stages
+from .runge_kutta import repeated, tableau_step
 from .stepping import fixed_steps
 
 TABLEAU = np.array([[0.0, 0.0], [1.0, 0.0]])
@@ -35,16 +35,13 @@ WEIGHTS = np.array([0.5, 0.5])
 
 
 @njit(cache=True, error_model="numpy")
+def step(y, p, h, pulls, k, out):
+    tableau_step(y, p, h, pulls, k, out, TABLEAU, WEIGHTS)
+
+
+@njit(cache=True, error_model="numpy")
 def heun_steps(y, p, h, n):
-    k, z, new = np.zeros((2, 15)), np.empty(15), y.copy()
-    for done in range(n):
-        rates(y, p, False, k[0])
-        stages(y, p, h, False, TABLEAU, 2, k, z)
-        advance(y, p, h, WEIGHTS, 2, k, new)
-        if not is_good(new):
-            return done
-        y[:] = new
-    return n
+    return repeated(step, y, p, h, n, 2)
 
 
 HEUN = Integrator(
