@@ -21,7 +21,7 @@ def as_numbers(text: bytes, count: int = -1, kind: type = float) -> tuple[np.nda
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", DeprecationWarning)  # as which older versions of NumPy tell it
-            numbers = np.fromstring(text, kind, sep=" ")
+            numbers: np.ndarray = np.fromstring(text, kind, sep=" ")
             if count in (-1, len(numbers)) and b"\0" not in text:  # at which reading would end
                 return numbers, True
     except (DeprecationWarning, ValueError):

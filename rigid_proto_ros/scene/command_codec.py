@@ -72,20 +72,20 @@ def frame_names(parameters: Parameters, node_name: str) -> Names:
 
 
 def load_command(
-    held: bool, frame_id: str, force: Vector, torque: Vector, names: Names = WORDS, **stamp: int
+    held: bool, frame_id: str, force: Vector, torque: Vector, names: Names = WORDS, **stamp: Any
 ) -> WrenchCommand:
     """A wrench (``held``) or poke; raises CommandRefused."""
     return WrenchCommand(held, parse_frame(frame_id, *names), force, torque, frame_id, **stamp)
 
 
-def string_target(frame_id: str, point: Vector, names: Names = WORDS, **stamp: int) -> MoveString:
+def string_target(frame_id: str, point: Vector, names: Names = WORDS, **stamp: Any) -> MoveString:
     """A target of the string; raises CommandRefused."""
     if frame_id not in ("", "world", names[0]):
         raise CommandRefused("frame", "frame_id", frame_id[:80], f"{names[0]}: the target is a point of the world")
     return MoveString(point, frame_id, **stamp)
 
 
-def string_attach(frame_id: str, point: Vector, names: Names = WORDS, **stamp: int) -> TieString:
+def string_attach(frame_id: str, point: Vector, names: Names = WORDS, **stamp: Any) -> TieString:
     """A knot of the string; raises CommandRefused."""
     world, body = names
     axes = {"": "world", "world": "world", world: "world", "body": "body", body: "body"}
@@ -96,7 +96,7 @@ def string_attach(frame_id: str, point: Vector, names: Names = WORDS, **stamp: i
     return TieString(axes[frame_id], point, frame_id, **stamp)
 
 
-def inertia(frame_id: str, numbers: Sequence[float], names: Names = WORDS, **stamp: int) -> Change:
+def inertia(frame_id: str, numbers: Sequence[float], names: Names = WORDS, **stamp: Any) -> Change:
     """The whole inertia, from mass, com, ixx ixy ixz iyy iyz izz; raises CommandRefused."""
     body = names[1]
     axes = {"body": "body", body: "body", "": "mesh", MESH_FRAME: "mesh", f"{body}/mesh": "mesh"}

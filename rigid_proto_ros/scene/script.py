@@ -33,7 +33,7 @@ from .command_codec import MAX_SCHEDULED, MESH_FRAME
 from .parameters import ZERO
 from .yaml_text import load_json, load_plain_yaml, read_text
 
-Stamp = dict[str, int]
+Stamp = dict[str, Any]
 """A command's stamp_ns and entry."""
 
 Result = TypeVar("Result")
