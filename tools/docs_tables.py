@@ -270,6 +270,16 @@ def lesson_table() -> str:
     return _table(("scene", "lesson"), ((_code(one.name), f"[{one.title}]({one.name}.md)") for one in lessons()))
 
 
+def gallery() -> str:
+    """Every lesson with its picture and its question."""
+    parts = []
+    for one in lessons():
+        choices = " ".join(f"**{letter}** {choice}" for letter, choice in zip("ABC", one.choices, strict=True))
+        picture = f"[![{one.title}](lessons/{one.name}.png)](lessons/{one.name}.md)"
+        parts.append(f"## {one.title}\n\n{picture}\n\n{_code(one.name)}: {one.question}\\\n{choices}")
+    return "\n\n".join(parts)
+
+
 def lesson_to_try(name: str) -> str:
     """A lesson's question and sentences, as the workbench shows them."""
     one = lesson(name)
@@ -299,6 +309,7 @@ TABLES = {
     "readers": readers,
     "bodies": bodies,
     "lessons": lesson_table,
+    "gallery": gallery,
     "motions": motions,
     "figures": figures,
 }
