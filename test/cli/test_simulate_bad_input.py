@@ -31,7 +31,8 @@ MESHES = {
     "point.obj": ("v 1 1 1\nv 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", "in one point"),
     "open.obj": (TETRAHEDRON.replace("f 2 3 4\n", ""), "--repair (mesh_repair), --fallback hull|box (mesh_fallback)"),
     "index.obj": (TETRAHEDRON.replace("f 2 3 4", "f 2 3 9"), "face 4 uses vertex 9, but the file has only 4"),
-    "what.xyz": (TETRAHEDRON, ".obj, .off, .ply, .stl"),
+    "what.part": (TETRAHEDRON, ".obj, .off, .ply, .stl"),
+    "points.xyz": ("0 0 0\n1 0 0\n0 1 0\n", "triangle"),
 }
 
 
