@@ -226,11 +226,9 @@ def _branch(session: RecordedSession, args: argparse.Namespace) -> None:
     branch = branch_at(session, time_ns) if given is None else recorded_branch(session, given, time_ns)
     scene = output_file("--as-scene", args.as_scene)
     scene.write_text(branch.scene, encoding="utf-8")
-    words = ["rigid_proto", "simulate", str(scene)]
-    if branch.entries:
-        script = scene.with_name(f"{scene.stem}_script.yaml")
-        script.write_text(branch.script, encoding="utf-8")
-        words += ["--script", str(script)]
+    script = scene.with_name(f"{scene.stem}_script.yaml")
+    script.write_text(branch.script, encoding="utf-8")
+    words = ["rigid_proto", "simulate", str(scene), "--script", str(script)]
     print(f"  scene at {args.at:g} s: {shlex.join(words)}")
     for note in branch.notes:
         print(f"  {note}")

@@ -37,8 +37,8 @@ class Branch:
 
     @property
     def script(self) -> str:
-        """The entries as a poke script's text, empty where nothing acts."""
-        return "".join(f"- {flow(entry)}\n" for entry in self.entries)
+        """The entries as a poke script's text, an empty list where nothing acts."""
+        return "".join(f"- {flow(entry)}\n" for entry in self.entries) or "[]\n"
 
 
 def branch_at(session: RecordedSession, time_ns: int) -> Branch:

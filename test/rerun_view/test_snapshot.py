@@ -94,7 +94,7 @@ def test_a_bag_is_drawn_as_the_recording_of_the_same_flight(tmp_path):
     pictures = []
     for session in (bag, rrd):
         picture = session.with_suffix(session.suffix + ".png")
-        take(str(session), "--at", "0.4", "-o", str(picture), "--view", "Flight", "--size", "800x500")
+        take(str(session), "--at", "0.4", "-o", str(picture), "--view", "Motion", "--size", "800x500")
         with Image.open(picture) as image:
             pictures.append(np.asarray(image.convert("RGB"), dtype=float))
     assert pictures[0].shape == pictures[1].shape

@@ -57,10 +57,10 @@ def test_a_thousand_hand_sessions_fly_again_to_the_bit(first: int) -> None:
 def test_what_was_done_before_a_reset_is_no_part_of_it() -> None:
     hand = HandSession(SCENE)
     hand.set(mass=0.2)
-    hand.load_command(False, "world@tip", [0.03, 0.0, 0.0])
+    hand.load(False, "world@tip", [0.03, 0.0, 0.0])
     hand.wait(SECOND)
     hand.reset()
-    hand.load_command(False, "world@tip", [0.0, 0.03, 0.0])
+    hand.load(False, "world@tip", [0.0, 0.03, 0.0])
     hand.wait(SECOND)
     saved = assert_flies_again(hand)
     assert saved.commands == 1
@@ -90,7 +90,7 @@ def test_what_was_done_in_one_paused_instant_is_one_message_to_a_node_in_the_ord
     hand.pause()
     for k in range(200):
         hand.set(ballast__tip=[0.0001 * k, 0.0, 0.0, 0.07])
-    hand.load_command(False, "normal@tip;impulse", [1e-4, 0.0, 0.0])
+    hand.load(False, "normal@tip;impulse", [1e-4, 0.0, 0.0])
     hand.wait(SECOND)
     script = parse_script(assert_flies_again(hand).script)
     (message,) = outgoing(script)
@@ -106,7 +106,7 @@ def test_a_change_that_only_a_later_scene_allows_flies_again() -> None:
     hand.set(mesh="t_handle")
     hand.wait(SECOND // 10)
     hand.set(inertia_model="solid")
-    hand.load_command(False, "world@vertex/3", [0.01, 0.0, 0.0])
+    hand.load(False, "world@vertex/3", [0.01, 0.0, 0.0])
     hand.wait(SECOND // 10)
     assert make_scenario(hand.first.parameters.named()).body_mesh is None
     with pytest.raises(InputError):
@@ -119,7 +119,7 @@ def test_a_script_is_judged_in_the_scene_that_it_has_made_by_then() -> None:
     hand.wait(SECOND // 10)
     hand.set(integrator="auto")
     hand.wait(SECOND // 10)
-    hand.load_command(False, "world@tip", [0.01, 0.0, 0.0])
+    hand.load(False, "world@tip", [0.01, 0.0, 0.0])
     hand.wait(SECOND // 10)
     assert assert_flies_again(hand).notes == []
 
@@ -145,8 +145,8 @@ def test_nothing_of_the_running_program_is_saved() -> None:
 def test_entries_are_the_commands_of_the_hand() -> None:
     hand = HandSession(SCENE)
     hand.wait(SECOND // 3)
-    hand.load_command(False, "normal@tip", [0.02, 0.0, 0.0])
-    hand.load_command(True, "body@point/0.01,0.02,0.03", [0.1, 0.2, 0.3], [0.0, 0.0, 1e-7])
+    hand.load(False, "normal@tip", [0.02, 0.0, 0.0])
+    hand.load(True, "body@point/0.01,0.02,0.03", [0.1, 0.2, 0.3], [0.0, 0.0, 1e-7])
     hand.wait(SECOND // 3)
     third = 333_333_333
     assert parse_script(script_of_session(hand.session()).script) == [

@@ -49,8 +49,7 @@ def session(request, tmp_path_factory):
 
 def fly_on(folder, seconds: float) -> OfflineRun:
     """The branch at the end of its own flight."""
-    script = folder / "x_script.yaml"
-    run = OfflineRun(read_scene(str(folder / "x.yaml")), read_script(script) if script.exists() else None)
+    run = OfflineRun(read_scene(str(folder / "x.yaml")), read_script(folder / "x_script.yaml"))
     assert run.advance(round(seconds * SECOND))
     return run
 
@@ -60,8 +59,9 @@ def test_a_branch_begins_with_the_recorded_state_and_flies_on_as_the_session_did
     until = {0.0: 0.15, 0.1: 0.05, 0.3: 0.08, 0.45: 0.3, 0.85: 0.04, 1.05: 0.5, 1.75: 0.5, 2.2: 0.5, 3.15: 0.9}[at]
     assert main(["replay", str(session), "--at", str(at), "--as-scene", str(tmp_path / "x.yaml")]) == 0
     said = capsys.readouterr().out.splitlines()[-1]
-    assert said.startswith(f"  scene at {at:g} s: rigid_proto simulate {tmp_path / 'x.yaml'}")
-    assert ("--script" in said) == (at in (0.3, 0.45, 0.85, 1.05, 3.15))
+    scene, script = tmp_path / "x.yaml", tmp_path / "x_script.yaml"
+    assert said == f"  scene at {at:g} s: rigid_proto simulate {scene} --script {script}"
+    assert bool(read_script(script)) == (at in (0.3, 0.45, 0.85, 1.05, 3.15))
     (recorded,) = read_runs(session)
 
     def differs(row: np.ndarray, time_s: float) -> float:
