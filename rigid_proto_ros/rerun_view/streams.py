@@ -80,8 +80,11 @@ class Stream(ABC):
         rr.send_columns(entity, indexes=times, columns=columns, recording=self.recording)
 
     def log_static(self, entity: str, *values: Any) -> None:
-        """Log values that hold at all times."""
-        rr.log(entity, *values, static=True, recording=self.recording)
+        """Log values that hold at all times. They arrive before what is sent after them: rr.log would put them aside
+        until a flush, and columns would overtake them.
+        """
+        batches = [batch for value in values for batch in value.as_component_batches()]
+        self.send(entity, [], [batch.partition([len(batch.as_arrow_array())]) for batch in batches])
 
     def send_layout(self, initial_view: str, subject: Subject, finished: Finished | None = None) -> None:
         """Make a viewer open with the layout for what the flight is about.

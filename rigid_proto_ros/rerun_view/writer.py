@@ -150,6 +150,8 @@ class SceneWriter:
 
     def _write_upto(self, block: Block, begin: int, end: int) -> None:
         """Exact states and picture of rows begin..end, which all belong to the present body, and what happened."""
+        # Lines come first: a file that is cut between them and the states has every line that acted on its states.
+        self._text_log.send(self._send)
         if begin < end:
             times_ns, walls, rows = block.times[begin:end], block.walls[begin:end], block.rows[begin:end]
             self._note_time(int(times_ns[-1]))
@@ -165,7 +167,6 @@ class SceneWriter:
             self._backend.begin(np.array(times))
             self._backend.scalars(style.EFFORT, np.column_stack(rates))
             self._efforts.clear()
-        self._text_log.send(self._send)
         self._state_timeline.send(self._send)
         if begin < end and self._picture.body is not None:
             for stream in streams:

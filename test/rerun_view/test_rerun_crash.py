@@ -56,6 +56,11 @@ def test_a_file_cut_anywhere_is_read_as_far_as_it_is_whole(recording, tmp_path):
         assert not session.complete or offset > starts[-1]
         assert session.rows.tobytes() == whole.rows[:n].tobytes()
         assert session.events == whole.events[: len(session.events)]
+        if n:
+            # What the states are computed from is there before them.
+            assert session.scene == whole.scene and session.mesh_sha256 == whole.mesh_sha256
+            assert np.array_equal(session.vertices, whole.vertices)
+            assert session.events[-1:] >= [event for event in whole.events if event[0] < session.times[-1]][-1:]
         if offset >= starts[-1]:
             assert n == len(whole.times)
 

@@ -156,6 +156,15 @@ def starved_s(pid: int) -> float:
     return 1e-9 * sum(map(int, waits))
 
 
+def holds_states(path: Path) -> bool:
+    """Whether a state has reached the file: the topics tell it earlier, as nobody who simulates waits for a disk."""
+    try:
+        (session,) = read_runs(path)
+    except InputError:
+        return False
+    return len(session.times) > 0
+
+
 def kill_while_recording(environment: dict[str, str], folder: Path, ending: str, after_s: float) -> None:
     from command_rig import RosClient, stamp_ns, wrench_message
     from ros_process import RosProcess
@@ -170,7 +179,10 @@ def kill_while_recording(environment: dict[str, str], folder: Path, ending: str,
             client.meet()
             client.publish("poke", wrench_message(0, "world@tip;impulse", (0.0, 0.001, 0.0)))
             before, end = starved_s(node.pid), time.monotonic() + after_s
-            client.until(lambda: client.heard_count("pose") and time.monotonic() > end, "states")
+            client.until(
+                lambda: client.heard_count("pose") and time.monotonic() > end and holds_states(path),
+                "states on the topic and in the file",
+            )
             starved = starved_s(node.pid) - before
             node.process.kill()
             node.process.wait()
