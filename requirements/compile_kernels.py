@@ -24,10 +24,8 @@ def scenes_and_scripts() -> list[tuple[str, Path | None]]:
     """Every bundled scene by itself, and every example script with the scene that its head names."""
     flown: list[tuple[str, Path | None]] = [(name, None) for name in scene_names()]
     for script in sorted((ROOT / "msg_examples").glob("*.yaml")):
-        text = script.read_text("utf-8")
-        if re.search(r"^- ", text, re.MULTILINE):  # a list; the others are messages for `ros2 topic pub`
-            named = re.search(r"simulate config/(\w+)\.yaml", text)
-            flown.append((named[1] if named else "t_handle", script))
+        named = re.search(r"simulate config/(\w+)\.yaml", script.read_text("utf-8"))
+        flown.append((named[1] if named else "t_handle", script))
     return flown
 
 

@@ -13,8 +13,6 @@ import numpy as np
 from .compilation import njit
 from .elementary import sine_cosine
 from .vectors import Numbers
-from .vectors import Vector as Vector
-from .vectors import vector as vector
 
 
 def cross(a: Numbers, b: Numbers) -> np.ndarray:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from ..scene.offline import notify_start
 from ..scene.scenario import Scenario
-from ..simulation.observer import Observer, Observers, Published, SceneChanged
+from ..simulation.observer import Observer, Observers, SceneChanged
 from .simulation_loop import SimulationLoop
 
 
@@ -71,11 +71,6 @@ class LiveObservers:
     def recording_trouble(self) -> str:
         """Why the last recording has stopped, or that the present one takes nothing; empty when all is well."""
         return self.recording_error or getattr(self._recorder, "stalled", "")
-
-    @property
-    def want_states(self) -> bool:
-        """Whether one of them takes the states."""
-        return Published in self.observer.takes
 
     @property
     def has_failed_recording(self) -> bool:

@@ -18,8 +18,12 @@ _HEAD = 100
 """Words, however many blanks stand between them, within which an ASCII file names its first facet."""
 _SPARE = 2
 """Bytes that may follow the last facet: a line end, or one more attribute count."""
-_NAME = re.compile(rb"solid\b.*?(?=\bfacet\b|\Z)", re.DOTALL)  # with what follows, which may be any words
-_CORNER = re.compile(rb"\svertex\s+(\S+\s+\S+\s+\S+)")
+_CORNER = rb"\s+vertex\s+(\S+\s+\S+\s+\S+)"
+_FACET_TEXT = re.compile(
+    rb"\bfacet\s+normal(?:\s+\S+){3}\s+outer\s+loop" + 3 * _CORNER + rb"\s+endloop\s+endfacet(?!\S)"
+)
+_FACET_PART = re.compile(rb"\bfacet\s+normal|\bouter\s+loop|\bvertex(?:\s+[-+.\d]\S*){3}|\bendloop")
+"""What no solid's name has."""
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -67,17 +71,18 @@ def read_stl(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
 
 
 def _ascii_points(data: bytes, name: str) -> np.ndarray:
-    """Corner points (3m, 3) in file order: line ends count as blanks."""
-    text = _NAME.sub(b" ", data.lower().replace(b"endsolid", b"solid"))
-    facets = text.split(b"endfacet")[:-1]
-    corners = _CORNER.findall(text)
-    found = text.count(b"vertex")
-    if not found == len(corners) == 3 * len(facets) or any(facet.count(b"vertex") != 3 for facet in facets):
-        received = f"{found} vertices in {len(facets)} whole facets"
+    """Corner points (3m, 3) in file order: line ends count as blanks. Beside whole facets only names of solids may
+    stand, so that nothing of a damaged file is left out in silence.
+    """
+    text = data.lower()
+    facets = _FACET_TEXT.findall(text)
+    rest = _FACET_TEXT.sub(b" ", text)
+    if not rest.lstrip().startswith(b"solid") or _FACET_PART.search(rest):
+        received = f"{text.count(b'vertex')} vertices in {len(facets)} whole facets"
         raise MeshError(name, f"{received}, which is not three a facet; the file may be truncated")
-    points, whole = as_numbers(b" ".join(corners), 9 * len(facets))
+    points, whole = as_numbers(b" ".join(itertools.chain.from_iterable(facets)), 9 * len(facets))
     if not whole:
-        read = len(points) // 3
-        position = next((m.start() for k, m in enumerate(re.finditer(rb"\bvertex\b", data, re.I)) if k == read), 0)
-        raise error_at(data, position, name, "vertex with three numbers")
+        facet, corner = divmod(len(points) // 3, 3)
+        match = next(itertools.islice(_FACET_TEXT.finditer(text), facet, None))
+        raise error_at(data, match.start(corner + 1), name, "vertex with three numbers")
     return points.reshape(-1, 3)

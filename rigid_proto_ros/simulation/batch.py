@@ -516,7 +516,7 @@ def fly_rows(
 ) -> Results:
     """Fly all rows, each beside its reference if there are any; those that it can't check have status 0.
 
-    sample_ns (m,) ascending, watched (m,), stops (k, 3), measures (j, MEASURE): simulation/flight_measures.py.
+    sample_ns (m,) ascending, watched (m,), stops (k, 3), measures (j, MEASURE): simulation/quantities.py.
     """
     sides = (batch,) if references is None else (batch, references)
     results = new_results(len(batch.rows), len(measures))

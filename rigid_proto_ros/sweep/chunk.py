@@ -123,8 +123,9 @@ def _group(study: Study, key: tuple[Any, ...], with_reference: bool) -> Group | 
 def _fly_group(
     study: Study, key: tuple[Any, ...], members: NDArray[np.int64], columns: list[np.ndarray], flown: _Rows
 ) -> None:
-    groups = [group for group in _sides(study, key) if group is not None]
-    if len(groups) < len(_sides(study, key)):
+    sides = _sides(study, key)
+    groups = [group for group in sides if group is not None]
+    if len(groups) < len(sides):
         return
     measures, own = study.measures, [column[members] for column in columns]
     (batch, good), *beside = [group.batch(own, len(members)) for group in groups]

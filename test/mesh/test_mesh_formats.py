@@ -185,6 +185,21 @@ def test_ascii_stl_in_every_spelling(tmp_path, change):
     assert np.array_equal(mesh.vertices[mesh.triangles], CUBE_VERTICES[CUBE_TRIANGLES])
 
 
+@pytest.mark.parametrize(
+    "damaged",
+    [b"facet normalsolid 0 0 1", b"facsolid et normal 0 0 1", b"solid facet normal 0 0", b"facet 0 0 1", b"\nsolid\n"],
+)
+@pytest.mark.parametrize("line_end", [b"\n", b" "])
+def test_no_facet_of_a_damaged_text_is_left_out_in_silence(tmp_path, damaged, line_end):
+    lines = stl_text().replace(b"solid test", b"solid", 1).split(b"\n")
+    firsts = [k for k, line in enumerate(lines) if line.strip().startswith(b"facet")]
+    assert len(firsts) == 12
+    for k in firsts:
+        text = line_end.join([*lines[:k], damaged, *lines[k + 1 :]])
+        with pytest.raises(MeshError, match="36 vertices in 11 whole facets"):
+            load(tmp_path, "a.stl", text)
+
+
 def test_a_binary_stl_whose_header_speaks_of_solids_and_facets_is_binary(tmp_path):
     data = b"solid with one facet each".ljust(80) + stl()[80:]
     mesh = load(tmp_path, "a.stl", data)
