@@ -28,11 +28,12 @@ setup: $(READY) ## .venv with all that run, up, test and lint need
 run: $(FOR_RUN) ## fly a bundled body, or MESH=path/to.obj, for 10 s; leaves out/session.rrd
 	@$(ROS) .venv/bin/rigid_proto demo $(if $(MESH),--mesh "$(MESH)")
 
+# 130 is how the two below end after Ctrl-C: for them no error, of which make would report.
 up: $(FOR_RUN) ## node and viewer; stays until Ctrl-C
-	@$(ROS) .venv/bin/rigid_proto up $(if $(MESH),--mesh "$(MESH)")
+	@$(ROS) .venv/bin/rigid_proto up $(if $(MESH),--mesh "$(MESH)") || [ $$? = 130 ]
 
 workbench: $(FOR_WORKBENCH) ## node and interactive page; stays until Ctrl-C
-	@$(ROS) .venv/bin/rigid_proto workbench $(if $(MESH),--mesh "$(MESH)")
+	@$(ROS) .venv/bin/rigid_proto workbench $(if $(MESH),--mesh "$(MESH)") || [ $$? = 130 ]
 
 # A wait that has run out says that the machine was busy or that a process wasn't discovered, and nothing about values: such a
 # test, and no other, is tried once more, and the report says which.

@@ -165,3 +165,18 @@ def test_two_makes_at_once_in_one_clone_take_turns(tmp_path: Path) -> None:
         os.close(folder)
         assert "/nowhere/python" in second.communicate(timeout=60)[1]
     assert second.returncode == 1
+
+
+@pytest.mark.parametrize(
+    ("target", "status", "made"), [("up", 130, 0), ("workbench", 130, 0), ("up", 1, 2), ("run", 130, 2)]
+)
+def test_make_calls_no_error_how_up_and_workbench_end_after_ctrl_c(tmp_path, target, status, made) -> None:
+    shutil.copy(SOURCE / "Makefile", tmp_path)
+    program = tmp_path / ".venv" / "bin" / "rigid_proto"
+    program.parent.mkdir(parents=True)
+    program.write_text(f"#!/bin/sh\nexit {status}\n", "utf-8")
+    program.chmod(0o755)
+    command = ["make", "-C", tmp_path, "--no-print-directory", target, "FOR_RUN=", "FOR_WORKBENCH="]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == made
+    assert ("Error" in done.stderr) == bool(made), done.stderr
