@@ -173,9 +173,10 @@ def test_rigid_proto_commands_run(
             )
             assert sent.returncode == 0, (command, sent.stderr)
             continue
-        if words(command)[1] == "snapshot" and not os.path.isdir("/usr/share/vulkan/icd.d"):
-            continue  # snapshot's own tests say what is missing
-        assert rigid_proto(words(command)[1:]) == 0, (command, capsys.readouterr().err)
+        status, said = rigid_proto(words(command)[1:]), capsys.readouterr().err
+        # Without a graphics driver snapshot says what to install; its own tests skip there.
+        undrawn = words(command)[1] == "snapshot" and "mesa-vulkan-drivers" in said
+        assert status == (2 if undrawn else 0), (command, said)
 
 
 def stays_up() -> Iterator[object]:
