@@ -86,7 +86,7 @@ def _recorded(
     ghosts: dict[int, np.ndarray],
 ) -> str:
     """The player with the motion in it."""
-    room = Room(server, environment=False)
+    room = Room(server)
     shown = set(SHOWN)
     falls = any(isinstance(event, BodyChanged) and np.any(event.body.gravity) for event in changes)
     if falls:

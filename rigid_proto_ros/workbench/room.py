@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What surrounds the body in the picture: light, a floor that takes its shadow, a wall where it falls, the camera."""
+"""What surrounds the body in the picture: a floor that takes its shadow, a wall where it falls, the camera.
+
+The light is viser's own. A recording's player puts it on again whenever it loops, whatever the recording says.
+"""
 
 from __future__ import annotations
 
@@ -27,15 +30,6 @@ CELLS = 4.0
 
 SLOPE = math.tan(0.5 * FIELD_OF_VIEW)
 
-SUN = np.array([0.416, -0.25, 0.874])
-"""Direction to the light that throws the shadow."""
-
-SUN_SIZES, SUN_ANGLE = 10.0, 0.2
-"""How far that light is from what it lights, in half sizes of that, and half the angle [rad] of its cone."""
-
-SKY_LIGHT = 2.0
-"""Of a picture without an environment map."""
-
 LEASH = 0.2
 """Body sizes that the body may move from the picture's middle before the picture follows."""
 
@@ -61,15 +55,14 @@ class Theme:
         self.section = (72, 77, 84) if dark else (202, 202, 208)
         self.sky = (26, 28, 32) if dark else (250, 251, 253)
         self.shadow = 0.5 if dark else 0.32
-        self.ambient, self.sun = (0.35, 1.3) if dark else (0.35, 1.2)
 
 
 class Room:
     """Lengths are the picture's units: one is the body's size. The floor stays below the picture's middle while its
-    lines stand still in the world. environment: lit from a map as well, which viser's server has and a file hasn't.
+    lines stand still in the world.
     """
 
-    def __init__(self, server: viser.ViserServer, environment: bool = True) -> None:
+    def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._scene = scene = server.scene
         self._cell = 0.25
@@ -79,7 +72,6 @@ class Room:
         self._floor_height = -0.8
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
-        scene.configure_default_lights(enabled=False)
         grid: dict[str, Any] = {
             "infinite_grid": True,
             "fade_from": "origin",
@@ -90,20 +82,6 @@ class Room:
         self._wall = scene.add_grid(
             "/room/wall", plane="xz", visible=False, infinite_grid=True, fade_from="origin", fade_strength=1.5
         )
-        # viser's directional light is several, of which each throws a shadow of its own.
-        self._sun = scene.add_light_spot(
-            "/room/sun",
-            color=(255, 250, 240),
-            angle=SUN_ANGLE,
-            penumbra=0.5,
-            decay=0.0,
-            cast_shadow=True,
-            direction=tuple(-SUN),
-        )
-        self._environment = environment
-        if not environment:
-            sky, ground = (255, 255, 255), (150, 148, 144)
-            scene.add_light_hemisphere("/room/sky", sky_color=sky, ground_color=ground, intensity=SKY_LIGHT)
         self.theme = Theme(False)
         self.paint(False)
 
@@ -113,9 +91,6 @@ class Room:
         self._server.gui.configure_theme(
             show_logo=False, show_share_button=False, control_width="large", dark_mode=dark
         )
-        if self._environment:
-            self._scene.configure_environment_map("studio", environment_intensity=theme.ambient)
-        self._sun.intensity = theme.sun
         for grid in (self._floor, self._wall):
             grid.cell_color, grid.section_color = theme.cell, theme.section
             grid.cell_thickness, grid.section_thickness = 0.6, 0.9
@@ -136,7 +111,6 @@ class Room:
             grid.cell_size, grid.section_size, grid.fade_distance = self._cell, 5.0 * self._cell, far
         self._floor_height = float(low[2]) - 0.18
         self._wall.visible = falls
-        self._sun.position = tuple(self._middle + SUN_SIZES * max(half, 0.5) * SUN)
         self._look()
 
     def _look(self) -> None:
