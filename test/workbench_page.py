@@ -41,6 +41,12 @@ SEE_THROUGH = ".mantine-Notifications-root, .mantine-Notifications-root * {opaci
 """viser says that WebGL runs in software, and stands before the picture while it does."""
 
 
+NEXT_PICTURE = """() => new Promise(done => {
+  requestAnimationFrame(() => done(true));
+  setTimeout(() => done(false), 10000);
+})"""
+
+
 class Flown:
     """A body that flies in real time, and its workbench. lesson: one that begins as the first browser is there."""
 
@@ -84,7 +90,14 @@ class Browser:
     def drawn(self, pictures: int = 2) -> None:
         """Wait for two pictures: what the page has been told is in the second, and there a click hits it."""
         for _ in range(pictures):
-            self.page.evaluate("() => new Promise(done => requestAnimationFrame(done))")
+            self.until(self._draws, "picture")
+
+    def _draws(self) -> bool:
+        """Whether there is a next picture; headless Chromium may stop drawing when its window changes, until it is asked for one."""
+        drawn = self.page.evaluate(NEXT_PICTURE)
+        if not drawn:
+            self.page.screenshot()
+        return drawn
 
     @property
     def text(self) -> str:
