@@ -43,7 +43,7 @@ def _start(program: str, module: str, needs_ros: bool = False, interrupted: int 
     package = __package__.rpartition(".")[0]
     status = importlib.import_module(f"{package}.{module}").main()
     interrupts.done()
-    return status
+    return interrupts.leave(status)
 
 
 def _remedy(needs_ros: bool) -> str:

@@ -85,7 +85,9 @@ def _run(args: argparse.Namespace) -> int:
 
     text = f"rigid_proto {args.command}: compiling kernels, at the first start only; a minute or two if all are missing"
     with notify_when_compiling(lambda: print(text, file=sys.stderr, flush=True)):
-        return args.run(args)
+        status = args.run(args)
+    print(end="", flush=True)  # in here: what can't be written is told as any other file
+    return status
 
 
 def _tell(command: str, error: Exception) -> int:

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from ..session.check import Difference
     from ..session.recorded_session import RecordedSession
 
-PAST_DIFFERENCE_NS = 1_000_000_000
-"""What a recording of both motions shows beyond the first difference: up to there they are one to the eye."""
-
 REFUSALS_SHOWN = 10
 """Of a run: a flood of commands can have been refused."""
 
@@ -43,11 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser, node="the node to send commands to, or the body in a bag with several")
     parser.add_argument(
         "--verify", action="store_true", help="simulate it again and compare; exit 1 at the first difference"
-    )
-    parser.add_argument(
-        "--until-differs",
-        action="store_true",
-        help="with --verify --record FILE.rrd: if it differs, record both motions, the computed one as a ghost",
     )
     parser.add_argument("--record", metavar="FILE", help="convert it to another recording, .rrd (Rerun) or .mcap")
     parser.add_argument(
@@ -72,19 +64,20 @@ def run(args: argparse.Namespace) -> int:
     if args.repair:
         repair(args.session, args.repair)
     runs = read_runs(args.session, "" if args.publish == "commands" else args.node)
+    if args.scene and not runs[-1].missing:
+        raise InputError("--scene", args.scene, "no scene: the session has its own")
     for number, session in enumerate(runs, 1):
         _print_session(args.session if len(runs) == 1 else f"{args.session}, run {number} of {len(runs)}", session)
     if args.repair:
         print(f"  repaired: {args.repair}")
-    if args.record and not args.until_differs:
+    if args.record:
         from ..rerun_view.session_files import record
 
         with Progress(f"recording {args.record}") as progress:
             record(runs, args.record, given_scene(args.scene), progress.fraction)
     if asked(args):
         _export(runs, args)
-    if not args.until_differs:
-        _print_how_to_view(args)
+    _print_how_to_view(args)
     if args.as_scene:
         _branch(runs[-1], args)
     status = _verify(runs, args) if args.verify else 0
@@ -98,8 +91,6 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError("--at", "needs --as-scene FILE.yaml, and --as-scene needs --at T")
     if args.at is not None and not (math.isfinite(args.at) and 0.0 <= args.at <= 1e9):
         raise InputError("--at", args.at, "seconds from 0 to 1e9")
-    if args.until_differs and not (args.verify and args.record and args.record.endswith(".rrd")):
-        raise InputError("--until-differs", "needs --verify and --record FILE.rrd")
     if args.speed is not None and not (math.isfinite(args.speed) and 1e-6 <= args.speed <= 1e6):
         raise InputError("--speed", args.speed, "a factor from 1e-6 to 1e6")
     if args.speed is not None and args.publish != "states":
@@ -154,19 +145,15 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
             print(f"rigid_proto replay: {args.session}: {which}{difference}", file=sys.stderr)
             if not difference.tampered:
                 _print_difference(difference, session)
-            if args.until_differs:
-                _record_both(session, difference, args)
             return 1
         verified += 1
-    if args.until_differs:
-        print(f"  the motions don't differ: {args.record} is not written")
     print("  verified: every command and state is reproduced bit for bit")
     return 0
 
 
 def _export(runs: list[RecordedSession], args: argparse.Namespace) -> None:
     from ..export.flight_record import FlightRecord, source_of_session
-    from ..session.playback import play
+    from ..session.replay import play
 
     session, record, given = runs[-1], FlightRecord(), given_scene(args.scene)
     with Progress("reading the motion") as progress:
@@ -195,14 +182,6 @@ def _print_difference(difference: Difference, session: RecordedSession) -> None:
     for name, was, now in table:
         mark = "" if was == now else "   <- differs"
         print(f"  {name:{wide[0]}}  recorded {was:{wide[1]}}  here {now}{mark}", file=sys.stderr)
-
-
-def _record_both(session: RecordedSession, difference: Difference, args: argparse.Namespace) -> None:
-    from ..rerun_view.session_files import record_beside
-
-    with Progress(f"recording {args.record}") as progress:
-        record_beside(session, args.record, difference.time_ns + PAST_DIFFERENCE_NS, progress.fraction)
-    print(f"  both motions, the computed one as a ghost: rerun {args.record}")
 
 
 def given_scene(path: str | None) -> Scenario | None:

@@ -19,8 +19,9 @@ from .terminal import line, table
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
+    from ..rerun_view.session_files import Recorder
     from ..scene.parameters import Parameters
-    from ..simulation.observer import Observer, Observers
+    from ..simulation.observer import Refused
 
 DURATION_NS = 10_000_000_000
 AFTER_SCRIPT_NS = 1_000_000_000
@@ -85,16 +86,11 @@ def _settings(begun: str) -> list[str]:
 
 def run(args: argparse.Namespace) -> int:
     """Run the scene and print its end."""
-    from ..rerun_view.session_files import is_mcap
-    from ..scene.offline import (
-        OfflineRun,
-        parse_setting,
-        read_scene,
-        run_with_progress,
-        summary,
-    )
+    from ..scene.offline import OfflineRun, parse_setting, read_scene, run_with_progress, summary
     from ..scene.scenario import nanoseconds
+    from ..scene.scenario_run import Refusals
     from ..scene.script import read_script
+    from ..simulation.observer import Observers
 
     if args.duration is not None and not (math.isfinite(args.duration) and 0.0 <= args.duration <= 1e9):
         raise InputError("--duration", args.duration, "seconds from 0 to 1e9")
@@ -106,29 +102,30 @@ def run(args: argparse.Namespace) -> int:
     duration_ns = max(DURATION_NS, last_ns + AFTER_SCRIPT_NS) if args.duration is None else nanoseconds(args.duration)
     if beyond := sum(command.stamp_ns >= duration_ns for command in script):
         _warn(f"{beyond} of the script's {len(script)} commands act at or after the end, {duration_ns / 1e9:.9g} s")
-    recordings = [file for file in (args.record or scenario.parameters.record, args.bag) if file]
-    if args.bag and not is_mcap(args.bag):
-        raise InputError("--bag", args.bag, "a file that ends in .mcap")
-    if recordings:
+    files = [file for file in (args.record or scenario.parameters.record, args.bag) if file]
+    if files:
         # Whatever is refused is refused here, before a recording of an earlier run is overwritten.
         OfflineRun(scenario, script)
-        _check_places(recordings)
+        _check_places(files, args.bag)
     check_exports(args)
-    record = _record() if asked(args) else None
-    observer = _observer(recordings, scenario.parameters, record)
+    record = _flight_record() if asked(args) else None
+    recorders = _recorders(files, scenario.parameters)
+    watching = [*recorders.values(), *filter(None, [record])]
     try:
-        flight = OfflineRun(scenario, script, observer)
+        # Only who records has a ghost.
+        flight = OfflineRun(scenario, script, Observers(*watching, Refusals(_warn_of_ghost)) if watching else None)
         wall_time = run_with_progress(flight, duration_ns, _warn)
         result = summary(flight, wall_time)
     finally:
-        if observer is not None:
-            observer.close()
+        for recorder in recorders.values():
+            recorder.close()
+    recorded = [file for file, recorder in recorders.items() if not recorder.error]
     for reason, count in flight.simulation.refused.items():
         _warn(f"{count} commands refused: {reason}")
     if args.json:
         print(json.dumps(result))
     else:
-        _print_summary(result, recordings)
+        _print_summary(result, recorded)
     if record is not None:
         from ..export.flight_record import source_of_scene
 
@@ -138,40 +135,50 @@ def run(args: argparse.Namespace) -> int:
     if flight.simulation.failure:
         _warn(f"stopped in the last good state: {flight.simulation.failure}")
         return 1
-    return 0
+    # A recording that stopped has said so itself.
+    return 0 if recorded == files else 2
 
 
-def _check_places(files: list[str]) -> None:
+def _check_places(files: list[str], bag: str | None) -> None:
+    from ..rerun_view.session_files import is_mcap
+
+    if bag and not is_mcap(bag):
+        raise InputError("--bag", bag, "a file that ends in .mcap")
     for file in files:
         output_file("record", file)
     if len({Path(file).resolve() for file in files}) < len(files):
         raise InputError("--bag", files[-1], "another file than that of --record")
 
 
-def _record() -> FlightRecord:
+def _flight_record() -> FlightRecord:
     from ..export.flight_record import FlightRecord
 
     return FlightRecord()
 
 
-def _observer(files: list[str], parameters: Parameters, record: FlightRecord | None) -> Observers | None:
-    """One observer that records to all of these files, and to a record for exports; None without any."""
-    if not files and record is None:
-        return None
+def _recorders(files: list[str], parameters: Parameters) -> dict[str, Recorder]:
+    """A recorder by file; raises InputError, and then none is left open."""
+    if not files:
+        return {}
     from ..rerun_view.session_files import make_recorder
-    from ..scene.ghost import GhostRefusals
-    from ..simulation.observer import Observers
 
-    opened: list[Observer] = [] if record is None else [record]
+    opened: dict[str, Recorder] = {}
     try:
         for file in files:
-            opened.append(make_recorder(file, parameters=parameters, on_error=_warn, simulated_log=True))
+            opened[file] = make_recorder(file, parameters=parameters, on_error=_warn, simulated_log=True)
     except InputError:
-        for recorder in opened:
+        for recorder in opened.values():
             recorder.close()
         raise
-    # Only who records has a ghost.
-    return Observers(*opened, GhostRefusals(_warn))
+    return opened
+
+
+def _warn_of_ghost(refusal: Refused) -> None:
+    """What the ghost goes without; other refusals are counted at the end."""
+    from ..scene.scenario_run import GHOST
+
+    if refusal.reason == GHOST:
+        _warn(f"at {refusal.time_ns / 1e9:.9g} s {refusal.message}")
 
 
 def _warn(message: str) -> None:

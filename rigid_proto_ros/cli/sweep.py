@@ -69,6 +69,8 @@ def _whole(study: Study, args: argparse.Namespace) -> int:
 
     arrow()  # a table that can't be written isn't flown either
     file = Path(args.output or Path(study.name).stem + ".parquet")
+    if file.suffix != ".parquet":
+        raise InputError("--output", str(file), "a file that ends in .parquet")
     plot = read_plot(args.plot, file) if args.plot else None
     try:
         with notify_when_compiling(lambda: _print("kernels are being compiled, which takes a while the first time")):
@@ -126,15 +128,12 @@ def _one_row(study: Study, args: argparse.Namespace) -> int:
 
 def _record_row(study: Study, row: Variation, file: str) -> None:
     """Fly the row once more with a recorder that sees everything."""
-    from ..rerun_view.session_files import make_recorder
+    from ..rerun_view.session_files import recording
     from ..scene.offline import OfflineRun
 
     OfflineRun(row.scenario, row.commands)  # a row that is refused overwrites no recording
-    observer = make_recorder(file, parameters=row.parameters, on_error=_print, simulated_log=True)
-    try:
+    with recording(file, parameters=row.parameters) as observer:
         OfflineRun(row.scenario, row.commands, observer).advance(study.duration_ns)
-    finally:
-        observer.close()
 
 
 def _print(message: str) -> None:

@@ -30,7 +30,8 @@ def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     if importlib.util.find_spec("viser") is None:
         raise InputError("workbench", is_missing("viser", "workbench"))
-    from ..live.shutdown import Shutdown, leave
+    from ..base.interrupts import leave
+    from ..live.shutdown import Shutdown
     from ..rerun_view.ports import LOOPBACK
     from ..scene.offline import read_scene
     from ..scene.parameters import Parameters

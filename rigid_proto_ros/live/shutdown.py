@@ -6,13 +6,14 @@ by hanging.
 from __future__ import annotations
 
 import faulthandler
-import os
 import select
 import signal
 import socket
 import sys
 import threading
 from typing import NoReturn
+
+from ..base.interrupts import leave
 
 CLOSING_S = 15.0
 """Longer than every wait for the physics thread and for recordings, added up."""
@@ -70,15 +71,6 @@ def begin_teardown(status: int) -> None:
     watch = threading.Timer(TEARDOWN_S, _leave_stuck, (status,))
     watch.daemon = True
     watch.start()
-
-
-def leave(status: int) -> NoReturn:
-    """End the process without the interpreter's own teardown: everything is closed, and unloading the middleware and
-    the compiled kernels takes ten times as long as all the closing did, with threads of other libraries still running.
-    """
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(status)
 
 
 def _leave_stuck(status: int) -> NoReturn:

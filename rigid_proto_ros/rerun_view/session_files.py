@@ -3,18 +3,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 from ..base.errors import InputError, is_missing
 from ..base.files import output_file
 from ..scene.parameters import Parameters
 from ..scene.scenario import Scenario
-from ..session.playback import play, play_beside
-from ..session.recorded_session import RecordedSession
-from ..simulation.observer import Observer, Reset
+from ..simulation.observer import Reset
+
+if TYPE_CHECKING:
+    from ..session.mcap_observer import McapObserver
+    from ..session.recorded_session import RecordedSession
+    from .observer import RerunObserver
+
+    Recorder = McapObserver | RerunObserver
 
 
 def is_mcap(path: str) -> bool:
@@ -28,7 +35,7 @@ def make_recorder(
     parameters: Parameters | None = None,
     on_error: Callable[[str], None] | None = None,
     simulated_log: bool = False,
-) -> Observer:
+) -> Recorder:
     """An observer that records to ``path``; raises InputError where it can't.
 
     parameters: the scene's, of which frames' names count. simulated_log: messages are logged at simulated time, as
@@ -46,6 +53,20 @@ def make_recorder(
     return RerunObserver(record=path, name=node_name, on_error=on_error, open_ended=not simulated_log)
 
 
+@contextmanager
+def recording(path: str, node_name: str = "rigid_body", parameters: Parameters | None = None) -> Iterator[Recorder]:
+    """A recorder at simulated time for the block, closed at its end; raises InputError where the file can't be
+    written.
+    """
+    recorder = make_recorder(path, node_name, parameters, on_error=lambda _: None, simulated_log=True)
+    try:
+        yield recorder
+    finally:
+        recorder.close()
+    if recorder.error:
+        raise InputError("--record", path, f"a file that can be written ({recorder.error})")
+
+
 def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
     """The runs of a session, the newest last: an .rrd or .mcap recording, or a bag of ``ros2 bag record``.
 
@@ -55,7 +76,10 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
     if not path.exists():
         raise InputError("session", f"there is no file and no folder {str(path)!r}")
     if not is_bag(path):
-        return [_rerun_reader().read_session(path)]
+        session = _rerun_reader().read_session(path)
+        if node and node.strip("/") != session.node_name:
+            raise InputError("--node", node, f"{session.node_name}, the only one of this recording")
+        return [session]
     bags = _bag_reader()
     from ..session.runs import is_session_topic, session_runs
 
@@ -124,38 +148,16 @@ def record(
 
     Raises InputError for a session without a scene and a file that can't be written.
     """
+    from ..session.replay import play
+
     for session in runs:
         if not session.scene and given is None:
             raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
-    recorder = make_recorder(str(path), runs[-1].node_name.rpartition("/")[2] or "rigid_body", simulated_log=True)
     total = sum(len(session.times) for session in runs)
-    before = 0
-    try:
+    told = 0
+    with recording(str(path), runs[-1].node_name.rpartition("/")[2] or "rigid_body") as recorder:
         for number, session in enumerate(runs):
             if number:
                 recorder.on(Reset())
-            play(session, recorder, given, _after(before, total, progress))
-            before += len(session.times)
-    finally:
-        recorder.close()
-    if error := getattr(recorder, "error", ""):
-        raise InputError("--record", str(path), f"a file that can be written ({error})")
-
-
-def record_beside(
-    session: RecordedSession, path: str, until_ns: int, progress: Callable[[float, float], None] = lambda *_: None
-) -> None:
-    """Record a session's states up to ``until_ns`` with the motion computed anew beside them, as a ghost; raises
-    InputError.
-    """
-    recorder = make_recorder(path, session.node_name.rpartition("/")[2] or "rigid_body", simulated_log=True)
-    try:
-        play_beside(session, recorder, until_ns, progress)
-    finally:
-        recorder.close()
-    if error := getattr(recorder, "error", ""):
-        raise InputError("--record", path, f"a file that can be written ({error})")
-
-
-def _after(before: int, total: int, progress: Callable[[float, float], None]) -> Callable[[float, float], None]:
-    return lambda done, _: progress(before + done, total)
+            play(session, recorder, given, lambda done, _, told=told: progress(told + done, total))
+            told += len(session.times)

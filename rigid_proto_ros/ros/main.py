@@ -12,7 +12,8 @@ import threading
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
-from ..live.shutdown import Shutdown, begin_closing, begin_teardown, leave
+from ..base.interrupts import leave
+from ..live.shutdown import Shutdown, begin_closing, begin_teardown
 
 if TYPE_CHECKING:
     from .node_process import NodeProcess

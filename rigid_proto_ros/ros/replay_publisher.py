@@ -23,9 +23,8 @@ from ..scene import cdr
 from ..scene.command_codec import frame_names, in_words, of_event
 from ..scene.sensor_noise import sensor_noise
 from ..session.messages import PROJECTIONS, StampedRows
-from ..session.playback import sorted_states
 from ..session.recorded_session import RecordedSession
-from ..session.replay import recorded_parameters
+from ..session.replay import recorded_parameters, sorted_states
 from ..session.runs import decode_event
 from ..simulation.commands import Change, Command
 from . import qos

@@ -1,17 +1,111 @@
 # SPDX-License-Identifier: MIT
-"""A scenario in motion: its simulation and its ghost, and the one place where a change of parameters reaches both."""
+"""A scenario in motion: its simulation and its ghost, and the one place where a change of parameters reaches both.
+
+The ghost is a second body that gets the same commands under another tensor or integrator, to be seen beside the first:
+true against box, exact against rk4, where the two part is the lesson. It never acts back, and a run without a viewer
+has none.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
+from ..base.errors import InputError
 from ..mesh.reading import Mesh
-from ..simulation.commands import Change
-from ..simulation.observer import Observer, SceneChanged
+from ..simulation.commands import Change, Command, Listed
+from ..simulation.observer import Event, GhostChanged, GhostPublished, Observer, Refused, SceneChanged
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
-from .ghost import Ghost, ghost_of
 from .scenario import BodyMesh, Scenario, check_inertia
+
+GHOST = "ghost"
+"""The reason of a refusal that is the ghost's alone."""
+
+
+class Refusals(Observer):
+    """Hears of commands that were refused when they came to act: on_refusal(event)."""
+
+    takes = frozenset({Refused})
+
+    def __init__(self, on_refusal: Callable[[Refused], None]) -> None:
+        self._on_refusal = on_refusal
+
+    def on(self, event: Event) -> None:
+        """A command was refused."""
+        if isinstance(event, Refused):
+            self._on_refusal(event)
+
+
+class Ghost:
+    """The simulation of ``Scenario.ghost``; follows another one's commands (Simulation.follower). The observer is told
+    of what the ghost doesn't support, once until the next reset.
+    """
+
+    def __init__(self, setup: Setup, observer: Observer) -> None:
+        self.simulation = Simulation(setup, Refusals(lambda event: self._goes_without(event.message)))
+        self._observer = observer
+        self._shown = True
+        self._refused = False
+
+    def announce(self) -> None:
+        """Tell the observer what the ghost is."""
+        self._observer.on(GhostChanged(self.simulation.time_ns, self.simulation.snapshot()))
+
+    def watch(self, observer: Observer) -> None:
+        """Tell another observer from now on."""
+        self._observer = observer
+        self.announce()
+
+    def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None:
+        """Take a command of the followed simulation; what the ghost doesn't support it goes without, and the observer
+        is told.
+        """
+        if isinstance(command, Change):
+            return  # ``change`` brings its own setup
+        # A change before it in its list may allow what the present setup doesn't: then it is checked when it acts.
+        checked = None if listed is None else (b"", self.simulation.setup)
+        try:
+            self.simulation.submit(command, when_ns, listed, checked)
+        except InputError as error:
+            self._goes_without(str(error))
+
+    def _goes_without(self, reason: str) -> None:
+        if self._shown and not self._refused:
+            self._refused = True
+            text = f"the ghost continues without a command: {reason}"
+            self._observer.on(Refused(self.simulation.time_ns, GHOST, text))
+
+    def change(self, time_ns: int, scenario: Scenario, listed: Listed | None = None) -> None:
+        """The followed scenario changed at ``time_ns``, at this place in a list; one without a ghost leaves this one
+        out of sight.
+        """
+        setup = scenario.ghost
+        self._shown = setup is not None
+        if setup is not None:
+            self.simulation.submit(Change({}, lambda: setup), max(time_ns, self.simulation.time_ns), listed)
+            self._observer.on(GhostChanged(time_ns, self.simulation.snapshot(setup)))
+
+    def reset(self, scenario: Scenario) -> None:
+        """Time 0 and the initial state."""
+        self.simulation.reset(scenario.ghost)
+        self._refused = False
+        self.announce()
+
+    def advance(self, until_ns: int) -> None:
+        """Advance the ghost and tell the observer where it is."""
+        state = self.simulation.advance(until_ns)
+        if self._shown and not self.simulation.failure:
+            self._observer.on(GhostPublished(until_ns, state.row))
+
+
+def ghost_of(scenario: Scenario, simulation: Simulation, observer: Observer | None) -> Ghost | None:
+    """The ghost that a scenario asks for, following the simulation; None when nobody would see it."""
+    if scenario.ghost is None or observer is None:
+        return None
+    ghost = Ghost(scenario.ghost, observer)
+    simulation.follower = ghost
+    ghost.announce()
+    return ghost
 
 
 class ScenarioRun:

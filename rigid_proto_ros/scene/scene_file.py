@@ -20,6 +20,9 @@ from ..base.errors import InputError, did_you_mean
 from .declaration import GONE_DEFAULTS, instead_of
 from .yaml_text import compose_yaml, read_text, scalar
 
+KINDS = {yaml.SequenceNode: "list", yaml.MappingNode: "mapping"}
+"""What a value is that is no single one, in a refusal."""
+
 
 def scene_file(name: str) -> Path:
     """The file of a scene given by path or bundled name; raises InputError naming the bundled ones."""
@@ -166,8 +169,8 @@ def _sequence(path: str, node: yaml.SequenceNode) -> list:
 
 
 def _refused(path: str, node: yaml.Node, accepted: str) -> InputError:
-    received = node.value if isinstance(node, yaml.ScalarNode) else node.tag.rsplit(":", 1)[-1]
-    if isinstance(node, yaml.SequenceNode):
+    received = node.value if isinstance(node, yaml.ScalarNode) else f"a {KINDS[type(node)]}"
+    if isinstance(node, yaml.SequenceNode) and all(isinstance(item, yaml.ScalarNode) for item in node.value):
         received = "[" + ", ".join(str(item.value) for item in node.value) + "]"
     # A value from the command line has no lines to count.
     where = path if str(path).startswith("-") else f"{path}, line {node.start_mark.line + 1}"

@@ -17,6 +17,9 @@ __all__ = ["bag_bytes", "bag_files", "read_bag", "repair_mcap"]
 
 METADATA = "metadata.yaml"
 
+_PART = re.compile(r"_(\d+)\.mcap(\.zstd)?\Z")
+"""How rosbag2 ends the names of a bag's files."""
+
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
@@ -48,7 +51,11 @@ def bag_files(path: Path) -> list[Path]:
     else:
         # metadata.yaml is written at the end: a bag whose recorder was killed has none.
         found = [f for f in path.iterdir() if ".mcap" in f.suffixes]
-        found.sort(key=lambda f: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", f.name)])
+        numbers = {f: _PART.search(f.name) for f in found}
+        if len({f.name[: number.start()] if number else f.name for f, number in numbers.items()}) > 1:
+            names = ", ".join(sorted(f.name for f in found))
+            raise InputError("session", f"{path} has several recordings, {names}; name one of them")
+        found.sort(key=lambda f: int(number[1]) if (number := numbers[f]) else 0)
     if not found:
         raise InputError("session", str(path), "a folder that ros2 bag record wrote, with .mcap files in it")
     return found

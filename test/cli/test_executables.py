@@ -4,11 +4,15 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import resource
 import signal
 import subprocess
 import sys
 
 import pytest
+from conftest import ENDINGS
+from ros_process import command
 
 from rigid_proto_ros.base import interrupts
 from rigid_proto_ros.cli import executables
@@ -88,3 +92,43 @@ def test_a_command_starts_without_scipys_linear_algebra_cffi_and_extensions_of_n
     expected = "0 True [] [] True"
     moved = "numba no longer looks for BLAS, cffi or extensions where cli/main.py lets it find none"
     assert ran.stdout.splitlines()[-1] == expected, moved
+
+
+def buffered() -> dict[str, str]:
+    """The environment of who pipes into another program: Python writes at the end."""
+    return {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+
+
+def test_an_output_that_nobody_reads_or_that_takes_nothing_is_told_in_a_line_at_most():
+    inspect = command("rigid_proto", "inspect", "book")
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(inspect, stdout=full, stderr=subprocess.PIPE, text=True, env=buffered(), check=False)
+    assert done.returncode == 2
+    assert done.stderr == "rigid_proto inspect: [Errno 28] No space left on device\n"
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(inspect, stdout=write, stderr=subprocess.PIPE, text=True, env=buffered(), check=False)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+FULL_BYTES = 2_000_000
+"""Larger than any kernel that may be compiled and kept on the way."""
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_recording_that_stopped_on_a_full_disk_is_exit_2_and_not_said_to_be_recorded(ending, tmp_path):
+    pytest.importorskip("mcap")
+    path = tmp_path / f"session{ending}"
+    words = ("simulate", "book", "--set", "publish_rate=10000", "--duration", "6", "--record", path)
+    done = subprocess.run(
+        command("rigid_proto", *words),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (FULL_BYTES, FULL_BYTES)),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    assert f"recording stopped: {path}: " in done.stderr and "Traceback" not in done.stderr
+    assert "state hash" in done.stdout and str(path) not in done.stdout
+    assert 0.5 * FULL_BYTES < path.stat().st_size <= FULL_BYTES

@@ -106,7 +106,7 @@ def test_while_it_works_and_again_while_it_closes() -> None:
 ENDLESS = (
     "rigid_proto simulate t_handle --duration 1e9",
     "rigid_proto simulate t_handle --duration 1e9 --record session.mcap",
-    "poke_client poke --push 1 --timeout 0",
+    "poke_client poke --at vertex/0 --push 1 --timeout 0",
 )
 
 # The first calls set the handler.

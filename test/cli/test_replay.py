@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import pytest
+from conftest import needs_rerun
 
 from rigid_proto_ros.cli import replay
 from rigid_proto_ros.cli.main import main
@@ -51,3 +52,31 @@ def test_a_recording_without_states_has_nothing_to_verify(tmp_path, capsys):
     assert main(["replay", str(tmp_path / "empty.mcap"), "--verify"]) == 2
     out, err = capsys.readouterr()
     assert "nothing to verify" in err and err.count("\n") == 1 and "verified" not in out
+
+
+def test_what_a_recording_has_itself_is_not_taken_from_elsewhere(tmp_path, capsys):
+    pytest.importorskip("mcap")
+    session = str(tmp_path / "s.mcap")
+    assert main(["simulate", "book", "--duration", "0.2", "--bag", session]) == 0
+    capsys.readouterr()
+    assert main(["replay", session, "--scene", "config/hammer.yaml", "--verify"]) == 2
+    assert "the session has its own" in capsys.readouterr().err
+
+
+@needs_rerun
+def test_a_node_that_a_recording_does_not_hold_is_refused(tmp_path, capsys):
+    session = str(tmp_path / "s.rrd")
+    assert main(["simulate", "book", "--duration", "0.2", "--record", session]) == 0
+    assert main(["replay", session, "--node", "/rigid_body"]) == 0
+    capsys.readouterr()
+    assert main(["replay", session, "--node", "other"]) == 2
+    assert "accepted: rigid_body" in capsys.readouterr().err
+
+
+def test_a_folder_of_several_recordings_is_no_bag(tmp_path, capsys):
+    pytest.importorskip("mcap")
+    for name in ("one", "two_2"):
+        assert main(["simulate", "book", "--duration", "0.2", "--bag", str(tmp_path / f"{name}.mcap")]) == 0
+    capsys.readouterr()
+    assert main(["replay", str(tmp_path)]) == 2
+    assert "one.mcap, two_2.mcap; name one of them" in capsys.readouterr().err

@@ -66,6 +66,7 @@ SCENES = {
     "not_yaml": ("rigid_body: {ros__parameters: [", "line 1", "", "valid YAML"),
     "tab": ("rigid_body:\n\tros__parameters: {}\n", "line 2", "", "valid YAML"),
     "list": ("- 1\n- 2\n", "line 1", "[1, 2]", "a mapping"),
+    "script": ("- {t: 1.0, force: [0, 0, 1]}\n", "line 1", "a list", "a mapping"),
     "no_section": ("mass: 1.0\n", "line 1", "1.0", "section"),
     "zero_quaternion": (
         scene_text("initial.orientation_xyzw: [0.0, 0.0, 0.0, 0.0]"),
@@ -224,6 +225,7 @@ def test_a_script_with_a_mistake_is_refused(name, tmp_path, capfd):
         (["replay", "book.rrd", "hammer.rrd"], "one argument too many"),
         (["replay", "nowhere.rrd"], "nowhere.rrd"),
         (["demo", "--duration", "1"], "--duration"),
+        (["sweep", "box_tensor", "-o", "table.csv"], ".parquet"),
     ],
 )
 def test_a_slip_on_the_command_line_is_refused(arguments, part, capfd):

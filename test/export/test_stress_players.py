@@ -24,7 +24,7 @@ from test_string_line import ALLOWED, TIMES, curves_of, fly_on_string
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.flight_record import FlightRecord, frames, source_of_session
 from rigid_proto_ros.rerun_view.session_files import read_runs
-from rigid_proto_ros.session.playback import play
+from rigid_proto_ros.session.replay import play
 
 pytestmark = [pytest.mark.stress]
 

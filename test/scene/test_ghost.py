@@ -8,8 +8,8 @@ from flights import SECOND
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.scene.ghost import ghost_of
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import ghost_of
 from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.simulation.observer import GhostChanged, GhostPublished, Observer, Published, Refused
 from rigid_proto_ros.simulation.simulation import Simulation

@@ -14,9 +14,9 @@ from flights import SECOND, EventLines
 
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.command_codec import in_words, of_event
-from rigid_proto_ros.scene.ghost import Ghost
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import Ghost
 from rigid_proto_ros.scene.script import expand_script
 from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.session.replay import resimulation

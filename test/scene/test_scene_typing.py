@@ -137,7 +137,7 @@ def test_a_mixed_list_is_refused_with_file_line_and_remedy(tmp_path):
     ("text", "words"),
     [
         ("\n[a]: {ros__parameters: {}}", "line 2: got '[a]'; accepted: a name"),
-        ("? {a: b}\n: {ros__parameters: {}}", "line 1: got 'map'; accepted: a name"),
+        ("? {a: b}\n: {ros__parameters: {}}", "line 1: got 'a mapping'; accepted: a name"),
         ("rigid_body: {? [a] : {mass: 1.0}}", "line 1: got '[a]'; accepted: a name"),
         ("rigid_body: {ros__parameters: {? [a] : 1.0}}", "line 1: got '[a]'; accepted: a name"),
         ("rigid_body:\n  ros__parameters: {mass: &a [*a]}", "line 2: got 'the alias *a'"),

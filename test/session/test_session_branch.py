@@ -15,7 +15,7 @@ from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script, read_script
-from rigid_proto_ros.session.branch import branch_at
+from rigid_proto_ros.session.branch import branch_at, recorded_branch
 from rigid_proto_ros.session.messages import PROJECTIONS
 from rigid_proto_ros.session.recorded_session import RecordedSession, scene_sha256
 from rigid_proto_ros.session.replay import resimulation
@@ -215,12 +215,11 @@ def test_a_scene_with_a_parameter_that_went_is_read_where_it_says_nothing_and_el
         read_scene_text(f'{head}"{{began_ns: -1}}"\n')
 
 
-def test_a_branch_from_recorded_states_alone_needs_a_scene(session, tmp_path, capsys):
-    scene = str(tmp_path / "x.yaml")
-    assert main(["replay", str(session), "--at", "1", "--as-scene", scene, "--scene", "t_handle"]) == 0
-    assert "isn't recorded" in capsys.readouterr().out
+def test_a_branch_from_recorded_states_alone_is_in_a_scene_that_is_given(session):
     (recorded,) = read_runs(session)
-    start = read_scene(scene).setup.initial
+    branch = recorded_branch(recorded, read_scene("t_handle"), SECOND)
+    assert "isn't recorded" in branch.notes[0]
+    start = make_scenario(read_scene_text(branch.scene).values).setup.initial
     assert np.abs(start - recorded.rows[recorded.times.tolist().index(SECOND)]).max() < 1e-12
 
 

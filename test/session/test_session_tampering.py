@@ -22,7 +22,7 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
-from rigid_proto_ros.session.check import Difference, broken_link, verify
+from rigid_proto_ros.session.check import broken_link, verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
 from rigid_proto_ros.session.messages import FIELDS
 from rigid_proto_ros.session.recorded_session import RecordedSession
@@ -157,26 +157,6 @@ def test_one_bit_of_a_state_is_found(session, topic):
         assert re.fullmatch(rf"at \S+ s: state \d+, {topic} {name} differs by 1 ulp: \S+ recorded, .*", str(difference))
         before = [line for time_ns, line in session.events if time_ns < difference.time_ns]
         assert difference.command == (f"command {len(before)}: {before[-1]}" if before else "")
-
-
-@needs_rerun
-def test_both_motions_are_in_the_recording_of_one_that_differs(session, tmp_path, capsys, monkeypatch):
-    from rerun.chunk import RrdReader
-
-    from rigid_proto_ros.picture.style import GHOST
-
-    path, both = tmp_path / "flown.mcap", tmp_path / "both.rrd"
-    assert main(["simulate", "t_handle", "--duration", "0.5", "--bag", str(path)]) == 0
-    arguments = ["replay", str(path), "--verify", "--until-differs"]
-    assert main(arguments) == 2
-    assert "--record FILE.rrd" in capsys.readouterr().err
-    assert main([*arguments, "--record", str(both)]) == 0
-    assert not both.exists() and "don't differ" in capsys.readouterr().out
-    monkeypatch.setattr("rigid_proto_ros.session.check.verify", lambda *_: Difference(10**8, "state 11 differs"))
-    assert main([*arguments, "--record", str(both)]) == 1
-    (read,) = read_runs(both)
-    assert len(read.times) == 51
-    assert sum(chunk.num_rows for chunk in RrdReader(both).stream() if chunk.entity_path.strip("/") == GHOST) >= 51
 
 
 @needs_rerun
