@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
@@ -159,5 +160,9 @@ def record(
         for number, session in enumerate(runs):
             if number:
                 recorder.on(Reset())
-            play(session, recorder, given, lambda done, _, told=told: progress(told + done, total))
+            play(session, recorder, given, partial(_after, told, total, progress))
             told += len(session.times)
+
+
+def _after(told: int, total: int, progress: Callable[[float, float], None], done: float, _: float) -> None:
+    progress(told + done, total)

@@ -20,7 +20,7 @@ from ..base.errors import InputError, did_you_mean
 from .declaration import GONE_DEFAULTS, instead_of
 from .yaml_text import compose_yaml, read_text, scalar
 
-KINDS = {yaml.SequenceNode: "list", yaml.MappingNode: "mapping"}
+KINDS: dict[type[yaml.Node], str] = {yaml.SequenceNode: "list", yaml.MappingNode: "mapping"}
 """What a value is that is no single one, in a refusal."""
 
 
