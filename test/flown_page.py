@@ -7,6 +7,7 @@ import asyncio
 import re
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 
 import numpy as np
 from viser._messages import GuiUpdateMessage
@@ -144,8 +145,12 @@ class FlownPage:
         assert widget.visible and not getattr(widget, "disabled", False), label
         return widget
 
-    def _update(self, widget, value) -> None:
-        """As a browser says it; until the page has done what it means."""
+    def begin_to_set(self, label: str, value) -> Future[None]:
+        """The same, without waiting until it is done."""
+        return self._begin_update(self._usable(label), value)
+
+    def _begin_update(self, widget, value) -> Future[None]:
+        """As a browser says it."""
 
         async def update() -> None:
             (client,) = self.server.get_clients()
@@ -153,7 +158,11 @@ class FlownPage:
             await self.server.gui._handle_gui_updates(client, message)
             await asyncio.sleep(0.01)
 
-        self.do(update)
+        return asyncio.run_coroutine_threadsafe(update(), self.server.get_event_loop())
+
+    def _update(self, widget, value) -> None:
+        """Until the page has done what it means."""
+        self._begin_update(widget, value).result(PATIENCE_S)
         self.wait_until_still()
         self.do(lambda: asyncio.sleep(0.0))
 

@@ -42,7 +42,7 @@ LOOKS = frozenset(
 )
 """Parameters that a lesson leaves as they are: how one looks at the motion, not the motion."""
 
-COMPILING = "compiling numerical kernels, once only; up to a minute"
+COMPILING = "compiling, first start only"
 
 Entry = dict[str, Any]
 """One entry of a poke script."""

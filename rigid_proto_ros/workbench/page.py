@@ -137,7 +137,7 @@ class Page:
         shown = {part for name in AT_FIRST for part in PARTS[name]} | {style.BODY_MESH, CONTACTS}
         self.backend = ViserBackend(server.scene, shown, lambda node: self.pointer.attach(node))
         self.picture = Picture(self.backend, lambda name: name in DESCRIBED or self.backend.wanted(name))
-        self._com = server.scene.add_icosphere(f"/{style.CENTRE}/com", COM_SIZE, (30, 30, 30), visible=False)
+        self._com = server.scene.add_icosphere(f"/{style.CENTRE}/com", COM_SIZE, (30, 30, 30), cast_shadow=False, visible=False)
         self.poses, self.tools = DrawnPoses(), Tools()
         self.pointer = Pointer(self.flight, self.poses, self.tools)
         self.pointer.attach_com(self._com)
@@ -281,10 +281,11 @@ class Page:
                 self._draw(times, rows)
                 times, rows = [], []
                 self._on(event)
+                self._undrawn = True
         self._draw(times, rows)
-        if self._undrawn and self.live.paused:
-            # While time stands nothing is published.
-            state = self.live.state
+        state = self.live.state
+        if self._undrawn and (self.live.paused or state.time_ns == 0):
+            # While time stands, or hasn't begun because kernels are being compiled, nothing is published.
             self._draw([state.time_ns], [state.row])
 
     def _on(self, event: Event) -> None:
@@ -366,7 +367,6 @@ class Page:
     def _reset(self) -> None:
         self._new_scene |= self.flight.scenes_begun != self._scenes_seen
         self._scenes_seen = self.flight.scenes_begun
-        self._undrawn = True
         self.picture.restart()
         self.backend.forget()
         self.poses.forget()

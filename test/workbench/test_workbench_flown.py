@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import io
+import threading
 import zipfile
 from collections.abc import Iterator
 
+import numba
 import numpy as np
 import pytest
 
@@ -25,6 +27,7 @@ from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench import controls
 from rigid_proto_ros.workbench import page as page_module
+from rigid_proto_ros.workbench.flight import COMPILING
 from rigid_proto_ros.workbench.lesson_course import COURSES
 from rigid_proto_ros.workbench.lesson_panel import FREE
 from rigid_proto_ros.workbench.readouts import PLOTTED_S, SPEED
@@ -275,6 +278,39 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
     assert (opacity is not None) == (SEE_INTO in page.lessons.course.shows)
     line = backend._nodes.get(style.STRING_LINE)
     assert (line is not None and line.visible) == (style.STRING_LINE in page.lessons.course.shows)
+
+
+def test_before_time_begins_the_body_is_seen_above_the_floor() -> None:
+    class Waiting(FlownPage):
+        def fly(self, seconds: float):
+            return self.seen.rows
+
+    flown = Waiting("t_handle")
+    try:
+        page = flown.page
+        flown.until(lambda: page.backend._nodes[style.MOMENTUM].visible, "arrow of L")
+        assert page.room._floor.position[2] < -0.5
+    finally:
+        flown.end()
+
+
+def test_a_lesson_that_is_picked_while_kernels_are_compiled_begins_when_they_are(flown: FlownPage) -> None:
+    page, compiled = flown.page, threading.Event()
+
+    def compile_something() -> None:
+        numba.njit(lambda: 1.0)()
+        assert compiled.wait(20.0)
+
+    page.flight.prepare(compile_something, lambda: None)
+    picking = flown.begin_to_set("Lesson", lesson("hammer").title)
+    flown.until(lambda: f"{COMPILING} …" in page.bar._line.content, "word of what is waited for")
+    compiled.set()
+    picking.result(20.0)
+    flown.until(lambda: page.lessons._asked, "question")
+    assert resolve_mesh(flown.scenario.parameters.mesh) == resolve_mesh("hammer")
+    assert lesson("hammer").question in page.lessons._text.content
+    flown.do(lambda: page.lessons.answer(0))
+    assert flown.fly(0.5)[-1][0] == 500_000_000
 
 
 def test_light_is_left_to_viser(flown: FlownPage) -> None:
