@@ -7,13 +7,15 @@ The light is viser's own. A recording's player puts it on again whenever it loop
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import viser
 
 from ..picture.plots import nice_step
 from ..picture.surface import BOX_CORNERS
+
+Colour = tuple[int, int, int]
 
 FIELD_OF_VIEW = math.radians(35.0)
 
@@ -31,9 +33,31 @@ CELLS = 4.0
 SLOPE = math.tan(0.5 * FIELD_OF_VIEW)
 
 LEASH = 0.2
-"""Body sizes that the body may move from the picture's middle before the picture follows."""
+"""Body sizes that the body may move from where it is expected before the picture follows; so deep is the floor."""
+
+GRID: dict[str, Any] = {
+    "infinite_grid": True,
+    "fade_from": "origin",
+    "fade_strength": 1.5,
+    "cell_thickness": 0.6,
+    "section_thickness": 0.9,
+}
 
 SKY_ROWS = 64
+
+
+class Theme(NamedTuple):
+    """Colours of a page. shadow: opacity."""
+
+    floor: Colour
+    cell: Colour
+    section: Colour
+    sky: Colour
+    shadow: float
+
+
+LIGHT = Theme((236, 236, 238), (220, 220, 224), (202, 202, 208), (250, 251, 253), 0.32)
+DARK = Theme((44, 47, 52), (58, 62, 68), (72, 77, 84), (26, 28, 32), 0.5)
 
 
 def distance_to_see(half_sides: np.ndarray) -> float:
@@ -45,55 +69,29 @@ def distance_to_see(half_sides: np.ndarray) -> float:
     return float((corners @ VIEW + beside / (PATH_FILLS * SLOPE)).max())
 
 
-class Theme:
-    """Colours of light and of dark pages."""
-
-    def __init__(self, dark: bool) -> None:
-        self.dark = dark
-        self.floor = (44, 47, 52) if dark else (236, 236, 238)
-        self.cell = (58, 62, 68) if dark else (220, 220, 224)
-        self.section = (72, 77, 84) if dark else (202, 202, 208)
-        self.sky = (26, 28, 32) if dark else (250, 251, 253)
-        self.shadow = 0.5 if dark else 0.32
-
-
 class Room:
     """Lengths are the picture's units: one is the body's size. The floor stays below the picture's middle while its
-    lines stand still in the world.
+    lines stand still in the world. cell: between lines of its grid.
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._scene = scene = server.scene
-        self._cell = 0.25
-        self._reach = 0.5
-        self._middle = np.zeros(3)
-        self._distance = 2.0
-        self._floor_height = -0.8
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
-        grid: dict[str, Any] = {
-            "infinite_grid": True,
-            "fade_from": "origin",
-            "fade_strength": 1.5,
-            "plane_opacity": 1.0,
-        }
-        self._floor = scene.add_grid("/room/floor", **grid)
-        self._wall = scene.add_grid(
-            "/room/wall", plane="xz", visible=False, infinite_grid=True, fade_from="origin", fade_strength=1.5
-        )
-        self.theme = Theme(False)
+        self._floor = scene.add_grid("/room/floor", plane_opacity=1.0, **GRID)
+        self._wall = scene.add_grid("/room/wall", plane="xz", **GRID)
         self.paint(False)
+        self.furnish(1.0, np.full(3, -0.5), np.full(3, 0.5), False)
 
     def paint(self, dark: bool) -> None:
         """Light or dark, all of it."""
-        self.theme = theme = Theme(dark)
+        theme = DARK if dark else LIGHT
         self._server.gui.configure_theme(
             show_logo=False, show_share_button=False, control_width="large", dark_mode=dark
         )
         for grid in (self._floor, self._wall):
             grid.cell_color, grid.section_color = theme.cell, theme.section
-            grid.cell_thickness, grid.section_thickness = 0.6, 0.9
         self._floor.plane_color, self._floor.shadow_opacity = theme.floor, theme.shadow
         share = np.linspace(0.0, 1.0, SKY_ROWS)[:, np.newaxis] ** 2
         rows = (1.0 - share) * np.array(theme.sky) + share * np.array(theme.floor)
@@ -101,42 +99,30 @@ class Room:
 
     def furnish(self, size_m: float, low: np.ndarray, high: np.ndarray, falls: bool) -> None:
         """For a body of this size [m] that will be between two corners (3,) [units, from the picture's middle]."""
+        half_sides = 0.5 * (high - low)
         self._middle = 0.5 * (low + high)
-        half = 0.5 * float(np.linalg.norm(high - low))
-        self._reach = max(half - 0.5, LEASH)
-        self._cell = nice_step(size_m / CELLS) / size_m
-        self._distance = max(0.5 / BODY_FILLS / SLOPE, distance_to_see(0.5 * (high - low)))
-        far = 3.0 * self._distance
+        self._reach = np.maximum(half_sides - 0.5, LEASH)
+        self._floor_height = float(low[2]) - LEASH
+        self.cell = nice_step(size_m / CELLS) / size_m
+        distance = max(0.5 / BODY_FILLS / SLOPE, distance_to_see(half_sides))
         for grid in (self._floor, self._wall):
-            grid.cell_size, grid.section_size, grid.fade_distance = self._cell, 5.0 * self._cell, far
-        self._floor_height = float(low[2]) - 0.18
+            grid.cell_size, grid.section_size, grid.fade_distance = self.cell, 5.0 * self.cell, 3.0 * distance
         self._wall.visible = falls
-        self._look()
-
-    def _look(self) -> None:
-        at = self._middle
-        position = at + self._distance * VIEW
+        position = self._middle + distance * VIEW
         camera = self._server.initial_camera
-        camera.position, camera.look_at, camera.fov = position, at, FIELD_OF_VIEW
+        camera.position, camera.look_at, camera.fov = position, self._middle, FIELD_OF_VIEW
         for client in self._server.get_clients().values():
             with client.atomic():
-                client.camera.position, client.camera.look_at = position, at
+                client.camera.position, client.camera.look_at = position, self._middle
 
     def follow(self, position: np.ndarray, origin: np.ndarray, unit: float) -> np.ndarray:
         """The world point (3,) [m] at the picture's middle, for a body there, so that it stays in sight."""
         away = position - (origin + unit * self._middle)
-        distance, leash = float(np.linalg.norm(away)), unit * self._reach
-        return origin + away * (1.0 - leash / distance) if distance > leash else origin
-
-    @property
-    def cell(self) -> float:
-        """Between lines of the floor's grid, in the picture's units."""
-        return self._cell
+        return origin + away - np.clip(away, -unit * self._reach, unit * self._reach)
 
     def place(self, origin: np.ndarray, unit: float) -> None:
         """The picture's middle is at the world point ``origin`` (3,) [m], one of its units is ``unit`` [m]."""
-        period = 5.0 * self._cell
-        x, y, z = (-np.asarray(origin) / unit) % period
+        x, y, z = (-np.asarray(origin) / unit) % (5.0 * self.cell)
         self._floor.position = (x, y, self._floor_height)
-        if self._wall.visible:
-            self._wall.position = (x, self._middle[1] + 1.5 + self._reach, z)
+        behind = self._middle[1] + 1.5 + float(np.linalg.norm(self._reach))
+        self._wall.position = (x, behind, z)

@@ -259,7 +259,14 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
         return np.column_stack([from_camera @ right, from_camera @ np.cross(right, away)]) / depth[:, np.newaxis]
 
     vertices = flown.scenario.body_mesh.mesh.vertices * setup.body.scale - setup.body.center_of_mass
-    drawn = seen(page.state.position + vertices @ page.state.rotation.T)
+
+    def body_seen() -> np.ndarray:
+        """The body's vertices in the picture, none of which is below the floor."""
+        vertices_now = page.state.position + vertices @ page.state.rotation.T
+        assert ((vertices_now - backend.origin)[:, 2] / backend.unit).min() > page.room._floor.position[2]
+        return seen(vertices_now)
+
+    drawn = body_seen()
     assert np.abs(drawn).max() < 1.0
     moves_away = setup.gravity.any() or setup.string.attached
     # The least are the top on a string seven times its length, and the spinning top.
@@ -278,6 +285,10 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
     assert (opacity is not None) == (SEE_INTO in page.lessons.course.shows)
     line = backend._nodes.get(style.STRING_LINE)
     assert (line is not None and line.visible) == (style.STRING_LINE in page.lessons.course.shows)
+    flown.do(lambda: page.lessons.answer(0))
+    for _ in range(8):
+        flown.fly(0.25)
+        assert np.abs(body_seen()).max() < 1.05, f"the body is beside the picture at {1e-9 * page.state.time_ns} s"
 
 
 def test_before_time_begins_the_body_is_seen_above_the_floor() -> None:
