@@ -3,7 +3,11 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import json
 import struct
+import zipfile
 
 import numpy as np
 
@@ -68,6 +72,108 @@ def ply_binary(vertices=CUBE_VERTICES, faces=CUBE_TRIANGLES, big: bool = False) 
     for face in faces:
         data += struct.pack(f"{order}B{len(face)}if", len(face), *(int(i) for i in face), 0.5)
     return data
+
+
+KINDS = {"i1": 5120, "u1": 5121, "<i2": 5122, "<u2": 5123, "<u4": 5125, "<f4": 5126}
+
+
+class Gltf:
+    """A glTF file of a cube, in parts that a test changes."""
+
+    def __init__(self, vertices=CUBE_VERTICES, kind: str = "<f4", triangles=CUBE_TRIANGLES) -> None:
+        self.bytes = b""
+        self.json = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}]}
+        self.json |= {"accessors": [], "bufferViews": []}
+        self.primitive = {"attributes": {"POSITION": self.add(vertices, kind)}, "indices": self.add(triangles, "<u2")}
+        self.json["meshes"] = [{"primitives": [self.primitive]}]
+
+    def view(self, values, kind: str) -> int:
+        data = np.asarray(values).astype(kind).tobytes()
+        self.json["bufferViews"].append({"buffer": 0, "byteOffset": len(self.bytes), "byteLength": len(data)})
+        self.bytes += data + b"\0" * (-len(data) % 4)
+        return len(self.json["bufferViews"]) - 1
+
+    def add(self, values, kind: str) -> int:
+        values = np.asarray(values)
+        scalar = values.ndim == 1 or np.issubdtype(values.dtype, np.integer) and kind == "<u2"
+        width = "SCALAR" if scalar else f"VEC{values.shape[1]}"
+        count = values.size if scalar else len(values)
+        accessor = {"bufferView": self.view(values, kind), "componentType": KINDS[kind], "count": count, "type": width}
+        self.json["accessors"].append(accessor)
+        return len(self.json["accessors"]) - 1
+
+    @property
+    def node(self) -> dict:
+        return self.json["nodes"][0]
+
+    def gltf(self) -> bytes:
+        """The file with its numbers in itself."""
+        uri = "data:application/octet-stream;base64," + base64.b64encode(self.bytes).decode()
+        return json.dumps({**self.json, "buffers": [{"uri": uri, "byteLength": len(self.bytes)}]}).encode()
+
+    def glb(self) -> bytes:
+        """The file as a binary one."""
+        text = json.dumps({**self.json, "buffers": [{"byteLength": len(self.bytes)}]}).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text
+        chunks += struct.pack("<I4s", len(self.bytes), b"BIN\0") + self.bytes
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
+
+
+def cube_object(number: int, attributes: str = "", triangles=CUBE_TRIANGLES) -> str:
+    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in CUBE_VERTICES)
+    faces = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in triangles)
+    mesh = f"<mesh><vertices>{vertices}</vertices><triangles>{faces}</triangles></mesh>"
+    return f'<object id="{number}" {attributes}>{mesh}</object>'
+
+
+def components(number: int, *references: str) -> str:
+    inside = "".join(f"<component {reference}/>" for reference in references)
+    return f'<object id="{number}"><components>{inside}</components></object>'
+
+
+def model(objects: str, *items: str, attributes: str = "") -> str:
+    build = "".join(f"<item {item}/>" for item in items)
+    names = f'xmlns="{CORE}" xmlns:p="{PRODUCTION}"'
+    return f'<model unit="meter" {names} {attributes}><resources>{objects}</resources><build>{build}</build></model>'
+
+
+def threemf(root: str, **others: str) -> bytes:
+    """A .3mf archive with the model to be built, and others by their names."""
+    relation = '<Relationship Target="/3D/root.model" Id="r" Type="http://x/3dmodel"/>'
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        archive.writestr("_rels/.rels", f"<Relationships>{relation}</Relationships>")
+        archive.writestr("3D/root.model", root)
+        for name, text in others.items():
+            archive.writestr(f"3D/{name}.model", text)
+    return packed.getvalue()
+
+
+GEOMETRY = (
+    '<geometry id="cube"><mesh><source id="s"><float_array id="f" count="24">'
+    + " ".join(str(x) for x in CUBE_VERTICES.ravel())
+    + '</float_array><technique_common><accessor source="#f" count="8" stride="3"><param name="X" type="float"/>'
+    '<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>'
+    '<vertices id="v"><input semantic="POSITION" source="#s"/></vertices><triangles count="12" material="m">'
+    '<input semantic="VERTEX" source="#v" offset="0"/><p>'
+    + " ".join(str(i) for i in CUBE_TRIANGLES.ravel())
+    + "</p></triangles></mesh></geometry>"
+)
+
+
+def collada(nodes: str, geometry: str = GEOMETRY, libraries: str = "") -> bytes:
+    """A .dae file whose scene has these nodes."""
+    return (
+        '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>'
+        f'<unit meter="1"/></asset>{libraries}<library_geometries>{geometry}</library_geometries>'
+        f'<library_visual_scenes><visual_scene id="scene">{nodes}</visual_scene></library_visual_scenes>'
+        '<scene><instance_visual_scene url="#scene"/></scene></COLLADA>'
+    ).encode()
 
 
 def moebius(segments: int = 24) -> tuple[np.ndarray, np.ndarray]:

@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: MIT
 """Files of placed parts, .gltf, .3mf and .dae: each feature that moves a vertex is read as specified or refused by name."""
 
-import base64
-import io
-import json
 import sys
-import zipfile
 
 import numpy as np
 import pytest
-from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES
+from mesh_files import (
+    CUBE_TRIANGLES,
+    CUBE_VERTICES,
+    GEOMETRY,
+    Gltf,
+    collada,
+    components,
+    cube_object,
+    model,
+    threemf,
+)
 
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
@@ -21,6 +27,11 @@ def no_cache(monkeypatch):
     monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
 
 
+def load(folder, name: str, data: bytes) -> Mesh:
+    (folder / name).write_bytes(data)
+    return load_mesh(str(folder / name))
+
+
 def volume(mesh: Mesh) -> float:
     return mesh_body(mesh).moments.moments("solid").measure
 
@@ -29,56 +40,17 @@ def box_of(mesh: Mesh) -> list[list[float]]:
     return [mesh.vertices.min(axis=0).tolist(), mesh.vertices.max(axis=0).tolist()]
 
 
-KINDS = {"i1": 5120, "u1": 5121, "<i2": 5122, "<u2": 5123, "<u4": 5125, "<f4": 5126}
-
-
-class Gltf:
-    """A .gltf file of a cube, in parts that a test changes."""
-
-    def __init__(self, vertices=CUBE_VERTICES, kind: str = "<f4", triangles=CUBE_TRIANGLES) -> None:
-        self.bytes = b""
-        self.json = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}]}
-        self.json |= {"accessors": [], "bufferViews": []}
-        self.primitive = {"attributes": {"POSITION": self.add(vertices, kind)}, "indices": self.add(triangles, "<u2")}
-        self.json["meshes"] = [{"primitives": [self.primitive]}]
-
-    def view(self, values, kind: str) -> int:
-        data = np.asarray(values).astype(kind).tobytes()
-        self.json["bufferViews"].append({"buffer": 0, "byteOffset": len(self.bytes), "byteLength": len(data)})
-        self.bytes += data + b"\0" * (-len(data) % 4)
-        return len(self.json["bufferViews"]) - 1
-
-    def add(self, values, kind: str) -> int:
-        values = np.asarray(values)
-        scalar = values.ndim == 1 or np.issubdtype(values.dtype, np.integer) and kind == "<u2"
-        width = "SCALAR" if scalar else f"VEC{values.shape[1]}"
-        count = values.size if scalar else len(values)
-        accessor = {"bufferView": self.view(values, kind), "componentType": KINDS[kind], "count": count, "type": width}
-        self.json["accessors"].append(accessor)
-        return len(self.json["accessors"]) - 1
-
-    @property
-    def node(self) -> dict:
-        return self.json["nodes"][0]
-
-    def load(self, folder) -> Mesh:
-        uri = "data:application/octet-stream;base64," + base64.b64encode(self.bytes).decode()
-        self.json["buffers"] = [{"uri": uri, "byteLength": len(self.bytes)}]
-        (folder / "a.gltf").write_text(json.dumps(self.json))
-        return load_mesh(str(folder / "a.gltf"))
-
-
 def test_gltf_normalized_integers_are_fractions(tmp_path):
     for kind in ("i1", "u1", "<i2", "<u2"):
         file = Gltf(CUBE_VERTICES * np.iinfo(np.dtype(kind)).max, kind)
         file.json["accessors"][0]["normalized"] = True
         file.json["extensionsRequired"] = ["KHR_mesh_quantization"]
         file.node.update(scale=[2, 2, 2], translation=[1, 0, 0])
-        assert box_of(file.load(tmp_path)) == [[1, 0, 0], [3, 2, 2]], kind
+        assert box_of(load(tmp_path, "a.gltf", file.gltf())) == [[1, 0, 0], [3, 2, 2]], kind
 
 
 def test_gltf_integers_that_are_not_normalized_are_themselves(tmp_path):
-    assert volume(Gltf(CUBE_VERTICES * 100, "u1").load(tmp_path)) == 1e6
+    assert volume(load(tmp_path, "a.gltf", Gltf(CUBE_VERTICES * 100, "u1").gltf())) == 1e6
 
 
 def test_gltf_sparse_accessors_replace_some_vertices(tmp_path):
@@ -93,7 +65,7 @@ def test_gltf_sparse_accessors_replace_some_vertices(tmp_path):
         }
         if not base:
             del file.json["accessors"][0]["bufferView"]
-        assert volume(file.load(tmp_path)) == 3.0
+        assert volume(load(tmp_path, "a.gltf", file.gltf())) == 3.0
 
 
 def test_gltf_instances_are_all_there(tmp_path):
@@ -102,7 +74,7 @@ def test_gltf_instances_are_all_there(tmp_path):
     scales = file.add(np.array([[1.0, 1, 1], [2, 2, 2], [1, 1, 1]]), "<f4")
     attributes = {"TRANSLATION": shifts, "SCALE": scales}
     file.node["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": attributes}}
-    mesh = file.load(tmp_path)
+    mesh = load(tmp_path, "a.gltf", file.gltf())
     assert volume(mesh) == 10.0 and box_of(mesh) == [[0, 0, 0], [7, 10, 2]]
 
 
@@ -113,7 +85,7 @@ def test_gltf_nodes_are_placed_one_in_the_other_and_mirrored_ones_face_outward(t
         {"children": [1], "rotation": [0, 0, half, half], "translation": [10, 0, 0]},
         {"mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -2, 0, 3, 0, 0, 1]},
     ]
-    mesh = file.load(tmp_path)
+    mesh = load(tmp_path, "a.gltf", file.gltf())
     np.testing.assert_allclose(box_of(mesh), [[9, 3, -2], [10, 4, 0]], rtol=0, atol=1e-15)
     body = mesh_body(mesh)
     assert body.moments.moments("solid").measure == pytest.approx(2.0) and not body.verdict.inward
@@ -127,7 +99,7 @@ def test_gltf_strips_and_fans_are_triangles(tmp_path):
     for quad in ((0, 2, 6, 4), (1, 5, 7, 3)):
         primitives.append({**file.primitive, "indices": file.add(np.array(quad), "<u2"), "mode": 6})
     file.json["meshes"][0]["primitives"] = [*primitives, {**file.primitive, "mode": 1}]
-    assert volume(file.load(tmp_path)) == 1.0
+    assert volume(load(tmp_path, "a.gltf", file.gltf())) == 1.0
 
 
 def test_gltf_of_which_something_is_not_read_says_what(tmp_path, monkeypatch):
@@ -155,13 +127,13 @@ def test_gltf_of_which_something_is_not_read_says_what(tmp_path, monkeypatch):
         file = Gltf()
         change(file)
         with pytest.raises(MeshError, match=words):
-            file.load(tmp_path)
+            load(tmp_path, "a.gltf", file.gltf())
 
 
 def test_gltf_extensions_that_only_change_looks_are_no_reason_to_refuse(tmp_path):
     file = Gltf()
     file.json["extensionsRequired"] = ["KHR_materials_unlit", "KHR_texture_transform"]
-    assert volume(file.load(tmp_path)) == 1.0
+    assert volume(load(tmp_path, "a.gltf", file.gltf())) == 1.0
 
 
 def test_draco_is_read_where_its_package_is(tmp_path):
@@ -172,39 +144,11 @@ def test_draco_is_read_where_its_package_is(tmp_path):
     file.json["extensionsRequired"] = ["KHR_draco_mesh_compression"]
     file.json["accessors"][0].pop("bufferView")
     file.primitive["extensions"] = {"KHR_draco_mesh_compression": {"bufferView": view, "attributes": {"POSITION": 0}}}
-    assert volume(file.load(tmp_path)) == pytest.approx(1.0, abs=1e-3)
-
-
-CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
-
-
-def cube_object(number: int, attributes: str = "", triangles=CUBE_TRIANGLES) -> str:
-    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in CUBE_VERTICES)
-    faces = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in triangles)
-    mesh = f"<mesh><vertices>{vertices}</vertices><triangles>{faces}</triangles></mesh>"
-    return f'<object id="{number}" {attributes}>{mesh}</object>'
-
-
-def components(number: int, *references: str) -> str:
-    inside = "".join(f"<component {reference}/>" for reference in references)
-    return f'<object id="{number}"><components>{inside}</components></object>'
-
-
-def model(objects: str, *items: str, attributes: str = "") -> str:
-    build = "".join(f"<item {item}/>" for item in items)
-    names = f'xmlns="{CORE}" xmlns:p="{PRODUCTION}"'
-    return f'<model unit="meter" {names} {attributes}><resources>{objects}</resources><build>{build}</build></model>'
+    assert volume(load(tmp_path, "a.gltf", file.gltf())) == pytest.approx(1.0, abs=1e-3)
 
 
 def load_3mf(folder, root: str, **others: str) -> Mesh:
-    relation = '<Relationship Target="/3D/root.model" Id="r" Type="http://x/3dmodel"/>'
-    with zipfile.ZipFile(folder / "a.3mf", "w") as archive:
-        archive.writestr("_rels/.rels", f"<Relationships>{relation}</Relationships>")
-        archive.writestr("3D/root.model", root)
-        for name, text in others.items():
-            archive.writestr(f"3D/{name}.model", text)
-    return load_mesh(str(folder / "a.3mf"))
+    return load(folder, "a.3mf", threemf(root, **others))
 
 
 SHIFT = 'transform="1 0 0 0 1 0 0 0 1 5 0 0"'
@@ -261,16 +205,6 @@ def test_3mf_of_which_something_is_not_read_says_what(tmp_path, root, words):
         load_3mf(tmp_path, root)
 
 
-GEOMETRY = (
-    '<geometry id="cube"><mesh><source id="s"><float_array id="f" count="24">'
-    + " ".join(str(x) for x in CUBE_VERTICES.ravel())
-    + '</float_array><technique_common><accessor source="#f" count="8" stride="3"><param name="X" type="float"/>'
-    '<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>'
-    '<vertices id="v"><input semantic="POSITION" source="#s"/></vertices><triangles count="12" material="m">'
-    '<input semantic="VERTEX" source="#v" offset="0"/><p>'
-    + " ".join(str(i) for i in CUBE_TRIANGLES.ravel())
-    + "</p></triangles></mesh></geometry>"
-)
 INSTANCE = '<instance_geometry url="#cube"/>'
 BOUND = (
     '<instance_geometry url="#cube"><bind_material><technique_common>'
@@ -287,13 +221,7 @@ TEXTURED = (
 
 def load_dae(folder, nodes: str, geometry: str = GEOMETRY, libraries: str = "") -> Mesh:
     pytest.importorskip("collada")
-    (folder / "a.dae").write_text(
-        '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>'
-        f'<unit meter="1"/></asset>{libraries}<library_geometries>{geometry}</library_geometries>'
-        f'<library_visual_scenes><visual_scene id="scene">{nodes}</visual_scene></library_visual_scenes>'
-        '<scene><instance_visual_scene url="#scene"/></scene></COLLADA>'
-    )
-    return load_mesh(str(folder / "a.dae"))
+    return load(folder, "a.dae", collada(nodes, geometry, libraries))
 
 
 def test_dae_instances_count_whatever_becomes_of_their_material_or_texture(tmp_path):
@@ -332,9 +260,5 @@ def test_dae_of_which_something_is_not_read_says_what(tmp_path, nodes, geometry,
 
 def test_a_zae_needs_one_document(tmp_path):
     pytest.importorskip("collada")
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w") as archive:
-        archive.writestr("a.txt", "")
-    (tmp_path / "a.zae").write_bytes(packed.getvalue())
     with pytest.raises(MeshError, match="0 .dae files"):
-        load_mesh(str(tmp_path / "a.zae"))
+        load(tmp_path, "a.zae", threemf(""))
