@@ -34,9 +34,10 @@ class Assembly:
                 self.name, f"it has more than {self.max_triangles} triangles; --max-triangles raises the limit"
             )
         linear, shift = matrix[:3, :3], matrix[:3, 3]
-        x, y, z = np.asarray(vertices, dtype=np.float64).T[:, :, None]
-        # Summed in a fixed order: BLAS would pick one by processor.
-        self._vertices.append(x * linear[:, 0] + y * linear[:, 1] + z * linear[:, 2] + shift)
+        with np.errstate(all="ignore"):  # the verdict refuses what isn't finite
+            x, y, z = np.asarray(vertices, dtype=np.float64).T[:, :, None]
+            # Summed in a fixed order: BLAS would pick one by processor.
+            self._vertices.append(x * linear[:, 0] + y * linear[:, 1] + z * linear[:, 2] + shift)
         if np.linalg.det(linear) < 0.0:
             triangles = triangles[:, [0, 2, 1]]
         self._triangles.append(triangles + self._count)

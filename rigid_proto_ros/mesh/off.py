@@ -34,11 +34,9 @@ def read_off(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     n, p = counts
     if p > max_triangles:
         raise MeshError(name, f"{p} faces are more than {max_triangles}; --max-triangles raises the limit")
-    if n + p > len(rows) - 1:
-        received = f"{min(n, len(rows) - 1)} vertices and {max(0, len(rows) - 1 - n)} faces"
-        raise MeshError(
-            name, f"{received}, but the header announces {n} vertices and {p} faces; the file may be truncated"
-        )
+    if n + p != len(rows) - 1:
+        announced = f"the header announces {n} vertices and {p} faces"
+        raise MeshError(name, f"{len(rows) - 1} lines, but {announced}; the file may be truncated or damaged")
     places = [row.split()[:3] for row in rows[1 : n + 1]]
     points, whole = as_numbers(b" ".join([word for row in places for word in row]), 3 * n)
     short = next((k for k, row in enumerate(places) if len(row) < 3), n)

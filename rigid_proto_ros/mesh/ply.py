@@ -28,6 +28,8 @@ _TYPES = {name: kind for kind, names in _NAMES.items() for name in names}
 """By the header's names, those of the modules struct and numpy."""
 _INDEX_NAMES = ("vertex_indices", "vertex_index")
 _FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
+SPARE = 2
+"""Bytes of a line end that may follow a binary body."""
 MAX_HEADER = 1_000_000
 """Bytes; a header has some lines of 20 to 60."""
 
@@ -167,6 +169,13 @@ class _Body:
         kind = self._type(element.properties[wanted].type if wanted >= 0 else "d")
         return np.array(sizes, np.int64), np.frombuffer(b"".join(parts), kind)
 
+    def check_end(self) -> None:
+        """Refuse a body that goes on behind the rows that the header announces, but for a line end."""
+        beyond = len(self.data) - self.position
+        if beyond > (0 if self.text else SPARE):
+            received = f"{beyond // 8} numbers" if self.text else f"{beyond} bytes"
+            raise MeshError(self.name, f"{received} follow what the header announces; the file may be damaged")
+
     def short(self, element: _Element, rows: int) -> MeshError:
         """The refusal of a body that has fewer rows than the header says."""
         announced = f"the header announces {element.count}; the file may be truncated or damaged"
@@ -248,6 +257,7 @@ def read_ply(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
             counts = np.full(len(numbers) // 3, 3)
         if element.name in ("face", "tristrips"):
             sizes, items = np.concatenate([sizes, counts]), np.concatenate([items, numbers])
+    body.check_end()
     if vertices is None:
         raise MeshError(name, [e.name for e in elements], "an element vertex with properties x, y, z")
     if sizes.size and sizes.min() < 3:

@@ -75,12 +75,13 @@ def _ascii_points(data: bytes, name: str) -> np.ndarray:
     stand, so that nothing of a damaged file is left out in silence.
     """
     text = data.lower()
-    facets = _FACET_TEXT.findall(text)
-    rest = _FACET_TEXT.sub(b" ", text)
+    parts = _FACET_TEXT.split(text)  # what stands before a facet, then its three corners, by turns
+    rest = b" ".join(parts[::4])
+    facets = len(parts) // 4
     if not rest.lstrip().startswith(b"solid") or _FACET_PART.search(rest):
-        received = f"{text.count(b'vertex')} vertices in {len(facets)} whole facets"
+        received = f"{text.count(b'vertex')} vertices in {facets} whole facets"
         raise MeshError(name, f"{received}, which is not three a facet; the file may be truncated")
-    points, whole = as_numbers(b" ".join(itertools.chain.from_iterable(facets)), 9 * len(facets))
+    points, whole = as_numbers(b" ".join(part for k, part in enumerate(parts) if k % 4), 9 * facets)
     if not whole:
         facet, corner = divmod(len(points) // 3, 3)
         match = next(itertools.islice(_FACET_TEXT.finditer(text), facet, None))

@@ -120,22 +120,6 @@ def _sort(keys: np.ndarray, first: int, last: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _counts(table: np.ndarray) -> tuple[int, int, int, int]:
-    """Numbers of edges of an odd number of uses, of unequal uses in both directions, of both but even, of
-    more than two.
-    """
-    odd = unbalanced = flipped = many = 0
-    for e in range(table.shape[0]):
-        uses = table[e, 2] + table[e, 3]
-        unequal = table[e, 2] != table[e, 3]
-        odd += uses & 1
-        unbalanced += unequal
-        flipped += unequal and not uses & 1
-        many += uses > 2
-    return odd, unbalanced, flipped, many
-
-
-@njit(cache=True, nogil=True)
 def _edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray, int, bool]:
     """Match the sides of ``corners`` (m, 3) edge by edge, and join triangles that share one.
 
@@ -242,8 +226,20 @@ def mesh_topology(vertices: np.ndarray, triangles: np.ndarray) -> Topology:
     edges, component, components, repeats = _edges(corners, len(vertices))
     duplicates, opposites = _repeated(corners) if repeats else (np.zeros(len(corners), dtype=bool), 0)
     degenerate = int(_without_area(vertices, triangles))
-    counts = (int(count) for count in _counts(edges))
-    return Topology(corners, edges, component, components, duplicates, opposites, degenerate, *counts)
+    uses, unequal = edges[:, 2] + edges[:, 3], edges[:, 2] != edges[:, 3]
+    return Topology(
+        corners,
+        edges,
+        component,
+        components,
+        duplicates,
+        opposites,
+        degenerate,
+        odd=int(np.count_nonzero(uses & 1)),
+        unbalanced=int(np.count_nonzero(unequal)),
+        flipped=int(np.count_nonzero(unequal & (uses & 1 == 0))),
+        nonmanifold=int(np.count_nonzero(uses > 2)),
+    )
 
 
 def _repeated(corners: np.ndarray) -> tuple[np.ndarray, int]:
@@ -295,39 +291,25 @@ def surplus_copies(topology: Topology) -> np.ndarray:
 
 @njit(cache=True, nogil=True)
 def _component_sums(
-    vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, count: int, reference: np.ndarray
+    vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, count: int, middle: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Sums of each component: those of the one at hand are kept out of memory, which costs more than the arithmetic."""
-    sums = np.zeros((count, 4))
+    volume, area = np.zeros(count), np.zeros((count, 3))
     lower, upper = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    x, y, z = reference[0], reference[1], reference[2]
-    first = 0
-    while first < len(triangles):
-        c = component[first]
-        volume, area_x, area_y, area_z = sums[c, 0], sums[c, 1], sums[c, 2], sums[c, 3]
-        low_x, low_y, low_z = lower[c, 0], lower[c, 1], lower[c, 2]
-        high_x, high_y, high_z = upper[c, 0], upper[c, 1], upper[c, 2]
-        t = first
-        while t < len(triangles) and component[t] == c:
-            i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            ax, ay, az = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-            bx, by, bz = vertices[j, 0], vertices[j, 1], vertices[j, 2]
-            cx, cy, cz = vertices[k, 0], vertices[k, 1], vertices[k, 2]
-            low_x, high_x = min(low_x, ax, bx, cx), max(high_x, ax, bx, cx)
-            low_y, high_y = min(low_y, ay, by, cy), max(high_y, ay, by, cy)
-            low_z, high_z = min(low_z, az, bz, cz), max(high_z, az, bz, cz)
-            ax, ay, az = ax - x, ay - y, az - z
-            ux, uy, uz = (bx - x) - ax, (by - y) - ay, (bz - z) - az
-            wx, wy, wz = (cx - x) - ax, (cy - y) - ay, (cz - z) - az
-            nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-            volume += (ax * nx + ay * ny + az * nz) / 6.0
-            area_x, area_y, area_z = area_x + 0.5 * nx, area_y + 0.5 * ny, area_z + 0.5 * nz
-            t += 1
-        sums[c, 0], sums[c, 1], sums[c, 2], sums[c, 3] = volume, area_x, area_y, area_z
-        lower[c, 0], lower[c, 1], lower[c, 2] = low_x, low_y, low_z
-        upper[c, 0], upper[c, 1], upper[c, 2] = high_x, high_y, high_z
-        first = t
-    return sums[:, 0].copy(), sums[:, 1:].copy(), lower, upper
+    for t in range(len(triangles)):
+        c = component[t]
+        corner, u, w = vertices[triangles[t, 0]], vertices[triangles[t, 1]], vertices[triangles[t, 2]]
+        for k in range(3):
+            lower[c, k] = min(lower[c, k], corner[k], u[k], w[k])
+            upper[c, k] = max(upper[c, k], corner[k], u[k], w[k])
+        ax, ay, az = corner[0] - middle[0], corner[1] - middle[1], corner[2] - middle[2]
+        ux, uy, uz = (u[0] - middle[0]) - ax, (u[1] - middle[1]) - ay, (u[2] - middle[2]) - az
+        wx, wy, wz = (w[0] - middle[0]) - ax, (w[1] - middle[1]) - ay, (w[2] - middle[2]) - az
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        volume[c] += (ax * nx + ay * ny + az * nz) / 6.0
+        area[c, 0] += 0.5 * nx
+        area[c, 1] += 0.5 * ny
+        area[c, 2] += 0.5 * nz
+    return volume, area, lower, upper
 
 
 @dataclass(frozen=True)
@@ -342,30 +324,16 @@ class Extent:
     first_not_finite: int
 
 
-@njit(cache=True, nogil=True)
-def _extent(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, int, int, int]:
-    used = np.zeros(vertices.shape[0], np.bool_)
-    for t in range(triangles.shape[0]):
-        for k in range(3):
-            used[triangles[t, k]] = True
-    lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
-    unused = not_finite = 0
-    first = -1
-    for i in range(vertices.shape[0]):
-        if not used[i]:
-            unused += 1
-            continue
-        if not np.isfinite(0.0 * vertices[i, 0] + 0.0 * vertices[i, 1] + 0.0 * vertices[i, 2]):
-            not_finite += 1
-            first = i if first < 0 else first
-        for k in range(3):
-            lower[k], upper[k] = min(lower[k], vertices[i, k]), max(upper[k], vertices[i, k])
-    return lower, upper, unused, not_finite, first
-
-
 def referenced_extent(vertices: np.ndarray, triangles: np.ndarray) -> Extent:
-    """The extent of the vertices (n, 3) that triangles (m, 3) use."""
-    return Extent(*_extent(vertices, triangles))
+    """The extent of the vertices (n, 3) that triangles (m, 3) use; its box means nothing where one isn't finite."""
+    used = np.zeros(len(vertices), dtype=bool)
+    used[triangles.ravel()] = True
+    points = vertices if used.all() else vertices[used]
+    lower, upper = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
+    bad = np.empty(0, np.int64)
+    if not np.isfinite(points).all():
+        bad = np.flatnonzero(used & ~np.isfinite(vertices).all(axis=1))
+    return Extent(lower, upper, len(vertices) - len(points), len(bad), int(bad[0]) if len(bad) else -1)
 
 
 @dataclass(frozen=True)

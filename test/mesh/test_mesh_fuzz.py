@@ -136,6 +136,7 @@ def no_cache(monkeypatch):
     monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("count", [30, pytest.param(10_000, marks=pytest.mark.stress)])
 @pytest.mark.parametrize("ending", SEEDS)
 def test_damaged_files_give_a_mesh_or_one_line(ending, count):

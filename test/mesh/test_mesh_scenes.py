@@ -130,6 +130,16 @@ def test_gltf_of_which_something_is_not_read_says_what(tmp_path, monkeypatch):
             load(tmp_path, "a.gltf", file.gltf())
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_gltf_numbers_that_are_not_finite_are_left_to_the_verdict(tmp_path):
+    signalling = np.frombuffer(np.uint32(0x7F800001).tobytes(), "<f4")[0]
+    for number in (np.inf, signalling):
+        vertices = CUBE_VERTICES.astype("<f4")
+        vertices[0, 0] = number
+        verdict = mesh_body(load(tmp_path, "a.gltf", Gltf(vertices).gltf())).verdict
+        assert [finding.code for finding in verdict.findings] == ["nonfinite"]
+
+
 def test_gltf_extensions_that_only_change_looks_are_no_reason_to_refuse(tmp_path):
     file = Gltf()
     file.json["extensionsRequired"] = ["KHR_materials_unlit", "KHR_texture_transform"]
