@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Compile kernels into the cache: ``compile_kernels.py integrators | flight | scenes``.
+"""Compile kernels into the cache: ``compile_kernels.py integrators | flight | first | scenes``.
 
-The first two are what the first flight needs; they share few kernels and take about as long, so that they run side by
-side. ``scenes``, after them, is what any other bundled scene, lesson or example script needs.
+The first two share few kernels and take about as long, so that they run side by side. ``first``, after them, is the few
+that are still missing for the flight of `make run`. ``scenes`` is what any other bundled scene, lesson or example
+script needs.
 """
 
 import re
 import sys
+import tempfile
 from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -14,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from rigid_proto_ros.base.bundled import scene_names, scene_path
+from rigid_proto_ros.base.bundled import example_path, scene_names, scene_path
 from rigid_proto_ros.cli.main import main as rigid_proto
-from rigid_proto_ros.live.warm_up import compile_flight, compile_integrators
+from rigid_proto_ros.live.warm_up import compile_flight, compile_integrators, warm_up
 from rigid_proto_ros.scene.offline import read_scene
 
 
@@ -29,12 +31,24 @@ def scenes_and_scripts() -> list[tuple[str, Path | None]]:
     return flown
 
 
+def fly(*words: str) -> int:
+    """`simulate` without what it prints; returns its exit status."""
+    with redirect_stdout(StringIO()):
+        return rigid_proto(["simulate", *words])
+
+
+def fly_first() -> int:
+    """What `make run` flies and shows; returns the exit status."""
+    warm_up(read_scene(str(scene_path("t_handle"))).setup)
+    script = str(example_path("flip_and_poke"))
+    with tempfile.TemporaryDirectory() as folder:
+        return fly("t_handle", "--script", script, "--duration", "9", "--record", f"{folder}/session.rrd")
+
+
 def fly_all() -> int:
     """Fly each of them for the usual 10 s; returns the first exit status that isn't 0."""
     for scene, script in scenes_and_scripts():
-        with redirect_stdout(StringIO()):
-            status = rigid_proto(["simulate", scene, *(["--script", str(script)] if script else [])])
-        if status:
+        if status := fly(scene, *(["--script", str(script)] if script else [])):
             return status
     return 0
 
@@ -46,7 +60,7 @@ def main(part: str) -> int:
     elif part == "flight":
         compile_flight(read_scene(str(scene_path("t_handle"))).setup)
     else:
-        return fly_all()
+        return fly_first() if part == "first" else fly_all()
     return 0
 
 

@@ -369,6 +369,8 @@ def main(stage):
             begin_compiling()
         progress = Progress("kernels, compiled once")
         await_kernels(progress, compiling)
+        compiling.append(("first", started(inner, COMPILE_KERNELS, "first")))
+        await_kernels(progress, compiling[-1:])
         if stage != "run":
             progress = Progress("kernels of all scenes, lessons and scripts, compiled once")
             compiling.append(("scenes", started(inner, COMPILE_KERNELS, "scenes")))

@@ -9,9 +9,9 @@ from flights import EventLines
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.command_codec import string_attach, string_target
-from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
+from rigid_proto_ros.scene.scenario import check_inertia, make_scenario, mesh_sha256_of
 from rigid_proto_ros.session.messages import PROJECTIONS
-from rigid_proto_ros.session.recorded_session import RecordedSession, scene_sha256
+from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, ReleaseString, WrenchCommand
 from rigid_proto_ros.simulation.observer import Reset
 from rigid_proto_ros.simulation.simulation import Simulation
@@ -115,7 +115,7 @@ class HandSession:
             events=list(self.log.timed),
             times=np.array([self.now_ns]),
             rows=self.simulation.state.row[None].copy(),
-            mesh_sha256=scene_sha256(self.first.text),
+            mesh_sha256=mesh_sha256_of(self.first.text),
         )
 
     def _submit(self, command) -> None:

@@ -12,8 +12,12 @@ import sys
 import time
 from pathlib import Path
 
+from ..base.child_processes import end_with_this_thread, with_this_package
 from ..base.errors import InputError
 from .options import add_mesh
+
+GRACE_S = 5.0
+"""A process that doesn't end within this time of SIGTERM is killed."""
 
 FLIGHT_S = 10.0
 CONFIRM_S = 2.0
@@ -55,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     from ..base.bundled import example_path, scene_path
     from ..scene.offline import read_scene
     from ..scene.script import read_script
-    from .processes import Processes, own_executable, text_parameter
+    from .executables import own_executable, text_parameter
 
     if not 3.0 <= args.duration <= 3600.0:
         raise InputError("--duration", args.duration, "seconds from 3 to 3600")
@@ -172,3 +176,41 @@ def _report(session: Path) -> int:
     print(f"\n{session} is the recorded session. Show it with:\n   .venv/bin/rerun {session}")
     print(f"Simulate it again and compare every state bit for bit:\n   .venv/bin/rigid_proto replay {session} --verify")
     return 0
+
+
+class Processes:
+    """Starts processes and ends them all on leaving, also when the command itself is ended by a signal."""
+
+    def __init__(self) -> None:
+        self._running: list[subprocess.Popen] = []
+
+    def __enter__(self) -> Processes:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in reversed(self._running):
+            self.end(process)
+
+    def start(self, command: list[str]) -> subprocess.Popen:
+        """Start a process in a session of its own: a Ctrl-C at the terminal reaches this command alone,
+        which ends them.
+        """
+        process = subprocess.Popen(
+            command, start_new_session=True, preexec_fn=end_with_this_thread(), env=with_this_package()
+        )
+        self._running.append(process)
+        return process
+
+    def end(self, process: subprocess.Popen) -> int:
+        """SIGTERM, of which Python dies quietly where it has no handler yet, then after a while SIGKILL; returns the
+        status.
+        """
+        if process in self._running:
+            self._running.remove(process)
+        if process.poll() is None:
+            process.terminate()
+            try:
+                process.wait(GRACE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+        return process.wait()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import json
 import sys
 
 from ..base import interrupts
@@ -60,6 +61,28 @@ def _remedy(needs_ros: bool) -> str:
             "/opt/ros/jazzy/setup.bash, or without one: pip install 'rigid_proto_ros[ros]'"
         )
     return ""
+
+
+def check_rclpy(field: str) -> None:
+    """Raise InputError where rclpy isn't found."""
+    from ..base.errors import InputError, is_missing
+
+    if importlib.util.find_spec("rclpy") is None:
+        source = "; or source the setup.bash of a ROS installation"
+        raise InputError(field, is_missing("rclpy", "ros") + source)
+
+
+def own_executable(name: str) -> list[str]:
+    """How to start one of this package's executables with the interpreter and packages of this process. Raises
+    InputError where they lack ROS.
+    """
+    check_rclpy(name)
+    return [sys.executable, "-m", "rigid_proto_ros.cli.executables", name]
+
+
+def text_parameter(name: str, text: str) -> list[str]:
+    """ROS arguments that give the node a text. Quoted: they are read as YAML, where ``part #2.obj`` is ``part``."""
+    return ["-p", f"{name}:={json.dumps(text, ensure_ascii=False)}"]
 
 
 if __name__ == "__main__":

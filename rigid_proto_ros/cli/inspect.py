@@ -13,7 +13,7 @@ from ..base.bundled import body_names
 from ..base.command_line import completes
 from ..base.errors import InputError
 from ..base.progress import Progress
-from ..mass.export import FRAMES, mjcf_inertial, sdf_inertial, urdf_inertial
+from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mass.from_mesh import FALLBACKS, UNION, mesh_body
 from ..mass.inspection import JSON_KEYS, MODELS, Inspection, as_json, inspect_mesh, verify_moments
 from ..mass.properties import scale_vector
@@ -95,7 +95,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_robot_arguments(parser)
     parser.add_argument("--record", metavar="FILE.rrd", help="record mesh, COM, axes and boxes for the Rerun viewer")
-    parser.add_argument("--frame", choices=FRAMES, default="mesh", help="origin of the exported link's frame")
     output = parser.add_mutually_exclusive_group()
     output.add_argument("--json", action="store_true", help="print one JSON object")
     output.add_argument("--urdf", action="store_true", help="a URDF <inertial> on stdout")
@@ -222,7 +221,7 @@ def _print(inspection: Inspection, report: dict, args: argparse.Namespace) -> No
         if len(args.mesh) > 1:
             print()
     else:
-        print(export(inspection.chosen, args.frame), end="")
+        print(export(inspection.chosen), end="")
         for finding in inspection.findings:
             if finding.severity != "info":
                 print(f"{finding.severity}: {finding.message}", file=sys.stderr)

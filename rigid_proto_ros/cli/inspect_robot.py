@@ -190,7 +190,7 @@ def lump(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(_lump_as_dict(args, whole)))
     elif export is not None:
-        print(export(whole.properties, args.frame), end="")
+        print(export(whole.properties), end="")
     else:
         print_lump(whole, written)
     return 0

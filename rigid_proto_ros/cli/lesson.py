@@ -24,7 +24,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     name = parser.add_argument("name", metavar="NAME", help="a lesson: the name of a bundled scene")
     completes(name, lambda _: scene_names())
     parser.add_argument("--html", metavar="FILE.html", required=True, help="the file to write")
-    parser.add_argument("--script", metavar="POKES.yaml", help="poke script (default: the lesson's own, if it has one)")
     parser.add_argument(
         "--duration", type=float, metavar="S", help="simulated seconds (default 10, or 1 s past its script)"
     )
@@ -49,8 +48,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--duration", args.duration, "seconds from 0.1 to 600")
     shown = lesson(args.name)
     output_file("--html", args.html)
-    own = example_path(shown.script) if shown.script else ""
-    script = read_script(args.script or own) if args.script or own else []
+    script = read_script(example_path(shown.script)) if shown.script else []
     last_ns = max((command.stamp_ns for command in script), default=0)
     duration_ns = max(nanoseconds(10.0), last_ns + nanoseconds(1.0))
     if args.duration is not None:

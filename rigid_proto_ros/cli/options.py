@@ -7,7 +7,6 @@ import argparse
 
 from ..base.bundled import scene_names
 from ..base.command_line import completes
-from ..base.errors import InputError
 
 
 def add_scene(parser: argparse.ArgumentParser, help: str, nargs: str | None = None, default: str | None = None) -> None:
@@ -33,14 +32,3 @@ def add_session(parser: argparse.ArgumentParser, node: str) -> None:
 def add_json(parser: argparse.ArgumentParser) -> None:
     """--json: for other programs."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-
-
-def pixels(text: str, smallest: int) -> tuple[int, int]:
-    """Width and height of --size; raises InputError."""
-    try:
-        width, height = (int(part) for part in text.lower().split("x"))
-    except ValueError:
-        width = height = 0
-    if not (smallest <= width <= 8000 and smallest <= height <= 8000):
-        raise InputError("--size", text, f"WIDTHxHEIGHT in pixels, each {smallest} to 8000")
-    return width, height

@@ -214,7 +214,7 @@ def _branch(session: RecordedSession, args: argparse.Namespace) -> None:
 
 
 def _publish(session: RecordedSession, args: argparse.Namespace) -> int:
-    from .processes import check_rclpy
+    from .executables import check_rclpy
 
     check_rclpy("--publish")
     from ..ros import replay_publisher

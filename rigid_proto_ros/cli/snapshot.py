@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..base.errors import InputError, is_missing
 from ..base.progress import Progress
-from .options import add_session, pixels
+from .options import add_session
 
 EXAMPLES = (
     ("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "the whole layout at 4 s"),
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     for module, package in (("rerun", "rerun-sdk"), ("PIL", "pillow")):
         if importlib.util.find_spec(module) is None:
             raise InputError("snapshot", is_missing(package, "rerun"))
-    size = pixels(args.size, 200)
+    size = _pixels(args.size, 200)
     if not is_bag(Path(args.session)):
         _draw(args, args.session, size)
         return 0
@@ -77,3 +77,14 @@ def _drawn(args: argparse.Namespace, folder: Path) -> Path:
     with Progress("reading the bag") as progress:
         record([session], path, given_scene(args.scene), progress.fraction)
     return path
+
+
+def _pixels(text: str, smallest: int) -> tuple[int, int]:
+    """Width and height of --size; raises InputError."""
+    try:
+        width, height = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        width = height = 0
+    if not (smallest <= width <= 8000 and smallest <= height <= 8000):
+        raise InputError("--size", text, f"WIDTHxHEIGHT in pixels, each {smallest} to 8000")
+    return width, height

@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     """Become the node: signals reach it directly."""
     from ..scene.offline import read_scene
     from ..scene.scene_file import scene_file
-    from .processes import own_executable, text_parameter
+    from .executables import own_executable, text_parameter
 
     own_executable("rigid_body_node")
 

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Mass properties as text to paste: URDF, SDF and MJCF inertials, every number with 17 digits.
 
-``frame`` says where the link's frame is: "mesh" at the mesh file's origin, so that the inertial carries the COM's
-position; "com" at the COM, so that the mesh itself has to be moved by the offset the comment names. Axes are the
-mesh's.
+The link's frame is that of the mesh file: its origin and axes.
 """
 
 from __future__ import annotations
@@ -12,11 +10,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..base.errors import InputError
 from .properties import MassProperties
 from .tensor import principal_axes, six_from_tensor
 
-FRAMES = ("mesh", "com")
 _FLAT = 1e-9  # A + B - C below this part of C: rounding in a reader's own eigenvalues may break its A + B >= C
 
 
@@ -28,31 +24,19 @@ def _numbers(values: Iterable[float]) -> str:
     return " ".join(_number(float(value)) for value in values)
 
 
-def _position(properties: MassProperties, frame: str) -> np.ndarray:
-    if frame not in FRAMES:
-        raise InputError("frame", frame, ", ".join(FRAMES))
-    return properties.center_of_mass if frame == "mesh" else np.zeros(3)
-
-
-def _comment(properties: MassProperties, frame: str, element: str) -> str:
-    if frame == "mesh":
-        return ""
-    return f"<!-- link frame at the COM: {element} of the mesh is {_numbers(-properties.center_of_mass)} -->\n"
-
-
-def urdf_inertial(properties: MassProperties, frame: str = "mesh") -> str:
+def urdf_inertial(properties: MassProperties) -> str:
     """A URDF <inertial> element; the tensor is about the COM in the link's axes."""
     ixx, ixy, ixz, iyy, iyz, izz = (_number(value) for value in six_from_tensor(properties.inertia))
     return (
-        _comment(properties, frame, "the <visual> and <collision> origin xyz") + "<inertial>\n"
-        f'  <origin xyz="{_numbers(_position(properties, frame))}" rpy="0 0 0"/>\n'
+        "<inertial>\n"
+        f'  <origin xyz="{_numbers(properties.center_of_mass)}" rpy="0 0 0"/>\n'
         f'  <mass value="{_number(properties.mass)}"/>\n'
         f'  <inertia ixx="{ixx}" ixy="{ixy}" ixz="{ixz}" iyy="{iyy}" iyz="{iyz}" izz="{izz}"/>\n'
         "</inertial>\n"
     )
 
 
-def sdf_inertial(properties: MassProperties, frame: str = "mesh") -> str:
+def sdf_inertial(properties: MassProperties) -> str:
     """An SDF <inertial> element; the tensor is about the COM in the link's axes."""
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     entries = "".join(
@@ -60,8 +44,8 @@ def sdf_inertial(properties: MassProperties, frame: str = "mesh") -> str:
         for name, value in zip(names, six_from_tensor(properties.inertia), strict=True)
     )
     return (
-        _comment(properties, frame, "the <visual> and <collision> pose") + "<inertial>\n"
-        f"  <pose>{_numbers(_position(properties, frame))} 0 0 0</pose>\n"
+        "<inertial>\n"
+        f"  <pose>{_numbers(properties.center_of_mass)} 0 0 0</pose>\n"
         f"  <mass>{_number(properties.mass)}</mass>\n"
         f"  <inertia>\n{entries}  </inertia>\n"
         "</inertial>\n"
@@ -73,14 +57,14 @@ def is_flat(a: float, b: float, c: float) -> bool:
     return a + b - c < _FLAT * c
 
 
-def mjcf_inertial(properties: MassProperties, frame: str = "mesh") -> str:
+def mjcf_inertial(properties: MassProperties) -> str:
     """An MJCF <inertial> element, ``fullinertia`` in the order xx yy zz xy xz yz.
 
     A flat body gets its principal moments and a quaternion instead: MuJoCo takes eigenvalues of a full tensor itself,
     and their rounding may break A + B ≥ C, which it refuses.
     """
-    position = _numbers(_position(properties, frame))
-    head = _comment(properties, frame, "the geom pos") + f'<inertial pos="{position}" mass="{_number(properties.mass)}"'
+    position = _numbers(properties.center_of_mass)
+    head = f'<inertial pos="{position}" mass="{_number(properties.mass)}"'
     (a, b, c), axes = principal_axes(properties.inertia)
     if is_flat(a, b, c):
         w, x, y, z = quaternion_wxyz(axes)

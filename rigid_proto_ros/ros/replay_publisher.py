@@ -22,8 +22,8 @@ from ..base.errors import InputError
 from ..scene import cdr
 from ..scene.command_codec import frame_names, in_words, of_event
 from ..scene.sensor_noise import sensor_noise
-from ..session.messages import PROJECTIONS, StampedRows
-from ..session.recorded_session import RecordedSession
+from ..session.messages import PROJECTIONS
+from ..session.recorded_session import RecordedSession, StampedRows
 from ..session.replay import recorded_parameters, sorted_states
 from ..session.runs import decode_event
 from ..simulation.commands import Change, Command

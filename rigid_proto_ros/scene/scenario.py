@@ -6,6 +6,7 @@ The node, the offline run and replay all come through here, so that one scene me
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -29,6 +30,8 @@ from ..simulation.thrusters import make_thruster
 from .declaration import READ_ONLY, Value
 from .parameters import Parameters, convert_all, parameter_named
 from .yaml_text import yaml_value
+
+_HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,12 @@ def scene_text(values: Mapping[str, Value], mesh_sha256: str = "") -> str:
     lines = [f"    {name}: {yaml_value(value)}" for name, value in sorted(values.items())]
     mesh = [f"# mesh_sha256: {mesh_sha256}"] if mesh_sha256 else []
     return "\n".join([*mesh, "/**:", "  ros__parameters:", *lines, ""])
+
+
+def mesh_sha256_of(scene: str) -> str:
+    """The hash of the mesh's file that ``scene_text`` put into a comment, or ""."""
+    found = _HASH.search(scene)
+    return found.group(1) if found else ""
 
 
 def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:

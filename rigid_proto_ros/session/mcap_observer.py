@@ -7,6 +7,7 @@ disk then. All runs go into one file: a reset begins the next one, as in a bag o
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import threading
 import time
@@ -22,6 +23,7 @@ from ..mesh.locate import resolve_mesh
 from ..scene import cdr
 from ..scene.command_codec import frame_names
 from ..scene.parameters import Parameters
+from ..scene.scenario import mesh_sha256_of
 from ..scene.scene_file import read_scene_text
 from ..simulation.observer import (
     AccuracyFloor,
@@ -37,8 +39,6 @@ from ..simulation.observer import (
 )
 from . import messages as session_messages
 from .mailbox import Block, Mailbox, Note
-from .recorded_session import file_sha256, scene_sha256
-from .runs import MADE_WITH, floor_name
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -78,8 +78,7 @@ class McapObserver(Observer):
         self._on_error = on_error or _logger.error
         self._simulated_log = simulated_log
         self._run_begins_ns = self._latest_log_ns = self._chunk = self._run = 0
-        world, self._body_frame = frame_names(parameters or Parameters(), node_name)
-        self._templates = {name: cdr.StampedTemplate(world, count) for name, count in (("pose", 7), ("twist", 6))}
+        self._world, self._body_frame = frame_names(parameters or Parameters(), node_name)
         self._scene = ""
         self._attached: set[str] = set()
         self._closed = False
@@ -126,7 +125,8 @@ class McapObserver(Observer):
 
         writer = Writer(self._stream)
         writer.start(profile="ros2")
-        writer.add_metadata(MADE_WITH, _made_with())
+        began = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+        writer.add_metadata(session_messages.MADE_WITH, {"cpu": cpu(), **versions("mcap"), "began": began})
         schemas = {
             message_type: writer.register_schema(message_type, "ros2msg", definition.encode())
             for message_type, definition in session_messages.DEFINITIONS.items()
@@ -151,7 +151,7 @@ class McapObserver(Observer):
         while True:
             closing = mailbox.closed
             try:
-                self._write_waiting()
+                self._write_what_waits()
                 if closing and self._writer is not None:
                     self._writer.finish()
                     self._stream.close()
@@ -162,16 +162,21 @@ class McapObserver(Observer):
                 return
             mailbox.wait(FLUSH_PERIOD_S)
 
-    def _write_waiting(self) -> None:
+    def _write_what_waits(self) -> None:
+        """Empty the mailbox into the file; without one, throw away what is in it."""
         more = True
         while more:
             block, _ = self._mailbox.take()
             if block is None:
                 break
             more = block.handed_over
-            writer = self._writer
-            if writer is not None:
-                self._write(writer, block)
+            if (writer := self._writer) is not None:
+                sent = 0
+                for note in block.notes:
+                    self._write_rows(writer, block, sent, note.after_rows)
+                    sent = note.after_rows
+                    self._write_note(writer, note)
+                self._write_rows(writer, block, sent, block.count)
             self._mailbox.give_back(block)
         if self._writer is not None:
             self._end_chunk(self._writer)
@@ -181,14 +186,6 @@ class McapObserver(Observer):
         if self._file.stat().st_ino != self._inode:
             raise OSError(None, "another file took its place")
         writer.flush()
-
-    def _write(self, writer: Writer, block: Block) -> None:
-        sent = 0
-        for note in block.notes:
-            self._write_rows(writer, block, sent, note.after_rows)
-            sent = note.after_rows
-            self._write_note(writer, note)
-        self._write_rows(writer, block, sent, block.count)
 
     def _write_message(self, writer: Writer, name: str, log_time: int, data: bytes) -> None:
         writer.add_message(self._channels[name], log_time, data, log_time)
@@ -213,26 +210,23 @@ class McapObserver(Observer):
                 self._write_message(writer, "applied", log_time, data)
             case BodyChanged(time_ns, body):
                 I = body.inertia
-                tensor = (I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2])
-                frame, com = f"{self._body_frame}/mesh", body.center_of_mass.tolist()
-                data = session_messages.inertia_bytes(time_ns, frame, body.mass, com, tensor)
+                numbers = (body.mass, *body.center_of_mass, I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2])
+                data = cdr.stamped_doubles(time_ns, f"{self._body_frame}/mesh", numbers)
                 self._write_message(writer, "inertia", log_time, data)
             case AccuracyFloor(time_ns, floor):
                 # It only rises within a run: the last one says all.
                 self._end_chunk(writer)
-                writer.add_metadata(floor_name(self._run), {"time_ns": str(time_ns), "floor": floor})
+                writer.add_metadata(session_messages.FLOOR.format(self._run), {"time_ns": str(time_ns), "floor": floor})
             case Started(scene=scene) | SceneChanged(scene=scene):
                 self._write_scene(writer, log_time, scene)
 
     def _write_scene(self, writer: Writer, log_time: int, scene: str) -> None:
         """Unless it is the one written last; with the mesh's file, once."""
-        if scene != self._scene:
-            self._scene = scene
-            self._write_message(writer, "scene", log_time, cdr.string(scene))
-            self._attach_mesh(writer, scene, log_time)
-
-    def _attach_mesh(self, writer: Writer, scene: str, log_time: int) -> None:
-        sha256 = scene_sha256(scene)
+        if scene == self._scene:
+            return
+        self._scene = scene
+        self._write_message(writer, "scene", log_time, cdr.string(scene))
+        sha256 = mesh_sha256_of(scene)
         if not sha256 or sha256 in self._attached:
             return
         self._attached.add(sha256)
@@ -242,7 +236,7 @@ class McapObserver(Observer):
         except (InputError, OSError):
             return
         # A file that was changed since it was loaded isn't the one that flies.
-        if file_sha256(data) == sha256:
+        if hashlib.sha256(data).hexdigest() == sha256:
             # The chunk before it declares the topics: from there on a cut file can be read.
             self._end_chunk(writer)
             writer.add_attachment(0, log_time, path.name, "application/octet-stream", data)
@@ -254,9 +248,9 @@ class McapObserver(Observer):
                 self._chunk = time_ns // CHUNK_NS
                 self._end_chunk(writer)
             log_time = self._log_time(time_ns, wall_ns)
-            for name, template in self._templates.items():
-                data = template.pack(time_ns, session_messages.PROJECTIONS[name](row))
-                self._write_message(writer, name, log_time, bytes(data))
+            for name in ("pose", "twist"):
+                data = cdr.stamped_doubles(time_ns, self._world, session_messages.PROJECTIONS[name](row))
+                self._write_message(writer, name, log_time, data)
 
     def _lost(self, reason: str) -> None:
         if self._writer is not None:
@@ -278,8 +272,3 @@ def _offered(latched: bool) -> str:
         f"  deadline:\n    {none}\n  lifespan:\n    {none}\n  liveliness: 1\n"
         f"  liveliness_lease_duration:\n    {none}\n  avoid_ros_namespace_conventions: false"
     )
-
-
-def _made_with() -> dict[str, str]:
-    began = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-    return {"cpu": cpu(), **versions("mcap"), "began": began}

@@ -9,8 +9,7 @@ bit.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 
@@ -74,20 +73,15 @@ LATCHED = ("scene", "inertia")
 READ = {name: TOPICS[name] for name in ("scene", "events", "pose", "twist")} | {"odom": "nav_msgs/msg/Odometry"}
 """Topics that a session is read from."""
 
+MADE_WITH = "rigid_proto_ros"
+"""Name of the metadata that say which processor and versions recorded."""
+
+FLOOR = "accuracy_floor of run {}"
+"""Name of the metadata, by the run's number from 0, that say why it is held to less than its accuracy."""
+
 _STAMP = struct.Struct("<iII")
 _LENGTH = struct.Struct("<I")
 _LITTLE_ENDIAN = b"\x00\x01"
-
-
-@dataclass(frozen=True)
-class StampedRows:
-    """What one topic published: times (n,) int64 [ns, simulated] and rows (n, k) float64."""
-
-    times: np.ndarray
-    rows: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.times)
 
 
 def pose_row(row: list[float]) -> list[float]:
@@ -169,18 +163,3 @@ def applied_bytes(time_ns: int, body_frame: str, load: Load, body: Body, attitud
     else:
         force = vector(load.own_force(body))
     return cdr.wrench_stamped(time_ns, body_frame, force, vector(np.asarray(torque) + cross(arm, force)))
-
-
-def inertia_bytes(time_ns: int, frame_id: str, mass: float, com: Iterable[float], tensor6: Iterable[float]) -> bytes:
-    """A geometry_msgs/InertiaStamped; tensor6 ixx ixy ixz iyy iyz izz."""
-    return cdr.stamped_doubles(time_ns, frame_id, (mass, *com, *tensor6))
-
-
-def simulated_time(stamp_ns: int, offsets: Sequence[tuple[int, int]]) -> int:
-    """Simulated time [ns] of a stamp of a node that may follow a /clock. offsets, as they were told: (simulated time
-    from which it holds, how far stamps are ahead); the last one counts that may have been in force.
-    """
-    for begin_ns, offset_ns in reversed(offsets):
-        if stamp_ns >= begin_ns + offset_ns:
-            return stamp_ns - offset_ns
-    return stamp_ns

@@ -6,7 +6,6 @@ found by its hash.
 from __future__ import annotations
 
 import hashlib
-import re
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -17,9 +16,17 @@ import numpy as np
 from ..base.bundled import body_names
 from ..base.errors import InputError, MeshError
 from ..mesh.reading import Mesh, load_mesh
-from .messages import StampedRows
 
-_HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
+
+@dataclass(frozen=True)
+class StampedRows:
+    """What one topic published: times (n,) int64 [ns, simulated] and rows (n, k) float64."""
+
+    times: np.ndarray
+    rows: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.times)
 
 
 @dataclass
@@ -78,17 +85,6 @@ class RecordedSession:
         return text
 
 
-def scene_sha256(scene: str) -> str:
-    """The hash of the mesh's file that a scene's text names in a comment, or ""."""
-    found = _HASH.search(scene)
-    return found.group(1) if found else ""
-
-
-def file_sha256(data: bytes) -> str:
-    """SHA-256 of a file's bytes, in hex."""
-    return hashlib.sha256(data).hexdigest()
-
-
 def find_mesh(
     name: str, sha256: str, attachments: Iterable[tuple[str, bytes]] = (), folder: Path | None = None
 ) -> Mesh:
@@ -106,7 +102,7 @@ def find_mesh(
         if mesh.sha256 == sha256:
             return mesh
     for file_name, data in attachments:
-        if file_sha256(data) == sha256:
+        if hashlib.sha256(data).hexdigest() == sha256:
             return _from_bytes(file_name, data)
     raise MeshError(
         "mesh", name, f"the file with SHA-256 {sha256}, there or beside the session; the recording doesn't hold it"

@@ -13,7 +13,7 @@ from ..mesh.reading import Mesh, load_mesh
 from ..scene.command_codec import frame_names, of_event
 from ..scene.offline import notify_start
 from ..scene.parameters import Parameters, convert_all
-from ..scene.scenario import Scenario, make_scenario
+from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
 from ..scene.scenario_run import ScenarioRun
 from ..scene.scene_file import read_scene_text
 from ..scene.sensor_noise import sensor_noise
@@ -22,7 +22,7 @@ from ..simulation.notifier import snapshot
 from ..simulation.observer import BodyChanged, Observer, Published
 from ..simulation.setup import Setup
 from .messages import PROJECTIONS
-from .recorded_session import RecordedSession, find_mesh, scene_sha256
+from .recorded_session import RecordedSession, find_mesh
 from .runs import decode_event
 
 
@@ -65,8 +65,8 @@ def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
     """By name, the meshes that later scenes of the session say were flown; None for those that none speaks of."""
     hashes: dict[str, str] = {}
     for scene in session.scenes:
-        if scene_sha256(scene):
-            hashes[str(read_scene_text(scene, "a recorded scene").values.get("mesh", ""))] = scene_sha256(scene)
+        if mesh_sha256_of(scene):
+            hashes[str(read_scene_text(scene, "a recorded scene").values.get("mesh", ""))] = mesh_sha256_of(scene)
 
     def find(name: str) -> Mesh | None:
         return find_mesh(name, hashes[name], session.attachments, session.folder) if name in hashes else None

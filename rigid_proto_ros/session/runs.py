@@ -13,20 +13,12 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.rotation import rotate, rotate_inverse
-from .messages import PROJECTIONS, READ, StampedRows, read_state, read_string, simulated_time
-from .recorded_session import RecordedSession, scene_sha256
+from ..scene.scenario import mesh_sha256_of
+from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_state, read_string
+from .recorded_session import RecordedSession, StampedRows
 
 if TYPE_CHECKING:
     from .mcap_reading import BagContent  # .rrd files are read without the package mcap
-
-MADE_WITH = "rigid_proto_ros"
-"""Name of the metadata that say which versions recorded."""
-
-
-def floor_name(run: int) -> str:
-    """Name of the metadata that say why a run, counted from 0, is held to less than its accuracy."""
-    return f"accuracy_floor of run {run}"
-
 
 RESET_WINDOW_NS = 1_000_000_000
 """Topics reach a recorder one by one: a reset's line and the first state after it lie this close in its log."""
@@ -74,8 +66,8 @@ def session_runs(content: BagContent, path: Path, node: str = "") -> list[Record
     runs = []
     for k in range(len(resets) + 1):
         run = replace(whole, scene=_scene_at(scenes, resets[k - 1] if k else None))
-        run.mesh_sha256 = scene_sha256(run.scene)
-        run.accuracy_floor = content.metadata.get(floor_name(k), {}).get("floor", "")
+        run.mesh_sha256 = mesh_sha256_of(run.scene)
+        run.accuracy_floor = content.metadata.get(FLOOR.format(k), {}).get("floor", "")
         begin = resets[k - 1] if k else None
         end = resets[k] if k < len(resets) else None
         run.events = [
@@ -145,11 +137,14 @@ def _states(
 
 
 def _simulated(stamp_ns: int, log: int, clocks: list[tuple[int, int, int]]) -> int:
-    """Simulated time of a stamp. clocks: when the log was told of another offset of stamps, and that offset as
-    ``simulated_time`` has it.
+    """Simulated time [ns] of a stamp of a node that may follow a /clock. clocks: when the log was told of another
+    offset of stamps, the simulated time from which it holds, and how far stamps are ahead then; the last one counts
+    that may have been in force.
     """
-    told_before = [(time_ns, offset_ns) for told, time_ns, offset_ns in clocks if told < log + RESET_WINDOW_NS]
-    return simulated_time(stamp_ns, told_before)
+    for told, begin_ns, offset_ns in reversed(clocks):
+        if told < log + RESET_WINDOW_NS and stamp_ns >= begin_ns + offset_ns:
+            return stamp_ns - offset_ns
+    return stamp_ns
 
 
 def _log_times_of_restarts(state: tuple[np.ndarray, StampedRows]) -> list[int]:

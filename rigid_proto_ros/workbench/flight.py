@@ -22,10 +22,10 @@ from ..base.compilation import notify_when_compiling
 from ..base.errors import InputError
 from ..live.live_simulation import LiveSimulation
 from ..scene.parameters import parameter_named
-from ..scene.scenario import Scenario, make_scenario
+from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
 from ..scene.scene_file import read_scene_text
 from ..session.branch import branch_at
-from ..session.recorded_session import RecordedSession, scene_sha256
+from ..session.recorded_session import RecordedSession
 from ..simulation.observer import Event, Logged, Observer, Published, Reset, SceneChanged
 
 KEPT_S = 300.0
@@ -88,7 +88,7 @@ class RunMemory(Observer):
         self._text = scene
         if not self._scene or (time_ns == 0 and not self._events):
             self._begin()
-        elif scene_sha256(scene) != scene_sha256(self._scenes[-1]):
+        elif mesh_sha256_of(scene) != mesh_sha256_of(self._scenes[-1]):
             self._scenes.append(scene)
 
     def session(self) -> RecordedSession:
@@ -103,7 +103,7 @@ class RunMemory(Observer):
                 events=list(self._events),
                 times=np.array([time_ns for time_ns, _ in states], np.int64),
                 rows=np.array([row for _, row in states]).reshape(-1, 13),
-                mesh_sha256=scene_sha256(self._scene),
+                mesh_sha256=mesh_sha256_of(self._scene),
                 node_name=self._name,
                 scenes=list(self._scenes),
             )

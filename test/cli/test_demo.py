@@ -83,7 +83,7 @@ def test_an_open_mesh_is_refused_in_one_line_that_names_what_helps(ros_environme
 @pytest.mark.stress
 def test_what_the_set_up_compiles_is_all_that_the_first_flight_needs(ros_environment, tmp_path):
     environment = {**ros_environment, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
-    for part in ("integrators", "flight"):
+    for part in ("integrators", "flight", "first"):
         command = [sys.executable, str(SOURCE / "requirements" / "compile_kernels.py"), part]
         subprocess.run(command, env=from_source(environment), check=True)
     compiled = sorted((tmp_path / "kernels").rglob("*.nbc"))

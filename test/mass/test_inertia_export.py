@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from mass_solids import moved, prism, sphere
 
-from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.export import mjcf_inertial, quaternion_wxyz, sdf_inertial, urdf_inertial
 from rigid_proto_ros.mass.properties import MassProperties, MeshMoments
@@ -81,20 +80,6 @@ def test_sdf_and_urdf_and_mjcf_are_read_back_by_our_own_reader(properties, tmp_p
         assert link.mass == properties.mass
         assert link.center_of_mass.tolist() == properties.center_of_mass.tolist()
         assert off(link.inertia, properties) <= 1e-14, name
-
-
-def test_the_com_frame_has_no_offset_and_says_where_the_mesh_goes(properties):
-    for export, path in ((urdf_inertial, "origin"), (sdf_inertial, "pose")):
-        text = export(properties, frame="com")
-        comment, element = text.split("\n", 1)
-        place = ElementTree.fromstring(element).find(path)
-        numbers = place.get("xyz") or place.text
-        assert [float(word) for word in numbers.split()[:3]] == [0.0, 0.0, 0.0]
-        offset = [float(word) for word in comment.split(" is ")[1].split()[:3]]
-        assert offset == (-properties.center_of_mass).tolist()
-    assert 'pos="0 0 0"' in mjcf_inertial(properties, frame="com")
-    with pytest.raises(InputError, match="mesh, com"):
-        urdf_inertial(properties, frame="base")
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -25,7 +25,8 @@ from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.sensor_noise import sensor_noise
 from rigid_proto_ros.session.check import verify
-from rigid_proto_ros.session.messages import PROJECTIONS, StampedRows, read_state
+from rigid_proto_ros.session.messages import PROJECTIONS, read_state
+from rigid_proto_ros.session.recorded_session import StampedRows
 from rigid_proto_ros.session.replay import resimulation
 
 QUICK_ENDINGS = pytest.mark.parametrize(

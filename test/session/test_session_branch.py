@@ -12,12 +12,12 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
-from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario import make_scenario, mesh_sha256_of
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script, read_script
 from rigid_proto_ros.session.branch import branch_at, recorded_branch
 from rigid_proto_ros.session.messages import PROJECTIONS
-from rigid_proto_ros.session.recorded_session import RecordedSession, scene_sha256
+from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.session.replay import resimulation
 from rigid_proto_ros.simulation.observer import Logged, Observer
 
@@ -150,7 +150,7 @@ def flown(changes: dict, until_ns: int) -> RecordedSession:
         events=lines.events,
         times=np.array([until_ns]),
         rows=run.simulation.state.row[None].copy(),
-        mesh_sha256=scene_sha256(scenario.text),
+        mesh_sha256=mesh_sha256_of(scenario.text),
     )
 
 

@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import random
+import signal
 import struct
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -152,17 +154,22 @@ def test_random_bytes_never_end_in_a_traceback(recording, tmp_path, capsys):
 
 def starved_s(pid: int) -> float:
     """How long the threads of a process have waited for a core [s]."""
-    waits = [task.read_text().split()[1] for task in Path(f"/proc/{pid}/task").glob("*/schedstat")]
-    return 1e-9 * sum(map(int, waits))
+    waits = 0
+    for task in Path(f"/proc/{pid}/task").glob("*/schedstat"):
+        with suppress(OSError):  # the thread has ended meanwhile
+            waits += int(task.read_text().split()[1])
+    return 1e-9 * waits
 
 
-def holds_states(path: Path) -> bool:
-    """Whether a state has reached the file: the topics tell it earlier, as nobody who simulates waits for a disk."""
+def states_end_ns(path: Path) -> int:
+    """Time of the last state in the file, or -1: the topics tell states earlier, as nobody who simulates waits for a
+    disk.
+    """
     try:
         (session,) = read_runs(path)
     except InputError:
-        return False
-    return len(session.times) > 0
+        return -1
+    return session.end_ns if len(session.times) else -1
 
 
 def kill_while_recording(environment: dict[str, str], folder: Path, ending: str, after_s: float) -> None:
@@ -173,17 +180,24 @@ def kill_while_recording(environment: dict[str, str], folder: Path, ending: str,
     path = folder / f"session{ending}"
     arguments = ["--params-file", scene_path("t_handle"), "-p", f"record:={path}", "-p", "publish_rate:=200"]
     node = RosProcess("rigid_body_node", "--ros-args", *arguments, environment=environment, log=folder / "node")
+    seen: list[tuple[float, int]] = []  # how long the node had starved, and then where the file ended
+
+    def recorded_for_long_enough() -> bool:
+        seen.append((starved_s(node.pid), states_end_ns(path)))
+        _, end_ns = seen[-1]
+        return client.heard_count("pose") and time.monotonic() > earliest and end_ns >= 0
+
     try:
         with RosClient(environment) as client:
             node.wait_for("is simulating")
+            seen.append((starved_s(node.pid), -1))
             client.meet()
             client.publish("poke", wrench_message(0, "world@tip;impulse", (0.0, 0.001, 0.0)))
-            before, end = starved_s(node.pid), time.monotonic() + after_s
-            client.until(
-                lambda: client.heard_count("pose") and time.monotonic() > end and holds_states(path),
-                "states on the topic and in the file",
-            )
-            starved = starved_s(node.pid) - before
+            earliest = time.monotonic() + after_s
+            client.until(recorded_for_long_enough, "states on the topic and in the file")
+            # Stopped, it waits for no core while that is read.
+            node.process.send_signal(signal.SIGSTOP)
+            starved = starved_s(node.pid)
             node.process.kill()
             node.process.wait()
             last = max(stamp_ns(message) for topic in ("pose", "twist") for message in client.heard(topic, last=1))
@@ -192,7 +206,8 @@ def kill_while_recording(environment: dict[str, str], folder: Path, ending: str,
         node.process.wait()
     (session,) = read_runs(path)
     assert not session.complete
-    # A second of what the machine let the node have: a thread that gets no core flushes nothing.
+    # A second of what the machine let the node have since the last flush: a thread that gets no core flushes nothing.
+    starved -= max(before for before, end_ns in seen if end_ns < session.end_ns)
     assert last - session.end_ns <= SECOND * (1.0 + max(0.0, starved))
     assert verify(session) is None
     repaired = folder / f"repaired{ending}"
