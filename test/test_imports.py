@@ -67,7 +67,7 @@ ALLOWED = {
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
     "viser": ("workbench",),
     "websockets": ("workbench",),  # comes with viser
-    "mcap": ("session.mcap_reading", "session.mcap_observer"),
+    "mcap": ("session.bag", "session.mcap_observer"),
     "zstandard": ("session.bag",),  # comes with mcap
     "rosbags": ("identify.bag_reading",),
 }

@@ -92,35 +92,24 @@ def read_schedule(text: str) -> dict | list:
 
 def expand_schedule(entries: dict | list) -> list[Command]:
     """The commands of what ``read_schedule`` gives, in the order in which they are listed; raises InputError."""
-    listed = entries if isinstance(entries, list) else [entries]
-    if any(isinstance(entry, dict) and "script" in entry for entry in listed):
-        raise InputError("schedule", "script", "entries alone, without a script around them")
-    commands = expand_script(listed, "schedule", MAX_SCHEDULED)
+    commands = expand_script(entries if isinstance(entries, list) else [entries], "schedule", MAX_SCHEDULED)
     # As listed, which only matters among those that act at once because their time is past.
     return sorted(commands, key=lambda command: command.entry)
 
 
 def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES) -> list[Command]:
-    """As ``parse_script``, from what its YAML says: a list of entries, or a mapping that holds one as ``script``."""
-    whole: dict = {}
-    if isinstance(entries, dict) and "script" in entries:
-        whole = {key: value for key, value in entries.items() if key != "script"}
-        _within(name, _check_keys, whole, _TIMING_KEYS - {"t"})
-        entries = entries["script"]
+    """As ``parse_script``, from what its YAML says: a list of entries, or nothing."""
     if entries is None:
         entries = []
     if not isinstance(entries, list):
         raise InputError(name, type(entries).__name__, "a list of entries such as - {t: 0.5, force: [0, 0, 1]}")
     commands: list[Command] = []
-    offsets_ns = _within(name, _offsets_ns, whole, max_commands)
     for number, entry in enumerate(entries, 1):
         try:
-            for k, offset_ns in enumerate(offsets_ns):
-                for t_ns in _times_ns(entry, f"{whole.get('seed', 0)}/{number}/{k}", max_commands):
-                    jitter_ns = _jitter_ns(whole, f"whole/{number}/{k}/{t_ns}") if whole else 0
-                    commands += _expand(entry, {"stamp_ns": max(0, t_ns + offset_ns + jitter_ns), "entry": number})
-                if len(commands) > max_commands:
-                    raise InputError("", f"more than {max_commands} commands")
+            for t_ns in _times_ns(entry, number, max_commands):
+                commands += _expand(entry, {"stamp_ns": t_ns, "entry": number})
+            if len(commands) > max_commands:
+                raise InputError("", f"more than {max_commands} commands")
         except CommandRefused:
             raise
         except InputError as error:
@@ -144,9 +133,9 @@ def _within(where: str, function: Callable[..., Result], *arguments: Any) -> Res
         raise _named(where, error) from None
 
 
-def _times_ns(entry: Any, seed: str, max_commands: int) -> list[int]:
-    """When an entry acts: at t, again ``every`` seconds for ``repeat`` times in all, each moved by up to
-    ±``jitter``.
+def _times_ns(entry: Any, number: int, max_commands: int) -> list[int]:
+    """When the ``number``-th entry acts: at t, again ``every`` seconds for ``repeat`` times in all, each moved by up
+    to ±``jitter``: a uniform random shift, the same for the same seed wherever and whenever the script is read.
     """
     if not isinstance(entry, dict):
         raise InputError("", entry, "a mapping such as {t: 0.5, force: [0, 0, 1]}")
@@ -155,31 +144,19 @@ def _times_ns(entry: Any, seed: str, max_commands: int) -> list[int]:
     t_ns = nanoseconds(_number(entry["t"], "t", 0.0, MAX_TIME_S))
     if entry.keys().isdisjoint(_REPEATING):
         return [t_ns]
-    offsets = _offsets_ns(entry, max_commands)
-    return [max(0, t_ns + offset + _jitter_ns(entry, f"{seed}/{k}")) for k, offset in enumerate(offsets)]
-
-
-def _offsets_ns(timing: dict, max_commands: int) -> list[int]:
-    if "repeat" not in timing and "every" not in timing:
-        return [0]
-    repeat = _number(timing.get("repeat", 1), "repeat", 1, max_commands)
+    repeat = _number(entry.get("repeat", 1), "repeat", 1, max_commands)
     if repeat != int(repeat):
         raise InputError("repeat", repeat, "a whole number of times")
-    if repeat > 1 and "every" not in timing:
+    if repeat > 1 and "every" not in entry:
         raise InputError("every", None, "the seconds between repeats")
-    every = _number(timing.get("every", 0.0), "every", 0.0, MAX_TIME_S)
-    return [nanoseconds(k * every) for k in range(int(repeat))]
-
-
-def _jitter_ns(timing: dict, seed: str) -> int:
-    """A uniform random shift, the same for the same seed wherever and whenever the script is read."""
-    if "jitter" not in timing:
-        return 0
-    jitter = _number(timing["jitter"], "jitter", 0.0, MAX_TIME_S)
+    every = _number(entry.get("every", 0.0), "every", 0.0, MAX_TIME_S)
+    times_ns = [t_ns + nanoseconds(k * every) for k in range(int(repeat))]
+    jitter = _number(entry.get("jitter", 0.0), "jitter", 0.0, MAX_TIME_S)
     if jitter == 0.0:
-        return 0
-    own = _number(timing.get("seed", 0), "seed", 0, 2**63)
-    return nanoseconds(random.Random(f"{int(own)}/{seed}").uniform(-jitter, jitter))
+        return times_ns
+    seed = int(_number(entry.get("seed", 0), "seed", 0, 2**63))
+    shifts = (random.Random(f"{seed}/0/{number}/0/{k}").uniform(-jitter, jitter) for k in range(int(repeat)))
+    return [max(0, time_ns + nanoseconds(shift)) for time_ns, shift in zip(times_ns, shifts, strict=True)]
 
 
 def _expand(entry: dict, stamp: Stamp) -> list[Command]:
@@ -266,7 +243,7 @@ ENTRY_KEYS: Mapping[str, Set[str]] = {
     "poke": _POKE_KEYS,
     "wrench": _WRENCH_KEYS,
     "string": _STRING_KEYS | {"release"},
-    "other": _READERS.keys() | {"script"},
+    "other": _READERS.keys(),
 }
 """The keys that a script may hold, by the kind of entry."""
 
@@ -347,8 +324,6 @@ def _check_keys(entry: dict, known: Set[str], others: Set[str] = frozenset()) ->
 
 
 def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
-    if type(value) is float and lower <= value <= upper:
-        return value
     if isinstance(value, str):
         # YAML reads 1e-3 without a point as text.
         try:
@@ -361,10 +336,6 @@ def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100)
 
 
 def _vector(value: Any, field: str) -> Vector:
-    if isinstance(value, (list, tuple)) and len(value) == 3:
-        x, y, z = value
-        if type(x) is type(y) is type(z) is float and abs(x) <= 1e100 and abs(y) <= 1e100 and abs(z) <= 1e100:
-            return x, y, z
     if not isinstance(value, (list, tuple)) or len(value) != 3:
         raise InputError(field, value, "three numbers [x, y, z]")
     x, y, z = (_number(v, field) for v in value)

@@ -18,7 +18,7 @@ from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_state, read_stri
 from .recorded_session import RecordedSession, StampedRows
 
 if TYPE_CHECKING:
-    from .mcap_reading import BagContent  # .rrd files are read without the package mcap
+    from .bag import BagContent  # .rrd files are read without the package mcap
 
 RESET_WINDOW_NS = 1_000_000_000
 """Topics reach a recorder one by one: a reset's line and the first state after it lie this close in its log."""

@@ -132,7 +132,7 @@ class Study:
 
 def script_entries(script: Any) -> list[Any]:
     """The list of entries in a script as YAML gives it."""
-    return (script["script"] if isinstance(script, dict) else script) or []
+    return script or []
 
 
 def study_file(name: str) -> Path:

@@ -137,7 +137,9 @@ class Page:
         shown = {part for name in AT_FIRST for part in PARTS[name]} | {style.BODY_MESH, CONTACTS}
         self.backend = ViserBackend(server.scene, shown, lambda node: self.pointer.attach(node))
         self.picture = Picture(self.backend, lambda name: name in DESCRIBED or self.backend.wanted(name))
-        self._com = server.scene.add_icosphere(f"/{style.CENTRE}/com", COM_SIZE, (30, 30, 30), cast_shadow=False, visible=False)
+        self._com = server.scene.add_icosphere(
+            f"/{style.CENTRE}/com", COM_SIZE, (30, 30, 30), cast_shadow=False, visible=False
+        )
         self.poses, self.tools = DrawnPoses(), Tools()
         self.pointer = Pointer(self.flight, self.poses, self.tools)
         self.pointer.attach_com(self._com)

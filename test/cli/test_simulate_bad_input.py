@@ -84,7 +84,7 @@ SCENES = {
 
 SCRIPTS = {
     "not_yaml": ("- {t: 1", "line"),
-    "mapping": ("t: 1\n", "a list"),
+    "mapping": ("script: [{t: 1, force: [0, 0, 1]}]\n", "a list"),
     "text_entry": ("- hello\n", "entry 1"),
     "no_time": ("- {force: [0, 0, 1]}\n", "entry 1, t"),
     "negative_time": ("- {t: -1, force: [0, 0, 1]}\n", "entry 1, t"),
