@@ -18,7 +18,7 @@ from ..base.errors import CommandRefused
 from ..motion.frames import parse_frame
 from ..motion.integrators import INTEGRATORS, auto
 from ..motion.integrators.stepping import method_table, provide_kernel
-from ..motion.state import State
+from ..motion.state import State, shift_com
 from ..motion.string import StringSettings
 from ..scene.scenario import Scenario
 from ..simulation.commands import Command, MoveString, WrenchCommand
@@ -42,6 +42,8 @@ def warm_up(setup: Setup) -> State:
             continue  # an integrator that doesn't support it will refuse it in flight too
         for until_ns in (1_000_000, 2_000_001):
             trial.advance(until_ns)
+    # Taken by changes in flight that move the COM.
+    shift_com(trial.state.row, 0.0, 0.0, 0.0)
     return trial.state
 
 

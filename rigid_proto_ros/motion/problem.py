@@ -23,6 +23,7 @@ from ..base.compilation import njit
 from ..base.records import record_type
 from . import body as of_body
 from . import loads as of_loads
+from .string import free_end_at
 
 PROBLEM = record_type(
     [
@@ -127,19 +128,17 @@ def begin_string(
     """Complete the problem p with a tied string (STRING,) whose free end goes from origin to target
     between these times.
     """
-    seconds, ends = (end_ns - begin_ns) * 1e-9, now_ns >= end_ns
+    free_end, hand = free_end_at(now_ns, string[ORIGIN:], string[TARGET:], begin_ns, end_ns)
     x, y, z = of_body.arm(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
     P = p.principal_axes
     for k in range(3):
-        hand = 0.0 if ends else (string[TARGET + k] - string[ORIGIN + k]) / seconds
-        free_end = string[TARGET + k] if ends else string[ORIGIN + k] + ((now_ns - begin_ns) * 1e-9) * hand
-        p.reference_velocity[k] = hand
-        p.start_velocity_added[k] = row[7 + k] - hand
-        p.acceleration_added[k] = p.reference_acceleration[k] - p.damping_linear * hand
+        p.reference_velocity[k] = hand[k]
+        p.start_velocity_added[k] = row[7 + k] - hand[k]
+        p.acceleration_added[k] = p.reference_acceleration[k] - p.damping_linear * hand[k]
         p.reference_acceleration[k] = 0.0
         p.attach[k] = P[k] * x + P[3 + k] * y + P[6 + k] * z
-        p.string_start[k] = row[k] - free_end
-        p.hand_velocity[k] = hand
+        p.string_start[k] = row[k] - free_end[k]
+        p.hand_velocity[k] = hand[k]
     p.reference_damping = 0.0
     p.translates = True
     p.has_string = True

@@ -108,6 +108,19 @@ def fill_initial_row(
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
+def shift_com(row: np.ndarray, x: float, y: float, z: float) -> None:
+    """Let a state row (13,) be that of another point of the same moving body, x, y, z [m, body axes] from the COM that
+    it was of: the place R d further, with the velocity v + ω × R d.
+    """
+    R = matrix_elements(row[3], row[4], row[5], row[6])
+    x, y, z = R[0] * x + R[1] * y + R[2] * z, R[3] * x + R[4] * y + R[5] * z, R[6] * x + R[7] * y + R[8] * z
+    a, b, c = row[10], row[11], row[12]
+    a, b, c = R[0] * a + R[1] * b + R[2] * c, R[3] * a + R[4] * b + R[5] * c, R[6] * a + R[7] * b + R[8] * c
+    row[0], row[1], row[2] = row[0] + x, row[1] + y, row[2] + z
+    row[7], row[8], row[9] = row[7] + (b * z - c * y), row[8] + (c * x - a * z), row[9] + (a * y - b * x)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
 def kinetic_energy(row: np.ndarray, mass: float, inertia: np.ndarray) -> float:
     """½ m|v|² + ½ ωᵀIω [J] of a state row (≥ 13,); inertia (9,) row by row."""
     x, y, z = row[10], row[11], row[12]

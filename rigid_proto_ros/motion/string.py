@@ -57,6 +57,20 @@ def length_of(x: float, y: float, z: float) -> float:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
+def free_end_at(
+    now_ns: int, origin: np.ndarray, target: np.ndarray, begin_ns: int, end_ns: int
+) -> tuple[Vector, Vector]:
+    """Where the free end is [m, world], and its velocity [m/s, world] from then on: it goes evenly from origin (3,) at
+    begin_ns to target (3,) at end_ns and stays there.
+    """
+    if now_ns >= end_ns:
+        return (target[0], target[1], target[2]), (0.0, 0.0, 0.0)
+    elapsed, seconds = (now_ns - begin_ns) * 1e-9, (end_ns - begin_ns) * 1e-9
+    x, y, z = (target[0] - origin[0]) / seconds, (target[1] - origin[1]) / seconds, (target[2] - origin[2]) / seconds
+    return (origin[0] + elapsed * x, origin[1] + elapsed * y, origin[2] + elapsed * z), (x, y, z)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
 def span_of(rx: float, ry: float, rz: float, row: np.ndarray, ex: float, ey: float, ez: float) -> Vector:
     """From the free end at e [m, world] to the knot at r [m from the COM, body axes] at a state row (13,): three
     numbers [m, world].
@@ -166,17 +180,9 @@ class StringState:
         """From the COM to the knot (3,) [m, body axes]."""
         return body.point(self.attach)
 
-    def hand_velocity(self, time_ns: int) -> np.ndarray:
-        """Velocity of the free end (3,) [m/s, world] from ``time_ns`` on."""
-        if time_ns >= self.end_ns:
-            return np.zeros(3)
-        return (self.target - self.origin) / ((self.end_ns - self.begin_ns) * 1e-9)
-
     def free_end(self, time_ns: int) -> np.ndarray:
         """Where the free end is (3,) [m, world]."""
-        if time_ns >= self.end_ns:
-            return self.target
-        return self.origin + ((time_ns - self.begin_ns) * 1e-9) * self.hand_velocity(time_ns)
+        return np.array(free_end_at(time_ns, self.origin, self.target, self.begin_ns, self.end_ns)[0])
 
     def span(self, body: Body, state: State) -> np.ndarray:
         """From the free end to the knot (3,) [m, world]."""

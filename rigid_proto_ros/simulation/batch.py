@@ -20,7 +20,6 @@ from ..base.borrowed_views import borrowed, copy_numbers
 from ..base.compilation import njit
 from ..base.exact_arithmetic import exact_quotient
 from ..base.records import record_type
-from ..base.rotation import matrix_elements
 from ..base.simd import aligned
 from ..base.vectors import Vector
 from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
@@ -31,8 +30,8 @@ from ..motion.integrators.auto import FASTEST
 from ..motion.integrators.stepping import provide_kernel
 from ..motion.loads import MAX_ACCELERATION, accumulate_load, is_within_magnitude
 from ..motion.problem import KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_body
-from ..motion.state import fill_initial_row
-from ..motion.string import effective_mass, energy_of, most_yielding, span_of, spring_of
+from ..motion.state import fill_initial_row, shift_com
+from ..motion.string import effective_mass, energy_of, free_end_at, most_yielding, span_of, spring_of
 from . import flight as fl
 from .quantities import CONTEXT, STATE, begin, first_satisfied, measure_flight
 from .setup import Setup
@@ -216,15 +215,8 @@ def _make_body(own: np.record, ballast: np.ndarray, body: np.ndarray) -> bool:
 @njit(cache=True, error_model="numpy", allocates=False)
 def _free_end(flight: np.record) -> Vector:
     """Where the string's free end is now: three numbers [m, world]."""
-    string, begin_ns, end_ns = flight.string, flight.string_begin_ns, flight.string_end_ns
-    if flight.now_ns >= end_ns:
-        return string[TARGET], string[TARGET + 1], string[TARGET + 2]
-    elapsed, seconds = (flight.now_ns - begin_ns) * 1e-9, (end_ns - begin_ns) * 1e-9
-    return (
-        string[ORIGIN] + elapsed * ((string[TARGET] - string[ORIGIN]) / seconds),
-        string[ORIGIN + 1] + elapsed * ((string[TARGET + 1] - string[ORIGIN + 1]) / seconds),
-        string[ORIGIN + 2] + elapsed * ((string[TARGET + 2] - string[ORIGIN + 2]) / seconds),
-    )
+    ends = flight.string[ORIGIN:], flight.string[TARGET:]
+    return free_end_at(flight.now_ns, *ends, flight.string_begin_ns, flight.string_end_ns)[0]
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -360,7 +352,7 @@ def _change(own: np.record, ballast: np.ndarray, flight: np.record, commands: np
     """Take other numbers in flight, as ``Simulation`` takes another setup: where the mesh keeps its size it stays where
     it is, so a COM that moves within it takes position and velocity along.
     """
-    body, row = flight.body, flight.row
+    body = flight.body
     x, y, z = body[COM], body[COM + 1], body[COM + 2]
     a, b, c = body[BODY_SCALE], body[BODY_SCALE + 1], body[BODY_SCALE + 2]
     if not _take_body(own, ballast, flight) or not _are_within_magnitude(commands, flight.due, body):
@@ -368,12 +360,7 @@ def _change(own: np.record, ballast: np.ndarray, flight: np.record, commands: np
     x, y, z = body[COM] - x, body[COM + 1] - y, body[COM + 2] - z
     kept = body[BODY_SCALE] == a and body[BODY_SCALE + 1] == b and body[BODY_SCALE + 2] == c
     if kept and (x != 0.0 or y != 0.0 or z != 0.0):
-        R = matrix_elements(row[3], row[4], row[5], row[6])
-        x, y, z = R[0] * x + R[1] * y + R[2] * z, R[3] * x + R[4] * y + R[5] * z, R[6] * x + R[7] * y + R[8] * z
-        a, b, c = row[10], row[11], row[12]
-        a, b, c = R[0] * a + R[1] * b + R[2] * c, R[3] * a + R[4] * b + R[5] * c, R[6] * a + R[7] * b + R[8] * c
-        row[0], row[1], row[2] = row[0] + x, row[1] + y, row[2] + z
-        row[7], row[8], row[9] = row[7] + (b * z - c * y), row[8] + (c * x - a * z), row[9] + (a * y - b * x)
+        shift_com(flight.row, x, y, z)
     for k in range(flight.acting):
         accumulate_load(loads[k].load, body, loads[k].share)
     return not flight.tied or _take_spring(own, flight)

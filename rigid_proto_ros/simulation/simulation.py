@@ -13,11 +13,10 @@ from heapq import heappop, heappush
 from typing import Protocol
 
 from ..base.errors import CommandRefused, InputError
-from ..base.rotation import cross, times
 from ..motion.integrators import check_supported
 from ..motion.integrators.integrator import MAX_SPEED, STRING
 from ..motion.loads import Load, load_of_bytes
-from ..motion.state import State
+from ..motion.state import State, shift_com
 from . import flight as fl
 from .checks import check_command, check_load_supported, check_rates, check_start, check_thrust, load_row, needs_of
 from .commands import (
@@ -376,10 +375,7 @@ class Simulation(Observables):
         old, self.setup = self.setup, new
         moved = new.body.center_of_mass - old.body.center_of_mass
         if new.geometry == old.geometry and moved.any():
-            shift = times(self.state.rotation, moved)
-            row = self._arrays.row
-            row[0:3] += shift
-            row[7:10] += cross(self.state.angular_velocity, shift)
+            shift_com(self._arrays.row, *moved.tolist())
             self.state = self._arrays.state
         self._arrays.take(new)
         self._string.change(old, new, self.state)
