@@ -25,6 +25,7 @@ def test_every_bundled_scene_is_a_lesson_with_a_title_a_question_three_sentences
         assert all(20 < len(sentence) < 200 for sentence in one.sentences), name
         assert one.sentences[-1].endswith("."), name
         assert len(one.reason) > 60, name
+        assert f"rigid_proto simulate config/{name}.yaml" in one.commands, name
         assert not one.script or one.script in example_names(), name
 
 

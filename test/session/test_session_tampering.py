@@ -10,6 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis.strategies import randoms
 
 pytest.importorskip("mcap")
 
@@ -76,8 +78,9 @@ def with_line(session: RecordedSession, number: int, line: str) -> RecordedSessi
     return replace(session, events=events)
 
 
-def check_random_change(session: RecordedSession, seed: int) -> None:
-    rng = random.Random(seed)
+@given(rng=randoms(use_true_random=False))
+@settings(max_examples=20, deadline=None)
+def test_a_random_change_of_an_event_is_found_and_named(session, rng):
     number = rng.randrange(len(session.events))
     event = json.loads(session.lines[number])
     path = rng.choice(leaves(event))
@@ -88,17 +91,6 @@ def check_random_change(session: RecordedSession, seed: int) -> None:
     difference = verify(with_line(session, number, json.dumps(event)))
     assert difference is not None, path
     assert f"command {number + 1} " in str(difference), (path, difference)
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_a_random_change_of_an_event_is_found_and_named(session, seed):
-    check_random_change(session, seed)
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("seed", range(10, 110))
-def test_a_hundred_more_random_changes(session, seed):
-    check_random_change(session, seed)
 
 
 def test_a_change_without_effect_on_the_motion_is_found(session):
