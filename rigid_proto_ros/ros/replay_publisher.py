@@ -107,7 +107,7 @@ def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
     streams, senders = _streams(session), {}
     for name in streams:
         publisher = node.create_publisher(types[name], f"/{session.node_name}/{name}", qos.STATE)
-        senders[name] = (publisher, _template(name, session))
+        senders[name] = (publisher, _packing(name, session))
     clock = node.create_publisher(Clock, "/clock", qos.CLOCK)
     _wait_for_subscribers(node, [*(publisher for publisher, _ in senders.values()), clock])
     merged = sorted(
@@ -156,19 +156,12 @@ def _streams(session: RecordedSession) -> dict[str, StampedRows]:
     }
 
 
-def _template(name: str, session: RecordedSession) -> Callable[[int, list[float]], bytes]:
+def _packing(name: str, session: RecordedSession) -> Callable[[int, list[float]], bytes]:
     """How a row of a topic becomes bytes, with the frames' names that the session flew with."""
-    world, body = frame_names(recorded_parameters(session), session.node_name)
-    if name != "odom":
-        template = cdr.StampedTemplate(world, {"pose": 7, "twist": 6}[name])
-        return lambda time_ns, row: bytes(template.pack(time_ns, row))
-    template = cdr.StampedTemplate(world, cdr.ODOMETRY_DOUBLES, child_frame_id=body)
-
-    def pack(time_ns: int, row: list[float]) -> bytes:
-        template.pack(time_ns, row[:7])
-        return bytes(template.pack(time_ns, row[7:], at=cdr.ODOMETRY_TWIST_AT))
-
-    return pack
+    frames = frame_names(recorded_parameters(session), session.node_name)
+    if name == "odom":
+        return lambda time_ns, row: cdr.odometry(time_ns, frames, row[:7], row[7:])
+    return lambda time_ns, row: cdr.stamped_doubles(time_ns, frames[0], row)
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -62,9 +62,6 @@ class StatePublisher:
         self._pose = publisher(PoseStamped, "pose")
         self._twist = publisher(TwistStamped, "twist")
         self._odom = publisher(Odometry, "odom")
-        self._pose_template = cdr.StampedTemplate(world_frame, 7)
-        self._twist_template = cdr.StampedTemplate(world_frame, 6)
-        self._odom_template = cdr.StampedTemplate(world_frame, cdr.ODOMETRY_DOUBLES, child_frame_id=body_frame)
         self._imu = publisher(Imu, "imu")
         self._imu_frame = body_frame
         self._clock: Publisher | None = None
@@ -74,7 +71,6 @@ class StatePublisher:
         self._tf_message: Any = None
         self._wanted: Topics = []
         self._noise: SensorNoise | None = None
-        self._has_covariances = False
 
     def configure(self, parameters: Parameters) -> None:
         """Switch /clock, /tf and noise on and off, and put the IMU where it is mounted; on the executor's thread."""
@@ -136,36 +132,29 @@ class StatePublisher:
 
     def _pose_message(self, time_ns: int, row: list[float]) -> bytes:
         row = self._with_noise("pose", time_ns, row)
-        return bytes(self._pose_template.pack(self._stamp_ns(time_ns), row[:7]))
+        return cdr.stamped_doubles(self._stamp_ns(time_ns), self._frames[0], row[:7])
 
     def _twist_message(self, time_ns: int, row: list[float]) -> bytes:
         row = self._with_noise("twist", time_ns, row)
-        return bytes(self._twist_template.pack(self._stamp_ns(time_ns), [*row[7:10], *rotate(*row[3:7], *row[10:13])]))
+        twist = (*row[7:10], *rotate(*row[3:7], *row[10:13]))
+        return cdr.stamped_doubles(self._stamp_ns(time_ns), self._frames[0], twist)
 
     def _odom_message(self, time_ns: int, row: list[float]) -> bytes:
         # An Odometry's twist is in the child frame: body axes.
         row = self._with_noise("odom", time_ns, row)
-        stamp_ns = self._stamp_ns(time_ns)
-        self._odom_template.pack(stamp_ns, row[:7])
-        for at, covariance in self._odom_covariances(time_ns):
-            self._odom_template.pack(stamp_ns, covariance, at=at)
-        v_body = rotate(-row[3], -row[4], -row[5], row[6], *row[7:10])
-        return bytes(self._odom_template.pack(stamp_ns, [*v_body, *row[10:13]], at=cdr.ODOMETRY_TWIST_AT))
+        twist = (*rotate(-row[3], -row[4], -row[5], row[6], *row[7:10]), *row[10:13])
+        covariances = (
+            self._covariance(POSITION, ORIENTATION, time_ns),
+            self._covariance(LINEAR_VELOCITY, ANGULAR_VELOCITY, time_ns),
+        )
+        return cdr.odometry(self._stamp_ns(time_ns), self._frames, row[:7], twist, covariances)
 
-    def _odom_covariances(self, time_ns: int) -> list[tuple[int, list[float]]]:
-        """Numbers of the doubles where the two covariances (36,) begin, and they, where they aren't what was there."""
-        noise = self._noise
-        if noise is None and not self._has_covariances:
-            return []
-        self._has_covariances = noise is not None
-        found = []
-        sides = ((7, POSITION, ORIENTATION), (cdr.ODOMETRY_TWIST_AT + 6, LINEAR_VELOCITY, ANGULAR_VELOCITY))
-        for at, linear, angular in sides:
-            variances = (
-                [0.0, 0.0] if noise is None else [noise.variance(sensor, time_ns) for sensor in (linear, angular)]
-            )
-            found.append((at, np.diag(np.repeat(variances, 3)).ravel().tolist()))
-        return found
+    def _covariance(self, linear: int, angular: int, time_ns: int) -> Sequence[float]:
+        """Of a pose or twist (36,), from the variances of two sensors."""
+        if self._noise is None:
+            return cdr.NO_COVARIANCE
+        variances = [self._noise.variance(sensor, time_ns) for sensor in (linear, angular)]
+        return np.diag(np.repeat(variances, 3)).ravel().tolist()
 
     def _imu_message(self, time_ns: int, row: list[float]) -> Imu:
         """Attitude, angular velocity and specific force, both in body axes, at the contact that was chosen."""

@@ -2,7 +2,8 @@
 """Messages as bytes: little-endian CDR, as every ROS 2 middleware sends them, packed by ``struct`` alone.
 
 Packing bytes costs a tenth of filling a message object and serializing it. The layout (OMG DDS-XTYPES, plain CDR): a
-header 00 01 00 00; strings as length with their NUL, then the bytes; doubles aligned to 8 from the end of the header.
+header 00 01 00 00; strings as length with their NUL, then the bytes, their length aligned to 4; doubles aligned to 8,
+both from the end of the header.
 """
 
 from __future__ import annotations
@@ -13,31 +14,48 @@ from collections.abc import Iterable, Sequence
 
 _HEADER = b"\x00\x01\x00\x00"
 _STAMP_AND_LENGTH = struct.Struct("<iII")
-_DOUBLES = {count: struct.Struct(f"<{count}d") for count in (3, 6, 10)}
+_LENGTH = struct.Struct("<I")
+
+NO_COVARIANCE = (0.0,) * 36
+ODOMETRY_DOUBLES = 7 + 36 + 6 + 36
+ODOMETRY_TWIST = slice(7 + 36, 7 + 36 + 6)
+"""Where an Odometry has its twist among its doubles: pose and twist are each followed by their covariance."""
 
 
-def _stamp_and_frame(stamp_ns: int, frame_id: str) -> bytes:
+def stamped_doubles(stamp_ns: int, frame_id: str, doubles: Sequence[float], child_frame_id: str | None = None) -> bytes:
+    """A header and doubles: PoseStamped (7: x y z, x y z w), TwistStamped (6), WrenchStamped (6); an Odometry has the
+    name of its child frame between them.
+    """
     frame = frame_id.encode() + b"\0"
     seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
-    return struct.pack(f"<iII{len(frame)}s", seconds, nanoseconds, len(frame), frame)
-
-
-def _aligned(body: bytes, to: int) -> bytes:
-    return body + b"\0" * (-len(body) % to)
-
-
-def stamped_doubles(stamp_ns: int, frame_id: str, doubles: Sequence[float]) -> bytes:
-    """PoseStamped (7: x y z, x y z w), TwistStamped (6) or WrenchStamped (6): a header and doubles."""
-    frame = frame_id.encode()
-    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
-    layout = _stamped_layout(len(frame) + 1, len(doubles))
-    return layout.pack(_HEADER, seconds, nanoseconds, len(frame) + 1, frame, *doubles)
+    if child_frame_id is None:
+        layout = _stamped_layout(len(frame), len(doubles))
+        return layout.pack(_HEADER, seconds, nanoseconds, len(frame), frame, *doubles)
+    child = child_frame_id.encode() + b"\0"
+    layout = _stamped_layout(len(frame), len(doubles), len(child))
+    return layout.pack(_HEADER, seconds, nanoseconds, len(frame), frame, len(child), child, *doubles)
 
 
 @functools.lru_cache(maxsize=1024)
-def _stamped_layout(length: int, count: int) -> struct.Struct:
-    """Header, stamp, a string of ``length`` with its NUL, and doubles aligned to 8."""
-    return struct.Struct(f"<4siII{length}s{-(12 + length) % 8}x{count}d")
+def _stamped_layout(length: int, count: int, child_length: int = 0) -> struct.Struct:
+    """Header, stamp, a string of ``length`` with its NUL, another where it has a length, and ``count`` doubles."""
+    strings, end = f"{length}s", 12 + length
+    if child_length:
+        strings += f"{-end % 4}xI{child_length}s"
+        end += -end % 4 + 4 + child_length
+    return struct.Struct(f"<4siII{strings}{-end % 8}x{count}d")
+
+
+def odometry(
+    stamp_ns: int,
+    frames: tuple[str, str],
+    pose: Sequence[float],
+    twist: Sequence[float],
+    covariances: tuple[Sequence[float], Sequence[float]] = (NO_COVARIANCE, NO_COVARIANCE),
+) -> bytes:
+    """A nav_msgs/Odometry: pose (7,) in the first frame, twist (6,) in the second, and the covariances (36,) of both."""
+    doubles = (*pose, *covariances[0], *twist, *covariances[1])
+    return stamped_doubles(stamp_ns, frames[0], doubles, frames[1])
 
 
 def wrench_stamped(stamp_ns: int, frame_id: str, force: Iterable[float], torque: Iterable[float]) -> bytes:
@@ -45,16 +63,22 @@ def wrench_stamped(stamp_ns: int, frame_id: str, force: Iterable[float], torque:
     return stamped_doubles(stamp_ns, frame_id, (*force, *torque))
 
 
-def read_stamped_doubles(data: bytes, count: int) -> tuple[int, int, str, tuple[float, ...]]:
+def read_stamped_doubles(
+    data: bytes, count: int, has_child_frame: bool = False
+) -> tuple[int, int, str, tuple[float, ...]]:
     """Seconds, nanoseconds, frame_id and doubles of a message as ``stamped_doubles`` packs it; raises ValueError for
     other bytes.
     """
     if data[:2] == _HEADER[:2] and len(data) >= 16:
         seconds, nanoseconds, length = _STAMP_AND_LENGTH.unpack_from(data, 4)
-        end = 16 + length
-        doubles_at = 4 + (end - 4 + 7) // 8 * 8
+        end = frame_end = 16 + length
+        if has_child_frame and end + 8 <= len(data):
+            end += -end % 4
+            end += 4 + _LENGTH.unpack_from(data, end)[0]
+        doubles_at = end + (4 - end) % 8
         if length and doubles_at + 8 * count <= len(data):
-            return seconds, nanoseconds, data[16 : end - 1].decode(), _DOUBLES[count].unpack_from(data, doubles_at)
+            doubles = struct.unpack_from(f"<{count}d", data, doubles_at)
+            return seconds, nanoseconds, data[16 : frame_end - 1].decode(), doubles
     raise ValueError(f"no header and {count} doubles as little-endian CDR")
 
 
@@ -64,36 +88,15 @@ def string(text: str) -> bytes:
     return _HEADER + struct.pack(f"<I{len(data)}s", len(data), data)
 
 
+def read_string(data: bytes) -> str:
+    """The text of a std_msgs/String; raises ValueError for other bytes."""
+    if data[:2] == _HEADER[:2] and len(data) >= 8:
+        (length,) = _LENGTH.unpack_from(data, 4)
+        if 0 < length <= len(data) - 8:
+            return data[8 : 8 + length - 1].decode()
+    raise ValueError("no string as little-endian CDR")
+
+
 def time(time_ns: int) -> bytes:
     """A rosgraph_msgs/Clock."""
     return _HEADER + struct.pack("<iI", *divmod(time_ns, 1_000_000_000))
-
-
-class StampedTemplate:
-    """One message kept as a buffer: only its stamp and its doubles are written anew.
-
-    count doubles follow the header (and, for nav_msgs/Odometry, a second frame id); zeros fill the gaps between
-    ``parts``.
-    """
-
-    def __init__(self, frame_id: str, count: int, child_frame_id: str | None = None) -> None:
-        body = _stamp_and_frame(0, frame_id)
-        if child_frame_id is not None:
-            child = child_frame_id.encode() + b"\0"
-            body = _aligned(body, 4) + struct.pack(f"<I{len(child)}s", len(child), child)
-        body = _aligned(body, 8)
-        self._doubles_at = len(_HEADER) + len(body)
-        self.buffer = bytearray(_HEADER + body + bytes(8 * count))
-        self._stamp = struct.Struct("<iI")
-
-    def pack(self, stamp_ns: int, doubles: Sequence[float], at: int = 0) -> bytearray:
-        """Write the stamp and doubles from number ``at`` on; returns the buffer, valid until the next call."""
-        self._stamp.pack_into(self.buffer, len(_HEADER), *divmod(stamp_ns, 1_000_000_000))
-        struct.pack_into(f"<{len(doubles)}d", self.buffer, self._doubles_at + 8 * at, *doubles)
-        return self.buffer
-
-
-ODOMETRY_TWIST_AT = 7 + 36
-"""Number of the double where an Odometry's twist begins: after the pose and its covariance."""
-
-ODOMETRY_DOUBLES = 7 + 36 + 6 + 36

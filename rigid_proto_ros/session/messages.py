@@ -8,7 +8,6 @@ bit.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
 
 import numpy as np
@@ -79,10 +78,6 @@ MADE_WITH = "rigid_proto_ros"
 FLOOR = "accuracy_floor of run {}"
 """Name of the metadata, by the run's number from 0, that say why it is held to less than its accuracy."""
 
-_STAMP = struct.Struct("<iII")
-_LENGTH = struct.Struct("<I")
-_LITTLE_ENDIAN = b"\x00\x01"
-
 
 def pose_row(row: list[float]) -> list[float]:
     """x, y, z, then the attitude xyzw."""
@@ -120,32 +115,20 @@ _DOUBLES = {"pose": 7, "twist": 6, "odom": cdr.ODOMETRY_DOUBLES}
 def read_string(data: bytes, topic: str) -> str:
     """The text of a std_msgs/String; raises InputError."""
     try:
-        (length,) = _LENGTH.unpack_from(data, 4)
-        if data[:2] == _LITTLE_ENDIAN and 0 < length <= len(data) - 8:
-            return data[8 : 8 + length - 1].decode()
-    except (struct.error, UnicodeDecodeError):
-        pass
-    raise _undecodable(topic, "std_msgs/msg/String")
+        return cdr.read_string(data)
+    except ValueError:
+        raise _undecodable(topic, "std_msgs/msg/String") from None
 
 
 def read_state(name: str, data: bytes, topic: str) -> tuple[int, list[float]]:
     """Stamp [ns] and row of a message of the state topic ``name``; raises InputError."""
     try:
-        if data[:2] == _LITTLE_ENDIAN:
-            seconds, nanoseconds, length = _STAMP.unpack_from(data, 4)
-            end = 16 + length
-            if name == "odom":
-                end = 4 + (end - 4 + 3) // 4 * 4
-                end += 4 + _LENGTH.unpack_from(data, end)[0]
-            doubles_at = 4 + (end - 4 + 7) // 8 * 8
-            values = list(struct.unpack_from(f"<{_DOUBLES[name]}d", data, doubles_at))
-            if name == "odom":
-                at = cdr.ODOMETRY_TWIST_AT
-                values = values[:7] + values[at : at + 6]
-            return seconds * 1_000_000_000 + nanoseconds, values
-    except struct.error:
-        pass
-    raise _undecodable(topic, READ[name])
+        seconds, nanoseconds, _, values = cdr.read_stamped_doubles(data, _DOUBLES[name], name == "odom")
+    except ValueError:
+        raise _undecodable(topic, READ[name]) from None
+    if name == "odom":
+        values = values[:7] + values[cdr.ODOMETRY_TWIST]
+    return seconds * 1_000_000_000 + nanoseconds, list(values)
 
 
 def _undecodable(topic: str, message_type: str) -> InputError:

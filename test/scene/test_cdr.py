@@ -14,6 +14,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import String
 
 from rigid_proto_ros.ros.command_subscriber import read_stamped
+from rigid_proto_ros.session.messages import read_state
 
 texts = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=40)
 stamps = st.integers(0, 2**31 * 10**9 - 1)
@@ -69,20 +70,17 @@ def test_states_are_the_serialized_messages_for_frames_of_any_length(length):
     pose = stamped(PoseStamped, time_ns, frame)
     fill(pose.pose.position, values[:3])
     fill(pose.pose.orientation, values[3:7])
-    assert bytes(cdr.StampedTemplate(frame, 7).pack(time_ns, values[:7])) == zero_padded(serialize_message(pose), frame)
+    assert cdr.stamped_doubles(time_ns, frame, values[:7]) == zero_padded(serialize_message(pose), frame)
     twist = stamped(TwistStamped, time_ns, frame)
     fill(twist.twist.linear, values[7:10])
     fill(twist.twist.angular, values[10:])
-    assert bytes(cdr.StampedTemplate(frame, 6).pack(time_ns, values[7:])) == zero_padded(
-        serialize_message(twist), frame
-    )
+    assert cdr.stamped_doubles(time_ns, frame, values[7:]) == zero_padded(serialize_message(twist), frame)
     odometry = stamped(Odometry, time_ns, frame)
     odometry.child_frame_id = child
     odometry.pose.pose, odometry.twist.twist = pose.pose, twist.twist
-    template = cdr.StampedTemplate(frame, cdr.ODOMETRY_DOUBLES, child_frame_id=child)
-    template.pack(time_ns, values[:7])
-    packed = bytes(template.pack(time_ns, values[7:], at=cdr.ODOMETRY_TWIST_AT))
+    packed = cdr.odometry(time_ns, (frame, child), values[:7], values[7:])
     assert packed == zero_padded(serialize_message(odometry), frame, child)
+    assert read_state("odom", packed, "odom") == (time_ns, values)
 
 
 @settings(max_examples=200, deadline=None)
