@@ -72,15 +72,15 @@ def starts_of(simulation, until_ns: int, count: int) -> list[tuple]:
     """
     rng = np.random.default_rng(1)
     simulation.advance(1)
-    found = [(simulation._segment.problem.copy(), simulation._segment.variables.copy(), 0.0)]
+    flight = simulation.flight
+    found = [(flight.problem.copy(), flight.variables.copy(), 0.0)]
     for at_ns in np.sort(rng.integers(2, until_ns, count)):
         simulation.advance(int(at_ns))
-        segment = simulation._segment
-        if simulation._segment.start.time_ns == at_ns:
+        if flight.start_ns == at_ns:
             continue
-        # The shorter step that was taken to the time asked for.
-        y = segment.sampled.copy()
-        found.append((segment.problem.copy(), y, (at_ns - segment.start.time_ns) * 1e-9))
+        # The shorter step that was taken to the time asked for, where there was one.
+        y = flight.trial if flight.now_ns > flight.committed_ns else flight.variables
+        found.append((flight.problem.copy(), y.copy(), (at_ns - int(flight.start_ns)) * 1e-9))
     return found
 
 

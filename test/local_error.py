@@ -14,6 +14,7 @@ from reference_motion import angle_between, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
 from rigid_proto_ros.motion.variables import LOW
+from rigid_proto_ros.simulation.flight import steps_of_segment
 from rigid_proto_ros.simulation.simulation import Simulation
 
 FLOOR = 32.0 * 2.0**-52
@@ -48,24 +49,24 @@ def committed_steps(
         if start_ns <= simulation.time_ns:
             continue
         simulation.advance(int(start_ns))
-        segment, portion = simulation._segment, 1000
-        number = segment.number
+        flight, portion = simulation.flight, 1000
+        number = int(flight.segments)
         while simulation.time_ns < until_ns:
-            steps, begin_ns, before = segment.steps, segment.committed_ns, segment.variables.copy()
+            steps, begin_ns, before = steps_of_segment(flight), int(flight.committed_ns), flight.variables.copy()
             simulation.advance(min(until_ns, simulation.time_ns + portion))
-            if segment.number != number:
+            if flight.segments != number:
                 break
-            taken = segment.steps - steps
+            taken = steps_of_segment(flight) - steps
             if taken == 1:
-                origin_ns = segment.start.time_ns
+                origin_ns = int(flight.start_ns)
                 found.append(
                     CommittedStep(
-                        segment.problem.copy(),
+                        flight.problem.copy(),
                         before,
-                        segment.variables.copy(),
+                        flight.variables.copy(),
                         begin_ns - origin_ns,
-                        segment.committed_ns - origin_ns,
-                        segment.floor_binds,
+                        int(flight.committed_ns) - origin_ns,
+                        bool(flight.control.floor_rate),
                     )
                 )
                 break

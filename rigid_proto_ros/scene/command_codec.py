@@ -203,7 +203,7 @@ def _three(content: Mapping, key: str) -> Vector:
 def in_words(command: Command) -> Command:
     """The command in frames ``world`` and ``body``, so that a node of any name reads it."""
     if isinstance(command, WrenchCommand):
-        return replace(command, frame_id=command.frame.text)
+        return replace(command, sent=None)
     if isinstance(command, MoveString):
         return replace(command, frame_id="world")
     if isinstance(command, TieString):

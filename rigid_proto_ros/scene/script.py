@@ -97,8 +97,12 @@ def expand_schedule(entries: dict | list) -> list[Command]:
     return sorted(commands, key=lambda command: command.entry)
 
 
-def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES) -> list[Command]:
-    """As ``parse_script``, from what its YAML says: a list of entries, or nothing."""
+def expand_script(
+    entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES, start_ns: int = 0
+) -> list[Command]:
+    """As ``parse_script``, from what its YAML says: a list of entries, or nothing. start_ns: from when its times
+    count.
+    """
     if entries is None:
         entries = []
     if not isinstance(entries, list):
@@ -107,7 +111,7 @@ def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_EN
     for number, entry in enumerate(entries, 1):
         try:
             for t_ns in _times_ns(entry, number, max_commands):
-                commands += _expand(entry, {"stamp_ns": t_ns, "entry": number})
+                commands += _expand(entry, {"stamp_ns": start_ns + t_ns, "entry": number})
             if len(commands) > max_commands:
                 raise InputError("", f"more than {max_commands} commands")
         except CommandRefused:
@@ -289,8 +293,7 @@ def _load(held: bool, entry: dict, stamp: Stamp) -> WrenchCommand:
         if point == ("com",):
             raise InputError("at", "com", "a point of the surface, which has a normal, such as {vertex: 0}")
         axes, force = "normal", (_number(entry["push"], "push"), 0.0, 0.0)
-    frame = Frame(axes, point, duration_s, impulse, slot)
-    return WrenchCommand(held, frame, force, torque, frame.text, **stamp)
+    return WrenchCommand(held, Frame(axes, point, duration_s, impulse, slot), force, torque, **stamp)
 
 
 def _at(at: object) -> tuple:
@@ -330,7 +333,8 @@ def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100)
             value = float(value)
         except ValueError:
             pass
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not lower <= value <= upper:
+    is_number = isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool))
+    if not is_number or not lower <= value <= upper:
         raise InputError(field, value, f"a number from {lower:g} to {upper:g}")
     return float(value)
 
@@ -338,5 +342,5 @@ def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100)
 def _vector(value: Any, field: str) -> Vector:
     if not isinstance(value, (list, tuple)) or len(value) != 3:
         raise InputError(field, value, "three numbers [x, y, z]")
-    x, y, z = (_number(v, field) for v in value)
-    return x, y, z
+    x, y, z = value
+    return _number(x, field), _number(y, field), _number(z, field)

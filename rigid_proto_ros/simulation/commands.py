@@ -56,14 +56,20 @@ class Stamped:
 class WrenchCommand(Stamped):
     """One message of the wrench topic (``held``) or the poke topic.
 
-    force [N], torque [N m] as sent (N s and N m s for an impulse), frame_id as sent, and the frame that it says.
+    force [N], torque [N m] as sent (N s and N m s for an impulse). sent: the frame as a message said it; None where it
+    wasn't one.
     """
 
     held: bool
     frame: Frame
     force: Vector
     torque: Vector
-    frame_id: str
+    sent: str | None = field(default=None, compare=False)
+
+    @property
+    def frame_id(self) -> str:
+        """The frame as sent, or written out."""
+        return self.frame.text if self.sent is None else self.sent
 
     @property
     def rank(self) -> Rank:

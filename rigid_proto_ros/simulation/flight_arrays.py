@@ -14,17 +14,11 @@ from numba import int64
 from ..base.compilation import njit
 from ..base.function_pointers import address_of_array, array_at, doubles_at, entry_of
 from ..base.records import place_of, record_type
-from ..base.rotation import length
 from ..base.simd import aligned
-from ..motion.integrators.auto import fastest_swing
-from ..motion.integrators.equations import stretch
-from ..motion.integrators.integrator import FIXED_STEPS, Method
 from ..motion.integrators.stepping import METHOD, provide_kernel
 from ..motion.loads import Load, load_of_row
-from ..motion.problem import PROBLEM
 from ..motion.state import State
 from ..motion.string import StringState
-from ..motion.variables import STORED
 from . import flight as fl
 from .commands import Pending
 from .flight import EVENT, FLIGHT, LOAD_ROW
@@ -276,11 +270,6 @@ class FlightArrays:
         """The state now."""
         return State(self.integers[_NOW_NS], self.row.copy())
 
-    def accelerations(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the COM (3,) [m/s², world] and angular (3,) [rad/s², body axes], now."""
-        six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(STORED)))
-        return six[:3], six[3:]
-
     @property
     def acts(self) -> bool:
         """Whether any load acts."""
@@ -291,43 +280,6 @@ class FlightArrays:
         for row in np.ndarray(self.integers[_ACTING], LOAD_ROW, self._loads):
             load = load_of_row(row.load)
             yield ActingLoad(load, int(row.at_ns), int(row.end_ns), int(row.id), int(row.kind), int(row.slot))
-
-    @property
-    def sums(self) -> np.ndarray:
-        """All of them summed (LOADS_SIZE,), as motion/loads.py lays them out."""
-        return self.flight.sums.copy()
-
-    @property
-    def steps(self) -> int:
-        """Steps committed since time 0."""
-        return int(self.flight.steps_before + fl.steps_of_segment(self.flight))
-
-    @property
-    def evaluations(self) -> int:
-        """Evaluations of the equations of motion in them."""
-        return int(self.flight.evaluations_before + fl.evaluations_of_segment(self.flight, self.methods))
-
-    @property
-    def hand_work(self) -> float:
-        """Of the string's hand since time 0 [J]."""
-        return float(self.flight.work_before + self.flight.work)
-
-    @property
-    def heat(self) -> float:
-        """In the string's damper since time 0 [J]."""
-        return float(self.flight.lost_before + self.flight.lost)
-
-    @property
-    def floors(self) -> list[float]:
-        """What has held the motion to less than its accuracy since time 0, by kind (flight.FLOOR_KINDS)."""
-        floors = self.flight.floors.copy()
-        fl.note_floors(self.flight, self.methods, floors)
-        return floors.tolist()
-
-    @property
-    def method(self) -> Method:
-        """How the segment is stepped."""
-        return self.integrator.methods[int(self.flight.method)]
 
     # Memory
 
@@ -342,83 +294,3 @@ class FlightArrays:
         self._table_bytes = loads.data.cast("B")
         numbers[_LOADS_AT], numbers[_EVENTS_AT] = address_of_array(loads), address_of_array(self._events)
         numbers[_ROWS] = rows
-
-
-class Segment:
-    """The segment that a flight is in: a stretch of time in which all commands are constant. Reads current values.
-
-    Steps count from the segment's start, and only full ones are committed; sampling a time in between takes one shorter
-    step on a copy. So the motion depends on where segments begin and end, that is on commands and their times, and not
-    on how often or in which portions it was asked for.
-
-    number: of segments begun before it and itself. start: state at the segment's start. committed_ns: where the last
-    full step ended. problem: motion/problem.py. variables: motion/variables.py, at the last committed step.
-    """
-
-    def __init__(self, arrays: FlightArrays) -> None:
-        self._arrays = arrays
-
-    @property
-    def number(self) -> int:
-        """Which segment of the flight it is, counted from 1."""
-        return int(self._arrays.flight.segments)
-
-    @property
-    def start(self) -> State:
-        """State at the segment's start."""
-        return State(int(self._arrays.flight.start_ns), self._arrays.flight.start.copy())
-
-    @property
-    def committed_ns(self) -> int:
-        """Where its last full step ended [ns]."""
-        return int(self._arrays.flight.committed_ns)
-
-    @property
-    def problem(self) -> np.record:
-        """Its problem (motion/problem.py)."""
-        return self._arrays.flight.problem
-
-    @property
-    def variables(self) -> np.ndarray:
-        """Its variables at the last committed step (motion/variables.py)."""
-        return self._arrays.flight.variables
-
-    @property
-    def sampled(self) -> np.ndarray:
-        """The variables at the time last advanced to."""
-        flight = self._arrays.flight
-        return flight.trial if flight.now_ns > flight.committed_ns else flight.variables
-
-    @property
-    def steps(self) -> int:
-        """Steps committed so far."""
-        return int(fl.steps_of_segment(self._arrays.flight))
-
-    @property
-    def evaluations(self) -> int:
-        """Evaluations of the equations of motion in them."""
-        return int(fl.evaluations_of_segment(self._arrays.flight, self._arrays.methods))
-
-    def expected_effort(self, now: State) -> tuple[float, float]:
-        """Steps and evaluations that a second of the motion from now on takes, as far as that is known beforehand."""
-        method = self._arrays.method
-        if method.way == FIXED_STEPS:
-            steps = 1e9 / int(self._arrays.flight.step_ns)
-            return steps, steps * method.evaluations
-        if method.radians == 0.0:
-            return 0.0, 0.0
-        fastest = length(now.angular_velocity_body)
-        if method.on_string and stretch(self.sampled, self.problem)[0] > 0.0:
-            fastest = max(fastest, fastest_swing(self.problem))
-        return fastest / method.radians, fastest / method.radians
-
-    @property
-    def choice(self) -> str:
-        """Which method, and why."""
-        step_s = int(self._arrays.flight.step_ns) * 1e-9
-        return self._arrays.method.choice(self.problem, step_s, float(self._arrays.flight.accuracy))
-
-    @property
-    def floor_binds(self) -> bool:
-        """Some step's error allowance was set by rounding and not by the accuracy asked for."""
-        return bool(self._arrays.flight.control.floor_rate)

@@ -11,11 +11,16 @@ import numpy as np
 
 from ..base.rotation import cross, dot, length, times, transposed_times
 from ..base.vectors import Numbers, Vector
+from ..motion.integrators.auto import fastest_swing
+from ..motion.integrators.equations import stretch
+from ..motion.integrators.integrator import FIXED_STEPS, Method
 from ..motion.loads import LoadSum
-from ..motion.state import State
+from ..motion.problem import PROBLEM
+from ..motion.state import State, angular_momentum
 from ..motion.string import StringState
-from .flight import FLOOR_KINDS
-from .flight_arrays import ActingLoad, FlightArrays, Segment
+from ..motion.variables import STORED
+from . import flight as fl
+from .flight_arrays import ActingLoad, FlightArrays
 from .setup import Setup
 from .string_control import StringControl
 from .thrusters import ThrusterControl
@@ -57,23 +62,30 @@ class Observables:
         return list(self._arrays.acting())
 
     @property
-    def _segment(self) -> Segment:
-        return Segment(self._arrays)
+    def flight(self) -> np.record:
+        """All that the compiled flight knows (simulation/flight.py), to be read."""
+        return self._arrays.flight
 
     @property
     def steps(self) -> int:
         """Steps committed since start or reset; sampling takes none."""
-        return self._arrays.steps
+        return int(self.flight.steps_before + fl.steps_of_segment(self.flight))
 
     @property
     def force_evaluations(self) -> int:
         """Evaluations of the equations of motion in those steps."""
-        return self._arrays.evaluations
+        in_segment = fl.evaluations_of_segment(self.flight, self._arrays.methods)
+        return int(self.flight.evaluations_before + in_segment)
+
+    @property
+    def _method(self) -> Method:
+        return self._arrays.integrator.methods[int(self.flight.method)]
 
     @property
     def choice(self) -> str:
         """Which method advances the body now, and why."""
-        return self._segment.choice
+        flight = self.flight
+        return self._method.choice(flight.problem, int(flight.step_ns) * 1e-9, float(flight.accuracy))
 
     @property
     def accuracy_floor(self) -> str:
@@ -86,8 +98,10 @@ class Observables:
     def floors(self) -> list[float]:
         """The same by kind (flight.FLOOR_KINDS), 0 where it hasn't."""
         if not self.setup.integrator.chooses and self.setup.integrator.name != "free_body":
-            return [0.0] * FLOOR_KINDS
-        return self._arrays.floors
+            return [0.0] * fl.FLOOR_KINDS
+        floors = self.flight.floors.copy()
+        fl.note_floors(self.flight, self._arrays.methods, floors)
+        return floors.tolist()
 
     @property
     def too_coarse(self) -> str:
@@ -110,15 +124,32 @@ class Observables:
         """That the present segment takes more computing than the clock leaves time for; empty when it doesn't. By what
         it took so far, and before that by the fastest that turns or swings.
         """
-        segment = self._segment
-        elapsed = (self.state.time_ns - segment.start.time_ns) * 1e-9
-        if segment.evaluations >= FEWEST_EVALUATIONS and elapsed > 0.0:
-            steps, evaluations = segment.steps / elapsed, segment.evaluations / elapsed
+        flight = self.flight
+        elapsed = (self.time_ns - int(flight.start_ns)) * 1e-9
+        evaluations = fl.evaluations_of_segment(flight, self._arrays.methods)
+        if evaluations >= FEWEST_EVALUATIONS and elapsed > 0.0:
+            steps, evaluations = fl.steps_of_segment(flight) / elapsed, evaluations / elapsed
         else:
-            steps, evaluations = segment.expected_effort(self.state)
+            steps, evaluations = self._expected_effort
         if evaluations < MOST_EVALUATIONS_A_SECOND[self.setup.integrator.chooses]:
             return ""
         return f"{self.choice}: {steps:.2g} steps for a second of the motion, slower than real time"
+
+    @property
+    def _expected_effort(self) -> tuple[float, float]:
+        """Steps and evaluations that a second of the motion from now on takes, as far as that is known beforehand."""
+        method, flight = self._method, self.flight
+        if method.way == FIXED_STEPS:
+            steps = 1e9 / int(flight.step_ns)
+            return steps, steps * method.evaluations
+        if method.radians == 0.0:
+            return 0.0, 0.0
+        fastest = length(self.state.angular_velocity_body)
+        if method.on_string:
+            now = flight.trial if flight.now_ns > flight.committed_ns else flight.variables
+            if stretch(now, flight.problem)[0] > 0.0:
+                fastest = max(fastest, fastest_swing(flight.problem))
+        return fastest / method.radians, fastest / method.radians
 
     @property
     def string(self) -> StringState | None:
@@ -133,12 +164,12 @@ class Observables:
     @property
     def hand_work(self) -> float:
         """What the hand at the string's free end has worked since start or reset [J]."""
-        return self._arrays.hand_work
+        return float(self.flight.work_before + self.flight.work)
 
     @property
     def string_heat(self) -> float:
         """What the string's damper has turned to heat since start or reset [J]."""
-        return self._arrays.heat
+        return float(self.flight.lost_before + self.flight.lost)
 
     @property
     def potential_energy(self) -> float:
@@ -166,7 +197,7 @@ class Observables:
         turned = self.string is not None or loads.torque_world.any() or loads.torque_body.any() or loads.moment.any()
         if turned or self.setup.angular_damping or not self.setup.gyroscopic:
             return 0.0
-        start = self._segment.start.angular_momentum(self.setup.body.inertia)
+        start = np.array(angular_momentum(self.flight.start, self.setup.body.inertia.ravel()))
         moved, size = self.angular_momentum - start, length(start)
         return length(moved) / size if size > 0.0 else 0.0
 
@@ -183,17 +214,22 @@ class Observables:
 
     def accelerations(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the COM (3,) [m/s²] and angular (3,) [rad/s²], both in world axes, now."""
-        linear, angular = self._arrays.accelerations()
+        linear, angular = self._accelerations()
         return linear, times(self.state.rotation, angular)
 
     def specific_force(self, point: Numbers) -> np.ndarray:
         """What an accelerometer at ``point`` (3,) [m, body axes from the COM] shows now (3,) [m/s², body axes]:
         Rᵀ(a − g) + ω' × r + ω × (ω × r).
         """
-        linear, angular = self._arrays.accelerations()
+        linear, angular = self._accelerations()
         w = self.state.angular_velocity_body
         own = transposed_times(self.state.rotation, linear - self.setup.gravity)
         return own + cross(angular, point) + cross(w, cross(w, point))
 
+    def _accelerations(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the COM (3,) [m/s², world] and angular (3,) [rad/s², body axes], now."""
+        six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(STORED)))
+        return six[:3], six[3:]
+
     def _load_sum(self) -> LoadSum:
-        return LoadSum(self._arrays.sums)
+        return LoadSum(self.flight.sums.copy())

@@ -412,7 +412,7 @@ class Simulation(Observables):
             self._push(pending)
         self._notify(due[:acted])
         self.time_ns, self.state = arrays.time_ns, arrays.state
-        when = f"{self._segment.committed_ns * 1e-9:.9g} s"
+        when = f"{int(self.flight.committed_ns) * 1e-9:.9g} s"
         self.failure = f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}"
         arrays.finish_segment()
         return self.state

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -68,10 +67,9 @@ class Flight:
         simulation, scene = self._run.simulation, self._run.scenario
         # Counted from now, in whole nanoseconds; seconds don't hold them all.
         start_ns = 0 if "t" in entry else simulation.time_ns
-        commands = expand_script([{"t": 0.0, **entry}], "command")
+        commands = expand_script([{"t": 0.0, **entry}], "command", start_ns=start_ns)
         for command in with_contacts(commands, scene.setup.contacts):
-            time_ns = start_ns + command.stamp_ns
-            simulation.submit(replace(command, stamp_ns=time_ns), time_ns, (0, self._commands))
+            simulation.submit(command, command.stamp_ns, (0, self._commands))
             self._commands += 1
 
     def step(self, seconds: float) -> State:

@@ -138,7 +138,7 @@ def test_a_session_of_a_node_of_another_name_is_sent_in_words_that_every_node_re
     run = Simulation(make_scenario({**SCENE, "contacts.tip": [0.0, 0.0, 0.07]}).setup, lines)
     poke = {"at": "tip", "axes": "body", "impulse": [1e-4, 0.0, 0.0]}
     (command,) = expand_script([{"t": 0.5, **poke}])
-    run.submit(replace(command, frame_id="spinning_top@tip;impulse"), SECOND // 2)
+    run.submit(replace(command, sent="spinning_top@tip;impulse"), SECOND // 2)
     run.advance(SECOND)
     scene = make_scenario({**SCENE, "contacts.tip": [0.0, 0.0, 0.07]}).text
     events = [(SECOND // 2, line) for line in lines.lines]

@@ -80,7 +80,7 @@ def noted_hash(command) -> str:
 @pytest.mark.parametrize(
     "command",
     [
-        replace(wrench("body@com"), frame_id='"é\\', force=(0.1, -0.0, 1e-300), torque=(1e22, 5e-324, 3.0)),
+        replace(wrench("body@com"), sent='"é\\', force=(0.1, -0.0, 1e-300), torque=(1e22, 5e-324, 3.0)),
         wrench("world", (1, 2.5, 0), (0, 0, 1)),
         wrench("world", np.array([0.1, 1e16, 2.0]), np.float64([1.0, 0.0, 1e-7])),
     ],

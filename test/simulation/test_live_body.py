@@ -9,6 +9,7 @@ import pytest
 from flights import SECOND
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
+from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
 from rigid_proto_ros.simulation.commands import Change
 from rigid_proto_ros.simulation.simulation import Simulation
@@ -62,7 +63,7 @@ class Flight:
         self.simulation.advance(WHEN + 1)
         assert not self.simulation.refused
         # The segment begins with the state that the change left.
-        return *before, self.simulation._segment.start, self.simulation.setup
+        return *before, State(WHEN, self.simulation.flight.start.copy()), self.simulation.setup
 
 
 def mesh_point(state, setup, point) -> tuple[np.ndarray, np.ndarray]:
@@ -149,7 +150,7 @@ def test_sending_back_the_inertia_that_was_received_changes_nothing(scene):
     flight.simulation.advance(WHEN + 1)
     assert not flight.simulation.refused
     new = flight.simulation.setup.body
-    assert flight.simulation._segment.start.row.tobytes() == before.row.tobytes()
+    assert flight.simulation.flight.start.tobytes() == before.row.tobytes()
     assert new.mass == old.mass
     assert new.center_of_mass.tobytes() == old.center_of_mass.tobytes()
     assert new.inertia.tobytes() == old.inertia.tobytes()
@@ -277,7 +278,7 @@ def fly_random_changes(count: int, seed: int) -> tuple[int, int]:
         assert not simulation.failure, changes
         assert np.isfinite(after.row).all(), changes
         assert math.isfinite(simulation.kinetic_energy + simulation.potential_energy)
-        start = simulation._segment.start
+        start = State(before.time_ns, simulation.flight.start.copy())
         if new.geometry == old.geometry:
             for point in ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0)):
                 for then, now in zip(mesh_point(before, old, point), mesh_point(start, new, point), strict=True):
