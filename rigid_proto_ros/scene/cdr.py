@@ -53,7 +53,7 @@ def odometry(
     twist: Sequence[float],
     covariances: tuple[Sequence[float], Sequence[float]] = (NO_COVARIANCE, NO_COVARIANCE),
 ) -> bytes:
-    """A nav_msgs/Odometry: pose (7,) in the first frame, twist (6,) in the second, and the covariances (36,) of both."""
+    """A nav_msgs/Odometry: pose (7,) in the first frame, twist (6,) in the second; covariances (36,) of both."""
     doubles = (*pose, *covariances[0], *twist, *covariances[1])
     return stamped_doubles(stamp_ns, frames[0], doubles, frames[1])
 
