@@ -91,7 +91,7 @@ def _check_library(name: str) -> None:
 
 def _parts(args: argparse.Namespace) -> list[str]:
     parts = getattr(args, "with")
-    return parts.split(",") if parts is not None else []
+    return [part.strip() for part in parts.split(",")] if parts is not None else []
 
 
 def write_exports(

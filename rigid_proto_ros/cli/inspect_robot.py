@@ -180,8 +180,10 @@ def lump(args: argparse.Namespace) -> int:
     from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
     from ..robots.composite_inertia import lump_robot
 
-    for flag in ("verify", "record", "ballast", "mass", "density", "repair", "fallback", "accept-open"):
-        if getattr(args, flag.replace("-", "_")):
+    unused = {"scale": ["1"], "model": "solid"}  # with their defaults; the others' are false
+    for flag in ("verify", "record", "ballast", "mass", "density", "repair", "fallback", "accept-open", *unused):
+        value = getattr(args, flag.replace("-", "_"))
+        if value and value != unused.get(flag):
             raise InputError(f"--{flag}", "can't be used with --lump, which takes the robot's own inertials")
     whole = lump_robot(Path(args.lump), dict(args.joint or []), tuple(args.package_path), tuple(args.xacro))
     written = _write_scene(whole, args.as_scene) if args.as_scene else ()

@@ -54,6 +54,9 @@ def run(args: argparse.Namespace) -> int:
     for option in ("record", "as_scene"):
         if getattr(args, option) and args.row is None:
             raise InputError(f"--{option.replace('_', '-')}", "needs --row")
+    for option in ("output", "resume", "plot", "dask"):
+        if getattr(args, option) and args.row is not None:
+            raise InputError(f"--{option}", "can't be combined with --row, which writes no table")
     study = read_study(args.study, args.yes)
     if args.row is not None:
         return _one_row(study, args)

@@ -176,6 +176,8 @@ def test_millimetres_are_suspected(capsys, meshes):
         (("book", "--max-triangles", "0"), ">= 1"),
         pytest.param(("book", "--record", "picture.png"), ".rrd", marks=needs_rerun),
         pytest.param(("book", "--record", "/dev/null/x.rrd"), "folder", marks=needs_rerun),
+        (("--lump", "robot.urdf", "--scale", "2"), "the robot's own inertials"),
+        (("--lump", "robot.urdf", "--model", "shell"), "the robot's own inertials"),
         ((), "--compare"),
     ],
 )

@@ -226,6 +226,7 @@ def test_a_script_with_a_mistake_is_refused(name, tmp_path, capfd):
         (["replay", "nowhere.rrd"], "nowhere.rrd"),
         (["demo", "--duration", "1"], "--duration"),
         (["sweep", "box_tensor", "-o", "table.csv"], ".parquet"),
+        (["sweep", "box_tensor", "--row", "3", "-o", "table.parquet"], "--row"),
     ],
 )
 def test_a_slip_on_the_command_line_is_refused(arguments, part, capfd):
