@@ -146,7 +146,7 @@ def threemf(root: str, **others: str) -> bytes:
     """A .3mf archive with the model to be built, and others by their names."""
     relation = '<Relationship Target="/3D/root.model" Id="r" Type="http://x/3dmodel"/>'
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w") as archive:
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("_rels/.rels", f"<Relationships>{relation}</Relationships>")
         archive.writestr("3D/root.model", root)
         for name, text in others.items():

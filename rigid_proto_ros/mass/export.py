@@ -10,6 +10,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from ..base.rotation import quaternion_from_matrix
 from .properties import MassProperties
 from .tensor import principal_axes, six_from_tensor
 
@@ -75,23 +76,5 @@ def mjcf_inertial(properties: MassProperties) -> str:
 
 def quaternion_wxyz(rotation: np.ndarray) -> tuple[float, float, float, float]:
     """Unit quaternion (w, x, y, z), MuJoCo's order, of a rotation matrix (3, 3)."""
-    r = rotation
-    squares = np.array(
-        [
-            1.0 + r[0, 0] + r[1, 1] + r[2, 2],
-            1.0 + r[0, 0] - r[1, 1] - r[2, 2],
-            1.0 - r[0, 0] + r[1, 1] - r[2, 2],
-            1.0 - r[0, 0] - r[1, 1] + r[2, 2],
-        ]
-    )
-    products = np.array(
-        [
-            [squares[0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], squares[1], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], squares[2], r[1, 2] + r[2, 1]],
-            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[3]],
-        ]
-    )
-    row = products[int(np.argmax(squares))]
-    w, x, y, z = (row / np.linalg.norm(row)).tolist()
+    x, y, z, w = quaternion_from_matrix(rotation).tolist()
     return w, x, y, z

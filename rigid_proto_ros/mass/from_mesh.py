@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from ..mesh import cache as mesh_cache
 from ..mesh.hull import box_surface, convex_hull
 from ..mesh.reading import Mesh, load_mesh
 from ..mesh.union import can_unite
-from .moments import Moments, referenced_vertices
+from .moments import referenced_vertices
 from .properties import MeshMoments
 from .repair import CRACK, close_surface, repair_surface, unite_components, weld_cracks
 from .verdict import INFO, NESTED, OVERLAPPING, UNREFERENCED, WARNING, Finding, Verdict, check_surface
@@ -64,11 +63,10 @@ def mesh_body(
         mesh = load_mesh(mesh)
     checked = _checked(mesh)
     # What is found of a repair or a stand-in is of this call, and no part of what is kept of the surface.
-    verdict, known = replace(checked.verdict, findings=list(checked.verdict.findings)), checked.moments
+    verdict = replace(checked.verdict, findings=list(checked.verdict.findings))
     vertices, triangles, polygon_starts = mesh.vertices, checked.triangles, checked.polygon_starts
     if verdict.usable and not np.isfinite(vertices).all():  # vertices that no face uses
         vertices = np.where(np.isfinite(vertices).all(axis=1)[:, None], vertices, vertices[triangles[0, 0]])
-    remember: Callable[[dict[str, Moments]], None] | None = functools.partial(_keep, mesh, checked)
     if repair and verdict.usable and _wants_repair(verdict):
         done: tuple[str, ...] = ()
         if repair != UNION or not verdict.closed:
@@ -77,7 +75,6 @@ def mesh_body(
         if repair == UNION:
             vertices, triangles, polygon_starts, joined = unite_components(vertices, triangles, polygon_starts)
             done = (*done, joined) if joined else done
-        known, remember = {}, None
         if done:
             verdict, _ = check_surface(vertices, triangles)
             verdict.findings.insert(0, Finding("repaired", WARNING, "repaired: " + "; ".join(done)))
@@ -88,7 +85,6 @@ def mesh_body(
         verdict, _ = check_surface(vertices, triangles)
         message = f"closed with flat caps, on which at most {effect:.2g} of volume and tensor depend: {reason}"
         verdict.findings.insert(0, Finding("open_accepted", WARNING, message))
-        known, remember = {}, None
     stand_in = None
     if verdict.united:
         stand_in = "united", functools.cache(lambda: unite_components(vertices, triangles, None)[:2])
@@ -106,8 +102,6 @@ def mesh_body(
         no_solid=no_solid,
         name=mesh.name,
         stand_in=stand_in,
-        known=known,
-        remember=remember,
     )
     return MeshBody(mesh, verdict, moments)
 
@@ -139,30 +133,30 @@ def _key(mesh: Mesh) -> str:
 
 @dataclass(frozen=True)
 class _Checked:
-    """The verdict on a mesh, the triangles that it holds for (cracks of rounding's size welded), and known moments."""
+    """The verdict on a mesh, and the triangles that it holds for; ``welded``: without cracks of rounding's size."""
 
     verdict: Verdict
     triangles: np.ndarray
     polygon_starts: np.ndarray | None
     welded: bool
-    moments: dict[str, Moments]
 
 
 def _checked(mesh: Mesh) -> _Checked:
-    """The verdict on the mesh and what is known of its moments, from the cache or anew."""
+    """The verdict on the mesh, from the cache or anew."""
     kept = mesh_cache.load_json(_key(mesh))
     if kept is not None:
         try:
             findings = [Finding(**finding) for finding in kept["verdict"].pop("findings")]
-            moments = {name: Moments.from_dict(value) for name, value in kept["moments"].items()}
             triangles, starts = mesh.triangles, mesh.polygon_starts
             if kept["welded"]:
                 triangles, starts, _ = weld_cracks(mesh.vertices, triangles, starts)
-            return _Checked(Verdict(findings=findings, **kept["verdict"]), triangles, starts, kept["welded"], moments)
+            return _Checked(Verdict(findings=findings, **kept["verdict"]), triangles, starts, kept["welded"])
         except (KeyError, TypeError, ValueError, AttributeError):
             pass
     checked = _checked_anew(mesh)
-    _keep(mesh, checked, {})
+    if not mesh_cache.is_passing(mesh.path):
+        entry = {"verdict": dataclasses.asdict(checked.verdict), "welded": checked.welded}
+        mesh_cache.store_json(_key(mesh), entry)
     return checked
 
 
@@ -176,13 +170,5 @@ def _checked_anew(mesh: Mesh) -> _Checked:
             verdict, _ = check_surface(mesh.vertices, triangles)
             verdict.findings[:] = spare + [finding for finding in verdict.findings if finding.code != UNREFERENCED]
             verdict.findings.insert(0, Finding("welded", INFO, f"{done}, less than {CRACK:g} of the diagonal"))
-            return _Checked(verdict, triangles, starts, True, {})
-    return _Checked(verdict, mesh.triangles, mesh.polygon_starts, False, {})
-
-
-def _keep(mesh: Mesh, checked: _Checked, moments: dict[str, Moments]) -> None:
-    if mesh_cache.is_passing(mesh.path):
-        return
-    known = {name: value.as_dict() for name, value in moments.items()}
-    entry = {"verdict": dataclasses.asdict(checked.verdict), "moments": known, "welded": checked.welded}
-    mesh_cache.store_json(_key(mesh), entry)
+            return _Checked(verdict, triangles, starts, True)
+    return _Checked(verdict, mesh.triangles, mesh.polygon_starts, False)

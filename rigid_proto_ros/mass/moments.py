@@ -67,19 +67,6 @@ class Moments:
         """Centroid (3,) in mesh coordinates, rounded once."""
         return self.reference + self.center
 
-    def as_dict(self) -> dict:
-        """The moments as a JSON object that ``from_dict`` reads back to the last bit."""
-        arrays = {k: getattr(self, k).tolist() for k in ("reference", "center", "center_low", "second")}
-        return {"measure": self.measure, "path": self.path, **arrays}
-
-    @classmethod
-    def from_dict(cls, value: dict) -> Moments:
-        """The moments of such a JSON object; raises KeyError, TypeError or ValueError when it is none."""
-        arrays = {k: np.array(value[k], dtype=np.float64) for k in ("reference", "center", "center_low", "second")}
-        if arrays["second"].shape != (6,) or any(arrays[k].shape != (3,) for k in arrays if k != "second"):
-            raise ValueError("moments of the wrong length")
-        return cls(measure=float(value["measure"]), path=str(value["path"]), **arrays)
-
 
 @njit(cache=True, nogil=True)
 def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
@@ -96,17 +83,16 @@ def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
 
 
 def _surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for an empty mesh."""
+    """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for an empty mesh, or a triangle
+    with a vertex that isn't there.
+    """
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
     if triangles.shape[0] == 0 or vertices.shape[0] == 0:
         raise MeshError("mesh", "there are no faces; a surface has at least one triangle")
-    return vertices, triangles
-
-
-def _check_vertex_numbers(vertices: np.ndarray, triangles: np.ndarray) -> None:
     if int(triangles.min()) < 0 or int(triangles.max()) >= vertices.shape[0]:
         raise MeshError("mesh", f"a face uses a vertex outside 0 to {vertices.shape[0] - 1}")
+    return vertices, triangles
 
 
 def _exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
@@ -182,12 +168,11 @@ def _across(lanes: Packed) -> float:
 @njit(cache=True, nogil=True)
 def _blocked_sums(
     vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float
-) -> tuple[np.ndarray, float, bool]:
+) -> tuple[np.ndarray, float]:
     """The solid's ten sums (10, 2) in plain doubles, block by block; blocks are combined without error.
 
-    Also Σ(|b − a|² + |c − a|²), which measures how much d can round, and whether every vertex named is there.
+    Also Σ(|b − a|² + |c − a|²), which measures how much d can round.
     """
-    known = np.uint64(vertices.shape[0])
     rx, ry, rz = reference[0], reference[1], reference[2]
     sums = np.zeros((10, 2))
     edges = 0.0
@@ -200,8 +185,6 @@ def _blocked_sums(
         for t in range(count):
             for corner in range(3):
                 i = triangles[start + t, corner]
-                if np.uint64(i) >= known:  # negative numbers wrap to large ones
-                    return sums, edges, False
                 for k in range(3):
                     corners[3 * corner + k, t] = vertices[i, k]
         whole = -(-count // _LANES) * _LANES
@@ -237,7 +220,7 @@ def _blocked_sums(
             sums[k, 0], error = two_sum(sums[k, 0], _across(block[k]))
             sums[k, 1] += error
         edges += _across(size)
-    return sums, edges, True
+    return sums, edges
 
 
 @njit(cache=True, nogil=True)
@@ -304,13 +287,10 @@ def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "a
     vertices, triangles = _surface(vertices, triangles)
     reference, factor, size = _exact_reference(vertices)
     if path == "blocked" or (path == "auto" and triangles.shape[0] > SMALL_MESH):
-        sums, edges, all_there = _blocked_sums(vertices, triangles, reference, factor)
-        if not all_there:
-            _check_vertex_numbers(vertices, triangles)
+        sums, edges = _blocked_sums(vertices, triangles, reference, factor)
         rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
         if path == "blocked" or rounding <= ROUNDING_LIMIT * abs(sums[0, 0]):
             return _moments(sums, reference, factor, (6.0, 24.0, 120.0), 3, "blocked")
-    _check_vertex_numbers(vertices, triangles)
     sums = _compensated_sums((vertices - reference) * factor, triangles)
     return _moments(sums, reference, factor, (6.0, 24.0, 120.0), 3, "compensated")
 
@@ -360,7 +340,6 @@ def shell_moments(vertices: np.ndarray, triangles: np.ndarray, polygon_starts: n
     area.
     """
     vertices, triangles = _surface(vertices, triangles)
-    _check_vertex_numbers(vertices, triangles)
     reference, factor, _ = _exact_reference(vertices)
     starts = np.arange(len(triangles) + 1) if polygon_starts is None else np.asarray(polygon_starts, np.int64)
     sums = _shell_sums((vertices - reference) * factor, triangles, starts)
@@ -392,7 +371,6 @@ def _point_sums(points: np.ndarray) -> np.ndarray:
 def point_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     """Equal point masses at the referenced vertices, the measure being their number (the 2019 paper's eq. 7)."""
     vertices, triangles = _surface(vertices, triangles)
-    _check_vertex_numbers(vertices, triangles)
     points = referenced_vertices(vertices, triangles)
     reference, factor, _ = _exact_reference(points)
     return _moments(_point_sums((points - reference) * factor), reference, factor, (1.0, 1.0, 1.0), 0)
@@ -401,7 +379,6 @@ def point_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
 def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     """The bounding box of the referenced vertices as a solid cuboid (the 2019 paper's eq. 8, centred on the box)."""
     vertices, triangles = _surface(vertices, triangles)
-    _check_vertex_numbers(vertices, triangles)
     lower, upper, finite = _bounds(referenced_vertices(vertices, triangles))
     if not finite:
         raise MeshError("mesh", "a vertex coordinate is not finite")

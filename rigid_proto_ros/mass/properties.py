@@ -76,8 +76,7 @@ class MeshMoments:
     says why the surface bounds no solid and what helps, "" that it bounds one: the solid model, and a density, are then
     refused with it. ``stand_in`` is another solid's name and what makes its vertices (k, 3) and triangles (l, 3): it is
     then taken instead, for a surface that bounds none or whose parts overlap.
-    A surface wound inward throughout is turned; ``turned`` says so. ``known`` are moments computed
-    earlier, by model; ``remember`` is called with all of them whenever another one has been computed.
+    A surface wound inward throughout is turned; ``turned`` says so.
     """
 
     def __init__(
@@ -89,8 +88,6 @@ class MeshMoments:
         no_solid: str = "",
         name: str = "mesh",
         stand_in: tuple[str, Callable[[], Surface]] | None = None,
-        known: dict[str, Moments] | None = None,
-        remember: Callable[[dict[str, Moments]], None] | None = None,
     ) -> None:
         self.vertices = vertices
         self.triangles = triangles
@@ -98,8 +95,7 @@ class MeshMoments:
         self.no_solid = no_solid
         self.name = name
         self.stand_in = stand_in
-        self._remember = remember
-        self._moments: dict[str | tuple, Moments] = dict((known or {}).items())
+        self._moments: dict[str | tuple, Moments] = {}
 
     @property
     def turned(self) -> bool:
@@ -122,8 +118,6 @@ class MeshMoments:
     def _get(self, key: str | tuple, compute: Callable[[], Moments]) -> Moments:
         if key not in self._moments:
             self._moments[key] = compute()
-            if self._remember is not None and isinstance(key, str):
-                self._remember({name: known for name, known in self._moments.items() if isinstance(name, str)})
         return self._moments[key]
 
     def moments(self, model: str, scale: ArrayLike = (1.0, 1.0, 1.0)) -> Moments:

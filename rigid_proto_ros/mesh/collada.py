@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""COLLADA (.dae, .zae) through pycollada: the geometry of the scene, without looks, lights and motion."""
+"""COLLADA (.dae) through pycollada: the geometry of the scene, without looks, lights and motion."""
 
 from __future__ import annotations
 
 import io
 import xml.etree.ElementTree as ElementTree
-import zipfile
 
 from ..base.errors import MeshError, is_missing
 from .assembly import Assembly
@@ -33,21 +32,15 @@ def _geometry_alone(data: bytes, name: str) -> bytes:
     return ElementTree.tostring(root)
 
 
-def add_collada(data: bytes, packed: bool, assembly: Assembly) -> float:
+def add_collada(data: bytes, assembly: Assembly) -> float:
     """Add the geometry of the scene in a file's bytes, in its unit; returns the metres in that unit.
 
-    packed: the bytes are an archive (.zae). Raises MeshError, or pycollada's errors.
+    Raises MeshError, or pycollada's errors.
     """
     try:
         import collada
     except ImportError:
         raise MeshError(assembly.name, is_missing("pycollada", "meshes")) from None
-    if packed:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            documents = [name for name in archive.namelist() if name.lower().endswith(".dae")]
-            if len(documents) != 1:
-                raise MeshError(assembly.name, f"an archive with {len(documents)} .dae files", "one with one")
-            data = archive.read(documents[0])
     document = collada.Collada(io.BytesIO(_geometry_alone(data, assembly.name)))
     if document.scene is None:
         raise MeshError(assembly.name, "the file has no scene that says which of its geometry is to be shown")

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import MeshError
+from ..base.rotation import matrix_from_quaternion, normalize
 from .assembly import Assembly
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
@@ -116,22 +117,11 @@ def _check_extensions(document: _Document) -> None:
             raise MeshError(document.name, f"it requires the extension {extension}", f"a file with {', '.join(_READ)}")
 
 
-def _rotation(xyzw: np.ndarray) -> np.ndarray:
-    """The matrix (3, 3) of a quaternion."""
-    x, y, z, w = np.asarray(xyzw, dtype=np.float64) / np.sqrt(np.sum(np.square(xyzw, dtype=np.float64)))
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 def _placement(translation: Any, rotation: Any, scale: Any) -> np.ndarray:
     """The matrix (4, 4) that scales, then turns, then shifts."""
     matrix = np.eye(4)
-    matrix[:3, :3] = _rotation(rotation) * np.asarray(scale, dtype=np.float64)
+    quaternion = normalize(*np.asarray(rotation, dtype=np.float64).tolist())
+    matrix[:3, :3] = matrix_from_quaternion(quaternion) * np.asarray(scale, dtype=np.float64)
     matrix[:3, 3] = translation
     return matrix
 

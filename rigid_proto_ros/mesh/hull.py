@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.errors import MeshError, is_missing
+from .topology import mesh_topology
 
 FLAT = 1e-12
 """Distances below this part of the points' extent count as zero: such a point adds less volume than rounding does."""
@@ -64,15 +65,9 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
             a, b, c = (shape[triangles[:, k]] for k in range(3))
             inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
             triangles[inward] = triangles[inward][:, [0, 2, 1]]
-            if _is_closed(triangles):
+            topology = mesh_topology(shape, triangles)
+            if not topology.unbalanced and not topology.nonmanifold:
                 return triangles
     except QhullError:
         pass
     raise MeshError("mesh_fallback", "the points lie in one plane and have no hull with a volume; use box instead")
-
-
-def _is_closed(triangles: np.ndarray) -> bool:
-    """Whether each directed edge of triangles (k, 3) has its reverse, once."""
-    edges = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-    forward, back = (np.sort(e[:, 0] * (int(triangles.max()) + 1) + e[:, 1]) for e in (edges, edges[:, ::-1]))
-    return bool(np.all(forward == back) and np.all(np.diff(forward) > 0))

@@ -11,7 +11,7 @@ import numpy as np
 from ..base.errors import MeshError
 from .assembly import Assembly
 
-_ARCHIVES = ("zip", "bz2", "tar.bz2", "tar.gz")
+_ARCHIVES = ("zip", "bz2", "tar.bz2", "tar.gz", "zae")
 
 
 def other_formats() -> tuple[str, ...]:

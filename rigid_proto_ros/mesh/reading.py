@@ -3,21 +3,17 @@
 
 from __future__ import annotations
 
-import bz2
-import gzip
 import hashlib
 import io
 import lzma
 import re
 import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
 import numpy as np
 
-from ..base.compilation import njit
 from ..base.errors import InputError, MeshError
 from ..base.files import read_bounded
 from . import cache as mesh_cache
@@ -35,11 +31,11 @@ from .threemf import add_threemf
 OWN_FORMATS = ("obj", "off", "ply", "stl")
 """Formats of one surface. trimesh 5.2 misreads some files of each in silence (tab-separated .obj, negative indices,
 strips and lists of several lengths in .ply, cut .off and .stl: benchmarks/mesh_readers.py) and keeps no polygons."""
-FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae", "zae")
+FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae")
 """Formats read as they are specified; those beyond OWN_FORMATS are scenes of placed parts. What else trimesh reads is
 taken from it."""
-PACKED = ("gz", "bz2")
-"""Endings of compressed files; before them stands the format's own, as in part.stl.gz."""
+PACKED = ("gz", "bz2", "xz", "zip", "zae")
+"""Endings of archives; of those that hold a mesh by definition, .3mf alone is read."""
 MAX_TRIANGLES = 20_000_000
 """Default limit: about 1.5 GB of arrays."""
 BYTES_PER_TRIANGLE = 400
@@ -84,20 +80,6 @@ class _Content:
     files: tuple[tuple[str, str], ...] = ()
 
 
-@njit(cache=True, nogil=True)
-def _fan(corners: np.ndarray, starts: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray) -> None:
-    t = 0
-    for polygon in range(starts.shape[0] - 1):
-        first = starts[polygon]
-        polygon_starts[polygon] = t
-        for k in range(first + 1, starts[polygon + 1] - 1):
-            triangles[t, 0] = corners[first]
-            triangles[t, 1] = corners[k]
-            triangles[t, 2] = corners[k + 1]
-            t += 1
-    polygon_starts[starts.shape[0] - 1] = t
-
-
 def fan_polygons(corners: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
     """Triangles (m, 3), fanned from each polygon's first corner, and the polygons' starts among them (p + 1,).
 
@@ -107,10 +89,11 @@ def fan_polygons(corners: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, n
     polygons = len(starts) - 1
     if len(corners) == 3 * polygons:
         return corners.reshape(-1, 3), None
-    triangles = np.empty((len(corners) - 2 * polygons, 3), np.int64)
-    polygon_starts = np.empty(polygons + 1, np.int64)
-    _fan(corners, starts, triangles, polygon_starts)
-    return triangles, polygon_starts
+    counts = np.diff(starts) - 2
+    polygon_starts = np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)])
+    first = np.repeat(starts[:-1], counts)
+    place = first + np.arange(len(first)) - np.repeat(polygon_starts[:-1], counts)
+    return np.stack([corners[first], corners[place + 1], corners[place + 2]], axis=1), polygon_starts
 
 
 def _sniff(data: bytes) -> str:
@@ -131,36 +114,21 @@ def _sniff(data: bytes) -> str:
     return ""
 
 
-def _formats(path: Path) -> tuple[str, str]:
-    """(format, packing or "") by the file's endings; raises MeshError for one that can't be read."""
-    endings = [ending.lower().lstrip(".") for ending in path.suffixes[-2:]]
-    packing = endings.pop() if endings and endings[-1] in PACKED else ""
-    if not endings or (endings[-1] not in FORMATS and endings[-1] not in other_formats()):
-        accepted = (
-            f"{', .'.join(FORMATS)}, nor one that trimesh reads, each also with .{' or .'.join(PACKED)} behind it"
+def _format(path: Path) -> str:
+    """The format by the file's ending; raises MeshError for one that can't be read."""
+    ending = path.suffix.lower().lstrip(".")
+    if ending in PACKED:
+        raise MeshError("mesh", f"{path.name!r} is packed; unpack it first")
+    if ending not in FORMATS and ending not in other_formats():
+        raise MeshError(
+            "mesh", f"{path.name!r} has none of the endings .{', .'.join(FORMATS)}, nor one that trimesh reads"
         )
-        raise MeshError("mesh", f"{path.name!r} has none of the endings .{accepted}")
-    return endings[-1], packing
-
-
-def _unpacked(data: bytes, packing: str, name: str, max_bytes: int) -> bytes:
-    """The content of a compressed file, of at most ``max_bytes``."""
-    opened = gzip.open if packing == "gz" else bz2.open
-    try:
-        with opened(io.BytesIO(data), "rb") as stream:
-            content = stream.read(max_bytes + 1)
-    except (OSError, EOFError, zlib.error) as error:
-        raise MeshError(name, f"the compressed content can't be read ({error})") from None
-    if len(content) > max_bytes:
-        raise MeshError(name, f"the content has more than {max_bytes} bytes; --max-triangles raises the limit")
-    return content
+    return ending
 
 
 def _read(data: bytes, path: Path, max_triangles: int) -> _Content:
     """The content of a file's bytes, by its endings."""
-    suffix, packing = _formats(path)
-    if packing:
-        data = _unpacked(data, packing, path.name, BYTES_PER_TRIANGLE * max_triangles)
+    suffix = _format(path)
     if not data.strip():
         raise MeshError(path.name, "the file is empty")
     found = _sniff(data)
@@ -210,15 +178,15 @@ def _read_scene(data: bytes, suffix: str, path: Path, max_triangles: int) -> _Co
         return content
 
     assembly, unit = Assembly(path.name, max_triangles), 1.0
-    if suffix in ("3mf", "zae"):
+    if suffix == "3mf":
         _check_archive(data, path.name, max_bytes)
     try:
         if suffix in ("glb", "gltf"):
             add_gltf(data, beside, assembly)
         elif suffix == "3mf":
             unit = add_threemf(data, assembly)
-        elif suffix in ("dae", "zae"):
-            unit = add_collada(data, suffix == "zae", assembly)
+        elif suffix == "dae":
+            unit = add_collada(data, assembly)
         else:
             unit = add_by_trimesh(data, suffix, assembly)
     except InputError:
@@ -239,33 +207,20 @@ def _with_files(sha256: str, files: tuple[tuple[str, str], ...]) -> str:
     return hashlib.sha256(repr((sha256, files)).encode()).hexdigest()
 
 
-def _files_now(path: Path, names: list[str]) -> tuple[tuple[str, str], ...]:
-    """Names and hashes of the files beside ``path`` as they are now; one that can't be read has the hash ""."""
-    found = []
-    for name in names:
-        try:
-            found.append((name, hashlib.sha256((path.parent / name).read_bytes()).hexdigest()))
-        except OSError:
-            found.append((name, ""))
-    return tuple(found)
-
-
-def _from_cache(key: str, path: Path) -> _Content | None:
-    """What is kept under a file's hash, if the other files that it took are as they were."""
-    index = mesh_cache.load_json(key) or {}
-    files = _files_now(path, [str(name) for name in index.get("files", [])])
-    kept = mesh_cache.load_arrays(_with_files(key, files))
+def _from_cache(key: str) -> _Content | None:
+    """What is kept under a file's hash."""
+    kept = mesh_cache.load_arrays(key)
     if kept is None or not {"vertices", "triangles", "unit"} <= kept.keys():
         return None
-    return _Content(kept["vertices"], kept["triangles"], kept.get("polygon_starts"), float(kept["unit"]), files)
+    return _Content(kept["vertices"], kept["triangles"], kept.get("polygon_starts"), float(kept["unit"]))
 
 
 def _to_cache(key: str, content: _Content) -> None:
-    polygons = {} if content.polygon_starts is None else {"polygon_starts": content.polygon_starts}
-    if content.files:
-        mesh_cache.store_json(key, {"files": [name for name, _ in content.files]})
-    arrays = {"vertices": content.vertices, "triangles": content.triangles, "unit": np.array(content.unit), **polygons}
-    mesh_cache.store_arrays(_with_files(key, content.files), **arrays)
+    """Keep what was read of a file by itself; the others that one took may change."""
+    if not content.files:
+        polygons = {} if content.polygon_starts is None else {"polygon_starts": content.polygon_starts}
+        arrays = {"vertices": content.vertices, "triangles": content.triangles, "unit": np.array(content.unit)}
+        mesh_cache.store_arrays(key, **arrays, **polygons)
 
 
 def load_mesh(name: str, *, max_triangles: int = MAX_TRIANGLES, search: Search = NOWHERE_ELSE) -> Mesh:
@@ -278,9 +233,9 @@ def load_mesh(name: str, *, max_triangles: int = MAX_TRIANGLES, search: Search =
     kind = f"a mesh of {max_triangles} triangles (--max-triangles raises the limit)"
     data = read_bounded(path, BYTES_PER_TRIANGLE * max_triangles, "mesh", kind)
     sha256 = hashlib.sha256(data).hexdigest()
-    key = f"{sha256}-{''.join(path.suffixes[-2:]).lower().lstrip('.')}"
+    key = f"{sha256}-{path.suffix.lower().lstrip('.')}"
     cached = len(data) >= CACHED_SIZE and not mesh_cache.is_passing(path)
-    content = _from_cache(key, path) if cached else None
+    content = _from_cache(key) if cached else None
     if content is None or len(content.triangles) > max_triangles:
         content = _read(data, path, max_triangles)
         if cached:

@@ -7,7 +7,7 @@ from mass_solids import box, circle, moved, prism, sphere
 
 from rigid_proto_ros.base.errors import InputError, MeshError, TensorError
 from rigid_proto_ros.mass import INERTIA_MODELS
-from rigid_proto_ros.mass.moments import Moments, point_moments, shell_moments, solid_moments
+from rigid_proto_ros.mass.moments import point_moments, shell_moments
 from rigid_proto_ros.mass.properties import MeshMoments, explicit_mass_properties
 
 COMPUTED = ("solid", "shell", "points", "bounding_box")
@@ -156,16 +156,6 @@ def test_a_rescale_never_passes_over_the_mesh_again(monkeypatch, lopsided):
     for model in COMPUTED:
         for scale in (2.0, -0.5, (3.0, 3.0, -3.0)):
             assert moments.mass_properties(model, scale=scale, ballast=((1.0, 0.0, 0.0, 0.0),)).mass > 1.0
-
-
-def test_moments_survive_json_to_the_last_bit(lopsided):
-    import json
-
-    moments = solid_moments(*lopsided)
-    again = Moments.from_dict(json.loads(json.dumps(moments.as_dict())))
-    assert again.measure == moments.measure
-    for name in ("reference", "center", "center_low", "second"):
-        assert getattr(again, name).tobytes() == getattr(moments, name).tobytes()
 
 
 def test_refusals_name_the_field_and_what_is_accepted():

@@ -266,9 +266,3 @@ def test_dae_strips_are_triangles(tmp_path):
 def test_dae_of_which_something_is_not_read_says_what(tmp_path, nodes, geometry, words):
     with pytest.raises(MeshError, match=words):
         load_dae(tmp_path, nodes, geometry)
-
-
-def test_a_zae_needs_one_document(tmp_path):
-    pytest.importorskip("collada")
-    with pytest.raises(MeshError, match="0 .dae files"):
-        load(tmp_path, "a.zae", threemf(""))
