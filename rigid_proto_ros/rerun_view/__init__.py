@@ -7,9 +7,5 @@ run that nobody watches doesn't pay for it.
 
 import os
 
-from .observer import RerunObserver
-
 # The library warns on the terminal of every file without an index; it reads this when it is imported.
 os.environ.setdefault("RUST_LOG", "warn,re_log_encoding::rrd::file_sink=error")
-
-__all__ = ["RerunObserver"]

@@ -49,7 +49,7 @@ def make_recorder(
             return McapObserver(path, node_name, parameters, on_error, simulated_log)
         except ImportError:
             raise InputError("record", is_missing("mcap", "mcap")) from None
-    from . import RerunObserver
+    from .observer import RerunObserver
 
     return RerunObserver(record=path, name=node_name, on_error=on_error, open_ended=not simulated_log)
 

@@ -123,7 +123,7 @@ def _make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
     parameters = scenario.parameters
     if parameters.viewer in ("none", "workbench"):
         return None
-    from ..rerun_view import RerunObserver
+    from ..rerun_view.observer import RerunObserver
 
     def tell(line: str) -> None:
         print(f"{node_name}: {line}", file=sys.stderr)

@@ -14,7 +14,7 @@ import pytest
 import rerun_flight as flight
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session
 from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, HEADER_BYTES, repair_rrd, whole_bytes
 from rigid_proto_ros.rerun_view.viewers import viewer_program
@@ -103,7 +103,7 @@ RECORDER = """
 import os, sys, time
 import rerun_flight as flight
 from rigid_proto_ros.simulation.observer import BodyChanged, Published, Started
-from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view.observer import RerunObserver
 observer = RerunObserver(record=sys.argv[1])
 states = flight.rows(100_000)
 observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))

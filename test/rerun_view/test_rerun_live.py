@@ -16,8 +16,9 @@ import pytest
 import rerun_flight as flight
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.rerun_view import RerunObserver, ports, viewers
 from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view import ports, viewers
+from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session
 from rigid_proto_ros.rerun_view.snapshot import DRIVERS, headless_viewer, show
 from rigid_proto_ros.simulation.observer import (
@@ -158,7 +159,7 @@ def _page(address: str) -> bytes:
 
 WATCHED_RUN = """
 import time
-from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view.observer import RerunObserver
 observer = RerunObserver(viewer="web")
 print(observer._processes[0].process.pid, flush=True)
 time.sleep(600)

@@ -8,8 +8,8 @@ import pytest
 import rerun_flight as flight
 
 from rigid_proto_ros.picture import style
-from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session, record_batches
 from rigid_proto_ros.rerun_view.writer import readable
 from rigid_proto_ros.simulation.observer import (

@@ -17,8 +17,8 @@ import rerun_flight as flight
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.picture import style
-from rigid_proto_ros.rerun_view import RerunObserver
 from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session, record_batches
 from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, whole_bytes
 from rigid_proto_ros.simulation.observer import BodyChanged, BodySnapshot, MeshChanged, Published, Reset, Started
@@ -267,7 +267,7 @@ def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_ru
 FULL_IN_FLIGHT = """
 import resource, signal, sys
 import rerun_flight as flight
-from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
@@ -345,7 +345,7 @@ def test_a_lost_file_stops_the_recording_and_is_reported(tmp_path, states):
 
 def test_rerun_is_not_imported_when_nobody_watches():
     code = (
-        "import sys; from rigid_proto_ros.rerun_view import RerunObserver; from rigid_proto_ros.simulation.observer import Reset; "
+        "import sys; from rigid_proto_ros.rerun_view.observer import RerunObserver; from rigid_proto_ros.simulation.observer import Reset; "
         "o = RerunObserver(); o.on(Reset()); o.close(); "
         "sys.exit('rerun' in sys.modules)"
     )

@@ -17,8 +17,9 @@ import rerun_flight as flight
 from rerun.chunk import RrdReader
 
 from rigid_proto_ros.picture import style
-from rigid_proto_ros.rerun_view import RerunObserver, viewers
 from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view import viewers
+from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session
 from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started, StatusChanged
 
@@ -28,7 +29,7 @@ RUN_WITH_A_STOPPED_VIEWER = """
 import sys, time
 import rerun_flight as flight
 from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started, StatusChanged
-from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view.observer import RerunObserver
 path, states = sys.argv[1], flight.rows(200)
 observer = RerunObserver(record=path, viewer="serve")
 observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))

@@ -15,7 +15,7 @@ from PIL import Image
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli import snapshot as command
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view import RerunObserver
+from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.snapshot import DRIVERS, is_one_colour
 
 pytestmark = pytest.mark.drawn
