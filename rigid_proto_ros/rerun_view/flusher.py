@@ -159,7 +159,6 @@ class Flusher:
                 break
             more = block.handed_over
             self._writer.write(block, self._on_note, skip_live=waiting > 1)
-            self.mailbox.give_back(block)
         self._flush_ghost()
         for stream in list(self._writer.streams):
             try:
@@ -189,7 +188,6 @@ class Flusher:
                 block.notes.pop(0)
                 return
             self._ghost_block = None
-            self.ghosts.give_back(block)
 
     def _on_note(self, note: Note) -> None:
         asked = note.event

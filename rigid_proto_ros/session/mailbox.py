@@ -63,7 +63,6 @@ class Mailbox:
         self._changed = threading.Condition(self._lock)
         self._filling = Block()
         self._waiting: deque[Block] = deque()
-        self._spare: list[Block] = []
         self._closed = False
         self._woken = False
         self._hurried = False
@@ -103,7 +102,7 @@ class Mailbox:
         if not self._closed and not self._given_up:
             self._filling.handed_over = True
             self._waiting.append(self._filling)
-        self._filling = self._spare.pop() if self._spare and not self._closed else Block()
+        self._filling = Block()
         self._changed.notify_all()
 
     def take(self) -> tuple[Block | None, int]:
@@ -115,19 +114,10 @@ class Mailbox:
                 self._changed.notify_all()
             elif not self._given_up and (self._filling.count or self._filling.notes):
                 block = self._filling
-                self._filling = self._spare.pop() if self._spare else Block()
+                self._filling = Block()
             else:
                 block = None
             return block, len(self._waiting)
-
-    def give_back(self, block: Block) -> None:
-        """Return a block whose rows were sent."""
-        block.count = 0
-        block.handed_over = False
-        block.notes.clear()
-        with self._changed:
-            if len(self._spare) < 2:
-                self._spare.append(block)
 
     def wait(self, seconds: float) -> None:
         """Return after ``seconds``, or at once when a block is full, on ``wake`` and when the mailbox is closed."""

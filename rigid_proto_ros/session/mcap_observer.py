@@ -177,7 +177,6 @@ class McapObserver(Observer):
                     sent = note.after_rows
                     self._write_note(writer, note)
                 self._write_rows(writer, block, sent, block.count)
-            self._mailbox.give_back(block)
         if self._writer is not None:
             self._end_chunk(self._writer)
 
