@@ -25,23 +25,8 @@ HEUN = '''
 """heun: two evaluations a step, order 2."""
 import numpy as np
 
-from ...base.compilation import njit
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, Integrator
-from .runge_kutta import repeated, tableau_step
-from .stepping import fixed_steps
-
-TABLEAU = np.array([[0.0, 0.0], [1.0, 0.0]])
-WEIGHTS = np.array([0.5, 0.5])
-
-
-@njit(cache=True, error_model="numpy")
-def step(y, p, h, pulls, k, out):
-    tableau_step(y, p, h, pulls, k, out, TABLEAU, WEIGHTS)
-
-
-@njit(cache=True, error_model="numpy")
-def heun_steps(y, p, h, n):
-    return repeated(step, y, p, h, n, 2)
+from .runge_kutta import explicit
 
 
 HEUN = Integrator(
@@ -52,8 +37,7 @@ HEUN = Integrator(
     limits="Explicit.",
     stability_limit=1.0,
     supports=LOADS | {ANGULAR_DAMPING, NO_GYROSCOPIC_TERM},
-    kernel=heun_steps,
-    make_methods=fixed_steps,
+    kernel=explicit(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.5]])),
 )
 '''
 
@@ -104,15 +88,9 @@ def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
     shutil.copytree(ROOT, tmp_path / ROOT.name, ignore=shutil.ignore_patterns("__pycache__"))
     folder = tmp_path / ROOT.name / "motion" / "integrators"
     (folder / "heun.py").write_text(HEUN, "utf-8")
-    # Its line, and its place among the others.
-    listing = (folder / "__init__.py").read_text("utf-8")
-    listing = listing.replace(
-        "from .integrator import Integrator\n", "from .heun import HEUN\nfrom .integrator import Integrator\n"
-    )
-    listing = listing.replace("        FREE_BODY_STRANG,\n", "        FREE_BODY_STRANG,\n        HEUN,\n")
-    (folder / "__init__.py").write_text(listing, "utf-8")
     names = (folder.parent / "__init__.py").read_text("utf-8")
-    (folder.parent / "__init__.py").write_text(names.replace('    "rk4",\n', '    "rk4",\n    "heun",\n'), "utf-8")
+    names = names.replace('    "rk4": "runge_kutta",\n', '    "rk4": "runge_kutta",\n    "heun": "heun",\n')
+    (folder.parent / "__init__.py").write_text(names, "utf-8")
     done = subprocess.run(
         [sys.executable, "-c", FLY], cwd=tmp_path, env=_only(tmp_path), capture_output=True, text=True, check=False
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 from numba.core import cgutils
 
-from .compilation import INTERPRETED, intrinsic, njit
+from .compilation import INTERPRETED, Emitted, intrinsic, njit
 
 _Arrays = TypeVar("_Arrays")
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING or INTERPRETED:
 else:
 
     @intrinsic
-    def borrowed(_typing_context: Any, arrays: Any) -> tuple:
+    def borrowed(_typing_context: Any, arrays: Any) -> Emitted:
         """As above."""
 
         def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -42,6 +42,8 @@ arraymath._HAVE_BLAS = importlib.util.find_spec("scipy") is not None  # noqa: SL
 __all__ = ["INTERPRETED", "intrinsic", "njit", "notify_when_compiling", "source_stamp"]
 
 _CONFIG: Any = config  # its settings are made when it is imported
+Emitted = tuple[Any, Any]
+"""Of an intrinsic: the signature, and the function that makes the code."""
 INTERPRETED = bool(_CONFIG.DISABLE_JIT)
 """NUMBA_DISABLE_JIT=1: kernels are plain functions, for readable tracebacks."""
 
@@ -128,7 +130,7 @@ class KernelLocator:
         self._py_file, self._lineno = file, line
 
     @classmethod
-    def from_function(cls, function: Callable, file: str) -> Any:
+    def from_function(cls, function: Callable[..., Any], file: str) -> Any:
         """A locator as numba wants it; None for what isn't of this package."""
         path = os.path.realpath(file)
         if not path.startswith(PACKAGE + os.sep):
@@ -176,7 +178,8 @@ def njit(*signature: Any, allocates: bool = True, **options: Any) -> Callable[[_
         try:
             # numba's own name (tried with 0.68); where it isn't given the caller's would count.
             options["_nrt"] = allocates
-            return numba.njit(*signature, **options)(function)
+            compiled: _Function = numba.njit(*signature, **options)(function)
+            return compiled
         finally:
             _CONFIG.CACHE_LOCATOR_CLASSES = before
 
@@ -185,7 +188,7 @@ def njit(*signature: Any, allocates: bool = True, **options: Any) -> Callable[[_
 
 if TYPE_CHECKING:
 
-    def intrinsic(*function: Callable, **options: Any) -> Any:
+    def intrinsic(*function: Callable[..., Any], **options: Any) -> Any:
         """numba's; what it makes takes the arguments without the first, and those are values and not types."""
 
 else:

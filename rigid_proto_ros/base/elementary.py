@@ -15,7 +15,7 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from .compilation import INTERPRETED, intrinsic, njit
+from .compilation import INTERPRETED, Emitted, intrinsic, njit
 from .exact_arithmetic import fast_two_sum, pair_add, pair_divide, pair_multiply, two_product, two_sum
 
 BIAS, MANTISSA_BITS = 1023, 52
@@ -23,7 +23,7 @@ MANTISSA = (1 << MANTISSA_BITS) - 1
 
 
 @intrinsic
-def bits_of(_typing_context: Any, _x: Any) -> tuple:
+def bits_of(_typing_context: Any, _x: Any) -> Emitted:
     """The 64 bits of a double as an integer."""
     return types.int64(types.float64), lambda _, builder, _signature, arguments: builder.bitcast(
         arguments[0], ir.IntType(64)
@@ -31,7 +31,7 @@ def bits_of(_typing_context: Any, _x: Any) -> tuple:
 
 
 @intrinsic
-def double_of(_typing_context: Any, _bits: Any) -> tuple:
+def double_of(_typing_context: Any, _bits: Any) -> Emitted:
     """The double with these 64 bits."""
     return types.float64(types.int64), lambda _, builder, _signature, arguments: builder.bitcast(
         arguments[0], ir.DoubleType()
@@ -226,9 +226,12 @@ def _exponential_parts(x: float) -> tuple[int, float, float, float]:
 def _scaled(x: float, n: int) -> float:
     """x 2ⁿ, |n| ≤ 1500, rounded once."""
     if -1000 < n < 1000:
-        return x * double_of((n + BIAS) << MANTISSA_BITS)
+        power: float = double_of((n + BIAS) << MANTISSA_BITS)
+        return x * power
     half = n // 2
-    return x * double_of((half + BIAS) << MANTISSA_BITS) * double_of((n - half + BIAS) << MANTISSA_BITS)
+    first: float = double_of((half + BIAS) << MANTISSA_BITS)
+    second: float = double_of((n - half + BIAS) << MANTISSA_BITS)
+    return x * first * second
 
 
 @njit(cache=True, error_model="numpy")
@@ -377,7 +380,8 @@ def _angle(less: float, more: float, octant: int) -> float:
     if octant == 1 or octant == 3:
         z, tail = -z, -tail
     high, low = fast_two_sum(_ANGLES[octant, k], z)
-    return high + (low + (_ANGLES_LOW[octant, k] + tail))
+    correction: float = _ANGLES_LOW[octant, k] + tail
+    return high + (low + correction)
 
 
 @njit(cache=True, error_model="numpy")

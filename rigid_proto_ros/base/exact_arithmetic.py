@@ -67,7 +67,8 @@ def exact_quotient(product: float, factor: float) -> float:
     x = product / factor
     if x * factor == product:
         return x
-    up, down = np.nextafter(x, np.inf), np.nextafter(x, -np.inf)
+    up: float = np.nextafter(x, np.inf)
+    down: float = np.nextafter(x, -np.inf)
     if up * factor == product:
         return up
     if down * factor == product:

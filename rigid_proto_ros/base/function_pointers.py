@@ -15,18 +15,19 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import carray, from_dtype, int64, types
+from numba import from_dtype, int64, types
 from numba.core import cgutils
 from numba.core.types.function_type import CompileResultWAP
 from numba.core.typing.templates import Signature
+from numba.np.numpy_support import carray
 
-from .compilation import INTERPRETED, intrinsic, njit
+from .compilation import INTERPRETED, Emitted, intrinsic, njit
 
 _kept: dict[int, Any] = {}
 """What stands at the addresses given away: code must not be collected while an array points at it."""
 
 
-def address_of(kernel: Callable, taken_as: types.FunctionType) -> int:
+def address_of(kernel: Callable[..., Any], taken_as: types.FunctionType) -> int:
     """The address of a compiled function for this signature, compiled or loaded from the cache if it isn't yet."""
     if INTERPRETED:
         found, address = kernel, id(kernel)
@@ -38,7 +39,7 @@ def address_of(kernel: Callable, taken_as: types.FunctionType) -> int:
     return address
 
 
-def entry_of(kernel: Callable, signature: Signature) -> Callable:
+def entry_of(kernel: Callable[..., Any], signature: Signature) -> Callable[..., Any]:
     """The compiled function itself for this signature: called without looking at its arguments' types.
 
     A call through numba's dispatcher looks them up each time, which costs more than a short kernel takes.
@@ -46,14 +47,15 @@ def entry_of(kernel: Callable, signature: Signature) -> Callable:
     if INTERPRETED:
         return kernel
     kernel.compile(signature)  # type: ignore[attr-defined]  # numba's
-    return kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]  # numba's
+    entry: Callable[..., Any] = kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]
+    return entry
 
 
-def function_at(taken_as: types.FunctionType) -> Callable:
+def function_at(taken_as: types.FunctionType) -> Callable[..., Any]:
     """The compiled function that turns an address into a function of this signature."""
 
     @intrinsic
-    def at(_typing_context: Any, _address: Any) -> tuple:
+    def at(_typing_context: Any, _address: Any) -> Emitted:
         def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             function = cgutils.create_struct_proxy(taken_as)(context, builder)
             nothing = cgutils.get_null_value(cgutils.voidptr_t)
@@ -71,18 +73,19 @@ def address_of_array(array: np.ndarray) -> int:
     return int(array.ctypes.data) if array.dtype.names else int(array.__array_interface__["data"][0])
 
 
-def _pointer_to(kind: types.Type) -> Callable:
+def _pointer_to(kind: types.Type) -> Callable[..., Any]:
     @intrinsic
-    def pointer(_typing_context: Any, _address: Any) -> tuple:
+    def pointer(_typing_context: Any, _address: Any) -> Emitted:
         def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             return builder.inttoptr(arguments[0], context.get_value_type(types.CPointer(kind)))
 
         return types.CPointer(kind)(int64), code
 
-    return pointer
+    at: Callable[..., Any] = pointer
+    return at
 
 
-def array_at(dtype: np.dtype) -> Callable:
+def array_at(dtype: np.dtype) -> Callable[..., Any]:
     """The function (address, shape) that gives a contiguous array of these."""
     pointer = _pointer_to(from_dtype(dtype))
 

@@ -25,9 +25,15 @@ def dot(a: Numbers, b: Numbers) -> float:
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
+@njit(cache=True)
+def norm(x: float, y: float, z: float) -> float:
+    """|v| of v = (x, y, z), where squares neither over- nor underflow."""
+    return math.sqrt(x * x + y * y + z * z)
+
+
 def length(v: Numbers) -> float:
-    """|v|, where squares neither over- nor underflow."""
-    return math.sqrt(dot(v, v))
+    """|v| of v (3,), likewise."""
+    return norm(float(v[0]), float(v[1]), float(v[2]))
 
 
 def times(matrix: np.ndarray, v: Numbers) -> np.ndarray:
@@ -37,7 +43,8 @@ def times(matrix: np.ndarray, v: Numbers) -> np.ndarray:
 
 def transposed_times(matrix: np.ndarray, v: Numbers) -> np.ndarray:
     """The transposed matrix (3, 3) times v (3,), in the same order."""
-    return matrix[0] * v[0] + matrix[1] * v[1] + matrix[2] * v[2]
+    product: np.ndarray = matrix[0] * v[0] + matrix[1] * v[1] + matrix[2] * v[2]
+    return product
 
 
 @njit(cache=True)
@@ -98,7 +105,7 @@ def to_unit(qx: float, qy: float, qz: float, qw: float) -> tuple[float, float, f
 @njit(cache=True, error_model="numpy")
 def exponential(x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Unit quaternion xyzw of the turn by |v| [rad] about v = (x, y, z); exact in the limit of small turns too."""
-    angle = math.sqrt(x * x + y * y + z * z)
+    angle = norm(x, y, z)
     # sin(a/2)/a: below 1e-4 the series ½ − a²/48 errs by 1e-19.
     sine, cosine = sine_cosine(0.5 * angle)
     factor = sine / angle if angle > 1e-4 else 0.5 - angle * angle / 48.0

@@ -18,7 +18,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import models, overload, register_model
 
-from .compilation import INTERPRETED, intrinsic, njit
+from .compilation import INTERPRETED, Emitted, intrinsic, njit
 
 _DOUBLE, _NUMBER, _BITS = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
 LINE = 8
@@ -38,7 +38,7 @@ class Doubles(types.Type):
 @register_model(Doubles)
 class _DoublesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.count))
+        super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.count))  # type: ignore[no-untyped-call]
 
 
 def aligned(shape: tuple[int, int], before: int = 0) -> np.ndarray:
@@ -50,11 +50,12 @@ def aligned(shape: tuple[int, int], before: int = 0) -> np.ndarray:
     return whole[first : first + shape[0] * shape[1]].reshape(shape)
 
 
-def _operation_on_vectors(plain: Callable, **options: bool) -> Any:
+def _operation_on_vectors(plain: Callable[..., Any], **options: bool) -> Callable[[Any], Callable[..., Any]]:
     """An intrinsic; where nothing is compiled vectors are arrays, and ``plain`` does the same with them."""
     if INTERPRETED:
         return lambda _: plain
-    return intrinsic(**options) if options else intrinsic
+    of_types: Callable[[Any], Callable[..., Any]] = intrinsic(**options) if options else intrinsic
+    return of_types
 
 
 def _pointer(context: Any, builder: ir.IRBuilder, kind: Any, array: Any, at: Any, count: Any) -> Any:
@@ -74,7 +75,7 @@ def _filled(builder: ir.IRBuilder, x: Any, count: Any) -> Any:
 
 
 @_operation_on_vectors(lambda array, at, like: array.reshape(-1)[at : at + like.size].copy())
-def load(_typing_context: Any, array: Any, _at: Any, like: Any) -> tuple:
+def load(_typing_context: Any, array: Any, _at: Any, like: Any) -> Emitted:
     """Numbers of a contiguous array from the number ``at`` on, as many as the vector ``like`` has."""
 
     def code(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
@@ -86,7 +87,7 @@ def load(_typing_context: Any, array: Any, _at: Any, like: Any) -> tuple:
 
 
 @_operation_on_vectors(lambda array, at, vector: array.reshape(-1).__setitem__(slice(at, at + vector.size), vector))
-def store(_typing_context: Any, array: Any, _at: Any, vector: Any) -> tuple:
+def store(_typing_context: Any, array: Any, _at: Any, vector: Any) -> Emitted:
     """Put a vector into a contiguous array from the number ``at`` on."""
 
     def code(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
@@ -98,7 +99,7 @@ def store(_typing_context: Any, array: Any, _at: Any, vector: Any) -> tuple:
 
 
 @_operation_on_vectors(lambda x, count: np.full(count, float(x)), prefer_literal=True)
-def filled(_typing_context: Any, _x: Any, count: Any) -> tuple:
+def filled(_typing_context: Any, _x: Any, count: Any) -> Emitted:
     """A constant number of times x."""
     kind = Doubles(count.literal_value)
     return kind(types.float64, count), lambda _, builder, _signature, arguments: _filled(
@@ -107,7 +108,7 @@ def filled(_typing_context: Any, _x: Any, count: Any) -> tuple:
 
 
 @_operation_on_vectors(lambda *parts: np.concatenate(parts))
-def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> tuple:
+def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Emitted:
     """The vector of the components a, b, c, d."""
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
@@ -119,7 +120,7 @@ def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> tuple:
 
 
 @_operation_on_vectors(lambda a, b: np.concatenate([a, b]))
-def paired(_typing_context: Any, a: Any, b: Any) -> tuple:
+def paired(_typing_context: Any, a: Any, b: Any) -> Emitted:
     """The vector of a's numbers, then b's, of which there are as many."""
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
@@ -129,13 +130,13 @@ def paired(_typing_context: Any, a: Any, b: Any) -> tuple:
 
 
 @_operation_on_vectors(lambda vector, number: vector.reshape(2, -1)[number], prefer_literal=True)
-def half(_typing_context: Any, vector: Any, number: Any) -> tuple:
+def half(_typing_context: Any, vector: Any, number: Any) -> Emitted:
     """The first or second half of a vector."""
     return _part(vector, number, 2)
 
 
 @_operation_on_vectors(lambda vector: float(np.max(np.abs(vector))))
-def largest(_typing_context: Any, vector: Any) -> tuple:
+def largest(_typing_context: Any, vector: Any) -> Emitted:
     """The largest absolute value; what is no number is larger than all."""
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
@@ -152,7 +153,7 @@ def largest(_typing_context: Any, vector: Any) -> tuple:
     lambda vector, order: np.concatenate([vector.reshape(4, -1), -vector.reshape(4, -1)])[list(order)].ravel(),
     prefer_literal=True,
 )
-def arranged(_typing_context: Any, vector: Any, order: Any) -> tuple:
+def arranged(_typing_context: Any, vector: Any, order: Any) -> Emitted:
     """Components of a vector of four in another order; 4 to 7 stand for the negatives of 0 to 3."""
     each = vector.count // 4
     chosen = [part.literal_value * each + k for part in order for k in range(each)]
@@ -166,7 +167,7 @@ def arranged(_typing_context: Any, vector: Any, order: Any) -> tuple:
 @_operation_on_vectors(
     lambda a, b, order: np.concatenate([a.reshape(4, -1), b.reshape(4, -1)])[list(order)].ravel(), prefer_literal=True
 )
-def mixed(_typing_context: Any, a: Any, b: Any, order: Any) -> tuple:
+def mixed(_typing_context: Any, a: Any, b: Any, order: Any) -> Emitted:
     """Components of two vectors of four: 0 to 3 of the first, 4 to 7 of the second."""
     each = a.count // 4
     chosen = [part.literal_value * each + k for part in order for k in range(each)]
@@ -178,12 +179,12 @@ def mixed(_typing_context: Any, a: Any, b: Any, order: Any) -> tuple:
 
 
 @_operation_on_vectors(lambda vector, number: vector.reshape(4, -1)[number], prefer_literal=True)
-def component(_typing_context: Any, vector: Any, number: Any) -> tuple:
+def component(_typing_context: Any, vector: Any, number: Any) -> Emitted:
     """One component of a vector of four."""
     return _part(vector, number, 4)
 
 
-def _part(vector: Any, number: Any, count: int) -> tuple:
+def _part(vector: Any, number: Any, count: int) -> Emitted:
     """Part ``number`` of ``count`` parts of equal length."""
     each = vector.count // count
     chosen = [number.literal_value * each + k for k in range(each)]
@@ -195,7 +196,7 @@ def _part(vector: Any, number: Any, count: int) -> tuple:
 
 
 @_operation_on_vectors(lambda vector, at: float(vector[at]), prefer_literal=True)
-def number(_typing_context: Any, vector: Any, at: Any) -> tuple:
+def number(_typing_context: Any, vector: Any, at: Any) -> Emitted:
     """One of a vector's doubles."""
     index = ir.Constant(_NUMBER, at.literal_value)
     return types.float64(vector, at), lambda _, builder, _signature, arguments: builder.extract_element(
@@ -215,11 +216,11 @@ def triple(array: np.ndarray, at: int, last: float) -> Packed:
     return four(array[at], array[at + 1], array[at + 2], last)
 
 
-def _operation(name: str) -> Callable:
+def _operation(name: str) -> Callable[..., Any]:
     """The instruction of this name on two vectors, or on a vector and a number."""
 
     @intrinsic
-    def of_vectors(_typing_context: Any, a: Any, b: Any) -> tuple:
+    def of_vectors(_typing_context: Any, a: Any, b: Any) -> Emitted:
         kind = a if isinstance(a, Doubles) else b
 
         def code(_context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
@@ -256,7 +257,7 @@ def _fused_exactly(a: float, b: float, c: float) -> float:
 
 
 @_operation_on_vectors(_fused_exactly)
-def fused_multiply_add(_typing_context: Any, _a: Any, _b: Any, _c: Any) -> tuple:
+def fused_multiply_add(_typing_context: Any, _a: Any, _b: Any, _c: Any) -> Emitted:
     """a b + c, rounded once."""
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:

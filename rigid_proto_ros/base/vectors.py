@@ -10,6 +10,8 @@ import numpy as np
 Numbers = Sequence[float] | np.ndarray
 """Components of a vector or a quaternion, as they may be given."""
 Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+"""xyzw."""
 
 
 def vector(numbers: Numbers) -> Vector:

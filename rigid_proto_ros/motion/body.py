@@ -6,7 +6,6 @@ Compiled kernels read a body as a row of BODY doubles.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import quaternion_of_axes
+from ..base.rotation import norm, quaternion_of_axes
 from ..base.vectors import Numbers
 from ..mass.closed_form import Principal
 from ..mass.tensor import principal_axes_kernel
@@ -56,7 +55,7 @@ def arm(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, f
 def normal(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A unit normal x, y, z of the unscaled mesh as a unit vector in body axes: normals transform by scale⁻¹."""
     x, y, z = x / body[BODY_SCALE], y / body[BODY_SCALE + 1], z / body[BODY_SCALE + 2]
-    size = math.sqrt(x * x + y * y + z * z)
+    size = norm(x, y, z)
     return x / size, y / size, z / size
 
 
@@ -127,7 +126,8 @@ class Body:
 
     def mesh_point(self, point: Numbers) -> np.ndarray:
         """Metres from the COM, body axes, to mesh coordinates (3,)."""
-        return (np.asarray(point) + self.center_of_mass) / self.scale
+        found: np.ndarray = (np.asarray(point) + self.center_of_mass) / self.scale
+        return found
 
     def angular_acceleration(self, torque_body: Numbers) -> np.ndarray:
         """I⁻¹ τ (3,), both in body axes."""

@@ -12,6 +12,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ..base.errors import CommandRefused, did_you_mean
 from ..base.vectors import Vector, vector
@@ -41,7 +42,7 @@ class Frame:
     """
 
     axes: str
-    point: tuple
+    point: tuple[Any, ...]
     duration_s: float | None = None
     impulse: bool = False
     slot: str = ""
@@ -60,13 +61,13 @@ class Frame:
         return f"{self.axes}@{point_text(self.point)}{self.options}"
 
 
-def point_text(point: tuple) -> str:
+def point_text(point: tuple[Any, ...]) -> str:
     """A point as it stands in a frame; numbers keep all their digits."""
     word, *values = point
     if word in FIXED_POINTS:
-        return word
+        return str(word)
     if word == "contact":
-        return values[0]
+        return str(values[0])
     if word == "vertex":
         return f"vertex/{values[0]}"
     return "/".join([word, *(",".join(repr(float(x)) for x in triple) for triple in values)])
@@ -99,7 +100,7 @@ def parse_frame(text: str, world: str = "world", body: str = "body") -> Frame:
     return Frame(axes, point, *_parse_options(options, text))
 
 
-def _parse_point(part: str, text: str, axes_words: Iterable[str] = ()) -> tuple:
+def _parse_point(part: str, text: str, axes_words: Iterable[str] = ()) -> tuple[Any, ...]:
     word, *values = part.split("/")
     if part in FIXED_POINTS:
         return (part,)

@@ -14,7 +14,7 @@ import functools
 import math
 import struct
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import boolean, float64
@@ -104,7 +104,7 @@ def is_within_magnitude(load: np.ndarray, body: np.ndarray) -> bool:
 
 
 @functools.cache
-def _within_magnitude() -> Callable:
+def _within_magnitude() -> Callable[..., Any]:
     return entry_of(is_within_magnitude, boolean(float64[::1], float64[::1]))
 
 
@@ -261,7 +261,7 @@ def light_amount(body: Body) -> float:
     """A load stays far below MAX_ACCELERATION while (Σ|F| + Σ|τ|)(1 + Σ|point|) is no more, point in mesh
     coordinates.
     """
-    largest = max(*map(abs, body.scale.tolist()), *map(abs, body.center_of_mass.tolist()))
+    largest: float = max(*map(abs, body.scale.tolist()), *map(abs, body.center_of_mass.tolist()))
     return 0.1 * MAX_ACCELERATION * min(body.mass, float(body.principal_moments[0]) / (1.0 + 3.0 * largest))
 
 
@@ -332,7 +332,7 @@ def _mesh_point(
     if word == "contact":
         return contact_point(values[0], contacts)
     if word == "point":
-        return values[0]
+        return vector(values[0])
     if surface is None:
         raise CommandRefused("frame", "frame_id", frame.text, "this point only on a body with a mesh")
     if word == "vertex":

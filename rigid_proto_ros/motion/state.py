@@ -129,7 +129,7 @@ def kinetic_energy(row: np.ndarray, mass: float, inertia: np.ndarray) -> float:
         + y * (inertia[3] * x + inertia[4] * y + inertia[5] * z)
         + z * (inertia[6] * x + inertia[7] * y + inertia[8] * z)
     )
-    return 0.5 * mass * (row[7] * row[7] + row[8] * row[8] + row[9] * row[9]) + 0.5 * turning
+    return float(0.5 * mass * (row[7] * row[7] + row[8] * row[8] + row[9] * row[9]) + 0.5 * turning)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.rotation import matrix_elements
+from ..base.rotation import matrix_elements, norm
 from ..base.vectors import Numbers, Vector, vector
 from .body import MASS, Body, angular_acceleration
 from .state import State
@@ -52,8 +52,7 @@ def length_of(x: float, y: float, z: float) -> float:
     largest = max(abs(x), abs(y), abs(z))
     if largest == 0.0:
         return 0.0
-    x, y, z = x / largest, y / largest, z / largest
-    return largest * math.sqrt(x * x + y * y + z * z)
+    return largest * norm(x / largest, y / largest, z / largest)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -111,7 +110,7 @@ def effective_mass(
         turning = third * _turning(body, rx, ry, rz, 1.0, 0.0, 0.0)
         turning += third * _turning(body, rx, ry, rz, 0.0, 1.0, 0.0)
         turning += third * _turning(body, rx, ry, rz, 0.0, 0.0, 1.0)
-    return 1.0 / (1.0 / body[MASS] + turning)
+    return float(1.0 / (1.0 / body[MASS] + turning))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)

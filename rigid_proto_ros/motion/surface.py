@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.elementary import inverse_tangent_of
-from ..base.rotation import length
+from ..base.rotation import length, norm
 from ..base.vectors import Numbers
 
 
@@ -29,7 +29,8 @@ class Surface:
     @cached_property
     def extent(self) -> np.ndarray:
         """Sides of the bounding box (3,)."""
-        return self.vertices.max(axis=0) - self.vertices.min(axis=0)
+        sides: np.ndarray = self.vertices.max(axis=0) - self.vertices.min(axis=0)
+        return sides
 
     def ray_hit(self, origin: Numbers, direction: Numbers) -> tuple[np.ndarray, int] | None:
         """First point (3,) where the ray meets the surface from either side, and its triangle; None for a miss."""
@@ -52,8 +53,7 @@ class Surface:
         which doesn't depend on how the faces are triangulated. Zero where they cancel.
         """
         point = np.asarray(point, dtype=float)
-        box = self.vertices.max(axis=0) - self.vertices.min(axis=0)
-        outward = np.array(_pseudo_normal(self.vertices, self.triangles, point, 1e-9 * length(box)))
+        outward = np.array(_pseudo_normal(self.vertices, self.triangles, point, 1e-9 * length(self.extent)))
         size = length(outward)
         return -outward / size if size > 1e-12 else np.zeros(3)
 
@@ -161,7 +161,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
 @njit(cache=True)
 def _angle(a: np.ndarray, b: np.ndarray) -> float:
     x, y, z = _cross(a, b)
-    return inverse_tangent_of(math.sqrt(x * x + y * y + z * z), (a * b).sum())
+    return inverse_tangent_of(norm(x, y, z), (a * b).sum())
 
 
 @njit(cache=True)
@@ -194,7 +194,7 @@ def _pseudo_normal(
         _, gap, angle = _nearest_on_triangle(foot, a, b, c)
         if gap <= tolerance * tolerance:
             x, y, z = _cross(b - a, c - a)
-            area = math.sqrt(x * x + y * y + z * z)
+            area = norm(x, y, z)
             if area > 0.0:
                 nx += angle * x / area
                 ny += angle * y / area

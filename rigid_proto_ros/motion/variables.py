@@ -12,6 +12,8 @@ e⁻ᶻ)/z². Damping is linear, so what a body-fixed force adds obeys u' = R g_
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..base.compilation import njit
@@ -28,6 +30,19 @@ VARIABLES = 15
 """How many integrators step."""
 LOW = 15  # (7,) low words of attitude and displacement, kept by those integrators that need more digits than a double's
 STORED = 22
+
+MAX_SPEED = 1e100
+"""|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
+
+
+@njit(cache=True, error_model="numpy")
+def is_good(y: np.ndarray) -> bool:
+    """Whether variables y are finite and no runaway."""
+    size = 0.0
+    for j in range(4, 13):
+        size += abs(y[j])
+    # Negated sense, so that NaN counts as a runaway.
+    return size <= MAX_SPEED and math.isfinite(y[0] + y[1] + y[2] + y[3])
 
 
 @njit(cache=True, error_model="numpy", allocates=False)

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..base.errors import CommandRefused, InputError, did_you_mean
 from ..mass import INERTIA_MODELS, MODEL_COMS
-from ..motion import INTEGRATOR_NAMES
+from ..motion import INTEGRATOR_FILES
 from ..motion.frames import check_contact_name
 from .declaration import (
     AT_RESET,
@@ -153,7 +153,7 @@ class GhostParameters:
     integrator: str = text(
         "",
         "Show a ghost, from time 0 or the next reset on, that gets the same commands under this integrator.",
-        choices=("", *INTEGRATOR_NAMES),
+        choices=("", *INTEGRATOR_FILES),
     )
 
 
@@ -222,7 +222,7 @@ class Parameters:
     integrator: str = text(
         "auto",
         "Integrator of the motion; auto picks the cheapest that meets accuracy.",
-        choices=INTEGRATOR_NAMES,
+        choices=tuple(INTEGRATOR_FILES),
     )
     step: float = number(
         0.001, "Step of fixed-step integrators, rounded to the nearest nanosecond.", "s", lower=1e-9, upper=1e5

@@ -18,14 +18,14 @@ from ..base.compilation import njit
 from ..base.records import record_type
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
-from ..motion.integrators.equations import accelerations, tension_margin
+from ..motion.integrators.equations import accelerations, parts_of, tension_margin
 from ..motion.integrators.error_measure import FLOOR
-from ..motion.integrators.integrator import ADAPTIVE, MAX_SPEED, NOTHING, ONE_STEP
+from ..motion.integrators.integrator import ADAPTIVE, NOTHING, ONE_STEP
 from ..motion.integrators.series_steps import CONTROL, begin_control
 from ..motion.integrators.stepping import commit, is_provided, reach
 from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
 from ..motion.problem import PROBLEM, STRING, begin_problem, begin_string
-from ..motion.variables import HAND_WORK, HEAT, STORED, to_good_row, to_variables
+from ..motion.variables import HAND_WORK, HEAT, MAX_SPEED, STORED, to_good_row, to_variables
 from .command_kinds import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE
 
 FLIGHT = record_type(
@@ -251,8 +251,8 @@ def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> 
     p = problem[0]
     complete_problem(flight, flight.row, flight.now_ns, p)
     to_variables(flight.row, p, y)
-    q, w, d, u = (y[0], y[1], y[2], y[3]), (y[4], y[5], y[6]), (y[7], y[8], y[9]), (y[10], y[11], y[12])
-    ex, ey, ez, ax, ay, az, _, _ = accelerations(*q, *w, *d, *u, p, tension_margin(y, p) > 0.0)
+    q, w, d, u = parts_of(y)
+    (ex, ey, ez), (ax, ay, az), _, _ = accelerations(q, w, d, u, p, tension_margin(y, p) > 0.0)
     a, v, P, c = p.reference_acceleration, p.reference_velocity, p.principal_axes, p.reference_damping
     return (
         *(a[0] - c * v[0] + ax, a[1] - c * v[1] + ay, a[2] - c * v[2] + az),

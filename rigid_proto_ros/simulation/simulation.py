@@ -14,9 +14,10 @@ from typing import Protocol
 
 from ..base.errors import CommandRefused, InputError
 from ..motion.integrators import check_supported
-from ..motion.integrators.integrator import MAX_SPEED, STRING
+from ..motion.integrators.integrator import STRING
 from ..motion.loads import Load, load_of_bytes
 from ..motion.state import State, shift_com
+from ..motion.variables import MAX_SPEED
 from . import flight as fl
 from .checks import check_command, check_load_supported, check_rates, check_start, check_thrust, load_row, needs_of
 from .commands import (

@@ -7,7 +7,6 @@ from one_segment import new_control
 
 from rigid_proto_ros.base.records import new_record
 from rigid_proto_ros.base.rotation import multiply
-from rigid_proto_ros.motion import INTEGRATOR_NAMES
 from rigid_proto_ros.motion.integrators import INTEGRATORS, series_steps
 from rigid_proto_ros.motion.integrators.series_steps import MAX_DEGREE
 from rigid_proto_ros.motion.problem import PROBLEM
@@ -15,10 +14,6 @@ from rigid_proto_ros.motion.variables import STORED
 
 MOMENTS = np.array((1.0, 2.0, 3.0))
 AXIS = np.array((0.3, 1.0, -0.2)) / np.linalg.norm((0.3, 1.0, -0.2))
-
-
-def test_all_can_be_named_without_loading_them():
-    assert tuple(INTEGRATORS) == INTEGRATOR_NAMES
 
 
 def segment(spin, torque_world, moments=MOMENTS):

@@ -11,32 +11,14 @@ where Python's rule would raise in the middle of it.
 
 from __future__ import annotations
 
+from importlib import import_module
+
 from ...base.errors import CommandRefused, InputError
-from .auto import AUTO
-from .dop853 import DOP853
-from .free_body import FREE_BODY
-from .free_body_strang import FREE_BODY_STRANG
-from .gram_schmidt import EULER, MIDPOINT
+from .. import INTEGRATOR_FILES
 from .integrator import Integrator
-from .lie_midpoint import LIE_MIDPOINT
-from .rk4 import RK4
-from .semi_implicit_euler import SEMI_IMPLICIT_EULER
-from .taylor import TAYLOR
 
 INTEGRATORS: dict[str, Integrator] = {
-    integrator.name: integrator
-    for integrator in (
-        AUTO,
-        EULER,
-        MIDPOINT,
-        SEMI_IMPLICIT_EULER,
-        RK4,
-        LIE_MIDPOINT,
-        DOP853,
-        TAYLOR,
-        FREE_BODY,
-        FREE_BODY_STRANG,
-    )
+    name: getattr(import_module(f".{file}", __name__), name.upper()) for name, file in INTEGRATOR_FILES.items()
 }
 
 

@@ -18,13 +18,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
 from ..string import most_yielding
-from ..variables import damping_functions
+from ..variables import damping_functions, is_good
 from .equations import stretch
 from .free_body import free_body_steps
 from .integrator import (
@@ -37,7 +38,6 @@ from .integrator import (
     STRING,
     Integrator,
     Method,
-    is_good,
 )
 from .series_steps import degree_for, degree_of_motion, motion_steps, motion_workspace, spin_steps, spin_workspace
 
@@ -77,7 +77,7 @@ ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, SLACK_AT_REST, ON_STRI
 @njit(cache=True, error_model="numpy", allocates=False)
 def _any(v: np.ndarray, at: int = 0) -> bool:
     """Whether any of three numbers isn't zero."""
-    return v[at] != 0.0 or v[at + 1] != 0.0 or v[at + 2] != 0.0
+    return bool(v[at] != 0.0 or v[at + 1] != 0.0 or v[at + 2] != 0.0)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -129,46 +129,38 @@ def _series(why: str, degree: Callable[[int], int] = int) -> Callable[..., str]:
     return choice
 
 
-def _methods(_integrator: Integrator) -> tuple[Method, ...]:
-    """A method for each kind of segment."""
-    by_kind = {
-        ASLEEP: Method(NOTHING, None, _constant("auto: sleeping, nothing moves or acts"), sleeps=True),
-        COASTING: Method(NOTHING, None, _constant("auto: closed form, nothing turns the body")),
-        STEADY: Method(ONE_STEP, steady_steps, _constant("auto: closed form, nothing changes the spin"), 1),
-        FREE: Method(ONE_STEP, free_body_steps, _constant("auto: free_body, free rotation, exact"), 1),
-        TURNING_LOADS: Method(
-            ADAPTIVE,
-            spin_steps,
-            _series("the loads turn with the body"),
-            0,
-            spin_workspace,
-            radians=RADIANS_A_STEP,
-        ),
-        ANY_LOADS: Method(
-            ADAPTIVE,
-            motion_steps,
-            _series("loads that depend on the attitude", degree_of_motion),
-            0,
-            motion_workspace,
-            radians=RADIANS_A_STEP,
-        ),
-        SLACK_AT_REST: Method(
-            NOTHING,
-            None,
-            _constant("auto: sleeping, the string is slack and nothing moves"),
-            sleeps=True,
-            on_string=True,
-        ),
-        ON_STRING: Method(
-            ADAPTIVE,
-            motion_steps,
-            _series("a string of up to {:.3g} rad/s", degree_of_motion),
-            workspace=motion_workspace,
-            on_string=True,
-            radians=RADIANS_A_STEP,
-        ),
-    }
-    return tuple(by_kind[kind] for kind in range(len(by_kind)))
+_SERIES_OF_MOTION = Method(
+    ADAPTIVE,
+    motion_steps,
+    _series("loads that depend on the attitude", degree_of_motion),
+    workspace=motion_workspace,
+    radians=RADIANS_A_STEP,
+)
+
+_BY_KIND = {
+    ASLEEP: Method(NOTHING, None, _constant("auto: sleeping, nothing moves or acts"), sleeps=True),
+    COASTING: Method(NOTHING, None, _constant("auto: closed form, nothing turns the body")),
+    STEADY: Method(ONE_STEP, steady_steps, _constant("auto: closed form, nothing changes the spin"), 1),
+    FREE: Method(ONE_STEP, free_body_steps, _constant("auto: free_body, free rotation, exact"), 1),
+    TURNING_LOADS: Method(
+        ADAPTIVE,
+        spin_steps,
+        _series("the loads turn with the body"),
+        workspace=spin_workspace,
+        radians=RADIANS_A_STEP,
+    ),
+    ANY_LOADS: _SERIES_OF_MOTION,
+    SLACK_AT_REST: Method(
+        NOTHING,
+        None,
+        _constant("auto: sleeping, the string is slack and nothing moves"),
+        sleeps=True,
+        on_string=True,
+    ),
+    ON_STRING: replace(
+        _SERIES_OF_MOTION, choice=_series("a string of up to {:.3g} rad/s", degree_of_motion), on_string=True
+    ),
+}
 
 
 AUTO = Integrator(
@@ -180,6 +172,5 @@ AUTO = Integrator(
     stability_limit=math.inf,
     supports=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
     kernel=None,
-    make_methods=_methods,
-    chooses=True,
+    ways=tuple(_BY_KIND[kind] for kind in range(len(_BY_KIND))),
 )

@@ -13,6 +13,8 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
+from ...base.rotation import norm
+from ...base.vectors import Vector
 from ..variables import damping_functions
 
 WEIGHINGS = 4
@@ -20,22 +22,20 @@ WEIGHINGS = 4
 
 FLOOR = 32.0 * 2.0**-52
 
-
-_Three = tuple[float, float, float]
+Weights = tuple[float, float, float, float]
+"""Of attitude (as quaternion difference), ω, x and v in the measure."""
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def scales(y: np.ndarray, p: np.record, elapsed: float) -> tuple[float, float, float, float]:
-    """Weights of attitude (as quaternion difference), ω, x and v at variables y, ``elapsed`` seconds into
-    the segment.
-    """
+def scales(y: np.ndarray, p: np.record, elapsed: float) -> Weights:
+    """The weights at variables y, ``elapsed`` seconds into the segment."""
     return scales_of((y[4], y[5], y[6]), (y[10], y[11], y[12]), p, elapsed)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def scales_of(w: _Three, u: _Three, p: np.record, elapsed: float) -> tuple[float, float, float, float]:
+def scales_of(w: Vector, u: Vector, p: np.record, elapsed: float) -> Weights:
     """The same at ω = w and the added velocity u."""
-    spin = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    spin = norm(*w)
     if not p.translates:
         return 2.0, 1.0 / max(spin, 1.0), 0.0, 0.0
     c = p.reference_damping
@@ -50,9 +50,7 @@ def scales_of(w: _Three, u: _Three, p: np.record, elapsed: float) -> tuple[float
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def heavier(
-    ending: tuple[float, float, float, float], weights: tuple[float, float, float, float]
-) -> tuple[tuple[float, float, float, float], bool]:
+def heavier(ending: Weights, weights: Weights) -> tuple[Weights, bool]:
     """The larger of the weights at a step's end and start, and whether they are clearly more than those
     at the start: a quarter.
     """
@@ -67,7 +65,7 @@ def jump_of_displacement(p: np.record, spin: float, speed: float) -> float:
     """
     if not p.has_string:
         return 0.0
-    arm = math.sqrt(p.attach[0] ** 2 + p.attach[1] ** 2 + p.attach[2] ** 2)
+    arm = norm(p.attach[0], p.attach[1], p.attach[2])
     # What a force at the knot does to the measured velocities, per newton and second.
     response = max(speed / p.mass, spin * arm / p.moments[0])
-    return p.string_damping * p.length * response
+    return float(p.string_damping * p.length * response)

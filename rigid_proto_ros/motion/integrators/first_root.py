@@ -48,14 +48,14 @@ def first_rise(g: np.ndarray, degree: int) -> float:
         begin, width = begins[top], widths[top]
         first, changes = _signs(b[top], degree)
         if first > 0:
-            return begin
+            return float(begin)
         if changes == 0:
             top -= 1
         elif changes == 1:
             return _root(g, degree, begin, begin + width)
         elif width <= _RESOLUTION * (begin + width) or top == _DEEPEST:
             if b[top, degree] > 0.0:
-                return begin + width
+                return float(begin + width)
             top -= 1
         else:
             half = 0.5 * width

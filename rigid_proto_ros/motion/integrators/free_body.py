@@ -1,9 +1,34 @@
 # SPDX-License-Identifier: MIT
-"""free_body: torque-free motion, exact to rounding for any time in one step.
+"""free_body: torque-free motion, exact to rounding for any time in one step; ``free_step`` is its map, of which
+free_body_strang is made, too.
 
-Its kernel can take many steps, for splittings and tests; in a simulation each sample is one step from the segment's
-start, so nothing accumulates. Attitude errs less than 50 ε (1 + |ω|h) rad. World forces at the COM, gravity and linear
-damping are closed form beside it.
+In a simulation each sample is one step from the segment's start, so nothing accumulates. Attitude errs less than
+50 ε (1 + |ω|h) rad. World forces at the COM, gravity and linear damping are closed form beside it.
+
+In principal axes the angular velocity follows Jacobi's elliptic functions, the attitude a turn about the angular
+momentum. Written for A, B, C and w = (w₁, w₂, w₃) with C the axis that the angular momentum circulates about in the
+body, w₃ ≥ 0:
+
+    P = B|B−A| w₂² + C|C−A| w₃²,  Q = A|C−A| w₁² + B|C−B| w₂²,  ω_p² = |C−B| P/(ABC),
+    m = |B−A| Q/(|C−B| P),  m₁ = 1 − m = |C−A| (C|C−B| w₃² − A|B−A| w₁²)/(|C−B| P).
+
+ω after h comes by the addition theorem with S = sn/ω_p, c = cn, d = dn at u = ω_p h, so that no elliptic integral is
+inverted and no division vanishes: with D = 1 − β sn² and β = B|B−A| w₂²/P,
+
+    w₁⁺ = (w₁ c − (C−B)/A w₂w₃ S d)/D,  w₂⁺ = (w₂ c d + (C−A)/B w₁w₃ S)/D,  w₃⁺ = (w₃ d − (B−A)/C w₁w₂ S c)/D.
+
+The attitude is R = R_L R_z(ψ) B(M), B(M) the shortest turn that takes the angular momentum M = (Aw₁, Bw₂, Cw₃) to the
+third axis and ψ' = (2E + L w₃)/(L + C w₃): all terms positive. A short step integrates ψ' by Gauss's rule, a long one
+in closed form: with dn = (1 − κs²)/(1 + κs²), s = sn of modulus κ = (1 − √m₁)/(1 + √m₁) (Gauss's transformation), ψ'
+becomes f_a + f_b s²/(1 + νs²), whose integral from the start of a period is Carlson's R_J, every argument positive. The
+integral from any other phase on is that over the time alone plus an arc tangent (addition theorem of the third kind): a
+difference of two incomplete integrals would cancel where both are large, near a middle axis that the body leaves or
+comes to.
+
+Sources: Whittaker, A Treatise on the Analytical Dynamics of Particles and Rigid Bodies (1937), section 69; van Zon and
+Schofield, J. Comput. Phys. 225 (2007) 145; Celledoni, Fassò, Säfström and Zanna, SIAM J. Sci. Comput. 30 (2008) 2084;
+Byrd and Friedman, Handbook of Elliptic Integrals (1971), 116.03, for the addition theorem; the gauge and the positive
+forms are worked out here.
 """
 
 from __future__ import annotations
@@ -13,35 +38,294 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
-from .free_body_step import free_step
-from .integrator import MAX_SPEED, ONE_STEP, Integrator, Method
+from ...base.elementary import inverse_tangent, sine_cosine
+from ...base.exact_arithmetic import pair_add, pair_multiply, two_product, two_sum
+from ...base.rotation import multiply, norm, normalize
+from ...base.vectors import Quaternion, Vector
+from ..variables import MAX_SPEED
+from .elliptic import carlson_rj, complete_quarter_period, sn_cn_dn
+from .equations import parts_of
+from .integrator import ONE_STEP, Integrator, Method
+
+SHORT = 0.4
+"""u = ω_p h below which ψ' is integrated by Gauss's rule; beyond it the closed form is cheaper."""
+
+FARTHEST_ON_SEPARATRIX = 300.0
+"""u at which a body on the separatrix lies on its middle axis to 1e-130; beyond it sech² would leave the doubles."""
+
+NO_SPIN = 1e-140
+"""Part of the largest ω below which a component is taken as none: its square times a ratio of moments
+would leave the doubles.
+"""
+
+# Gauss-Legendre nodes and weights on (0, 1); ψ' has its poles at least about 1.2 from the real u axis.
+_NODES_3 = (0.11270166537925831, 0.5, 0.8872983346207417)
+_WEIGHTS_3 = (0.2777777777777778, 0.4444444444444444, 0.2777777777777778)
+_NODES_5 = (0.046910077030668004, 0.23076534494715845, 0.5, 0.7692346550528415, 0.953089922969332)
+_WEIGHTS_5 = (0.11846344252809454, 0.23931433524968324, 0.28444444444444444, 0.23931433524968324, 0.11846344252809454)
+_NODES_8 = (
+    *(0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751),
+    *(0.591717321247825, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681),
+)
+_WEIGHTS_8 = (
+    *(0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.181341891689181),
+    *(0.181341891689181, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813),
+)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def free_step(q: Quaternion, w: Vector, moments: Vector, h: float) -> tuple[Quaternion, Vector]:
+    """Attitude q and ω = w (principal axes, moments ascending) after h seconds without torque."""
+    wx, wy, wz = w
+    i1, i2, i3 = moments
+    largest = max(abs(wx), abs(wy), abs(wz))
+    if largest == 0.0 or h == 0.0:
+        return q, w
+    # Powers of two: units in which nothing under- or overflows, and no rounding.
+    _, e = math.frexp(largest)
+    _, f = math.frexp(i3)
+    wx, wy, wz, h = math.ldexp(wx, -e), math.ldexp(wy, -e), math.ldexp(wz, -e), math.ldexp(h, e)
+    i1, i2, i3 = math.ldexp(i1, -f), math.ldexp(i2, -f), math.ldexp(i3, -f)
+    if not math.isfinite(wx + wy + wz + h):
+        # A runaway of the scheme around it; the iterations below would never end.
+        return (math.nan, math.nan, math.nan, math.nan), (wx, wy, wz)
+    wx = 0.0 if abs(wx) < NO_SPIN else wx
+    wy = 0.0 if abs(wy) < NO_SPIN else wy
+    wz = 0.0 if abs(wz) < NO_SPIN else wz
+    third, first = i3 * (i3 - i2) * wz * wz, i1 * (i2 - i1) * wx * wx
+    side = third - first
+    if abs(side) < 1e-14 * third:
+        # The sign is in digits that doubles have lost.
+        side = _side_of_separatrix(i1, i2, i3, wx, wz)
+    about_third = side > 0.0 if side != 0.0 else i3 - i2 >= i2 - i1
+    if not about_third:
+        # A turn that exchanges first and third axis.
+        i1, i3 = i3, i1
+        wx, wy, wz = wz, -wy, wx
+    flipped = wz < 0.0
+    if flipped:
+        wy, wz = -wy, -wz
+    (rx, ry, rz, rw), (wx, wy, wz) = _circulate((i1, i2, i3), (wx, wy, wz), h)
+    if flipped:
+        wy, wz, ry, rz = -wy, -wz, -ry, -rz
+    if not about_third:
+        wx, wy, wz = wz, -wy, wx
+        rx, ry, rz = rz, -ry, rx
+    turned = normalize(*multiply(*q, rx, ry, rz, rw))
+    return turned, (math.ldexp(wx, e), math.ldexp(wy, e), math.ldexp(wz, e))
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector]:
+    """The turn r xyzw (not normalized) over h, and w after it."""
+    A, B, C = moments
+    w1, w2, w3 = w
+    gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
+    P = B * gba * w2 * w2 + C * gca * w3 * w3
+    Q = A * gca * w1 * w1 + B * gcb * w2 * w2
+    rate = math.sqrt(gcb * P / (A * B * C))
+    if rate == 0.0 or Q == 0.0 or (w1 == 0.0 and w3 == 0.0):
+        return _even_turn(w, h), w
+    u = rate * h
+    if abs(u) <= SHORT:
+        m = gba * Q / (gcb * P)
+        v, psi = _short(moments, w, P, rate, m, h)
+    else:
+        v, psi = _long(moments, w, P, Q, rate, h)
+    M1, M2, M3 = A * w1, B * w2, C * w3
+    L = norm(M1, M2, M3)
+    s, c = sine_cosine(0.5 * psi)
+    turned = multiply(-M2, M1, 0.0, L + M3, 0.0, 0.0, s, c)
+    return multiply(*turned, B * v[1], -A * v[0], 0.0, L + C * v[2]), v
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _even_turn(w: Vector, h: float) -> Quaternion:
+    """Turn by |w| h about w."""
+    size = norm(*w)
+    s, c = sine_cosine(0.5 * size * h)
+    s /= size
+    return w[0] * s, w[1] * s, w[2] * s, c
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _third(w3: float, twist: float, beta: float, rate: float, m: float, t: float) -> float:
+    """w₃ after t, from the short-time sn, cn, dn; ``twist`` is (B−A)/C w₁w₂."""
+    s, c, d = sn_cn_dn(rate * t, m, 1.0)
+    return (w3 * d - twist * (s / rate) * c) / (1.0 - beta * s * s)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _short(moments: Vector, w: Vector, P: float, rate: float, m: float, h: float) -> tuple[Vector, float]:
+    """w and ψ after a short h; w as increments, which keeps energy and momentum from drifting."""
+    A, B, C = moments
+    w1, w2, w3 = w
+    beta = B * abs(B - A) * w2 * w2 / P
+    s, c, d = sn_cn_dn(rate * h, m, 1.0)
+    S, bottom = s / rate, 1.0 - beta * s * s
+    # c − D, d − D and cd − D without cancellation.
+    ss = s * s
+    less_c, less_d = ss / (1.0 + c), m * ss / (1.0 + d)
+    twist = (B - A) / C * w1 * w2
+    d1 = (w1 * (beta * ss - less_c) - (C - B) / A * w2 * w3 * S * d) / bottom
+    d2 = (w2 * (beta * ss - less_c - c * less_d) + (C - A) / B * w1 * w3 * S) / bottom
+    d3 = (w3 * (beta * ss - less_d) - twist * S * c) / bottom
+    # Roundings of S, c and d are the same every step; what they do to Q and P is taken out, lest it add up.
+    gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
+    Q = A * gca * w1 * w1 + B * gcb * w2 * w2
+    excess = 0.5 * (A * gca * d1 * (2.0 * w1 + d1) + B * gcb * d2 * (2.0 * w2 + d2)) / Q
+    d1, d2 = d1 - excess * (w1 + d1), d2 - excess * (w2 + d2)
+    share = C * gca * w3 * w3
+    # Where the third axis has a small share in P, Q keeps P as well.
+    if share > 0.5 * P:
+        d3 -= 0.5 * (B * gba * d2 * (2.0 * w2 + d2) + C * gca * d3 * (2.0 * w3 + d3)) / share * (w3 + d3)
+    M1, M2, M3 = A * w1, B * w2, C * w3
+    L = norm(M1, M2, M3)
+    E2 = w1 * M1 + w2 * M2 + w3 * M3
+    u = abs(rate * h)
+    total = 0.0
+    if u < 0.01:
+        for j in range(3):
+            x = _third(w3, twist, beta, rate, m, _NODES_3[j] * h)
+            total += _WEIGHTS_3[j] * ((E2 + L * x) / (L + C * x))
+    elif u < 0.1:
+        for j in range(5):
+            x = _third(w3, twist, beta, rate, m, _NODES_5[j] * h)
+            total += _WEIGHTS_5[j] * ((E2 + L * x) / (L + C * x))
+    else:
+        for j in range(8):
+            x = _third(w3, twist, beta, rate, m, _NODES_8[j] * h)
+            total += _WEIGHTS_8[j] * ((E2 + L * x) / (L + C * x))
+    return (w1 + d1, w2 + d2, w3 + d3), h * total
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _long(moments: Vector, w: Vector, P: float, Q: float, rate: float, h: float) -> tuple[Vector, float]:
+    """w and ψ after any h."""
+    A, B, C = moments
+    w1, w2, w3 = w
+    gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
+    m, m1 = gba * Q / (gcb * P), gca * abs(_side_of_separatrix(A, B, C, w1, w3)) / (gcb * P)
+    M1, M2, M3 = A * w1, B * w2, C * w3
+    L = norm(M1, M2, M3)
+    E2 = w1 * M1 + w2 * M2 + w3 * M3
+    whole, beyond = 0.0, 0.0
+    u = rate * h
+    K = math.inf
+    if m1 > 0.0:
+        K = complete_quarter_period(m1)
+        whole = float(round(0.5 * u / K))
+        s, c, d = sn_cn_dn(u - 2.0 * K * whole, m, m1)
+        if whole % 2.0 != 0.0:
+            s, c = -s, -c
+    else:
+        if abs(u) > FARTHEST_ON_SEPARATRIX:
+            beyond = u - math.copysign(FARTHEST_ON_SEPARATRIX, u)
+            u -= beyond
+        s, c, d = sn_cn_dn(u, m, 0.0)
+    S = s / rate
+    bottom = (C * gca * w3 * w3 + B * gba * w2 * w2 * c * c) / P
+    v1 = (w1 * c - (C - B) / A * w2 * w3 * S * d) / bottom
+    v2 = (w2 * c * d + (C - A) / B * w1 * w3 * S) / bottom
+    v3 = (w3 * d - (B - A) / C * w1 * w2 * S * c) / bottom
+
+    k1 = math.sqrt(m1)
+    kappa, W, nu, f_a, f_b, modulus1 = precession_terms(A, B, C, P, Q, L, E2, m, k1)
+    sign = math.copysign(1.0, C - B)
+    x0, _ = _gauss_phase(w1 * math.sqrt(A * gca / Q), sign * w2 * math.sqrt(B * gcb / Q), w3 / W, k1)
+    x1, y1 = _gauss_phase(v1 * math.sqrt(A * gca / Q), sign * v2 * math.sqrt(B * gcb / Q), v3 / W, k1)
+    x, y = _gauss_phase(c, s, d, k1)
+    # By the addition theorem: the integral over the time itself, and what the phase of the start adds to it.
+    integral = _added_by_phase(x0, x, x1, y1, modulus1, kappa, nu)
+    if whole != 0.0:
+        integral += whole * 2.0 / 3.0 * carlson_rj(0.0, modulus1, 1.0, 1.0 + nu)
+        if whole % 2.0 != 0.0:
+            x = -x
+    integral += _third_kind(x, y, modulus1, nu)
+    psi = f_a * (u / rate) + f_b * (1.0 + kappa) / rate * integral
+    return (v1, v2, v3), psi + E2 / L * (beyond / rate)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def precession_terms(
+    A: float, B: float, C: float, P: float, Q: float, L: float, E2: float, m: float, k1: float
+) -> tuple[float, float, float, float, float, float]:
+    """κ, W (the largest w₃), ν, f_a, f_b and κ's complement m₁ of ψ' = f_a + f_b s²/(1 + νs²); k1 is √m₁, E2 is 2E."""
+    gca = abs(C - A)
+    kappa = m / ((1.0 + k1) * (1.0 + k1))
+    W = math.sqrt(P / (C * gca))
+    most = L + C * W
+    nu = kappa * A * Q / (gca * most * most)
+    f_a = (E2 + L * W) / most
+    f_b = 2.0 * kappa * W * math.copysign(Q, C - B) / (most * most)
+    return kappa, W, nu, f_a, f_b, 4.0 * k1 / ((1.0 + k1) * (1.0 + k1))
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _side_of_separatrix(A: float, B: float, C: float, w1: float, w3: float) -> float:
+    """C(C−B) w₃² − A(B−A) w₁² in pairs of doubles: near the separatrix the motion hangs on its last digits."""
+    g, g_low = two_sum(C, -B)
+    x, x_low = pair_multiply(g, g_low, C, 0.0)
+    s, s_low = two_product(w3, w3)
+    x, x_low = pair_multiply(x, x_low, s, s_low)
+    g, g_low = two_sum(B, -A)
+    y, y_low = pair_multiply(g, g_low, A, 0.0)
+    s, s_low = two_product(w1, w1)
+    y, y_low = pair_multiply(y, y_low, s, s_low)
+    distance, _ = pair_add(x, x_low, -y, -y_low)
+    return distance
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _gauss_phase(cn: float, sn: float, dn: float, k1: float) -> tuple[float, float]:
+    """sn and cn of Gauss's transformed modulus."""
+    s = sn * (1.0 + k1) / (1.0 + dn)
+    c = cn * math.sqrt(2.0 * (1.0 + k1) / ((dn + k1) * (1.0 + dn)))
+    size = math.sqrt(s * s + c * c)
+    return s / size, c / size
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _added_by_phase(s0: float, s: float, s1: float, c1: float, modulus1: float, kappa: float, nu: float) -> float:
+    """∫ from u₀ to u₀ + u less ∫ from 0 to u of sn²/(1 + ν sn²): s₀, s, s₁ are sn of u₀, u and u₀ + u, c₁
+    cn of the last.
+    """
+    d1 = math.sqrt(c1 * c1 + modulus1 * s1 * s1)
+    product = s0 * s * s1 / (1.0 + nu * s1 * s1 - nu * s0 * s * c1 * d1)
+    root = math.sqrt(nu * (1.0 + nu) * (nu + kappa * kappa))
+    angle = root * product
+    return product if abs(angle) < 1e-9 else inverse_tangent(angle) / root
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _third_kind(s: float, c: float, modulus1: float, nu: float) -> float:
+    """∫ sin²/(1 + ν sin²)/√(1 − κ² sin²) from 0 to φ."""
+    cc, ss = c * c, s * s
+    return s * ss / 3.0 * carlson_rj(cc, cc + modulus1 * ss, 1.0, 1.0 + nu * ss)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def free_body_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
-    q0, q1, q2, q3, w1, w2, w3 = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
-    a, b, c = p.moments[0], p.moments[1], p.moments[2]
+    q, w, _, _ = parts_of(y)
+    moments = p.moments[0], p.moments[1], p.moments[2]
     for done in range(n):
-        q0, q1, q2, q3, w1, w2, w3 = free_step(q0, q1, q2, q3, w1, w2, w3, a, b, c, h)
-        if not (abs(w1) + abs(w2) + abs(w3) <= MAX_SPEED and math.isfinite(q0 + q1 + q2 + q3)):
+        q, w = free_step(q, w, moments, h)
+        if not (abs(w[0]) + abs(w[1]) + abs(w[2]) <= MAX_SPEED and math.isfinite(q[0] + q[1] + q[2] + q[3])):
             return done
-        y[0], y[1], y[2], y[3], y[4], y[5], y[6] = q0, q1, q2, q3, w1, w2, w3
+        y[0], y[1], y[2], y[3] = q
+        y[4], y[5], y[6] = w
     return n
-
-
-def _methods(_integrator: Integrator) -> tuple[Method, ...]:
-    return (Method(ONE_STEP, free_body_steps, lambda _p, _step_s, _accuracy: "free_body: one exact step", 1),)
 
 
 FREE_BODY = Integrator(
     name="free_body",
     order=None,
     evaluations=1,
-    source="Jacobi's elliptic functions; see integrators/free_body_step.py",
+    source="Jacobi's elliptic functions; see integrators/free_body.py",
     limits="Torque-free motion alone, exact; the step has no bearing.",
     stability_limit=math.inf,
     supports=frozenset(),
     kernel=free_body_steps,
-    make_methods=_methods,
+    ways=(Method(ONE_STEP, free_body_steps, lambda _p, _step_s, _accuracy: "free_body: one exact step", 1),),
 )

@@ -15,17 +15,16 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import rotate
-from ..variables import damping_functions
-from .equations import undamped_torque
-from .free_body_step import free_step
-from .integrator import ANGULAR_DAMPING, LOADS, Integrator, is_good
-from .stepping import fixed_steps
+from ..variables import damping_functions, is_good
+from .equations import parts_of, undamped_torque
+from .free_body import free_step
+from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _push(y: np.ndarray, p: np.record) -> tuple[float, ...]:
     """Torque (principal axes) and acceleration (world axes) at the attitude of y: six numbers."""
-    tx, ty, tz = undamped_torque(y[0], y[1], y[2], y[3], p)
+    tx, ty, tz = undamped_torque((y[0], y[1], y[2], y[3]), p)
     if not p.translates:
         return tx, ty, tz, 0.0, 0.0, 0.0
     own, added = p.acceleration_body, p.acceleration_added
@@ -49,26 +48,19 @@ def _kick(y: np.ndarray, p: np.record, h: float, pushed: tuple[float, ...]) -> N
             y[10 + k] += h * damping_functions(linear * h)[0] * (pushed[3 + k] - linear * y[10 + k])
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
-def _drift(y: np.ndarray, h: float) -> None:
-    """Move the added displacement on with its velocity for h seconds, in place."""
-    for k in range(3):
-        y[7 + k] += h * y[10 + k]
-
-
 @njit(cache=True, error_model="numpy")
 def free_body_strang_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
-    a, b, c = p.moments[0], p.moments[1], p.moments[2]
+    moments = p.moments[0], p.moments[1], p.moments[2]
     new = y.copy()
     pushed = _push(new, p)
     for done in range(n):
         _kick(new, p, 0.5 * h, pushed)
-        new[0], new[1], new[2], new[3], new[4], new[5], new[6] = free_step(
-            new[0], new[1], new[2], new[3], new[4], new[5], new[6], a, b, c, h
-        )
+        q, w, _, _ = parts_of(new)
+        (new[0], new[1], new[2], new[3]), (new[4], new[5], new[6]) = free_step(q, w, moments, h)
         if p.translates:
-            _drift(new, h)
+            for k in range(3):
+                new[7 + k] += h * new[10 + k]
         # The next step's first half kick sees the same attitude.
         pushed = _push(new, p)
         _kick(new, p, 0.5 * h, pushed)
@@ -87,5 +79,4 @@ FREE_BODY_STRANG = Integrator(
     stability_limit=math.inf,
     supports=LOADS | {ANGULAR_DAMPING},
     kernel=free_body_strang_steps,
-    make_methods=fixed_steps,
 )

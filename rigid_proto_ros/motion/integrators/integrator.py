@@ -3,29 +3,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from ...base.compilation import njit
 from ..loads import Load
-
-MAX_SPEED = 1e100
-"""|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
-
-
-@njit(cache=True, error_model="numpy")
-def is_good(y: np.ndarray) -> bool:
-    """Whether variables y are finite and no runaway."""
-    size = 0.0
-    for j in range(4, 13):
-        size += abs(y[j])
-    # Negated sense, so that NaN counts as a runaway.
-    return size <= MAX_SPEED and math.isfinite(y[0] + y[1] + y[2] + y[3])
-
 
 BODY_TORQUE = "a torque"
 WORLD_TORQUE = "a torque fixed in the world or a world force off the centre of mass"
@@ -52,11 +37,17 @@ the variables stay.
 """
 
 
+Kernel = Callable[[np.ndarray, np.record, float, int], int]
+"""(y, p, h, n): takes up to n steps of h seconds in place and returns how many were good; a step whose result isn't
+finite or passes MAX_SPEED is undone.
+"""
+
+
 @dataclass(frozen=True)
 class Method:
     """A way to step, and the kernel that does it.
 
-    kernel: (y, p, h, n), or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps,
+    kernel: a Kernel, or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps,
     or samples; control: CONTROL of integrators/series_steps.py. choice(p, step_s, accuracy): what it is and why, in
     words. evaluations: of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room
     for the kernel. sleeps: nothing moves. on_string: for segments with a string alone. radians: of the fastest turn or
@@ -64,7 +55,7 @@ class Method:
     """
 
     way: int
-    kernel: Callable | None
+    kernel: Callable[..., Any] | None
     choice: Callable[[np.record, float, float], str]
     evaluations: int = 0
     workspace: Callable[[int], np.ndarray] | None = None
@@ -77,11 +68,8 @@ class Method:
 class Integrator:
     """order: global order of accuracy, None when exact. evaluations: of the equations of motion per step. source: where
     it is from. limits: what it is good for and what breaks it, one sentence. stability_limit: largest |ω|h, and ω_s h
-    of a string, at which a fixed step still says something. carries: which needs of a scene (above) it can meet.
-    kernel(y, p, h, n): take up to n steps of h seconds in place and return how many were good; a step whose result
-    isn't finite or passes MAX_SPEED is undone.
-    make_methods: the ways in which segments are stepped; chooses: by what a segment holds
-    (auto), else by whether a string is tied.
+    of a string, at which a fixed step still says something. supports: which needs of a scene (above) it can meet.
+    kernel: for fixed steps; None for auto. ways: how segments are stepped where that isn't by fixed steps of it.
     """
 
     name: str
@@ -91,14 +79,24 @@ class Integrator:
     limits: str
     stability_limit: float
     supports: frozenset[str]
-    kernel: Callable[[np.ndarray, np.record, float, int], int] | None
-    make_methods: Callable[[Integrator], tuple[Method, ...]]
-    chooses: bool = False
+    kernel: Kernel | None
+    ways: tuple[Method, ...] = ()
+
+    @property
+    def chooses(self) -> bool:
+        """Whether it goes by what a segment holds (auto), and not by whether a string is tied alone."""
+        return self.kernel is None
 
     @cached_property
     def methods(self) -> tuple[Method, ...]:
         """How segments are stepped, in the order of auto's kinds, or without and with a string."""
-        return self.make_methods(self)
+        if self.ways:
+            return self.ways
+        without = Method(FIXED_STEPS, self.kernel, self._fixed_choice, self.evaluations)
+        return without, replace(without, on_string=True)
+
+    def _fixed_choice(self, _p: np.record, step_s: float, _accuracy: float) -> str:
+        return f"{self.name}: fixed steps of {step_s:g} s"
 
     @cached_property
     def supports_loads(self) -> bool:

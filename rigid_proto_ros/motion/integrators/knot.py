@@ -17,35 +17,31 @@ from ...base.compilation import njit
 from ...base.exact_arithmetic import fast_two_sum, two_product, two_sum
 from ..variables import LOW
 
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _difference(a: float, a_low: float, b: float, c: float, c_low: float, d: float) -> tuple[float, float]:
-    """a b − c d as a pair, b and d doubles."""
-    x, e = two_product(a, b)
-    y, f = two_product(c, d)
-    s, g = two_sum(x, -y)
-    return s, g + (e - f) + (a_low * b - c_low * d)
-
-
+Pair = tuple[float, float]
+"""high + low."""
 Knot = tuple[float, float, float, float, float]
 """From the free end to the knot (3,) [m, world], its length l, and l − rest length [m]."""
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def knot_and_stretch(y: np.ndarray, p: np.record) -> tuple[float, float, float, float, float]:
-    """From the free end to the knot (world), its length l, and l − rest length with an error of 1e-30 m
-    and not of 1e-16 m.
-    """
+def _difference(a: Pair, b: float, c: Pair, d: float) -> Pair:
+    """a b − c d."""
+    x, e = two_product(a[0], b)
+    y, f = two_product(c[0], d)
+    s, g = two_sum(x, -y)
+    return s, g + (e - f) + (a[1] * b - c[1] * d)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def knot_and_stretch(y: np.ndarray, p: np.record) -> Knot:
+    """The knot at variables y, l − rest length with an error of 1e-30 m and not of 1e-16 m."""
     r1, r2, r3 = p.attach[0], p.attach[1], p.attach[2]
-    qx, qy, qz, qw = y[0], y[1], y[2], y[3]
-    lx, ly, lz, lw = y[LOW], y[LOW + 1], y[LOW + 2], y[LOW + 3]
+    qx, qy, qz, qw = (y[0], y[LOW]), (y[1], y[LOW + 1]), (y[2], y[LOW + 2]), (y[3], y[LOW + 3])
     # t = u × r, R r = r + 2 (w t + u × t) with q = (u, w).
-    t1, f1 = _difference(qy, ly, r3, qz, lz, r2)
-    t2, f2 = _difference(qz, lz, r1, qx, lx, r3)
-    t3, f3 = _difference(qx, lx, r2, qy, ly, r1)
-    a1, b1 = _moved(y, p, 0, r1, qw, lw, t1, f1, qy, ly, t3, f3, qz, lz, t2, f2)
-    a2, b2 = _moved(y, p, 1, r2, qw, lw, t2, f2, qz, lz, t1, f1, qx, lx, t3, f3)
-    a3, b3 = _moved(y, p, 2, r3, qw, lw, t3, f3, qx, lx, t2, f2, qy, ly, t1, f1)
+    t1, t2, t3 = _difference(qy, r3, qz, r2), _difference(qz, r1, qx, r3), _difference(qx, r2, qy, r1)
+    a1, b1 = _moved(y, p, 0, r1, qw, t1, qy, t3, qz, t2)
+    a2, b2 = _moved(y, p, 1, r2, qw, t2, qz, t1, qx, t3)
+    a3, b3 = _moved(y, p, 2, r3, qw, t3, qx, t2, qy, t1)
     s1, e1 = two_product(a1, a1)
     s2, e2 = two_product(a2, a2)
     s3, e3 = two_product(a3, a3)
@@ -62,28 +58,15 @@ def knot_and_stretch(y: np.ndarray, p: np.record) -> tuple[float, float, float, 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _moved(
-    y: np.ndarray,
-    p: np.record,
-    k: int,
-    r: float,
-    w: float,
-    w_low: float,
-    t: float,
-    t_low: float,
-    ua: float,
-    ua_low: float,
-    ta: float,
-    ta_low: float,
-    ub: float,
-    ub_low: float,
-    tb: float,
-    tb_low: float,
-) -> tuple[float, float]:
-    """Component k of start + d + r + 2 (w t + ua ta − ub tb) as a pair."""
-    x1, e1 = two_product(w, t)
-    x2, e2 = two_product(ua, ta)
-    x3, e3 = two_product(ub, tb)
-    low = (e1 + e2 - e3) + (w_low * t + w * t_low) + (ua_low * ta + ua * ta_low) - (ub_low * tb + ub * tb_low)
+    y: np.ndarray, p: np.record, k: int, r: float, w: Pair, t: Pair, ua: Pair, ta: Pair, ub: Pair, tb: Pair
+) -> Pair:
+    """Component k of start + d + r + 2 (w t + ua ta − ub tb)."""
+    x1, e1 = two_product(w[0], t[0])
+    x2, e2 = two_product(ua[0], ta[0])
+    x3, e3 = two_product(ub[0], tb[0])
+    low = (
+        (e1 + e2 - e3) + (w[1] * t[0] + w[0] * t[1]) + (ua[1] * ta[0] + ua[0] * ta[1]) - (ub[1] * tb[0] + ub[0] * tb[1])
+    )
     s, g1 = two_sum(x1, x2)
     s, g2 = two_sum(s, -x3)
     low = 2.0 * (low + g1 + g2)

@@ -24,9 +24,10 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize, rotate
-from .equations import torque
-from .integrator import ANGULAR_DAMPING, LOADS, Integrator, is_good
-from .stepping import fixed_steps
+from ...base.vectors import Quaternion, Vector
+from ..variables import is_good
+from .equations import parts_of, torque
+from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 
 _MAX_ITERATIONS = 60
 """Newton's method needs 3 to 6; far more only where the step is too long for a solution to be found."""
@@ -35,52 +36,39 @@ _ROUNDING = 2.0**-52
 
 
 @njit(cache=True, error_model="numpy")
-def _half_turned(
-    qx: float, qy: float, qz: float, qw: float, ox: float, oy: float, oz: float, h: float
-) -> tuple[float, float, float, float]:
-    """The mean attitude: half of the Cayley turn of ω̄ after q."""
-    a, b, c = 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz
+def _half_turned(q: Quaternion, o: Vector, h: float) -> Quaternion:
+    """The mean attitude: half of the Cayley turn of ω̄ = o after q."""
+    a, b, c = 0.5 * h * o[0], 0.5 * h * o[1], 0.5 * h * o[2]
     w = math.sqrt(1.0 + a * a + b * b + c * c)
-    qx, qy, qz, qw = multiply(qx, qy, qz, qw, a, b, c, 1.0 + w)
-    return normalize(qx, qy, qz, qw)
+    return normalize(*multiply(*q, a, b, c, 1.0 + w))
 
 
 @njit(cache=True, error_model="numpy")
-def _cayley_turned(
-    qx: float, qy: float, qz: float, qw: float, ox: float, oy: float, oz: float, h: float
-) -> tuple[float, float, float, float]:
-    """The attitude after the whole turn: q ⊗ (½hω̄, 1), normalized."""
-    qx, qy, qz, qw = multiply(qx, qy, qz, qw, 0.5 * h * ox, 0.5 * h * oy, 0.5 * h * oz, 1.0)
-    return normalize(qx, qy, qz, qw)
+def _mean_torque(o: Vector, t: Vector, h: float) -> Vector:
+    """t − ½h ω̄ × t for a torque t in the axes of the mean attitude."""
+    s = math.sqrt(1.0 + 0.25 * h * h * (o[0] * o[0] + o[1] * o[1] + o[2] * o[2]))
+    along = -0.25 * h * h / (1.0 + s) * (o[0] * t[0] + o[1] * t[1] + o[2] * t[2])
+    return s * t[0] + along * o[0], s * t[1] + along * o[1], s * t[2] + along * o[2]
 
 
 @njit(cache=True, error_model="numpy")
-def _mean_torque(
-    ox: float, oy: float, oz: float, tx: float, ty: float, tz: float, h: float
-) -> tuple[float, float, float]:
-    """t − ½h ω̄ × t for a torque (tx, ty, tz) in the axes of the mean attitude."""
-    s = math.sqrt(1.0 + 0.25 * h * h * (ox * ox + oy * oy + oz * oz))
-    along = -0.25 * h * h / (1.0 + s) * (ox * tx + oy * ty + oz * tz)
-    return s * tx + along * ox, s * ty + along * oy, s * tz + along * oz
+def _change_of_momentum(q: Quaternion, o: Vector, p: np.record, h: float) -> Vector:
+    """I(ω⁺ − ω) that follows from the mean spin."""
+    tx, ty, tz = _mean_torque(o, torque(_half_turned(q, o, h), o, p), h)
+    A, B, C = p.moments[0], p.moments[1], p.moments[2]
+    gx, gy, gz = (B - C) * o[1] * o[2], (C - A) * o[2] * o[0], (A - B) * o[0] * o[1]
+    return h * (tx + gx), h * (ty + gy), h * (tz + gz)
 
 
 @njit(cache=True, error_model="numpy")
-def _gyroscopic_torque(ox: float, oy: float, oz: float, p: np.record) -> tuple[float, float, float]:
-    """−ω̄ × Iω̄."""
-    a, b, c = p.moments[0], p.moments[1], p.moments[2]
-    return (b - c) * oy * oz, (c - a) * oz * ox, (a - b) * ox * oy
-
-
-@njit(cache=True, error_model="numpy")
-def _newton_correction(
-    ox: float, oy: float, oz: float, rx: float, ry: float, rz: float, h: float, p: np.record
-) -> tuple[float, float, float]:
+def _newton_correction(o: Vector, r: Vector, h: float, p: np.record) -> Vector:
     """δ with J δ = −residual r of 2I(ω̄ − ω) − h(...) = 0.
 
     J = 2I + h([ω̄]× I − [Iω̄]× + c): gyroscopic term and damping exactly (its torque is −c ω̄ in the axes of the start
     too).
     """
     damping = h * p.damping_angular
+    ox, oy, oz = o
     A, B, C = p.moments[0], p.moments[1], p.moments[2]
     j00, j11, j22 = 2.0 * A + damping, 2.0 * B + damping, 2.0 * C + damping
     # Row i of ω̄ × Iω̄ differentiated; for instance (C − B) ω̄₂ω̄₃.
@@ -92,52 +80,41 @@ def _newton_correction(
     c20, c21, c22 = j10 * j21 - j11 * j20, j01 * j20 - j00 * j21, j00 * j11 - j01 * j10
     d = -1.0 / (j00 * c00 + j01 * c10 + j02 * c20)
     return (
-        d * (c00 * rx + c01 * ry + c02 * rz),
-        d * (c10 * rx + c11 * ry + c12 * rz),
-        d * (c20 * rx + c21 * ry + c22 * rz),
+        d * (c00 * r[0] + c01 * r[1] + c02 * r[2]),
+        d * (c10 * r[0] + c11 * r[1] + c12 * r[2]),
+        d * (c20 * r[0] + c21 * r[1] + c22 * r[2]),
     )
-
-
-@njit(cache=True, error_model="numpy")
-def _change_of_momentum(
-    y: np.ndarray, ox: float, oy: float, oz: float, p: np.record, h: float
-) -> tuple[float, float, float]:
-    """I(ω⁺ − ω) that follows from the mean spin."""
-    mx, my, mz, mw = _half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
-    tx, ty, tz = torque(mx, my, mz, mw, ox, oy, oz, p)
-    tx, ty, tz = _mean_torque(ox, oy, oz, tx, ty, tz, h)
-    gx, gy, gz = _gyroscopic_torque(ox, oy, oz, p)
-    return h * (tx + gx), h * (ty + gy), h * (tz + gz)
 
 
 @njit(cache=True, error_model="numpy")
 def _step(y: np.ndarray, p: np.record, h: float, out: np.ndarray) -> bool:
     """One step from y into out; returns whether the iteration converged."""
     A, B, C = p.moments[0], p.moments[1], p.moments[2]
-    wx, wy, wz = y[4], y[5], y[6]
-    ox, oy, oz = wx, wy, wz
+    q, w, _, _ = parts_of(y)
+    wx, wy, wz = o = w
     change = 0.0
     converged = False
     for _ in range(_MAX_ITERATIONS):
-        kx, ky, kz = _change_of_momentum(y, ox, oy, oz, p, h)
-        rx, ry, rz = 2.0 * A * (ox - wx) - kx, 2.0 * B * (oy - wy) - ky, 2.0 * C * (oz - wz) - kz
-        ex, ey, ez = _newton_correction(ox, oy, oz, rx, ry, rz, h, p)
-        ox, oy, oz = ox + ex, oy + ey, oz + ez
+        kx, ky, kz = _change_of_momentum(q, o, p, h)
+        r = 2.0 * A * (o[0] - wx) - kx, 2.0 * B * (o[1] - wy) - ky, 2.0 * C * (o[2] - wz) - kz
+        ex, ey, ez = _newton_correction(o, r, h, p)
+        o = o[0] + ex, o[1] + ey, o[2] + ez
         before, change = change, max(abs(ex), abs(ey), abs(ez))
-        size = max(abs(ox), abs(oy), abs(oz))
+        size = max(abs(o[0]), abs(o[1]), abs(o[2]))
         # Converged when corrections are rounding and no longer shrink.
         if change <= _ROUNDING * size or (
             change <= 64.0 * _ROUNDING * size and before != 0.0 and change >= 0.5 * before
         ):
             converged = True
             break
-    kx, ky, kz = _change_of_momentum(y, ox, oy, oz, p, h)
+    kx, ky, kz = _change_of_momentum(q, o, p, h)
     out[4], out[5], out[6] = wx + kx / A, wy + ky / B, wz + kz / C
-    out[0], out[1], out[2], out[3] = _cayley_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
+    # The whole Cayley turn: q ⊗ (½hω̄, 1).
+    turned = multiply(*q, 0.5 * h * o[0], 0.5 * h * o[1], 0.5 * h * o[2], 1.0)
+    out[0], out[1], out[2], out[3] = normalize(*turned)
     if p.translates:
         own, added, c = p.acceleration_body, p.acceleration_added, p.damping_linear
-        mx, my, mz, mw = _half_turned(y[0], y[1], y[2], y[3], ox, oy, oz, h)
-        push = rotate(mx, my, mz, mw, own[0], own[1], own[2])
+        push = rotate(*_half_turned(q, o, h), own[0], own[1], own[2])
         for k in range(3):
             # v⁺ = v + h(a − c ½(v + v⁺)), solved.
             mean = (y[10 + k] + 0.5 * h * (push[k] + added[k])) / (1.0 + 0.5 * h * c)
@@ -166,5 +143,4 @@ LIE_MIDPOINT = Integrator(
     stability_limit=1.0,
     supports=LOADS | {ANGULAR_DAMPING},
     kernel=lie_midpoint_steps,
-    make_methods=fixed_steps,
 )

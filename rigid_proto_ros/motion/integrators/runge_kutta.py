@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Explicit Runge-Kutta methods by their tableau, and the loop over steps of one length that all such methods share.
+"""Explicit Runge-Kutta methods by their tableau, rk4 among them, and the loop over steps of one length that all
+methods with fixed steps share.
 
 Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.1. The quaternion is
-normalized after the step; the right-hand side takes its direction only, so stages may leave the unit sphere.
+normalized after the step; the right-hand side takes its direction only, so stages may leave the unit sphere. Euler's
+equations with the gyroscopic term: Goldstein, Classical Mechanics (2002), section 5.5.
 """
 
 from __future__ import annotations
@@ -15,15 +17,18 @@ from ...base.borrowed_views import copy_numbers
 from ...base.compilation import njit
 from ...base.rotation import normalize
 from ...base.simd import Packed, filled, four, joined, load, number, store
-from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY
+from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good
 from .equations import accelerations, stretch, tension_margin
-from .integrator import is_good
+from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator, Kernel
 from .string_law import excursion, is_one_sided, shortening_heat
 
-Step = Callable[[np.ndarray, np.record, float, bool, np.ndarray, np.ndarray], None]
-"""One step (y, p, h, pulls, k, out) of h seconds from variables y into out with the string's law given; k (s, 16):
-room for the rates of s stages.
+Step = Callable[[np.ndarray, np.record, float, bool, np.ndarray, np.ndarray, np.ndarray], None]
+"""One step (y, p, h, pulls, tableau, k, out) of h seconds from variables y into out with the string's law given.
+tableau (s + 1, s): the weights aᵢⱼ of s stages, and as its last row those of the step, bⱼ; k (s, 16): room for rates.
 """
+
+ONE_STAGE = np.array([[0.0], [1.0]])
+"""The tableau of Euler's method."""
 
 _MAX_PARTS = 1000
 """Of one step: more is chatter of a step far too long for its string, and the rest of it is taken with one law."""
@@ -39,7 +44,8 @@ def _rates(z: Packed, p: np.record, pulls: bool) -> Packed:
     """Time derivatives of the variables z, four by four: q; ω and the hand's work; d and the damper's heat; u."""
     qx, qy, qz, qw = number(z, 0), number(z, 1), number(z, 2), number(z, 3)
     wx, wy, wz = number(z, 4), number(z, 5), number(z, 6)
-    ux, uy, uz = number(z, 12), number(z, 13), number(z, 14)
+    d = number(z, 8), number(z, 9), number(z, 10)
+    u = number(z, 12), number(z, 13), number(z, 14)
     turned = four(
         0.5 * (qw * wx + qy * wz - qz * wy),
         0.5 * (qw * wy - qx * wz + qz * wx),
@@ -48,16 +54,16 @@ def _rates(z: Packed, p: np.record, pulls: bool) -> Packed:
     )
     if p.translates or p.has_world_torque:
         qx, qy, qz, qw = normalize(qx, qy, qz, qw)
-    dx, dy, dz = number(z, 8), number(z, 9), number(z, 10)
-    ex, ey, ez, ax, ay, az, work, heat = accelerations(qx, qy, qz, qw, wx, wy, wz, dx, dy, dz, ux, uy, uz, p, pulls)
-    return joined(turned, four(ex, ey, ez, work), four(ux, uy, uz, heat), four(ax, ay, az, 0.0))
+    turning, moving, work, heat = accelerations((qx, qy, qz, qw), (wx, wy, wz), d, u, p, pulls)
+    return joined(turned, four(*turning, work), four(*u, heat), four(*moving, 0.0))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def tableau_step(
-    y: np.ndarray, p: np.record, h: float, pulls: bool, k: np.ndarray, out: np.ndarray, A: np.ndarray, b: np.ndarray
+    y: np.ndarray, p: np.record, h: float, pulls: bool, tableau: np.ndarray, k: np.ndarray, out: np.ndarray
 ) -> None:
-    """A ``Step`` by the method with stages A (s, s) and weights b (s,): kᵢ = f(y + h Σ Aᵢⱼ kⱼ), out = y + h Σ bᵢ kᵢ."""
+    """A ``Step``: kᵢ = f(y + h Σ aᵢⱼ kⱼ), out = y + h Σ bᵢ kᵢ."""
+    stages = tableau.shape[1]
     # What was stored one by one is loaded one by one: nothing waits until it is written.
     start = joined(
         four(y[0], y[1], y[2], y[3]),
@@ -66,14 +72,14 @@ def tableau_step(
         four(y[VELOCITY], y[VELOCITY + 1], y[VELOCITY + 2], 0.0),
     )
     total = filled(0.0, 16)
-    for i in range(b.shape[0]):
+    for i in range(stages):
         z = filled(0.0, 16)
         for j in range(i):
-            if A[i, j] != 0.0:
-                z = z + load(k, 16 * j, z) * A[i, j]
+            if tableau[i, j] != 0.0:
+                z = z + load(k, 16 * j, z) * tableau[i, j]
         rate = _rates(start + z * h, p, pulls)
         store(k, 16 * i, rate)
-        total = total + rate * b[i]
+        total = total + rate * tableau[stages, i]
     end = start + total * h
     out[0], out[1], out[2], out[3] = normalize(number(end, 0), number(end, 1), number(end, 2), number(end, 3))
     out[SPIN], out[SPIN + 1], out[SPIN + 2] = number(end, 4), number(end, 5), number(end, 6)
@@ -83,18 +89,18 @@ def tableau_step(
 
 
 @njit(inline="always", error_model="numpy")
-def repeated(step: Step, y: np.ndarray, p: np.record, h: float, n: int, stages: int) -> int:
+def repeated(step: Step, tableau: np.ndarray, y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place, each cut where a pull-only string turns slack or taut; returns the number of
     good ones.
 
     Put into the kernel that calls it, since numba keeps no compiled code that was handed a function.
     """
-    new, k = y.copy(), np.zeros((stages, 16))
+    new, k = y.copy(), np.zeros((tableau.shape[1], 16))
     for done in range(n):
         if is_one_sided(p):
-            _step_on_string(step, y, p, h, k, new)
+            _step_on_string(step, tableau, y, p, h, k, new)
         else:
-            step(y, p, h, True, k, new)
+            step(y, p, h, True, tableau, k, new)
         if not is_good(new):
             return done
         copy_numbers(new, y)
@@ -102,7 +108,9 @@ def repeated(step: Step, y: np.ndarray, p: np.record, h: float, n: int, stages: 
 
 
 @njit(inline="always", error_model="numpy")
-def _step_on_string(step: Step, y: np.ndarray, p: np.record, h: float, k: np.ndarray, end: np.ndarray) -> None:
+def _step_on_string(
+    step: Step, tableau: np.ndarray, y: np.ndarray, p: np.record, h: float, k: np.ndarray, end: np.ndarray
+) -> None:
     """A step of h seconds from y into ``end``: the law of tension has a kink (a jump, with a damper) where it changes,
     and a step across that would lose its order.
     """
@@ -111,12 +119,12 @@ def _step_on_string(step: Step, y: np.ndarray, p: np.record, h: float, k: np.nda
         # 1. All that is left, with the law at its start.
         low, high, at_low = 0.0, left, tension_margin(here, p)
         pulls = at_low > 0.0
-        step(here, p, left, pulls, k, end)
+        step(here, p, left, pulls, tableau, k, end)
         at_high = tension_margin(end, p)
         # 2. Within it the law may change and change back: where that is likely the step is looked at.
         look = excursion(here, end, left, p, pulls)
         if look > 0.0:
-            step(here, p, look, pulls, k, end)
+            step(here, p, look, pulls, tableau, k, end)
             margin = tension_margin(end, p)
             if (margin > 0.0) == pulls:
                 low, at_low = look, margin
@@ -133,7 +141,7 @@ def _step_on_string(step: Step, y: np.ndarray, p: np.record, h: float, k: np.nda
                     middle = root if low <= root <= high else middle
                 # A root at one end is closed in on from the other side by the smallest step.
                 middle = min(max(middle, low + 0.5 * resolution), high - 0.5 * resolution)
-                step(here, p, middle, pulls, k, end)
+                step(here, p, middle, pulls, tableau, k, end)
                 margin = tension_margin(end, p)
                 if (margin > 0.0) == pulls:
                     low, at_low, at_high = middle, margin, 0.5 * at_high
@@ -141,10 +149,42 @@ def _step_on_string(step: Step, y: np.ndarray, p: np.record, h: float, k: np.nda
                     high, at_high, at_low = middle, margin, 0.5 * at_low
         else:
             high = left
-        step(here, p, high, pulls, k, end)
+        step(here, p, high, pulls, tableau, k, end)
         if not pulls:
             end[HEAT] += shortening_heat(p, stretch(here, p)[0], stretch(end, p)[0])
         left -= high
         if left <= resolution:
             break
         copy_numbers(end, here)
+
+
+def explicit(tableau: np.ndarray) -> Kernel:
+    """The kernel of the explicit method with this tableau (s + 1, s)."""
+
+    @njit(cache=True, error_model="numpy")
+    def steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+        return repeated(tableau_step, tableau, y, p, h, n)
+
+    return steps
+
+
+RK4 = Integrator(
+    name="rk4",
+    order=4,
+    evaluations=4,
+    source="Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.1",
+    limits="Explicit: diverges beyond |ω|h of about 2.8; energy drifts with h⁵ per step.",
+    stability_limit=1.0,
+    supports=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
+    kernel=explicit(
+        np.array(
+            [
+                [0.0, 0.0, 0.0, 0.0],
+                [0.5, 0.0, 0.0, 0.0],
+                [0.0, 0.5, 0.0, 0.0],
+                [0.0, 0.0, 1.0, 0.0],
+                [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
+            ]
+        )
+    ),
+)

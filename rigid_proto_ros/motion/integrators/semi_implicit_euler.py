@@ -12,32 +12,31 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize
-from .equations import accelerations
+from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY
+from .equations import accelerations, parts_of
 from .integrator import ANGULAR_DAMPING, LOADS, STRING, Integrator
-from .runge_kutta import repeated
-from .stepping import fixed_steps
+from .runge_kutta import ONE_STAGE, repeated
 
 
 @njit(cache=True, error_model="numpy")
-def _step(y: np.ndarray, p: np.record, h: float, pulls: bool, _k: np.ndarray, out: np.ndarray) -> None:
-    qx, qy, qz, qw, wx, wy, wz = y[0], y[1], y[2], y[3], y[4], y[5], y[6]
-    ex, ey, ez, ax, ay, az, work, heat = accelerations(
-        qx, qy, qz, qw, wx, wy, wz, y[7], y[8], y[9], y[10], y[11], y[12], p, pulls
-    )
-    wx, wy, wz = wx + h * ex, wy + h * ey, wz + h * ez
-    rx, ry, rz, rw = exponential(h * wx, h * wy, h * wz)
-    qx, qy, qz, qw = multiply(qx, qy, qz, qw, rx, ry, rz, rw)
-    out[0], out[1], out[2], out[3] = normalize(qx, qy, qz, qw)
-    out[4], out[5], out[6] = wx, wy, wz
-    out[10], out[11], out[12] = y[10] + h * ax, y[11] + h * ay, y[12] + h * az
-    out[7], out[8], out[9] = y[7] + h * out[10], y[8] + h * out[11], y[9] + h * out[12]
-    out[13], out[14] = y[13] + h * work, y[14] + h * heat
+def _step(
+    y: np.ndarray, p: np.record, h: float, pulls: bool, _tableau: np.ndarray, _k: np.ndarray, out: np.ndarray
+) -> None:
+    q, w, d, u = parts_of(y)
+    turning, moving, work, heat = accelerations(q, w, d, u, p, pulls)
+    for j in range(3):
+        out[SPIN + j] = w[j] + h * turning[j]
+        out[VELOCITY + j] = u[j] + h * moving[j]
+        out[DISPLACEMENT + j] = d[j] + h * out[VELOCITY + j]
+    turn = exponential(h * out[SPIN], h * out[SPIN + 1], h * out[SPIN + 2])
+    out[0], out[1], out[2], out[3] = normalize(*multiply(*q, *turn))
+    out[HAND_WORK], out[HEAT] = y[HAND_WORK] + h * work, y[HEAT] + h * heat
 
 
 @njit(cache=True, error_model="numpy")
 def semi_implicit_euler_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
-    return repeated(_step, y, p, h, n, 1)
+    return repeated(_step, ONE_STAGE, y, p, h, n)
 
 
 SEMI_IMPLICIT_EULER = Integrator(
@@ -50,5 +49,4 @@ SEMI_IMPLICIT_EULER = Integrator(
     stability_limit=0.1,
     supports=LOADS | {ANGULAR_DAMPING, STRING},
     kernel=semi_implicit_euler_steps,
-    make_methods=fixed_steps,
 )

@@ -19,6 +19,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
+from ...base.rotation import norm
 from ...base.simd import (
     Packed,
     arranged,
@@ -36,9 +37,8 @@ from ...base.simd import (
     triple,
 )
 from ..string import NO_DIRECTION
-from ..variables import DISPLACEMENT, HAND_WORK, HEAT, LOW, SPIN, VELOCITY
-from .error_measure import scales_of
-from .integrator import MAX_SPEED
+from ..variables import DISPLACEMENT, HAND_WORK, HEAT, LOW, MAX_SPEED, SPIN, VELOCITY
+from .error_measure import Weights, scales_of
 from .knot import Knot, moved_pair, unit_attitude
 
 
@@ -118,7 +118,7 @@ def put_variables(variables: Packed, y: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def scales_at(variables: Packed, p: np.record, elapsed: float) -> tuple[float, float, float, float]:
+def scales_at(variables: Packed, p: np.record, elapsed: float) -> Weights:
     """Weights of errors at the variables, ``elapsed`` seconds into the segment (integrators/error_measure.py)."""
     w = number(variables, 4), number(variables, 5), number(variables, 6)
     return scales_of(w, (number(variables, 12), number(variables, 13), number(variables, 14)), p, elapsed)
@@ -218,7 +218,7 @@ def spin_at(c: np.ndarray, degree: int, h: float) -> Packed:
 @njit(cache=True, error_model="numpy", allocates=False)
 def are_good(variables: Packed) -> bool:
     """Finite and no runaway."""
-    return largest(variables) <= MAX_SPEED
+    return bool(largest(variables) <= MAX_SPEED)
 
 
 # Loads of any kind, and a string
@@ -239,7 +239,7 @@ MOTION_COLUMNS = 136
 def _dot(a: Packed, b: Packed) -> float:
     """Of the first three components."""
     ab = a * b
-    return number(ab, 0) + number(ab, 1) + number(ab, 2)
+    return float(number(ab, 0) + number(ab, 1) + number(ab, 2))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -489,7 +489,7 @@ def stretch_at(c: np.ndarray, p: np.record, degree: int, h: float) -> tuple[floa
     ax, ay, az, bx, by, bz = number(a, 0), number(a, 1), number(a, 2), number(b, 0), number(b, 1), number(b, 2)
     dx, dy, dz = ax * h, ay * h, az * h
     ax, ay, az = c[0, A_KNOT] + dx, c[0, A_KNOT + 1] + dy, c[0, A_KNOT + 2] + dz
-    length = math.sqrt(ax * ax + ay * ay + az * az)
+    length = norm(ax, ay, az)
     if length == 0.0:
         return -p.rest_length, 0.0
     # The change of length without cancellation: l⁺² − l² = (a⁺ − a)·(a⁺ + a).

@@ -27,10 +27,9 @@ from ...base.compilation import njit
 from ...base.elementary import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of, logarithm
 from ...base.records import record_type
 from ...base.simd import Packed, aligned, filled, four, joined, largest, load
-from ..variables import ATTITUDE, HEAT, STORED
-from .error_measure import FLOOR, WEIGHINGS, heavier, jump_of_displacement, scales
+from ..variables import ATTITUDE, HEAT, STORED, is_good
+from .error_measure import FLOOR, WEIGHINGS, Weights, heavier, jump_of_displacement, scales
 from .first_root import NONE
-from .integrator import is_good
 from .series import (
     A_KNOT,
     MOTION_COLUMNS,
@@ -123,7 +122,7 @@ def fast_log2(x: float) -> float:
     bits = bits_of(x)
     # m − 1 with x = 2ⁿ m: exact where x is normal. log₂ m − (m − 1) vanishes at m = 1 and 2; the line has its slopes
     # there.
-    f = double_of((bits & MANTISSA) | (BIAS << MANTISSA_BITS)) - 1.0
+    f: float = double_of((bits & MANTISSA) | (BIAS << MANTISSA_BITS)) - 1.0
     return float((bits >> MANTISSA_BITS) - BIAS) + f + f * (1.0 - f) * (0.4427 - 0.164 * f)
 
 
@@ -132,7 +131,7 @@ def fast_exp2(x: float) -> float:
     """2ˣ with a relative error below 0.001, for x cut to ±1000."""
     whole = math.floor(min(max(x, -1000.0), 1000.0))
     f = min(max(x, -1000.0), 1000.0) - whole
-    power = double_of((int(whole) + BIAS) << MANTISSA_BITS)
+    power: float = double_of((int(whole) + BIAS) << MANTISSA_BITS)
     return power * (1.0 + f - f * (1.0 - f) * (0.3069 + 0.0794 * f))
 
 
@@ -175,9 +174,7 @@ def _length_for(growth: float, accuracy: float, degree: int, part: float) -> flo
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _allowed_length(
-    c: np.ndarray, degree: int, weights: tuple[float, float, float, float], accuracy: float, part: float
-) -> float:
+def _allowed_length(c: np.ndarray, degree: int, weights: Weights, accuracy: float, part: float) -> float:
     """h [s] after which a series of the motion errs by this part of the accuracy times h."""
     attitude, spin, place, speed = weights
     of_row = joined(
@@ -221,19 +218,6 @@ def _accept_step(control: np.record, length_ns: int) -> None:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _commit(control: np.record, y: np.ndarray, following: np.ndarray, room_ns: int) -> int:
-    """Commit the step that waits, which ends in ``following``, in y if it fits into ``room_ns``; returns its length
-    [ns], 0 where it goes beyond.
-    """
-    length = control.accepted_ns
-    if length > room_ns:
-        return 0
-    copy_numbers(following, y)
-    _count(control)
-    return length
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
 def _count(control: np.record) -> None:
     """The step that waits is committed."""
     control.elapsed_ns += control.accepted_ns
@@ -252,12 +236,6 @@ def spin_workspace(degree: int) -> np.ndarray:
     them once more.
     """
     return aligned((degree + 1, SPIN_COLUMNS))
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _weights_of_row(weights: tuple[float, float, float, float]) -> Packed:
-    attitude, spin, place, speed = weights
-    return joined(filled(attitude, 4), filled(spin, 4), filled(place, 4), filled(speed, 4))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -297,7 +275,10 @@ def spin_steps(
                 spin_series(here, p, degree, c)
                 control.series = True
             for _ in range(WEIGHINGS):
-                growth = _log2_growth(c, VARIABLES_AT, SPIN_COLUMNS, degree, _weights_of_row(weights))
+                of_row = joined(
+                    filled(weights[0], 4), filled(weights[1], 4), filled(weights[2], 4), filled(weights[3], 4)
+                )
+                growth = _log2_growth(c, VARIABLES_AT, SPIN_COLUMNS, degree, of_row)
                 length = int(_length_for(growth, accuracy, degree, PART) * 1e9)
                 there = spin_at(c, degree, length * 1e-9)
                 if length < 1 or not are_good(there):
@@ -334,9 +315,7 @@ def motion_workspace(degree: int) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _lay_out(
-    y: np.ndarray, p: np.record, control: np.record, weights: tuple[float, float, float, float], c: np.ndarray
-) -> int:
+def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, c: np.ndarray) -> int:
     """Series of one step from y into c and control; returns its length [ns], 0 when there is none.
     weights: of errors.
     """
@@ -456,7 +435,9 @@ def motion_steps(
         if sampling:
             _reach(p, control, c, span_ns, y)
             return span_ns if is_good(y) else 0
-        length = _commit(control, y, following, span_ns - advanced)
-        if length == 0:
+        length = int(control.accepted_ns)
+        if length > span_ns - advanced:
             return advanced
+        copy_numbers(following, y)
+        _count(control)
         advanced += length

@@ -8,7 +8,6 @@ takes one shorter step from there on a copy. So neither depends on when anybody 
 from __future__ import annotations
 
 import functools
-from dataclasses import replace
 
 import numpy as np
 from numba import boolean, float64, from_dtype, int64, types
@@ -17,7 +16,7 @@ from ...base.compilation import njit
 from ...base.function_pointers import address_of, function_at
 from ...base.records import record_type
 from ..problem import PROBLEM
-from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Integrator, Method
+from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Integrator
 from .series_steps import CONTROL
 
 STEPS = types.FunctionType(int64(float64[::1], from_dtype(PROBLEM), float64, int64))
@@ -29,17 +28,6 @@ ADAPTIVE_STEPS = types.FunctionType(
 """A kernel (y, p, control, following, workspace, span_ns, sampling)."""
 
 steps_at, adaptive_steps_at = function_at(STEPS), function_at(ADAPTIVE_STEPS)
-
-
-def fixed_steps(integrator: Integrator) -> tuple[Method, ...]:
-    """Steps of one length, counted from the segment's start; the second method is for a segment with a string."""
-
-    def choice(_p: np.record, step_s: float, _accuracy: float) -> str:
-        return f"{integrator.name}: fixed steps of {step_s:g} s"
-
-    without = Method(FIXED_STEPS, integrator.kernel, choice, integrator.evaluations)
-    return without, replace(without, on_string=True)
-
 
 METHOD = record_type(
     [
@@ -80,7 +68,7 @@ def provide_kernel(integrator: Integrator, table: np.ndarray, number: int) -> No
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def is_provided(method: np.record) -> bool:
     """Whether the method's kernel can be called."""
-    return method.way == NOTHING or method.address != 0
+    return bool(method.way == NOTHING or method.address != 0)
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
@@ -126,5 +114,5 @@ def reach(
     if method.way == ADAPTIVE:
         workspace = room[: method.rows * method.columns].reshape((method.rows, method.columns))
         steps = adaptive_steps_at(method.address)
-        return steps(y, p, control, following, workspace, rest_ns, True) == rest_ns
-    return steps_at(method.address)(y, p, rest_ns * 1e-9, 1) == 1
+        return bool(steps(y, p, control, following, workspace, rest_ns, True) == rest_ns)
+    return bool(steps_at(method.address)(y, p, rest_ns * 1e-9, 1) == 1)

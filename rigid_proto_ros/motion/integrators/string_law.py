@@ -23,6 +23,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
+from ...base.rotation import norm
 from ..string import NO_DIRECTION
 from .equations import knot_of, stretch
 from .first_root import NONE, first_rise
@@ -78,7 +79,7 @@ def law_of(y: np.ndarray, p: np.record, knot: Knot) -> float:
     ax, ay, az, length, x = knot
     if x <= 0.0:
         return SLACK
-    _, _, _, vx, vy, vz = knot_of(y, p)
+    _, (vx, vy, vz) = knot_of(y, p)
     rate = (ax * vx + ay * vy + az * vz) / length
     return PULLS if p.stiffness * x + p.string_damping * rate > 0.0 else SHORTENS
 
@@ -87,7 +88,7 @@ def law_of(y: np.ndarray, p: np.record, knot: Knot) -> float:
 def shortening_heat(p: np.record, before: float, after: float) -> float:
     """What the damper takes while the string doesn't pull [J]: all of ½ k x² lost from one stretch to another."""
     before, after = max(before, 0.0), max(after, 0.0)
-    return 0.5 * p.stiffness * (before - after) * (before + after)
+    return float(0.5 * p.stiffness * (before - after) * (before + after))
 
 
 # Along a series
@@ -204,7 +205,7 @@ def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: fl
     x, rate = stretch_at(c, p, degree, t)
     wrong = abs(stiffness * x + damping * rate - tension)
     speed = abs(c[1, A_KNOT]) + abs(c[1, A_KNOT + 1]) + abs(c[1, A_KNOT + 2])
-    return wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE] + 2e-15 * damping * speed
+    return bool(wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE] + 2e-15 * damping * speed)
 
 
 # Along a fixed step
@@ -218,11 +219,11 @@ def excursion(y: np.ndarray, end: np.ndarray, h: float, p: np.record, pulls: boo
     rest, x = p.rest_length, stretch(y, p)[0]
     if (x > 0.0) != pulls:
         return 0.0
-    start, stop = knot_of(y, p), knot_of(end, p)
+    (start, velocity), (stop, last_velocity) = knot_of(y, p), knot_of(end, p)
     a = np.empty((4, 3))
     for k in range(3):
         # a(s h) = a₀ + r₀ s + (3Δ − 2 r₀ − r₁) s² + (r₀ + r₁ − 2Δ) s³ with r = a' h.
-        r0, r1, change = start[3 + k] * h, stop[3 + k] * h, stop[k] - start[k]
+        r0, r1, change = velocity[k] * h, last_velocity[k] * h, stop[k] - start[k]
         a[0, k], a[1, k] = start[k], r0
         a[2, k], a[3, k] = 3.0 * change - 2.0 * r0 - r1, r0 + r1 - 2.0 * change
     g = _square_less_rest(a, x, rest)
@@ -249,7 +250,7 @@ def excursion(y: np.ndarray, end: np.ndarray, h: float, p: np.record, pulls: boo
 @njit(cache=True, error_model="numpy")
 def may_pass(p: np.record) -> bool:
     """Whether the string is one that pushes at no length."""
-    return p.has_string and p.bilateral and p.rest_length != 0.0
+    return bool(p.has_string and p.bilateral and p.rest_length != 0.0)
 
 
 @njit(cache=True, error_model="numpy")
@@ -269,7 +270,7 @@ def before_passage(c: np.ndarray, p: np.record, degree: int, knot: Knot, h: floa
         return h, 0
     nearest = -(ax * vx + ay * vy + az * vz) / square if speed > 0.0 else 0.0
     bx, by, bz = ax + vx * nearest, ay + vy * nearest, az + vz * nearest
-    straight = math.sqrt(bx * bx + by * by + bz * bz) <= _MISSES * speed
+    straight = norm(bx, by, bz) <= _MISSES * speed
     if h * 1e9 < 1.0 or (straight and 0.0 <= nearest <= _AT_ONCE and speed > 0.0):
         return h, max(int(math.ceil(2e9 * abs(nearest))), 2)
     return h, 0

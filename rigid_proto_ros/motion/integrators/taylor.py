@@ -14,7 +14,6 @@ import numpy as np
 from ...base.compilation import njit
 from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
 from .series import SPIN_COLUMNS, are_good, put_variables, spin_at, spin_series, variables_of
-from .stepping import fixed_steps
 
 DEGREE = 18
 
@@ -49,5 +48,4 @@ TAYLOR = Integrator(
     stability_limit=1.0,
     supports=frozenset({BODY_TORQUE, BODY_FORCE, ANGULAR_DAMPING}),
     kernel=taylor_steps,
-    make_methods=fixed_steps,
 )
