@@ -11,7 +11,7 @@ from rigid_proto_ros.motion.integrators.integrator import Integrator
 from rigid_proto_ros.motion.integrators.series_steps import CONTROL, degree_for
 from rigid_proto_ros.motion.integrators.stepping import method_table, provide_kernel, workspace_size
 from rigid_proto_ros.motion.loads import LoadSum
-from rigid_proto_ros.motion.problem import PROBLEM, begin_body, begin_problem, begin_string
+from rigid_proto_ros.motion.problem import PROBLEM, Environment, begin_body, begin_problem, begin_string
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringState
 from rigid_proto_ros.motion.variables import STORED, to_variables
@@ -32,7 +32,8 @@ def make_problem(
     """The segment's problem for a body under summed loads, and a string if tied, from a state on."""
     p, row = new_record(PROBLEM), body.row.copy()
     row[LENGTH] = length
-    begin_body(p, row, np.asarray(gravity, dtype=float), linear_damping, angular_damping, float(gyroscopic))
+    around = Environment(gravity=gravity, linear_damping=linear_damping, angular_damping=angular_damping)
+    begin_body(p, row, around.environment, float(gyroscopic))
     begin_problem(p, loads.values, state.row)
     if string is not None:
         begin_string(p, row, string.row, string.begin_ns, string.end_ns, state.row, state.time_ns)

@@ -38,7 +38,8 @@ class Doubles(types.Type):
 @register_model(Doubles)
 class _DoublesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.count))  # type: ignore[no-untyped-call]
+        initialize: Any = super().__init__
+        initialize(manager, kind, ir.VectorType(_DOUBLE, kind.count))
 
 
 def aligned(shape: tuple[int, int], before: int = 0) -> np.ndarray:

@@ -21,7 +21,7 @@ from ..motion import loads as ld
 from ..motion.integrators.auto import AUTO
 from ..motion.integrators.series_steps import degree_for
 from ..motion.integrators.stepping import METHOD, method_table, provide_kernel, workspace_size
-from ..motion.problem import begin_body
+from ..motion.problem import ENVIRONMENT, begin_body
 from ..simulation import flight as fl
 
 ACCURACY = 1e-11
@@ -127,7 +127,7 @@ def _fly_all(
     """
     methods, flights, rows, events, room = tables
     count, flight = commands.shape[0], flights[0]
-    body = np.zeros(of_body.BODY)
+    body, environment = np.zeros(of_body.BODY), np.zeros(1, ENVIRONMENT)[0]
     for i in range(flown.shape[0]):
         own = flown[i]
         good[i] = 0
@@ -139,8 +139,10 @@ def _fly_all(
         copy_numbers(own[START:], flight.row)
         copy_numbers(flight.row, flight.start)
         copy_numbers(body, flight.body)
-        damping = (own[LINEAR_DAMPING], own[ANGULAR_DAMPING])
-        begin_body(flight.common, body, own[GRAVITY : GRAVITY + 3], damping[0], damping[1], 1.0)
+        for k in range(3):
+            environment.gravity[k] = own[GRAVITY + k]
+        environment.linear_damping, environment.angular_damping = own[LINEAR_DAMPING], own[ANGULAR_DAMPING]
+        begin_body(flight.common, body, environment, 1.0)
         flight.accuracy, flight.degree = ACCURACY, degree
         for c in range(count):
             row = rows[c]

@@ -10,18 +10,15 @@ What a load does is compiled, once: live flights, offline ones and sweeps call t
 
 from __future__ import annotations
 
-import functools
 import math
 import struct
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
-from numba import boolean, float64
 
 from ..base.compilation import njit
 from ..base.errors import CommandRefused
-from ..base.function_pointers import entry_of
 from ..base.rotation import matrix_elements, transposed_times
 from ..base.vectors import Numbers, Vector, vector
 from . import body as of_body
@@ -101,11 +98,6 @@ def is_within_magnitude(load: np.ndarray, body: np.ndarray) -> bool:
     """Whether both stay within MAX_ACCELERATION; an overflow to NaN doesn't."""
     linear, angular = magnitudes(load, body)
     return linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION
-
-
-@functools.cache
-def _within_magnitude() -> Callable[..., Any]:
-    return entry_of(is_within_magnitude, boolean(float64[::1], float64[::1]))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -217,8 +209,8 @@ class Load(NamedTuple):
 
     def check_magnitude(self, body: Body) -> None:
         """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION."""
-        row = np.frombuffer(self.packed)
-        if not _within_magnitude()(row, body.row):
+        row = self.row
+        if not is_within_magnitude(row, body.row):
             linear, angular = magnitudes(row, body.row)
             raise CommandRefused(
                 "magnitude",

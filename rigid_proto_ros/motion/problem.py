@@ -17,13 +17,45 @@ one it is the even motion of the string's free end.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.records import record_type
+from ..base.records import new_record, record_type
 from . import body as of_body
 from . import loads as of_loads
 from .string import free_end_at
+
+ENVIRONMENT_FIELDS: list[tuple[Any, ...]] = [
+    ("gravity", np.float64, 3),  # [m/s², world]
+    ("linear_damping", np.float64),  # [N s/m]
+    ("angular_damping", np.float64),  # [N m s]
+]
+"""What acts beside loads and a string, by the names of the parameters that set it."""
+ENVIRONMENT = record_type(ENVIRONMENT_FIELDS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Environment:
+    """The same in Python: gravity (3,) [m/s², world], linear_damping [N s/m], angular_damping [N m s]; and gyroscopic,
+    whether the term ω × Iω is kept.
+    """
+
+    gravity: np.ndarray
+    linear_damping: float
+    angular_damping: float
+    gyroscopic: bool = True
+
+    @property
+    def environment(self) -> np.record:
+        """As compiled functions read it (ENVIRONMENT)."""
+        record = new_record(ENVIRONMENT)
+        for name, *_ in ENVIRONMENT_FIELDS:
+            record[name] = getattr(self, name)
+        return record
+
 
 PROBLEM = record_type(
     [
@@ -68,26 +100,19 @@ STRING = 13
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
-def begin_body(
-    p: np.record,
-    body: np.ndarray,
-    gravity: np.ndarray,
-    linear_damping: float,
-    angular_damping: float,
-    gyroscopic: float,
-) -> None:
+def begin_body(p: np.record, body: np.ndarray, environment: np.record, gyroscopic: float) -> None:
     """Fill p, a record of zeros, with what is the same in every segment of a body (BODY,): all but loads, string and
-    start.
+    start. environment: a record with the fields of ENVIRONMENT, and others.
     """
     for k in range(3):
         p.moments[k] = body[of_body.MOMENTS + k]
-        p.reference_acceleration[k] = gravity[k]
+        p.reference_acceleration[k] = environment.gravity[k]
     for k in range(9):
         p.principal_axes[k] = body[of_body.AXES + k]
     for k in range(4):
         p.principal_quaternion[k] = body[of_body.QUATERNION + k]
-    p.damping_linear = linear_damping / body[of_body.MASS]
-    p.damping_angular = angular_damping
+    p.damping_linear = environment.linear_damping / body[of_body.MASS]
+    p.damping_angular = environment.angular_damping
     p.gyroscopic = gyroscopic
     p.reference_damping = p.damping_linear
     p.mass = body[of_body.MASS]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ..mass.tensor import check_tensor
 from ..mesh.reading import Mesh
 from ..motion.body import make_body
 from ..motion.integrators import integrator_named
+from ..motion.problem import ENVIRONMENT_FIELDS
 from ..motion.state import fill_initial_row
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
@@ -191,16 +193,16 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
     if parameters.imu_contact and parameters.imu_contact not in parameters.contacts:
         known = ", ".join(sorted(parameters.contacts)) or "the body has none"
         raise InputError("imu_contact", parameters.imu_contact, f"'' for the COM, or a contact ({known})")
+    numbers = {name: getattr(parameters, name) for name, *_ in ENVIRONMENT_FIELDS}
+    environment: dict[str, Any] = {name: np.asarray(n) if isinstance(n, tuple) else n for name, n in numbers.items()}
     setup = Setup(
         body=body,
         inertia_model=parameters.inertia_model,
         surface=body_mesh.surface if body_mesh else None,
         geometry=(body_mesh.mesh.sha256 if body_mesh else "", *scale.tolist()),
         contacts=dict(parameters.contacts),
-        gravity=np.asarray(parameters.gravity),
-        linear_damping=parameters.linear_damping,
-        angular_damping=parameters.angular_damping,
         gyroscopic=parameters.gyroscopic,
+        **environment,
         integrator=integrator_named(parameters.integrator),
         step_ns=max(1, nanoseconds(parameters.step)),
         wrench_timeout_ns=nanoseconds(parameters.wrench_timeout),

@@ -29,7 +29,7 @@ from ..motion.body import AXES, BODY_SCALE, COM, INERTIA, LENGTH, MASS, MOMENTS,
 from ..motion.integrators.auto import FASTEST
 from ..motion.integrators.stepping import provide_kernel
 from ..motion.loads import MAX_ACCELERATION, accumulate_load, is_within_magnitude
-from ..motion.problem import KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_body
+from ..motion.problem import ENVIRONMENT_FIELDS, KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_body
 from ..motion.state import fill_initial_row, shift_com
 from ..motion.string import effective_mass, energy_of, free_end_at, most_yielding, span_of, spring_of
 from . import flight as fl
@@ -43,9 +43,7 @@ _NUMBERS: list[tuple[Any, ...]] = [
     ("explicit_inertia_mass", np.float64),  # [kg]
     ("explicit_inertia_center_of_mass", np.float64, 3),  # [mesh coordinates]
     ("explicit_inertia_tensor", np.float64, 6),  # ixx ixy ixz iyy iyz izz [kg m²]
-    ("gravity", np.float64, 3),  # [m/s², world]
-    ("linear_damping", np.float64),  # [N s/m]
-    ("angular_damping", np.float64),  # [N m s]
+    *ENVIRONMENT_FIELDS,
     ("initial_position", np.float64, 3),  # [m, world]
     ("initial_orientation_xyzw", np.float64, 4),  # of any length
     ("initial_linear_velocity", np.float64, 3),  # [m/s, world]
@@ -320,8 +318,7 @@ def _take_body(own: np.record, ballast: np.ndarray, flight: np.record) -> bool:
     if not _make_body(own, ballast, body):
         return False
     linear, angular = own.linear_damping / body[MASS], own.angular_damping / body[MOMENTS]
-    gyroscopic = flight.common.gyroscopic
-    begin_body(flight.common, body, own.gravity, own.linear_damping, own.angular_damping, gyroscopic)
+    begin_body(flight.common, body, own, flight.common.gyroscopic)
     return not flight.chooses or (linear <= FASTEST and angular <= FASTEST)
 
 

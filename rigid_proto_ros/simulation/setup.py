@@ -18,7 +18,7 @@ from ..motion.integrators.integrator import Integrator
 from ..motion.integrators.series_steps import degree_for
 from ..motion.integrators.stepping import method_table, workspace_size
 from ..motion.loads import light_amount
-from ..motion.problem import PROBLEM, begin_body
+from ..motion.problem import PROBLEM, Environment, begin_body
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
 from .flight import FLIGHT
@@ -38,12 +38,12 @@ class FlightStart(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Setup:
+class Setup(Environment):
     """geometry: equal values mean the same mesh at the same size, so that a change of COM moves the COM and not the
-    mesh. contacts: mesh coordinates by name. gravity (3,) [m/s², world], linear_damping [N s/m], angular_damping [N m
-    s]. wrench_timeout_ns 0 holds for ever. accuracy: local error rate for integrators that choose their own steps.
-    initial (13,): the state row at time 0. initial_string_mass [kg]: from what stiffness and damping follow of a
-    string that is tied at time 0; 0 for the effective mass of the body as it is then. thrusters: by name, in its order.
+    mesh. contacts: mesh coordinates by name. wrench_timeout_ns 0 holds for ever. accuracy: local error rate for
+    integrators that choose their own steps. initial (13,): the state row at time 0. initial_string_mass [kg]: from what
+    stiffness and damping follow of a string that is tied at time 0; 0 for the effective mass of the body as it is then.
+    thrusters: by name, in its order.
     """
 
     body: Body
@@ -51,10 +51,6 @@ class Setup:
     surface: Surface | None
     geometry: tuple
     contacts: Mapping[str, tuple[float, float, float]]
-    gravity: np.ndarray
-    linear_damping: float
-    angular_damping: float
-    gyroscopic: bool
     integrator: Integrator
     step_ns: int
     wrench_timeout_ns: int
@@ -107,7 +103,6 @@ class Setup:
     @cached_property
     def problem(self) -> np.record:
         """What all segments under this setup have in common (motion/problem.py)."""
-        problem, gravity = new_record(PROBLEM), np.asarray(self.gravity, dtype=float)
-        damping = (float(self.linear_damping), float(self.angular_damping))
-        begin_body(problem, self.body_row, gravity, damping[0], damping[1], float(self.gyroscopic))
+        problem = new_record(PROBLEM)
+        begin_body(problem, self.body_row, self.environment, float(self.gyroscopic))
         return problem

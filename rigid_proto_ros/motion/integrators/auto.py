@@ -89,26 +89,20 @@ def fastest_swing(p: np.record) -> float:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _kind_on_string(p: np.record, y: np.ndarray) -> int:
-    turns = _any(y, 4) or _any(p.torque_body) or p.has_world_torque
-    accelerated = _any(p.acceleration_added) or _any(p.acceleration_body)
-    if stretch(y, p)[0] <= 0.0 and not (turns or accelerated or _any(y, 10) or _any(p.hand_velocity)):
-        return SLACK_AT_REST
-    return ON_STRING
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
 def kind_of_segment(p: np.record, y: np.ndarray) -> int:
     """Which of the kinds a segment with problem p from variables y on is."""
     spins = _any(y, 4)
     turned = _any(p.torque_body) or p.has_world_torque or (spins and p.damping_angular != 0.0)
     translates = p.translates
     if p.has_string:
-        return _kind_on_string(p, y)
+        turns = spins or _any(p.torque_body) or p.has_world_torque
+        accelerated = _any(p.acceleration_added) or _any(p.acceleration_body)
+        moves = turns or accelerated or _any(y, 10) or _any(p.hand_velocity)
+        return ON_STRING if moves or stretch(y, p)[0] > 0.0 else SLACK_AT_REST
     if not turned:
         if not spins and not translates:
-            moves = _any(p.reference_velocity) or _any(p.reference_acceleration)
-            return COASTING if moves else ASLEEP
+            falls = _any(p.reference_velocity) or _any(p.reference_acceleration)
+            return COASTING if falls else ASLEEP
         if not spins or (p.gyroscopic == 0.0 and not translates):
             return STEADY
         if not translates:

@@ -48,6 +48,17 @@ def torque(q: Quaternion, w: Vector, p: np.record) -> Vector:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
+def angular_acceleration(w: Vector, t: Vector, p: np.record) -> Vector:
+    """Euler's equations in principal axes: ω' = I⁻¹(τ − ω × Iω); without the gyroscopic term I⁻¹τ."""
+    A, B, C, g = p.moments[0], p.moments[1], p.moments[2], p.gyroscopic
+    return (
+        (t[0] - g * (C - B) * w[1] * w[2]) / A,
+        (t[1] - g * (A - C) * w[2] * w[0]) / B,
+        (t[2] - g * (B - A) * w[0] * w[1]) / C,
+    )
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
 def knot(q: Quaternion, w: Vector, d: Vector, u: Vector, p: np.record) -> tuple[Vector, Vector]:
     """From the free end to the knot, a, and its rate a', world axes."""
     r, start = p.attach, p.string_start
@@ -92,23 +103,18 @@ def accelerations(
 
     I ω' = τ − ω × Iω, without the gyroscopic term τ; u' is its constant part, R g_b, −c_v u and the string's F/m.
     """
+    if not p.translates:
+        return angular_acceleration(w, torque(q, w, p), p), (0.0, 0.0, 0.0), 0.0, 0.0
     tx, ty, tz = torque(q, w, p)
-    ax, ay, az, work, heat = 0.0, 0.0, 0.0, 0.0, 0.0
-    if p.translates:
-        own, added, c = p.acceleration_body, p.acceleration_added, p.damping_linear
-        ax, ay, az = rotate(*q, own[0], own[1], own[2])
-        ax, ay, az = ax + (added[0] - c * u[0]), ay + (added[1] - c * u[1]), az + (added[2] - c * u[2])
-        if p.has_string:
-            force, about_com, work, heat = string_pull(q, w, d, u, p, taut)
-            ax, ay, az = ax + force[0] / p.mass, ay + force[1] / p.mass, az + force[2] / p.mass
-            tx, ty, tz = tx + about_com[0], ty + about_com[1], tz + about_com[2]
-    A, B, C, g = p.moments[0], p.moments[1], p.moments[2], p.gyroscopic
-    turning = (
-        (tx - g * (C - B) * w[1] * w[2]) / A,
-        (ty - g * (A - C) * w[2] * w[0]) / B,
-        (tz - g * (B - A) * w[0] * w[1]) / C,
-    )
-    return turning, (ax, ay, az), work, heat
+    own, added, c = p.acceleration_body, p.acceleration_added, p.damping_linear
+    ax, ay, az = rotate(*q, own[0], own[1], own[2])
+    ax, ay, az = ax + (added[0] - c * u[0]), ay + (added[1] - c * u[1]), az + (added[2] - c * u[2])
+    work, heat = 0.0, 0.0
+    if p.has_string:
+        force, about_com, work, heat = string_pull(q, w, d, u, p, taut)
+        ax, ay, az = ax + force[0] / p.mass, ay + force[1] / p.mass, az + force[2] / p.mass
+        tx, ty, tz = tx + about_com[0], ty + about_com[1], tz + about_com[2]
+    return angular_acceleration(w, (tx, ty, tz), p), (ax, ay, az), work, heat
 
 
 @njit(cache=True, error_model="numpy", allocates=False)

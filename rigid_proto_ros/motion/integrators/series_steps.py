@@ -150,20 +150,18 @@ def degree_of_motion(degree: int) -> int:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _log2_growth(c: np.ndarray, at: int, columns: int, degree: int, weights: Packed) -> float:
-    """log₂ σ from the last three coefficients: of the largest k-th root of a bound on their measure. at: where a row's
+def _length_for(
+    c: np.ndarray, at: int, columns: int, degree: int, weights: Packed, accuracy: float, part: float
+) -> float:
+    """h [s] with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor) times ``part``, or a little less. at: where a row's
     variables begin, of ``columns`` numbers; weights: of each of them.
     """
+    # log₂ σ from the last three coefficients: of the largest k-th root of a bound on their measure.
     last = degree * columns + at
     # No length is more than twice the largest number in it, and no square of a large coefficient overflows.
     growth = fast_log2(2.0 * largest(load(c, last - 2 * columns, weights) * weights)) * (1.0 / (degree - 2.0))
     growth = max(growth, fast_log2(2.0 * largest(load(c, last - columns, weights) * weights)) * (1.0 / (degree - 1.0)))
-    return max(growth, fast_log2(2.0 * largest(load(c, last, weights) * weights)) * (1.0 / degree))
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _length_for(growth: float, accuracy: float, degree: int, part: float) -> float:
-    """h [s] with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor) times ``part``, or a little less."""
+    growth = max(growth, fast_log2(2.0 * largest(load(c, last, weights) * weights)) * (1.0 / degree))
     share, least = fast_log2(part * accuracy) - growth, fast_log2(part * FLOOR)
     # (N + 1) x = max(share + x, least) + log₂(1 − 2ˣ) for x = log₂ σh, the last term replaced by two chords below it.
     x = max(
@@ -183,7 +181,7 @@ def _allowed_length(c: np.ndarray, degree: int, weights: Weights, accuracy: floa
         four(place, place, speed, speed),
         four(speed, 0.0, 0.0, 0.0),
     )
-    return _length_for(_log2_growth(c, ATTITUDE, MOTION_COLUMNS, degree, of_row), accuracy, degree, part)
+    return _length_for(c, ATTITUDE, MOTION_COLUMNS, degree, of_row, accuracy, part)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -192,7 +190,7 @@ def _known_length(c: np.ndarray, degree: int, place: float, accuracy: float, par
     angle: of the degree N its remainder is up to 2ᴺ times that of the attitude's series.
     """
     of_row = four(place, place, place, 0.0)
-    return _length_for(_log2_growth(c, A_KNOT, MOTION_COLUMNS, degree, of_row), accuracy, degree, part)
+    return _length_for(c, A_KNOT, MOTION_COLUMNS, degree, of_row, accuracy, part)
 
 
 # The step that waits
@@ -278,8 +276,7 @@ def spin_steps(
                 of_row = joined(
                     filled(weights[0], 4), filled(weights[1], 4), filled(weights[2], 4), filled(weights[3], 4)
                 )
-                growth = _log2_growth(c, VARIABLES_AT, SPIN_COLUMNS, degree, of_row)
-                length = int(_length_for(growth, accuracy, degree, PART) * 1e9)
+                length = int(_length_for(c, VARIABLES_AT, SPIN_COLUMNS, degree, of_row, accuracy, PART) * 1e9)
                 there = spin_at(c, degree, length * 1e-9)
                 if length < 1 or not are_good(there):
                     control.failed = True
