@@ -129,11 +129,6 @@ class Body:
         found: np.ndarray = (np.asarray(point) + self.center_of_mass) / self.scale
         return found
 
-    def angular_acceleration(self, torque_body: Numbers) -> np.ndarray:
-        """I⁻¹ τ (3,), both in body axes."""
-        x, y, z = torque_body
-        return np.array(angular_acceleration(self.row, float(x), float(y), float(z)))
-
 
 def make_body(
     mass: float, center_of_mass: Numbers, inertia: Sequence[Numbers] | np.ndarray, scale: Numbers = (1.0, 1.0, 1.0)

@@ -197,12 +197,6 @@ class Load(NamedTuple):
         """From the COM to the point of attack (3,) [m, body axes]."""
         return np.array(arm_of(self.row, body.row))
 
-    def force_body(self, body: Body, state: State) -> np.ndarray:
-        """The force (3,) in body axes at this state."""
-        if self.axes == "world":
-            return transposed_times(state.rotation, np.asarray(self.force))
-        return self.own_force(body)
-
     def own_force(self, body: Body) -> np.ndarray:
         """The force (3,) in body axes, of a load whose axes turn with the body."""
         return np.array(own_force(self.row, body.row))

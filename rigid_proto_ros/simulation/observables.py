@@ -14,6 +14,7 @@ from ..base.vectors import Numbers, Vector
 from ..motion.integrators.auto import fastest_swing
 from ..motion.integrators.equations import stretch
 from ..motion.integrators.integrator import FIXED_STEPS, Method
+from ..motion.integrators.series_steps import degree_of_motion
 from ..motion.loads import LoadSum
 from ..motion.problem import PROBLEM
 from ..motion.state import State, angular_momentum
@@ -85,7 +86,13 @@ class Observables:
     def choice(self) -> str:
         """Which method advances the body now, and why."""
         flight = self.flight
-        return self._method.choice(flight.problem, int(flight.step_ns) * 1e-9, float(flight.accuracy))
+        degree = int(flight.degree)
+        return self._method.choice.format(
+            step_s=int(flight.step_ns) * 1e-9,
+            degree=degree,
+            degree_of_motion=degree_of_motion(degree),
+            swing=fastest_swing(flight.problem),
+        )
 
     @property
     def accuracy_floor(self) -> str:

@@ -48,39 +48,6 @@ def test_a_kernel_is_compiled_anew_when_a_file_behind_its_imports_has_changed(tm
     assert said == [["2", "0"], ["2", "1"], ["3", "0"]], BROKEN
 
 
-SUMS = """
-import numpy as np
-from package.mass.moments import _sum as kernel
-zero = (0.0, 0.0, 0.0)
-print(kernel(zero, zero, 1.0)[0][0], sum(kernel.stats.cache_hits.values()))
-"""
-
-
-def test_the_sums_over_a_mesh_are_compiled_anew_when_the_arithmetic_under_them_has_changed(tmp_path):
-    base, mass = tmp_path / "package" / "base", tmp_path / "package" / "mass"
-    for folder, names in ((base, ("compilation", "errors", "exact_arithmetic", "simd")), (mass, ("moments",))):
-        folder.mkdir(parents=True)
-        for name in names:
-            shutil.copy(PACKAGE / folder.name / f"{name}.py", folder)
-    arithmetic = (base / "exact_arithmetic.py").read_text()
-    head = "def two_sum(a: float, b: float) -> tuple[float, float]:\n"
-    changed = arithmetic.replace(head, f"{head}    return 42.0, 0.0\n", 1)
-    assert changed != arithmetic
-    said = []
-    for text in (arithmetic, arithmetic, changed):
-        (base / "exact_arithmetic.py").write_text(text)
-        ran = subprocess.run(
-            [sys.executable, "-B", "-c", SUMS],
-            cwd=tmp_path,
-            env=own_cache(tmp_path),
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        said.append(ran.stdout.split())
-    assert said == [["0.0", "0"], ["0.0", "1"], ["42.0", "0"]]
-
-
 def test_a_copy_elsewhere_finds_the_kernels_of_the_same_sources_and_old_ones_are_removed(tmp_path):
     said = []
     for checkout, added in (("one", 1), ("two", 1), ("two", 2), ("one", 1)):

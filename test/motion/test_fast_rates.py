@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from flights import SECOND, flight, flight_setup, spinning, wrench
 from mpmath import mp, mpc, mpf
-from reference_motion import angle_between
 
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.body import make_body
@@ -154,15 +153,3 @@ def test_a_string_that_swings_too_fast_for_the_clock_says_so():
     assert "steps for a second of the motion, slower than real time" in simulation.too_slow
     simulation.advance(SECOND // 10)
     assert "slower than real time" in simulation.too_slow
-
-
-def test_portions_have_no_bearing_on_fast_damping():
-    def state(portion_ns):
-        simulation = flight(BODY, integrator="auto", initial=spinning((3, 4, 5)), angular_damping=1e3, string=tied())
-        for at in range(portion_ns, SECOND // 50, portion_ns):
-            simulation.advance(at)
-        return simulation.advance(SECOND // 50)
-
-    whole, parts = state(10**9), state(123_457)
-    assert whole.sha256() == parts.sha256()
-    assert angle_between(whole.orientation_xyzw, np.eye(3)) < 1.0

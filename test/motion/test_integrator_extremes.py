@@ -94,19 +94,13 @@ def check(name, seed):
         assert state.time_ns == until
 
 
+@pytest.mark.parametrize("seeds", [range(40), pytest.param(range(1000, 4000), marks=pytest.mark.stress)])
 @pytest.mark.parametrize("name", INTEGRATORS)
-def test_extremes_end_in_a_state_a_refusal_or_a_stop(name):
-    for seed in range(40):
+def test_extremes_end_in_a_state_a_refusal_or_a_stop(name, seeds):
+    for seed in seeds:
         check(name, seed)
 
 
 def test_a_spin_too_fast_for_any_step_stops_the_motion_though_the_string_nears_its_free_end():
     # 1e9 rad/s and more by a torque of 1e17 N m: the step past the free end takes a turn of a nanosecond for a small one.
     check("auto", 2209)
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("name", INTEGRATORS)
-def test_extremes_end_in_a_state_a_refusal_or_a_stop_many_times(name):
-    for seed in range(1000, 4000):
-        check(name, seed)

@@ -11,11 +11,7 @@ from problems import PROBLEMS
 from work_precision_ours import simulation_of
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-12)
-SCENES = 10
-STRESS_SCENES = 300
-STRESS_SCENES_A_TEST = 10
 STEPS_PER_SCENE = 6
-QUICK_STEPS_PER_SCENE = 2
 LONGEST_S = 2.0
 """Of a benchmark's problem; the fastest string takes 1e5 steps a second."""
 
@@ -34,7 +30,7 @@ def shares(simulation, duration_s, accuracy, seed, count=STEPS_PER_SCENE):
     return [(local_error(step) / allowed(step, accuracy), step.length) for step in steps]
 
 
-def check(seeds, steps_per_scene=STEPS_PER_SCENE):
+def check(seeds, steps_per_scene):
     worst, judged, failures = 0.0, 0, []
     for seed in seeds:
         for accuracy in ACCURACIES:
@@ -51,14 +47,15 @@ def check(seeds, steps_per_scene=STEPS_PER_SCENE):
     assert not failures, "\n".join(failures)
 
 
-def test_auto_meets_its_accuracy_in_random_scenes():
-    check(range(SCENES), QUICK_STEPS_PER_SCENE)
+STRESS_SEEDS = [range(first, first + 10) for first in range(1000, 1300, 10)]
 
 
-@pytest.mark.stress
-@pytest.mark.parametrize("first", range(1000, 1000 + STRESS_SCENES, STRESS_SCENES_A_TEST))
-def test_auto_meets_its_accuracy_in_three_hundred_random_scenes(first):
-    check(range(first, first + STRESS_SCENES_A_TEST))
+@pytest.mark.parametrize(
+    ("seeds", "steps_per_scene"),
+    [(range(10), 2), *(pytest.param(seeds, STEPS_PER_SCENE, marks=pytest.mark.stress) for seeds in STRESS_SEEDS)],
+)
+def test_auto_meets_its_accuracy_in_random_scenes(seeds, steps_per_scene):
+    check(seeds, steps_per_scene)
 
 
 @pytest.mark.stress

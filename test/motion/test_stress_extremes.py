@@ -67,15 +67,13 @@ def check_forces(name, steps_s, exponents=EXPONENTS):
                     assert end != "stopped", (name, frame, exponent, step_s)
 
 
+@pytest.mark.parametrize("stress", [False, pytest.param(True, marks=pytest.mark.stress)])
 @pytest.mark.parametrize("name", sorted(INTEGRATORS))
-def test_any_force_ends_right_or_refused_or_stopped(name):
-    check_forces(name, (1e-3,), FEW_EXPONENTS)
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("name", sorted(INTEGRATORS))
-def test_any_force_at_any_step_ends_right_or_refused_or_stopped(name):
-    check_forces(name, (1e-4,) if name == "auto" else (1e-4, 3e-3, 0.07, 1.0), MORE_EXPONENTS)
+def test_any_force_ends_right_or_refused_or_stopped(name, stress):
+    if not stress:
+        check_forces(name, (1e-3,), FEW_EXPONENTS)
+    else:
+        check_forces(name, (1e-4,) if name == "auto" else (1e-4, 3e-3, 0.07, 1.0), MORE_EXPONENTS)
 
 
 def loaded_flight(name, load, step_s):
@@ -119,20 +117,15 @@ def check_step(name, load, step_s):
             return
 
 
+RANDOM_STEPS_S = np.maximum(1e-9, 10.0 ** np.random.default_rng(3).uniform(-9.0, 3.0, 200)).tolist()
+
+
+@pytest.mark.parametrize("steps_s", [STEPS_S, pytest.param(RANDOM_STEPS_S, marks=pytest.mark.stress)])
 @pytest.mark.parametrize("load", LOADS)
 @pytest.mark.parametrize("name", sorted(INTEGRATORS))
-def test_any_step_from_a_nanosecond_to_a_thousand_seconds_stays_finite_or_warns(name, load):
-    for step_s in STEPS_S:
+def test_any_step_from_a_nanosecond_to_a_thousand_seconds_stays_finite_or_warns(name, load, steps_s):
+    for step_s in steps_s:
         check_step(name, load, step_s)
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("load", LOADS)
-@pytest.mark.parametrize("name", sorted(INTEGRATORS))
-def test_random_steps_from_a_nanosecond_to_a_thousand_seconds_stay_finite_or_warn(name, load):
-    rng = np.random.default_rng(3)
-    for step_s in 10.0 ** rng.uniform(-9.0, 3.0, 200):
-        check_step(name, load, max(1e-9, float(step_s)))
 
 
 @pytest.mark.parametrize("frame", ["world@point/.1,.2,.3", "body@point/.1,.2,.3"])

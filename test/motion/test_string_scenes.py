@@ -15,9 +15,14 @@ from hypothesis import strategies as st
 from reference_flights import fly
 
 END_NS = round(END_S * SECOND)
-SCENES, EVERYDAY = 10, 10
+SCENES = 10
 STRESS_SCENES, STRESS_EVERYDAY, CHUNK = 20_000, 1_000, 500
 ACCURACIES = (1e-6, 1e-9, 1e-11)
+
+
+def chunks(stress):
+    """Where a few scenes, and where chunks of a stress test's begin."""
+    return [0, *(pytest.param(first, marks=pytest.mark.stress) for first in range(SCENES, stress, CHUNK))]
 
 
 def random_scene(seed):
@@ -31,15 +36,13 @@ def share_of_random_scene(seed):
     return share(scene, scene.row_at, accuracy)
 
 
-def check_scenes(seeds):
-    shares = {seed: share_of_random_scene(seed) for seed in seeds}
-    worst = max(shares, key=shares.__getitem__)
-    print(f"{len(shares)} scenes, the worst, {worst}, takes {shares[worst]:.2f} of what is allowed")
-    assert shares[worst] <= 1.0, {seed: round(x, 2) for seed, x in shares.items() if x > 1.0}
+def share_of_everyday_scene(seed):
+    scene = everyday_scene(seed)
+    return share(scene, scene.row_at, 1e-9)
 
 
-def check_everyday(seeds):
-    shares = {seed: share((scene := everyday_scene(seed)), scene.row_at, 1e-9) for seed in seeds}
+def check(share_of, seeds):
+    shares = {seed: share_of(seed) for seed in seeds}
     worst = max(shares, key=shares.__getitem__)
     print(f"{len(shares)} scenes, the worst, {worst}, takes {shares[worst]:.2f} of what is allowed")
     assert shares[worst] <= 1.0, {seed: round(x, 2) for seed, x in shares.items() if x > 1.0}
@@ -58,12 +61,14 @@ def check_portions(scene, seed):
     assert (split.hand_work, split.string_heat) == (whole.hand_work, whole.string_heat)
 
 
-def test_scenes_of_all_features_fly_as_the_reference_does():
-    check_scenes(range(SCENES))
+@pytest.mark.parametrize("first", chunks(STRESS_SCENES))
+def test_scenes_of_all_features_fly_as_the_reference_does(first):
+    check(share_of_random_scene, range(first, first + (CHUNK if first else SCENES)))
 
 
-def test_everyday_throws_on_a_rope_fly_as_the_reference_does():
-    check_everyday(range(EVERYDAY))
+@pytest.mark.parametrize("first", chunks(STRESS_EVERYDAY))
+def test_everyday_throws_on_a_rope_fly_as_the_reference_does(first):
+    check(share_of_everyday_scene, range(first, first + (CHUNK if first else SCENES)))
 
 
 @settings(max_examples=10, deadline=None)
@@ -76,7 +81,9 @@ def test_any_features_together_fly_as_the_reference_does(features, seed):
     assert share(scene, scene.row_at, 1e-9) <= 1.0
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "seed", [*range(8), *(pytest.param(seed, marks=pytest.mark.stress) for seed in range(8, 1000))]
+)
 def test_a_thousand_portions_of_any_scene_give_the_bits_of_one(seed):
     check_portions(random_scene(seed)[0], seed)
 
@@ -91,22 +98,3 @@ def test_a_disturbance_is_measured_as_the_error_that_it_is():
     disturbed, exact = (fly(scene.numbers, (0.5, 0.7), (0.3, 0.4), END_S, rate, ways) for rate in (1e-6, 0.0))
     moved = (disturbed - exact)[0] / scene.setup.length
     assert abs(moved / (1e-6 * END_S**2 / 2.0) - 1.0) <= 5e-3
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("first", range(0, STRESS_SCENES, CHUNK))
-def test_twenty_thousand_scenes_fly_as_the_reference_does(first):
-    check_scenes(range(first, first + CHUNK))
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("first", range(0, STRESS_EVERYDAY, CHUNK))
-def test_a_thousand_everyday_throws_on_a_rope_fly_as_the_reference_does(first):
-    check_everyday(range(first, first + CHUNK))
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("first", range(0, 1000, 100))
-def test_a_thousand_portions_of_a_thousand_scenes_give_the_bits_of_one(first):
-    for seed in range(first, first + 100):
-        check_portions(random_scene(seed)[0], seed)

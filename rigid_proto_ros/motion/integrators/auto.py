@@ -17,7 +17,6 @@ problem and start; steps are functions of what they start from. Strings and damp
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -39,7 +38,7 @@ from .integrator import (
     Integrator,
     Method,
 )
-from .series_steps import degree_for, degree_of_motion, motion_steps, motion_workspace, spin_steps, spin_workspace
+from .series_steps import motion_steps, motion_workspace, spin_steps, spin_workspace
 
 FASTEST = 5e5
 """rad/s of a string's swing, and 1/s of damping, that a core can follow in real time: 3.3e5 steps a second, each 2 to 3
@@ -95,9 +94,8 @@ def kind_of_segment(p: np.record, y: np.ndarray) -> int:
     turned = _any(p.torque_body) or p.has_world_torque or (spins and p.damping_angular != 0.0)
     translates = p.translates
     if p.has_string:
-        turns = spins or _any(p.torque_body) or p.has_world_torque
         accelerated = _any(p.acceleration_added) or _any(p.acceleration_body)
-        moves = turns or accelerated or _any(y, 10) or _any(p.hand_velocity)
+        moves = spins or turned or accelerated or _any(y, 10) or _any(p.hand_velocity)
         return ON_STRING if moves or stretch(y, p)[0] > 0.0 else SLACK_AT_REST
     if not turned:
         if not spins and not translates:
@@ -110,36 +108,23 @@ def kind_of_segment(p: np.record, y: np.ndarray) -> int:
     return ANY_LOADS if p.has_world_torque else TURNING_LOADS
 
 
-def _constant(choice: str) -> Callable[..., str]:
-    return lambda _p, _step_s, _accuracy: choice
-
-
-def _series(why: str, degree: Callable[[int], int] = int) -> Callable[..., str]:
-    """degree: that of the method's series, from the one that the accuracy asks for."""
-
-    def choice(p: np.record, _step_s: float, accuracy: float) -> str:
-        return f"auto: taylor of degree {degree(degree_for(accuracy))}, {why.format(fastest_swing(p))}"
-
-    return choice
-
-
 _SERIES_OF_MOTION = Method(
     ADAPTIVE,
     motion_steps,
-    _series("loads that depend on the attitude", degree_of_motion),
+    "auto: taylor of degree {degree_of_motion}, loads that depend on the attitude",
     workspace=motion_workspace,
     radians=RADIANS_A_STEP,
 )
 
 _BY_KIND = {
-    ASLEEP: Method(NOTHING, None, _constant("auto: sleeping, nothing moves or acts"), sleeps=True),
-    COASTING: Method(NOTHING, None, _constant("auto: closed form, nothing turns the body")),
-    STEADY: Method(ONE_STEP, steady_steps, _constant("auto: closed form, nothing changes the spin"), 1),
-    FREE: Method(ONE_STEP, free_body_steps, _constant("auto: free_body, free rotation, exact"), 1),
+    ASLEEP: Method(NOTHING, None, "auto: sleeping, nothing moves or acts", sleeps=True),
+    COASTING: Method(NOTHING, None, "auto: closed form, nothing turns the body"),
+    STEADY: Method(ONE_STEP, steady_steps, "auto: closed form, nothing changes the spin", 1),
+    FREE: Method(ONE_STEP, free_body_steps, "auto: free_body, free rotation, exact", 1),
     TURNING_LOADS: Method(
         ADAPTIVE,
         spin_steps,
-        _series("the loads turn with the body"),
+        "auto: taylor of degree {degree}, the loads turn with the body",
         workspace=spin_workspace,
         radians=RADIANS_A_STEP,
     ),
@@ -147,12 +132,14 @@ _BY_KIND = {
     SLACK_AT_REST: Method(
         NOTHING,
         None,
-        _constant("auto: sleeping, the string is slack and nothing moves"),
+        "auto: sleeping, the string is slack and nothing moves",
         sleeps=True,
         on_string=True,
     ),
     ON_STRING: replace(
-        _SERIES_OF_MOTION, choice=_series("a string of up to {:.3g} rad/s", degree_of_motion), on_string=True
+        _SERIES_OF_MOTION,
+        choice="auto: taylor of degree {degree_of_motion}, a string of up to {swing:.3g} rad/s",
+        on_string=True,
     ),
 }
 

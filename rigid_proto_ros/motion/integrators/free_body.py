@@ -327,5 +327,5 @@ FREE_BODY = Integrator(
     stability_limit=math.inf,
     supports=frozenset(),
     kernel=free_body_steps,
-    ways=(Method(ONE_STEP, free_body_steps, lambda _p, _step_s, _accuracy: "free_body: one exact step", 1),),
+    ways=(Method(ONE_STEP, free_body_steps, "free_body: one exact step", 1),),
 )

@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from ...base.borrowed_views import copy_numbers
 from ...base.compilation import njit
 from ...base.rotation import matrix_elements, norm
 from ...base.vectors import Quaternion, Vector
@@ -84,7 +85,7 @@ def _quaternion_near(matrix: _Matrix, q: Quaternion) -> Quaternion:
 
 @njit(cache=True, error_model="numpy")
 def _moved(y: np.ndarray, at: np.ndarray, p: np.record, h: float, pulls: bool, out: np.ndarray) -> None:
-    """y + h f(at) into out; of the attitude the matrix."""
+    """y + h f(at) into out, which may be ``at``; of the attitude the matrix."""
     q, w, d, u = parts_of(at)
     turning, moving, work, heat = accelerations(q, w, d, u, p, pulls)
     start, _, _, _ = parts_of(y)
@@ -99,13 +100,11 @@ def _moved(y: np.ndarray, at: np.ndarray, p: np.record, h: float, pulls: bool, o
 
 @njit(cache=True, error_model="numpy")
 def _step(
-    y: np.ndarray, p: np.record, h: float, pulls: bool, tableau: np.ndarray, k: np.ndarray, out: np.ndarray
+    y: np.ndarray, p: np.record, h: float, pulls: bool, tableau: np.ndarray, _k: np.ndarray, out: np.ndarray
 ) -> None:
-    at, last = y, tableau.shape[1] - 1
-    for i in range(last):
-        _moved(y, at, p, tableau[i + 1, i] * h, pulls, k[i])
-        at = k[i]
-    _moved(y, at, p, tableau[last + 1, last] * h, pulls, out)
+    copy_numbers(y, out)
+    for i in range(tableau.shape[1]):
+        _moved(y, out, p, tableau[i + 1, i] * h, pulls, out)
 
 
 def _steps(tableau: np.ndarray) -> Kernel:

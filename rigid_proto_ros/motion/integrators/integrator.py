@@ -47,16 +47,17 @@ finite or passes MAX_SPEED is undone.
 class Method:
     """A way to step, and the kernel that does it.
 
-    kernel: a Kernel, or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps,
-    or samples; control: CONTROL of integrators/series_steps.py. choice(p, step_s, accuracy): what it is and why, in
-    words. evaluations: of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room
-    for the kernel. sleeps: nothing moves. on_string: for segments with a string alone. radians: of the fastest turn or
-    swing that a step covers, about; 0 where steps don't follow it.
+    kernel: a Kernel, or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps, or
+    samples; control: CONTROL of integrators/series_steps.py. choice: what it is and why, in words, with places for
+    {step_s}, for {degree} and {degree_of_motion} of series, and for {swing}, the string's fastest [rad/s]. evaluations:
+    of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
+    sleeps: nothing moves. on_string: for segments with a string alone. radians: of the fastest turn or swing that a
+    step covers, about; 0 where steps don't follow it.
     """
 
     way: int
     kernel: Callable[..., Any] | None
-    choice: Callable[[np.record, float, float], str]
+    choice: str
     evaluations: int = 0
     workspace: Callable[[int], np.ndarray] | None = None
     sleeps: bool = False
@@ -92,11 +93,9 @@ class Integrator:
         """How segments are stepped, in the order of auto's kinds, or without and with a string."""
         if self.ways:
             return self.ways
-        without = Method(FIXED_STEPS, self.kernel, self._fixed_choice, self.evaluations)
+        choice = f"{self.name}: fixed steps of {{step_s:g}} s"
+        without = Method(FIXED_STEPS, self.kernel, choice, self.evaluations)
         return without, replace(without, on_string=True)
-
-    def _fixed_choice(self, _p: np.record, step_s: float, _accuracy: float) -> str:
-        return f"{self.name}: fixed steps of {step_s:g} s"
 
     @cached_property
     def supports_loads(self) -> bool:
