@@ -47,7 +47,7 @@ def entry_of(kernel: Callable[..., Any], signature: Signature) -> Callable[..., 
     if INTERPRETED:
         return kernel
     kernel.compile(signature)  # type: ignore[attr-defined]  # numba's
-    entry: Callable[..., Any] = kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]
+    entry: Callable[..., Any] = kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]  # numba's
     return entry
 
 
