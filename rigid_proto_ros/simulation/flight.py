@@ -16,6 +16,7 @@ import numpy as np
 from ..base.borrowed_views import copy_numbers
 from ..base.compilation import njit
 from ..base.records import record_type
+from ..base.rotation import norm
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
 from ..motion.integrators.equations import accelerations, parts_of, tension_margin
@@ -309,7 +310,7 @@ def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> N
     accuracy, control, body, row = flight.accuracy, flight.control, flight.body, flight.row
     floors[STEP_FLOOR] = max(floors[STEP_FLOOR], control.floor_rate)
     floors[PASSAGE_FLOOR] += control.passages
-    rate = ROUNDINGS * 2.0**-52 * math.sqrt(row[10] * row[10] + row[11] * row[11] + row[12] * row[12])
+    rate = ROUNDINGS * 2.0**-52 * norm(row[10], row[11], row[12])
     method = methods[flight.method]
     if method.way in (NOTHING, ONE_STEP) and not method.sleeps and rate > accuracy:
         floors[SPIN_FLOOR] = max(floors[SPIN_FLOOR], rate)

@@ -15,7 +15,7 @@ import numpy as np
 from ..base.borrowed_views import copy_numbers
 from ..base.compilation import njit
 from ..base.elementary import inverse_tangent_of
-from ..base.rotation import rotate
+from ..base.rotation import norm, rotate
 from ..motion.state import angular_momentum, kinetic_energy
 
 QUANTITIES = {
@@ -77,18 +77,13 @@ def _potential(row: np.ndarray, context: np.ndarray) -> float:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _length(x: float, y: float, z: float) -> float:
-    return math.sqrt(x * x + y * y + z * z)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
 def attitude_angle(a: np.ndarray, b: np.ndarray) -> float:
     """Angle of the rotation from attitude a (4,) to b (4,), xyzw [rad, 0 to π]."""
     w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     x = a[3] * b[0] - a[0] * b[3] - a[1] * b[2] + a[2] * b[1]
     y = a[3] * b[1] + a[0] * b[2] - a[1] * b[3] - a[2] * b[0]
     z = a[3] * b[2] - a[0] * b[1] + a[1] * b[0] - a[2] * b[3]
-    return 2.0 * inverse_tangent_of(_length(x, y, z), abs(w))
+    return 2.0 * inverse_tangent_of(norm(x, y, z), abs(w))
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
@@ -109,11 +104,11 @@ def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
     if code < 13:
         return row[code]
     if code == SPEED:
-        return _length(row[7], row[8], row[9])
+        return norm(row[7], row[8], row[9])
     if code == SPIN:
-        return _length(row[10], row[11], row[12])
+        return norm(row[10], row[11], row[12])
     if code == DISTANCE:
-        return _length(row[0] - context[START], row[1] - context[START + 1], row[2] - context[START + 2])
+        return norm(row[0] - context[START], row[1] - context[START + 1], row[2] - context[START + 2])
     if code == TURNED:
         return attitude_angle(context[START + 3 : START + 7], row[3:7])
     if code == KINETIC:
@@ -128,9 +123,9 @@ def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
         )
     lx, ly, lz = _momentum(row, context)
     if code == MOMENTUM:
-        return _length(lx, ly, lz)
+        return norm(lx, ly, lz)
     ax, ay, az = context[START_MOMENTUM], context[START_MOMENTUM + 1], context[START_MOMENTUM + 2]
-    across = _length(ly * az - lz * ay, lz * ax - lx * az, lx * ay - ly * ax)
+    across = norm(ly * az - lz * ay, lz * ax - lx * az, lx * ay - ly * ax)
     return inverse_tangent_of(across, lx * ax + ly * ay + lz * az)
 
 
@@ -140,12 +135,12 @@ def difference(code: int, a: np.ndarray, b: np.ndarray) -> float:
     if code == 0:
         return attitude_angle(a[3:7], b[3:7])
     if code == 1:
-        return _length(a[0] - b[0], a[1] - b[1], a[2] - b[2])
+        return norm(a[0] - b[0], a[1] - b[1], a[2] - b[2])
     if code == 2:
-        return _length(a[7] - b[7], a[8] - b[8], a[9] - b[9])
+        return norm(a[7] - b[7], a[8] - b[8], a[9] - b[9])
     ax, ay, az = rotate(a[3], a[4], a[5], a[6], a[10], a[11], a[12])
     bx, by, bz = rotate(b[3], b[4], b[5], b[6], b[10], b[11], b[12])
-    return _length(ax - bx, ay - by, az - bz)
+    return norm(ax - bx, ay - by, az - bz)
 
 
 STOP_CODE, STOP_SIGN, STOP_LIMIT = range(3)
@@ -186,7 +181,7 @@ def count_flips(
     x, y, z = measure[B], measure[C], measure[D]
     if x == 0.0 and y == 0.0 and z == 0.0:
         x, y, z = context[START + 10], context[START + 11], context[START + 12]
-    size = math.sqrt(x * x + y * y + z * z)
+    size = norm(x, y, z)
     if not size > 0.0:
         return math.nan
     s = START

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ..base.errors import CommandRefused, InputError
+from ..base.rotation import norm
 from ..base.vectors import Vector
 from ..motion.body import Body
 from ..motion.loads import Load
@@ -46,7 +47,7 @@ def make_thruster(name: str, numbers: Sequence[float], bidirectional: bool, mini
         accepted = "x, y, z, a direction that isn't zero, and behind them if wanted limit >= 0 [N]"
         raise InputError(f"thrusters.{name}", list(numbers), accepted)
     dx, dy, dz = dx / largest, dy / largest, dz / largest
-    size = math.sqrt(dx * dx + dy * dy + dz * dz)
+    size = norm(dx, dy, dz)
     most = limit or math.inf
     return Thruster((x, y, z), (dx / size, dy / size, dz / size), -most if bidirectional else 0.0, most, minimum_on_ns)
 
