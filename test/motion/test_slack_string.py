@@ -32,9 +32,9 @@ def thrown(accuracy=1e-9, **changes):
 def test_a_book_thrown_on_a_slack_rope_lands_where_the_reference_has_it():
     simulation = thrown()
     simulation.advance(1)
-    segment = simulation._segment
-    y = segment.variables
-    (exact,) = reference_motion(reference_problem(segment.problem), [*y[7:10], *y[0:4], *y[10:13], *y[4:7]], [2.0], 20)
+    flown = simulation.flight
+    y = flown.variables
+    (exact,) = reference_motion(reference_problem(flown.problem), [*y[7:10], *y[0:4], *y[10:13], *y[4:7]], [2.0], 20)
     for accuracy in (1e-3, 1e-6, 1e-9, 1e-12):
         simulation = thrown(accuracy)
         simulation.advance(1)
