@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from judged_meshes import codes, load, volume
 from mesh_files import CUBE_QUADS, CUBE_TRIANGLES, CUBE_VERTICES, obj, off, ply, ply_binary, stl, stl_text
 
 from rigid_proto_ros.base.bundled import body_names
@@ -16,17 +17,6 @@ from rigid_proto_ros.mesh import cache as mesh_cache
 from rigid_proto_ros.mesh import reading as mesh_io
 from rigid_proto_ros.mesh.ascii_floats import as_numbers, word_position
 from rigid_proto_ros.mesh.reading import load_mesh
-
-
-def load(tmp_path, name: str, data: bytes):
-    path = tmp_path / name
-    path.write_bytes(data)
-    return load_mesh(str(path))
-
-
-def volume(mesh) -> float:
-    return mesh_body(mesh).moments.moments("solid").measure
-
 
 WHOLE = {
     "a.obj": obj(),
@@ -99,7 +89,7 @@ def test_unreferenced_vertices_are_counted_and_carry_nothing(tmp_path):
     assert len(mesh.vertices) == 9
     body = mesh_body(mesh)
     assert body.moments.mass_properties(density=1.0).center_of_mass.tolist() == [0.5, 0.5, 0.5]
-    assert [finding.code for finding in body.verdict.findings] == ["unreferenced_vertices"]
+    assert codes(body) == {"unreferenced_vertices": "info"}
 
 
 def test_coff_colours_and_comments_are_skipped(tmp_path):

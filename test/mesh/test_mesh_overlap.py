@@ -5,31 +5,15 @@ import json
 
 import numpy as np
 import pytest
+from judged_meshes import body, codes, volume
 from mass_solids import box, inward, moved, sphere, together
 from mesh_files import obj
 
 from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.inspection import verify_moments
 from rigid_proto_ros.mesh import union
-from rigid_proto_ros.mesh.reading import Mesh
 from rigid_proto_ros.mesh.union import counted_once
-
-
-@pytest.fixture(autouse=True)
-def no_cache(monkeypatch):
-    monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
-
-
-def body(surface, **options):
-    vertices, triangles = surface
-    name = str(hash((vertices.tobytes(), triangles.tobytes())))
-    return mesh_body(Mesh("made", "/made.obj", vertices, triangles, None, name), **options)
-
-
-def volume(made) -> float:
-    return made.moments.moments("solid").measure
 
 
 def message(made, code: str) -> str:
@@ -49,7 +33,7 @@ def test_the_solid_of_parts_that_overlap_is_their_union_and_the_sum_is_told(shif
     assert max(verify_moments(made, np.ones(3)).values()) <= 1e-13
     whole = body(two, repair="union")
     assert volume(whole) == pytest.approx(once, rel=1e-12)
-    assert {finding.code for finding in whole.verdict.findings} <= {"repaired", "unreferenced_vertices"}
+    assert codes(whole).keys() <= {"repaired", "unreferenced_vertices"}
     # The vertices of the file keep their numbers.
     assert np.array_equal(whole.vertices[: len(two[0])], two[0])
 
@@ -57,8 +41,7 @@ def test_the_solid_of_parts_that_overlap_is_their_union_and_the_sum_is_told(shif
 def test_an_overlap_of_roundings_size_is_no_warning():
     pytest.importorskip("manifold3d")
     made = body(together(box(cells=2), moved(box(cells=2), (1.0 - 1e-8, 0.013, 0.0271))))
-    severities = {finding.code: finding.severity for finding in made.verdict.findings}
-    assert severities.get("overlapping_components", "info") == "info"
+    assert codes(made).get("overlapping_components", "info") == "info"
 
 
 def test_a_part_that_stands_on_another_one_does_not_overlap_it_however_their_heights_are_rounded():
@@ -122,10 +105,8 @@ def tube(pitch: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_surface_that_passes_through_itself_is_told():
-    assert [finding.code for finding in body(tube(0.05)).verdict.findings if finding.severity == "warning"].count(
-        "self_crossing"
-    ) == 1
-    assert "self_crossing" not in {finding.code for finding in body(tube(0.5)).verdict.findings}
+    assert codes(body(tube(0.05)))["self_crossing"] == "warning"
+    assert "self_crossing" not in codes(body(tube(0.5)))
     assert not body(sphere(20)).verdict.findings
 
 

@@ -6,6 +6,7 @@ import struct
 
 import numpy as np
 import pytest
+from judged_meshes import body, codes, load, volume
 from mass_solids import box, sphere
 from mesh_files import (
     CUBE_QUADS,
@@ -30,10 +31,6 @@ from rigid_proto_ros.mesh import reading
 from rigid_proto_ros.mesh.reading import Mesh, load_mesh
 
 
-def volume(path) -> float:
-    return mesh_body(load_mesh(str(path))).moments.moments("solid").measure
-
-
 def write_gltf(folder, vertices: np.ndarray) -> None:
     """model.gltf and model.bin of a cube; the .gltf is the same for any vertices."""
     made = Gltf(vertices)
@@ -50,11 +47,11 @@ def test_every_file_that_was_read_is_in_the_caches_key(tmp_path, monkeypatch, si
     monkeypatch.setattr(reading, "CACHED_SIZE", size)
     for name, scale, expected in (("a", 1.0, 1.0), ("b", 2.0, 8.0), ("a", 1.0, 1.0), ("a", 3.0, 27.0)):
         write_gltf(tmp_path / name, scale * CUBE_VERTICES)
-        assert volume(tmp_path / name / "model.gltf") == pytest.approx(expected, rel=1e-12)
-    assert volume(tmp_path / "a" / "model.gltf") == pytest.approx(27.0, rel=1e-12)
+        assert volume(load_mesh(str(tmp_path / name / "model.gltf"))) == pytest.approx(expected, rel=1e-12)
+    assert volume(load_mesh(str(tmp_path / "a" / "model.gltf"))) == pytest.approx(27.0, rel=1e-12)
     (tmp_path / "a" / "model.bin").unlink()
     with pytest.raises(MeshError):
-        volume(tmp_path / "a" / "model.gltf")
+        volume(load_mesh(str(tmp_path / "a" / "model.gltf")))
 
 
 def dae(unit: str) -> bytes:
@@ -81,8 +78,7 @@ UNITS = [
 def test_a_unit_that_the_file_states_is_taken_and_said(tmp_path, name, data, unit):
     if name.endswith("dae"):
         pytest.importorskip("collada")
-    (tmp_path / name).write_bytes(data)
-    mesh = load_mesh(str(tmp_path / name))
+    mesh = load(tmp_path, name, data)
     assert mesh.unit == unit
     inspection = inspect_mesh(mesh_body(mesh))
     assert inspection.volume == pytest.approx(unit**3, rel=1e-12)
@@ -99,9 +95,8 @@ def test_a_size_that_no_metre_file_has_names_the_unit_that_makes_sense(side, wor
 
 @pytest.mark.parametrize("name", ["a.stl.gz", "a.obj.bz2", "a.zae"])
 def test_packed_files_are_to_be_unpacked_first(tmp_path, name):
-    (tmp_path / name).write_bytes(stl())
     with pytest.raises(MeshError, match="unpack it first"):
-        load_mesh(str(tmp_path / name))
+        load(tmp_path, name, stl())
 
 
 def test_an_archive_that_is_none_or_would_fill_the_memory_says_so(tmp_path):
@@ -111,28 +106,16 @@ def test_an_archive_that_is_none_or_would_fill_the_memory_says_so(tmp_path):
             load_mesh(str(tmp_path / "a.3mf"), max_triangles=100)
 
 
-def made(vertices, triangles) -> Mesh:
-    name = str(hash((vertices.tobytes(), triangles.tobytes())))
-    return Mesh("made", "/made.obj", vertices, triangles, None, name)
-
-
-@pytest.fixture
-def no_cache(monkeypatch):
-    monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
-
-
-def test_cracks_below_1e_12_of_the_diagonal_are_welded_and_said(no_cache):
+def test_cracks_below_1e_12_of_the_diagonal_are_welded_and_said():
     vertices, triangles = sphere(10)
     soup = vertices[triangles].reshape(-1, 3)
     for size, closed in ((1e-13, True), (1e-9, False)):
         torn = soup + np.random.default_rng(1).uniform(-size, size, soup.shape)
-        body = mesh_body(made(torn, np.arange(len(torn)).reshape(-1, 3)))
-        assert body.verdict.closed == closed
+        welded = body((torn, np.arange(len(torn)).reshape(-1, 3)))
+        assert welded.verdict.closed == closed
         if closed:
-            (finding,) = body.verdict.findings
-            assert (finding.code, finding.severity) == ("welded", "info")
-            whole = mesh_body(made(vertices, triangles)).moments.moments("solid").measure
-            assert body.moments.moments("solid").measure == pytest.approx(whole, rel=1e-12)
+            assert codes(welded) == {"welded": "info"}
+            assert volume(welded) == pytest.approx(volume(body((vertices, triangles))), rel=1e-12)
 
 
 def test_welded_cracks_come_from_the_cache_alike(tmp_path, monkeypatch):
@@ -141,28 +124,29 @@ def test_welded_cracks_come_from_the_cache_alike(tmp_path, monkeypatch):
     vertices, triangles = sphere(6)
     soup = vertices[triangles].reshape(-1, 3)
     torn = soup + np.random.default_rng(1).uniform(-1e-14, 1e-14, soup.shape)
-    first, again = (mesh_body(made(torn, np.arange(len(torn)).reshape(-1, 3))) for _ in range(2))
+    mesh = Mesh("made", "/made.obj", torn, np.arange(len(torn)).reshape(-1, 3), None, "made")
+    first, again = (mesh_body(mesh) for _ in range(2))
     assert again.verdict == first.verdict and np.array_equal(again.triangles, first.triangles)
     assert again.moments.moments("solid").measure == first.moments.moments("solid").measure
 
 
-def test_an_open_tube_says_what_it_is_with_caps(no_cache):
+def test_an_open_tube_says_what_it_is_with_caps():
     angles = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     vertices = np.concatenate([np.column_stack([ring, np.full(64, z)]) for z in (-0.5, 0.5)])
     i, j = np.arange(64), (np.arange(64) + 1) % 64
     tube = np.concatenate([np.stack([i, j, 64 + j], axis=1), np.stack([i, 64 + j, 64 + i], axis=1)])
-    reason = mesh_body(made(vertices, tube)).verdict.reason
+    reason = body((vertices, tube)).verdict.reason
     assert "flat caps over the holes give 3.14" in reason  # 64 sides: 3.137
     assert "2.09 to 2.09" not in reason and "volume unknown" in reason
 
 
-def test_a_refusal_never_prints_a_range_of_equal_ends(no_cache):
+def test_a_refusal_never_prints_a_range_of_equal_ends():
     rng = np.random.default_rng(3)
     vertices, triangles = box((1.0, 2.0, 3.0), 6)
     for count in range(1, 30):
         hole = rng.choice(len(triangles), count, replace=False)
-        reason = mesh_body(made(vertices, np.delete(triangles, hole, axis=0))).verdict.reason
+        reason = body((vertices, np.delete(triangles, hole, axis=0))).verdict.reason
         if "ambiguous" in reason:
             low, high = reason.partition("ambiguous: ")[2].split(",")[0].split(" to ")
             assert low != high
@@ -184,21 +168,18 @@ def test_a_binary_ply_with_several_lists_and_one_in_big_endian_are_read(tmp_path
         header += "".join(f"property double {axis}\n" for axis in "xyz")
         header += "element face 6\nproperty list uint int vertex_indices\nproperty uchar flags\n"
         header += "property list uchar float texcoord\nend_header\n"
-        body = b"".join(struct.pack(f"{order}3d", *v) for v in CUBE_VERTICES)
+        rows = b"".join(struct.pack(f"{order}3d", *v) for v in CUBE_VERTICES)
         for quad in CUBE_QUADS:
-            body += struct.pack(f"{order}I4iBB8f", 4, *quad, 7, 8, *[0.5] * 8)
-        (tmp_path / f"{word}.ply").write_bytes(header.encode() + body)
-        assert volume(tmp_path / f"{word}.ply") == 1.0
-        (tmp_path / "cut.ply").write_bytes((header.encode() + body)[:-3])
+            rows += struct.pack(f"{order}I4iBB8f", 4, *quad, 7, 8, *[0.5] * 8)
+        assert volume(load(tmp_path, "a.ply", header.encode() + rows)) == 1.0
         with pytest.raises(MeshError, match="truncated"):
-            volume(tmp_path / "cut.ply")
+            load(tmp_path, "cut.ply", (header.encode() + rows)[:-3])
 
 
 def test_a_ply_whose_faces_name_fractions_of_vertices_is_refused(tmp_path):
     text = ply().replace(b"3 0 1 3", b"3 0 1.5 3", 1).replace(b"list uchar int", b"list uchar float")
-    (tmp_path / "a.ply").write_bytes(text)
     with pytest.raises(MeshError, match=r"vertex 1\.5"):
-        volume(tmp_path / "a.ply")
+        load(tmp_path, "a.ply", text)
 
 
 @pytest.mark.parametrize(
@@ -235,7 +216,7 @@ def test_a_format_without_a_reader_here_is_read_by_trimesh(tmp_path):
     path.write_bytes(xaml("2 0 0 0 0 2 0 0 0 0 2 0 5 6 7 1"))
     mesh = load_mesh(str(path))
     assert mesh.vertices.tolist() == (2.0 * CUBE_VERTICES + [5.0, 6.0, 7.0]).tolist()
-    assert volume(path) == 8.0
+    assert volume(load_mesh(str(path))) == 8.0
     path.write_bytes(b"<a/>")
     with pytest.raises(MeshError, match=r"a\.xaml"):
         load_mesh(str(path))

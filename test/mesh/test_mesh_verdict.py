@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from judged_meshes import body, codes, volume
 from mass_solids import box, inward, moved, rotation, sphere, together
 from mesh_files import moebius
 
@@ -17,28 +18,8 @@ from rigid_proto_ros.mass.repair import RepairedSurface
 from rigid_proto_ros.mass.verdict import unit_suspicion
 from rigid_proto_ros.mesh import nesting as mesh_topology_nesting
 from rigid_proto_ros.mesh.hull import box_surface, convex_hull
-from rigid_proto_ros.mesh.reading import Mesh, load_mesh
+from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.mesh.topology import mesh_topology
-
-
-def body(surface, polygon_starts=None, **options):
-    vertices, triangles = surface
-    name = str(hash((vertices.tobytes(), triangles.tobytes())))
-    return mesh_body(Mesh("made", "/made.obj", vertices, triangles, polygon_starts, name), **options)
-
-
-def codes(made) -> dict[str, str]:
-    return {finding.code: finding.severity for finding in made.verdict.findings}
-
-
-def solid_volume(made) -> float:
-    return made.moments.moments("solid").measure
-
-
-@pytest.fixture(autouse=True)
-def no_cache(monkeypatch):
-    monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
-
 
 BALL = sphere(10)
 HOLLOW = together(box((4.0, 4.0, 4.0)), inward(sphere(10)))
@@ -55,22 +36,22 @@ def test_corners_split_for_textures_are_one_vertex_to_the_verdict():
     soup = vertices[triangles].reshape(-1, 3)
     made = body((soup, np.arange(len(soup)).reshape(-1, 3)))
     assert made.verdict.closed
-    assert solid_volume(made) == pytest.approx(solid_volume(body(BALL)), rel=1e-14)
+    assert volume(made) == pytest.approx(volume(body(BALL)), rel=1e-14)
 
 
 def test_cavities_are_kept():
     made = body(HOLLOW)
     assert codes(made) == {"cavities": "info"}
-    assert solid_volume(made) == pytest.approx(64.0 - solid_volume(body(BALL)), rel=1e-13)
-    assert solid_volume(body(inward(HOLLOW))) == solid_volume(made)
+    assert volume(made) == pytest.approx(64.0 - volume(body(BALL)), rel=1e-13)
+    assert volume(body(inward(HOLLOW))) == volume(made)
 
 
 def test_a_part_inside_another_wound_outward_counts_twice_and_is_told():
     made = body(together(box((4.0, 4.0, 4.0)), BALL))
     assert codes(made) == {"nested_components": "warning"}
-    assert solid_volume(made) > 64.0
+    assert volume(made) > 64.0
     repaired = body(together(box((4.0, 4.0, 4.0)), BALL), repair=True)
-    assert solid_volume(repaired) == pytest.approx(solid_volume(body(HOLLOW)), rel=1e-14)
+    assert volume(repaired) == pytest.approx(volume(body(HOLLOW)), rel=1e-14)
 
 
 @pytest.mark.parametrize("shift", [(0.5, 0.5, 0.5), (0.31, 0.17, 0.05), (0.9, 0.0, 0.0)])
@@ -114,8 +95,8 @@ def bubbles(count: int) -> tuple:
 def test_a_ball_with_many_bubbles_is_right_as_it_is():
     made = body(bubbles(6), repair=True)
     assert codes(made) == {"cavities": "info"}
-    one = solid_volume(body(sphere(4, (0.02, 0.02, 0.02))))
-    assert solid_volume(made) == pytest.approx(solid_volume(body(sphere(12))) - 216 * one, rel=1e-12)
+    one = volume(body(sphere(4, (0.02, 0.02, 0.02))))
+    assert volume(made) == pytest.approx(volume(body(sphere(12))) - 216 * one, rel=1e-12)
 
 
 def test_what_is_left_undecided_accuses_no_component_and_turns_none(monkeypatch):
@@ -123,8 +104,8 @@ def test_what_is_left_undecided_accuses_no_component_and_turns_none(monkeypatch)
     made = body(bubbles(4), repair=True)
     assert codes(made)["components_unchecked"] == "warning"
     assert "component_inward" not in codes(made) and "repaired" not in codes(made)
-    one = solid_volume(body(sphere(4, (0.02, 0.02, 0.02))))
-    assert solid_volume(made) == pytest.approx(solid_volume(body(sphere(12))) - 64 * one, rel=1e-12)
+    one = volume(body(sphere(4, (0.02, 0.02, 0.02))))
+    assert volume(made) == pytest.approx(volume(body(sphere(12))) - 64 * one, rel=1e-12)
 
 
 def test_an_open_surface_says_how_far_its_volume_depends_on_the_origin():
@@ -147,7 +128,7 @@ def test_repair_turns_faces_to_agree(fraction):
     made = body((vertices, broken))
     assert codes(made)["inconsistent_winding"] == "error"
     repaired = body((vertices, broken), repair=True)
-    assert solid_volume(repaired) == pytest.approx(solid_volume(body(BALL)), rel=1e-14)
+    assert volume(repaired) == pytest.approx(volume(body(BALL)), rel=1e-14)
     assert codes(repaired) == {"repaired": "warning"}
 
 
@@ -156,7 +137,7 @@ def test_repair_keeps_a_cavity_whatever_the_faces_said():
     flip = np.random.default_rng(2).random(len(triangles)) < 0.3
     broken = triangles.copy()
     broken[flip] = broken[flip, ::-1]
-    assert solid_volume(body((vertices, broken), repair=True)) == pytest.approx(solid_volume(body(HOLLOW)), rel=1e-14)
+    assert volume(body((vertices, broken), repair=True)) == pytest.approx(volume(body(HOLLOW)), rel=1e-14)
 
 
 def test_repair_of_bodies_wound_apart(meshes):
@@ -168,7 +149,7 @@ def test_repair_of_bodies_wound_apart(meshes):
         abs(solid_moments(mesh.vertices, repaired.triangles[topology.component == c]).measure)
         for c in range(topology.components)
     ]
-    assert solid_volume(repaired) == pytest.approx(sum(parts), rel=1e-13)
+    assert volume(repaired) == pytest.approx(sum(parts), rel=1e-13)
 
 
 def test_repair_turns_polygons_as_a_whole(meshes):
@@ -178,7 +159,7 @@ def test_repair_turns_polygons_as_a_whole(meshes):
     surface.turn(np.repeat(chosen, np.diff(mesh.polygon_starts)))
     broken = dataclasses.replace(mesh, triangles=surface.triangles, sha256="broken")
     repaired, whole = mesh_body(broken, repair=True), mesh_body(mesh)
-    assert solid_volume(repaired) == solid_volume(whole)
+    assert volume(repaired) == volume(whole)
     assert repaired.moments.moments("shell").measure == pytest.approx(whole.moments.moments("shell").measure, rel=1e-14)
 
 
@@ -186,7 +167,7 @@ def test_repair_drops_copies_and_back_sides():
     vertices, triangles = BALL
     twice = body((vertices, np.concatenate([triangles, triangles])), repair=True)
     both = body((vertices, np.concatenate([triangles, triangles[:, ::-1]])), repair=True)
-    assert solid_volume(twice) == solid_volume(both) == pytest.approx(solid_volume(body(BALL)), rel=1e-14)
+    assert volume(twice) == volume(both) == pytest.approx(volume(body(BALL)), rel=1e-14)
 
 
 def test_repair_welds_a_torn_surface():
@@ -197,7 +178,7 @@ def test_repair_welds_a_torn_surface():
     assert codes(body(torn))["open"] == "error"
     repaired = body(torn, repair=True)
     assert "welded" in repaired.verdict.findings[0].message
-    assert solid_volume(repaired) == pytest.approx(solid_volume(body(BALL)), rel=1e-5)
+    assert volume(repaired) == pytest.approx(volume(body(BALL)), rel=1e-5)
 
 
 def test_repair_caps_flat_holes_exactly():
@@ -205,10 +186,10 @@ def test_repair_caps_flat_holes_exactly():
     missing = np.all(vertices[triangles][:, :, 2] == 1.5, axis=1)
     repaired = body((vertices, triangles[~missing]), repair=True)
     assert "capped 1 hole with" in repaired.verdict.findings[0].message
-    assert solid_volume(repaired) == pytest.approx(6.0, rel=1e-15)
+    assert volume(repaired) == pytest.approx(6.0, rel=1e-15)
     assert repaired.moments.moments("shell").measure == pytest.approx(22.0, rel=1e-14)
     few = body((vertices, np.delete(triangles, [3, 40, 41, 90], axis=0)), repair=True)
-    assert solid_volume(few) == pytest.approx(6.0, rel=1e-15)
+    assert volume(few) == pytest.approx(6.0, rel=1e-15)
 
 
 def test_copies_that_close_the_surface_stay_and_those_that_spoil_it_go():
@@ -216,14 +197,14 @@ def test_copies_that_close_the_surface_stay_and_those_that_spoil_it_go():
     there_and_back = np.concatenate([triangles, triangles[[3]], triangles[[3]][:, ::-1]])
     made = body((vertices, there_and_back))
     assert made.verdict.closed and codes(made)["duplicate_faces"] == "info"
-    assert solid_volume(made) == pytest.approx(solid_volume(body(BALL)), rel=1e-14)
+    assert volume(made) == pytest.approx(volume(body(BALL)), rel=1e-14)
     for more in (triangles[[3]], triangles[:7], triangles, np.concatenate([triangles[:7], triangles[[50]]])):
         spoilt = vertices, np.concatenate([triangles, more])
         assert codes(body(spoilt))["duplicate_faces"] == "error"
         assert f"{len(more)} duplicate face" in body(spoilt).verdict.reason
         repaired = body(spoilt, repair=True)
         assert repaired.verdict.closed
-        assert solid_volume(repaired) == pytest.approx(solid_volume(body(BALL)), rel=1e-14)
+        assert volume(repaired) == pytest.approx(volume(body(BALL)), rel=1e-14)
 
 
 @given(st.integers(0, 10**6), st.sampled_from([1, 2, 5]))
@@ -242,7 +223,7 @@ def test_whatever_closes_small_holes_changes_no_more_than_is_said(seed, holes):
         effect = body(surface).verdict.hole_effect
         accepted = body(surface, accept_open=1.001 * effect)
         assert codes(accepted)["open_accepted"] == "warning"
-        assert abs(solid_volume(accepted) / solid_volume(whole) - 1.0) <= effect
+        assert abs(volume(accepted) / volume(whole) - 1.0) <= effect
         tensors = [made.moments.mass_properties(density=1.0).inertia for made in (accepted, whole)]
         assert np.abs(tensors[0] - tensors[1]).max() <= effect * np.abs(tensors[1]).max()
 
@@ -280,11 +261,11 @@ def test_the_fallbacks_are_named_and_stand_in():
     vertices, triangles = box((1.0, 2.0, 3.0))
     opened = (vertices @ rotation(1).T, triangles[:-1])
     hull = body(opened, fallback="hull")
-    assert solid_volume(hull) == pytest.approx(6.0, rel=1e-14)
+    assert volume(hull) == pytest.approx(6.0, rel=1e-14)
     assert codes(hull) == {"open": "error", "fallback": "warning"}
     assert "convex hull" in hull.verdict.findings[-1].message
     cuboid = body(opened, fallback="box")
-    assert solid_volume(cuboid) == pytest.approx(np.prod(np.ptp(opened[0], axis=0)), rel=1e-14)
+    assert volume(cuboid) == pytest.approx(np.prod(np.ptp(opened[0], axis=0)), rel=1e-14)
     solid, box_model = (cuboid.moments.mass_properties(m, mass=1.0).inertia for m in ("solid", "bounding_box"))
     assert solid == pytest.approx(box_model, rel=1e-13, abs=1e-15)
     assert codes(body(BALL, fallback="hull")) == {}  # nothing to stand in for
@@ -348,4 +329,4 @@ def test_many_components_are_judged_in_bounded_work():
     parts = [moved(box(), (3.0 * i, 3.0 * j, 3.0 * k)) for i in range(14) for j in range(14) for k in range(11)]
     made = body(together(*parts))
     assert codes(made) == {"components_unchecked": "warning"}
-    assert solid_volume(made) == pytest.approx(len(parts), rel=1e-13)
+    assert volume(made) == pytest.approx(len(parts), rel=1e-13)
