@@ -9,8 +9,9 @@ from functools import partial
 
 import numpy as np
 
-from .fitting import short_misfit
+from .fitting import CannotFlyError, fit_flights, short_misfit
 from .measurements import ACCELERATION, ATTITUDE, POSITION, RATE, VELOCITY, MeasuredFlight, Series
+from .residual_checks import check_residuals
 from .unknowns import Unknowns, Values
 
 USUAL = (
@@ -27,30 +28,46 @@ _DIRECTIONS = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0
 
 
 def likely_cause(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> str:
-    """Which conversion makes short parts of the flights fit, in words, or the usual causes; empty where they fit as
-    they are, so that none of these is the cause.
+    """Which conversion makes the flights fit, or at least short parts of them, in words, or the usual causes; empty
+    where short parts fit as they are and no other unit of a sensor makes the whole fit.
     """
-    if short_misfit(flights, unknowns, values) <= 1.0:
-        return ""
-    for cause, remedy, converted, gravity in _conversions(flights, values):
-        if short_misfit(converted, unknowns, replace(values, gravity=gravity)) <= 1.0:
+    fits_short = short_misfit(flights, unknowns, values) <= 1.0
+    partly = ""
+    # Poses of wrong units or axes don't fit for a moment; accelerations may, with another mass.
+    for cause, remedy, converted, gravity in _conversions(flights, values, sensors_only=fits_short):
+        other = replace(values, gravity=gravity)
+        if short_misfit(converted, unknowns, other) > 1.0:
+            continue
+        if _fits(converted, unknowns, other):
             return f"it fits if {cause}: {remedy}"
-    return USUAL
+        partly = partly or f"short parts fit if {cause}: {remedy}"
+    return "" if fits_short else partly or USUAL
+
+
+def _fits(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> bool:
+    """Whether the whole flights leave no more than noise."""
+    try:
+        estimate = fit_flights(flights, unknowns, values)
+        return all(check.is_noise for check in check_residuals(flights, estimate))
+    except CannotFlyError:
+        return False
 
 
 def _conversions(
-    flights: Sequence[MeasuredFlight], values: Values
+    flights: Sequence[MeasuredFlight], values: Values, sensors_only: bool
 ) -> Iterator[tuple[str, str, list[MeasuredFlight], np.ndarray]]:
-    """Cause, remedy, and flights and gravity as they are then."""
+    """Cause, remedy, and flights and gravity as they are then; of rates and accelerations alone or of all."""
     kinds = {series.kind for flight in flights for series in flight.series}
     for scaled, factor, cause in _SCALES:
-        if scaled[0] in kinds:
+        if scaled[0] in kinds and not (sensors_only and POSITION in scaled):
             yield (
                 cause,
                 f"multiply them by {factor:.6g}",
                 _changed(flights, scaled, partial(np.multiply, factor)),
                 values.gravity,
             )
+    if sensors_only:
+        return
     for direction in _DIRECTIONS:
         gravity = 9.81 * np.array(direction)
         if not np.allclose(gravity, values.gravity):

@@ -102,6 +102,7 @@ def _frame_mistakes(truth: MassProperties, mass: float, stated: np.ndarray, use:
         ("taken about the stated origin, not about the COM", _parallel(truth.inertia, mass, com - stated)),
         ("moved from the COM to the origin the wrong way round", _parallel(truth.inertia, -mass, com)),
         ("in the mesh's axes, not in the link's", use.rotation.T @ truth.inertia @ use.rotation),
+        ("principal moments on the diagonal, their axes left out", np.diag(np.linalg.eigvalsh(truth.inertia))),
         *(("turned by the conjugate of the principal rotation", turned) for turned in _conjugates(truth.inertia)),
     ]
 

@@ -16,7 +16,7 @@ from ..mass.tensor import check_tensor
 from ..mesh.locate import Search
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
 from .link_shapes import Meshes, primitive_surface
-from .model import COLLISION, HERE, VISUAL, Link, Pose, Shape
+from .model import COLLISION, HERE, VISUAL, Link, Pose, Shape, valid_numbers
 from .reading import read_robot
 
 
@@ -35,6 +35,7 @@ class Lump:
     doubts: tuple[str, ...]
 
 
+@np.errstate(all="ignore")  # of numbers near the largest, which are refused
 def lump_robot(
     path: Path, joints: Mapping[str, float], folders: tuple[Path, ...] = (), xacro: tuple[str, ...] = ()
 ) -> Lump:
@@ -46,7 +47,8 @@ def lump_robot(
     robot = read_robot(path, folders, xacro)
     search = Search(path.parent, folders)
     links = robot.simulated() if robot.simulated else [_computed(link, Meshes(search)) for link in robot.links]
-    poses = robot.poses(joints)
+    with valid_numbers(path.name):  # of the joints, which are read now
+        poses = robot.poses(joints)
     lost = next((link.name for link in links if link.name not in poses), None)
     if lost is not None:
         raise InputError("lump", f"link {lost!r} is connected to no other; accepted: one tree of links")

@@ -323,6 +323,7 @@ def _by_mesh(doctor: Doctor, mesh: str, scale: np.ndarray | None, link_name: str
     return judged(link, diagnose(link, parts, options, shape.role), [parts.points])
 
 
+@np.errstate(all="ignore")  # of numbers near the largest, which are judged
 def compare_robot(
     path: Path,
     options: Options,

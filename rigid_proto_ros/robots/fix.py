@@ -14,6 +14,8 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
+import numpy as np
+
 from ..base.errors import InputError
 from ..base.files import read_bounded
 from ..mass.export import is_flat, quaternion_wxyz
@@ -237,6 +239,7 @@ def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, options: Options, pla
     return ""
 
 
+@np.errstate(all="ignore")
 def fix_robot(
     path: Path, options: Options, *, link: str | None = None, everything: bool = False
 ) -> tuple[bytes, list[FixedLink]]:

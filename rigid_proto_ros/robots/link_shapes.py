@@ -186,6 +186,8 @@ class LinkShapes:
             measure += size
             first += size * center
             second += size * np.outer(center, center) + moment
+        if not 0.0 < measure < math.inf or not np.isfinite(second).all():
+            raise InputError(self.names, f"{model} of measure {measure:g}; a body needs a finite one > 0")
         return measure, first, second
 
     def _part(self, shape: Shape, body: MeshBody | None, model: str) -> tuple[float, np.ndarray, np.ndarray]:

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from xml.etree.ElementTree import Element
 
@@ -195,6 +196,17 @@ def rotation_from_wxyz(quaternion: ArrayLike) -> np.ndarray:
     """Rotation (3, 3) of a quaternion (w, x, y, z), MuJoCo's order, of any length but 0."""
     w, x, y, z = (np.asarray(quaternion, dtype=float) / np.linalg.norm(np.asarray(quaternion, dtype=float))).tolist()
     return matrix_from_quaternion([x, y, z, w])
+
+
+@contextmanager
+def valid_numbers(file: str) -> Iterator[None]:
+    """Raise InputError for what is no number in a robot file of this name."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (ValueError, TypeError, KeyError) as error:
+        raise InputError("robot file", file, f"valid numbers ({error})") from None
 
 
 def floats(text: str | None, default: str, count: int) -> np.ndarray:

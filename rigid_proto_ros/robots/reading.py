@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 from ..base.errors import InputError
 from .mjcf import read_mjcf
-from .model import Robot
+from .model import Robot, valid_numbers
 from .robot_xml import robot_root
 from .sdf import read_sdf
 from .urdf import read_urdf
@@ -22,17 +22,13 @@ def read_robot(path: Path, folders: tuple[Path, ...] = (), xacro: tuple[str, ...
 
 def robot_of(root: Element, path: Path) -> Robot:
     """The robot below the root of a file; raises InputError for what is none, or holds what are no numbers."""
-    try:
+    with valid_numbers(path.name):
         if root.tag == "robot":
             return read_urdf(root)
         if root.tag == "sdf":
             return read_sdf(root)
         if root.tag == "mujoco":
             return read_mjcf(root, path)
-    except (ValueError, TypeError, KeyError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError("robot file", path.name, f"valid numbers ({error})") from None
     tag = re.sub(r"[^\w:.{}/-]", "?", str(root.tag))[:40]
     accepted = "URDF's <robot>, SDF's <sdf> or MJCF's <mujoco>"
     raise InputError("robot file", f"{path.name} begins with <{tag}>, not with {accepted}")

@@ -122,3 +122,13 @@ def test_a_unit_or_an_axis_that_was_taken_for_another_is_named(kinds, convert, g
     found = identify([flight], fit)
     assert not found.fits
     assert cause in found.remarks[0]
+
+
+def test_accelerations_in_g_are_named_where_short_parts_fit_with_another_mass() -> None:
+    truth = mf.values_of(0.5, (0.01, -0.02, 0.03), INERTIA, (0.0, 0.0, -9.81))
+    load = mf.load_history((0.5, 0.05, "body", (0.05, 0.02, 0.0), (0.3, 0.5, 2.0), (0, 0, 0)))
+    flight = mf.with_imu(truth, mf.tumbling(), np.random.default_rng(2), 3.0, load, place=(0.05, 0.0, 0.02))
+    found = identify(
+        [_with(flight, (ms.ACCELERATION,), lambda v: v / 9.80665)], ("mass", "com", "inertia", "imu_place")
+    )
+    assert not found.fits and found.remarks[0].startswith("it fits if accelerations are in g")

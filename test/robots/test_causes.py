@@ -98,6 +98,10 @@ def conjugate(six) -> tuple:
     return six_from_tensor(axes.T @ np.diag(moments[[1, 2, 0]]) @ axes)
 
 
+def principal(six) -> tuple:
+    return six_from_tensor(np.diag(np.linalg.eigvalsh(tensor(six))[::-1]))
+
+
 MISTAKES = {
     "millimetres": (lambda c, s: (c, 1e6 * s), "kg mm²"),
     "gram millimetres": (lambda c, s: (c, 1e9 * s), "g mm²"),
@@ -119,6 +123,7 @@ MISTAKES = {
     "one entry, smaller": (lambda c, s: (c, s * [1, 1, 1, 1e-2, 1, 1]), "iyy is 10^-2 times"),
     "six of nine": (lambda c, s: (c, s[[0, 1, 2, 1, 3, 4]]), "first six of nine entries"),
     "conjugate rotation": (lambda c, s: (c, conjugate(s)), "conjugate of the principal rotation"),
+    "principal moments": (lambda c, s: (c, principal(s)), "principal moments on the diagonal"),
     "two at once": (lambda c, s: (c, 1e6 * s * [1, -1, -1, 1, -1, 1]), "signs of the products"),
 }
 

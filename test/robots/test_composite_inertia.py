@@ -212,6 +212,7 @@ def test_the_command_writes_a_scene_that_flies(tmp_path, capsys, monkeypatch):
         (["--lump", "two.urdf"], "2 root links"),
         (["--lump", "loop.urdf"], "is the child of two joints"),
         (["--lump", "empty.urdf"], "inertials"),
+        (["--lump", "axis.urdf"], "valid numbers"),
     ],
 )
 def test_what_is_no_one_body_is_refused_in_one_line(tmp_path, capsys, monkeypatch, arguments, words):
@@ -220,6 +221,7 @@ def test_what_is_no_one_body_is_refused_in_one_line(tmp_path, capsys, monkeypatc
     (tmp_path / "two.urdf").write_text(f'<robot name="r">{link("a", 1, "0 0 0")}{link("b", 1, "0 0 0")}</robot>')
     again = joint("again", "fixed", "base", "hand")
     (tmp_path / "loop.urdf").write_text(URDF.replace("</robot>", f"{again}</robot>"))
+    (tmp_path / "axis.urdf").write_text(URDF.replace('xyz="1 2 3"', 'xyz="along"'))
     (tmp_path / "empty.urdf").write_text(f'<robot name="r"><link name="a">{BOX}</link></robot>')
     assert main(["inspect", *arguments]) == 2
     refusal = capsys.readouterr().err

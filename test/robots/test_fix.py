@@ -271,6 +271,18 @@ def test_xacro_is_refused_with_the_command_that_expands_it(parts):
         fixed(path)
 
 
+def test_a_shape_without_a_volume_that_a_number_can_hold_is_no_solid(parts, recwarn):
+    path = parts / "robot.urdf"
+    shape = '<visual><geometry><cylinder radius="1e-300" length="1"/></geometry></visual>'
+    tensor = '<inertia ixx="inf" iyy="1e308" izz="1"/>'
+    path.write_text(
+        f'<robot name="r"><link name="a">{shape}<inertial><mass value="1"/>{tensor}</inertial></link></robot>'
+    )
+    data, links = fixed(path)
+    assert data == path.read_bytes() and links["a"].before.status == "impossible" and links["a"].left
+    assert not recwarn
+
+
 ROBOTS = os.environ.get("RIGID_PROTO_ROBOTS", "")
 
 
