@@ -48,7 +48,6 @@ ALLOWED = {
     "numba": ("base", "mesh", "mass", "motion", "simulation", "sweep", "identify.trajectories"),
     "llvmlite": ("base.simd", "base.elementary", "base.provenance"),  # comes with numba
     "argcomplete": ("base.command_line",),
-    "rich": ("cli", "base.progress"),
     "yaml": ("scene", "session", "sweep", "ros", "cli"),
     "trimesh": ("mesh.other_formats",),
     "collada": ("mesh.collada",),

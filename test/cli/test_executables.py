@@ -110,6 +110,9 @@ def test_an_output_that_nobody_reads_or_that_takes_nothing_is_told_in_a_line_at_
     done = subprocess.run(inspect, stdout=write, stderr=subprocess.PIPE, text=True, env=buffered(), check=False)
     os.close(write)
     assert (done.returncode, done.stderr) == (0, "")
+    closed = ["sh", "-c", 'exec "$@" >&-', "sh", *inspect]
+    done = subprocess.run(closed, stderr=subprocess.PIPE, text=True, env=buffered(), check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 FULL_BYTES = 2_000_000
