@@ -77,6 +77,7 @@ class LiveSimulation:
     def stop(self) -> None:
         """End the motion, then the observers: what they hold goes out."""
         self._thread.stop()
+        self.loop.simulation.notify_end()
         self.observers.close()
 
     def call(self, function: Callable[[], Any], timeout_s: float = 10.0) -> Any:

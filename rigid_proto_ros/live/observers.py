@@ -48,6 +48,7 @@ class LiveObservers:
         by whom nobody waits for.
         """
         finished = self._recorder
+        loop.simulation.notify_end()
         self.record_to(recorder)
         loop.watch(self.observer)
         if recorder is not None:

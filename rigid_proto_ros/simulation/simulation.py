@@ -109,7 +109,9 @@ class Simulation(Observables):
         self._notifier.status(self, paused)
 
     def notify_end(self) -> None:
-        """Tell the observer, at the end of a flight, what it has cost and how far it was held to its accuracy."""
+        """Tell the observer, at the end of a run or of its watch, what the run has cost and how far it was held to its
+        accuracy; in flight that is told from time to time alone.
+        """
         self._notifier.cost(self)
 
     def snapshot(self, setup: Setup | None = None) -> BodySnapshot:
@@ -171,6 +173,7 @@ class Simulation(Observables):
         """
         self._arrays.end_all()
         self._notify([])
+        self.notify_end()
         self.observer.on(Reset())
         self.events.reset()
         before = self.setup
