@@ -145,8 +145,8 @@ class Client:
         return len(self.received[topic])
 
     def advertise(self, topic, type, wait=True, **qos):
-        """A publisher, matched with the node's subscription."""
-        publisher = self.node.create_publisher(TYPES[type], topic, profile(**qos))
+        """A publisher, matched with the node's subscription; ``topic#2`` is another one of the same topic."""
+        publisher = self.node.create_publisher(TYPES[type], topic.partition("#")[0], profile(**qos))
         self.publishers[topic] = (publisher, TYPES[type])
         if wait:
             _until(lambda: publisher.get_subscription_count(), f"a subscription of {topic}")
@@ -160,17 +160,16 @@ class Client:
                 time.sleep(max(0.0, start + k / rate - time.monotonic()))
             publisher.publish(filled(message_type(), content))
 
-    def repeat(self, topic, content, count, rate=0.0):
-        """One message ``count`` times; rate per second, 0 as fast as it goes."""
-        publisher, message_type = self.publishers[topic]
-        message = filled(message_type(), content)
-        message = serialize_message(message)
+    def repeat(self, topics, content, count, rate=0.0):
+        """One message ``count`` times by each of these publishers, in turn; rate per second, 0 as fast as it goes."""
+        publishers = [self.publishers[topic][0] for topic in topics]
+        message = serialize_message(filled(self.publishers[topics[0]][1](), content))
         start = time.monotonic()
         for k in range(count):
             if rate and k % 10 == 0:
                 time.sleep(max(0.0, start + k / rate - time.monotonic()))
-            publisher.publish(message)
-        return time.monotonic() - start
+            for publisher in publishers:
+                publisher.publish(message)
 
     def publish_bytes(self, topic, messages):
         """Serialized messages, in hex, as they are."""

@@ -10,23 +10,16 @@ import math
 import textwrap
 from collections.abc import Callable
 
+from rclpy.utilities import remove_ros_args
+
 from ..base.command_line import Parser, complete
-from ..base.errors import InputError, did_you_mean
+from ..base.errors import InputError
 from ..scene.offline import scene_values
 from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
 from ..scene.scene_file import typed_value
 from ..scene.script import MAX_TIME_S
 
 NODE_NAME = "rigid_body"
-
-_WITH_VALUE = (
-    *("-p", "--param", "--params-file", "-r", "--remap"),
-    *("-e", "--enclave", "--log-level", "--log-config-file", "--log-file-name"),
-)
-_SWITCHES = tuple(
-    f"--{word}-{what}-logs" for word in ("enable", "disable") for what in ("rosout", "stdout", "external-lib")
-)
-"""What rcl reads behind ``--ros-args``."""
 
 EXAMPLES = (
     ("rigid_body_node", "simulate the bundled T-handle"),
@@ -36,9 +29,9 @@ EXAMPLES = (
 
 
 def own_arguments(argv: list[str]) -> argparse.Namespace:
-    """``until``: seconds, or None. Everything else outside ``--ros-args ...
-    [--]`` ends the process: --help with 0, what isn't known with 2 and the nearest option. Options inside that rcl
-    wouldn't know are refused, too.
+    """``until``: seconds, or None. All else outside ``--ros-args ... [--]`` ends the process: --help with 0, what
+    isn't known with 2 and the nearest option. Raises InputError for options inside that rcl doesn't know or can't read;
+    ``given_arguments`` says better what is wrong with a parameter.
     """
     parser = Parser(
         prog="rigid_body_node",
@@ -47,9 +40,11 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
         examples=EXAMPLES,
     )
     parser.add_argument("--until", type=_seconds, metavar="S", help="end when simulated time reaches this many seconds")
-    own, ros = _split(argv[1:])
-    for word in ros:
-        _check_ros_option(word)
+    try:
+        own = remove_ros_args(argv)[1:]
+    except Exception as error:  # rclpy's own error types differ between versions
+        accepted = "--params-file FILE, -p NAME:=VALUE, -r FROM:=TO and what else ROS 2 takes there"
+        raise InputError("--ros-args", " ".join(str(error).split()), accepted) from None
     if "-h" in own or "--help" in own:
         parser.epilog = f"{_parameter_help()}\n\n{parser.epilog}"
     if own and not any(word.startswith("-") for word in own):
@@ -67,36 +62,6 @@ def _seconds(text: str) -> float:
     if not 0.0 < seconds <= MAX_TIME_S:
         raise argparse.ArgumentTypeError(f"got {text}; accepted: seconds above 0, up to {MAX_TIME_S:g}")
     return seconds
-
-
-def _split(words: list[str]) -> tuple[list[str], list[str]]:
-    """The words outside ``--ros-args ... --``, and those inside that aren't the value of the one before."""
-    own: list[str] = []
-    ros: list[str] = []
-    inside = value = False
-    for word in words:
-        if value:
-            value = False
-        elif word == "--ros-args":
-            inside = True
-        elif inside and word == "--":
-            inside = False
-        elif inside:
-            ros.append(word)
-            value = word in _WITH_VALUE
-        else:
-            own.append(word)
-    return own, ros
-
-
-def _check_ros_option(word: str) -> None:
-    known = (*_WITH_VALUE, *_SWITCHES)
-    if word in known:
-        return
-    hint = did_you_mean(word, [option for option in known if option.startswith("--")])
-    if not word.startswith("-") and ":=" in word:
-        hint = f"did you mean -p {word}?"
-    raise InputError("--ros-args", f"there is no ROS argument {word}{hint and '; ' + hint}")
 
 
 def _parameter_help() -> str:

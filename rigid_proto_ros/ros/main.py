@@ -53,12 +53,14 @@ class _Start(threading.Thread):
     def run(self) -> None:
         """On the thread."""
         try:
-            from .arguments import own_arguments
+            from .arguments import given_arguments, own_arguments, remapped_node_name
 
+            # First, since it says better than ROS what is wrong with a parameter.
+            given = given_arguments(self._argv, remapped_node_name(self._argv), _warn)
             own = own_arguments(self._argv)
             from .node_process import NodeProcess
 
-            self._process = NodeProcess(self._argv, self._shutdown.request, own.until)
+            self._process = NodeProcess(self._argv, given, self._shutdown.request, own.until)
             self._process.start()
         except BaseException as error:  # raised again by the main thread
             self._error = error
@@ -80,3 +82,7 @@ class _Start(threading.Thread):
             begin_teardown(status)
             self._process.leave_ros()
         return status
+
+
+def _warn(warning: str) -> None:
+    print(f"rigid_body_node: {warning}", file=sys.stderr)

@@ -7,7 +7,7 @@ import importlib.util
 import sys
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import rclpy
@@ -20,7 +20,6 @@ from ..live.warm_up import IntegratorsCompiling, warm_up
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, nanoseconds
 from ..simulation.observer import Observer
-from .arguments import given_arguments, remapped_node_name
 from .diagnostics import Reports
 from .node import RigidBodyNode
 
@@ -29,12 +28,19 @@ if TYPE_CHECKING:
 
 
 class NodeProcess:
-    """request_end() is called when the process should end by itself: after a fault, or when simulated time has come to
-    until_s.
+    """given: parameters by name, as files and ``-p`` give them. request_end() is called when the process should end by
+    itself: after a fault, or when simulated time has come to until_s.
     """
 
-    def __init__(self, argv: list[str], request_end: Callable[[], None], until_s: float | None = None) -> None:
+    def __init__(
+        self,
+        argv: list[str],
+        given: Mapping[str, object],
+        request_end: Callable[[], None],
+        until_s: float | None = None,
+    ) -> None:
         self._argv = argv
+        self._given = given
         self._request_end = request_end
         self._until_s = until_s
         self._ending = False
@@ -47,7 +53,6 @@ class NodeProcess:
 
     def start(self) -> None:
         """Make the node, which may compile for minutes, and let it run. Raises InputError."""
-        given = given_arguments(self._argv, remapped_node_name(self._argv), _warn)
         try:
             # The middleware must outlive the physics thread, so rclpy's own handlers of signals stay out.
             rclpy.init(args=self._argv, signal_handler_options=SignalHandlerOptions.NO)
@@ -60,7 +65,7 @@ class NodeProcess:
             integrators.begin()
 
         with notify_when_compiling(begin_compiling):
-            node = self._node = RigidBodyNode(given, _make_viewer)
+            node = self._node = RigidBodyNode(self._given, _make_viewer)
             setup = node.live.scenario.setup
             integrators.wait(setup)
             node.states.pack_all(warm_up(setup))
@@ -112,10 +117,6 @@ class NodeProcess:
         if self._node is not None:
             self._node.destroy_node()
         rclpy.try_shutdown()
-
-
-def _warn(warning: str) -> None:
-    print(f"rigid_body_node: {warning}", file=sys.stderr)
 
 
 def _make_viewer(scenario: Scenario, node_name: str) -> Observer | None:

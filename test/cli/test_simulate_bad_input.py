@@ -294,8 +294,8 @@ def test_the_node_refuses_a_slip_before_ros_sees_it(arguments, part, capfd):
         (["--recrd"], "no option --recrd"),
         (["hammer"], "--ros-args --params-file hammer"),
         (["--until"], "--until"),
-        (["--ros-args", "--parms-file", "x.yaml"], "did you mean --params-file?"),
-        (["--ros-args", "mesh:=book"], "did you mean -p mesh:=book?"),
+        (["--ros-args", "--parms-file", "x.yaml"], "accepted: --params-file FILE"),
+        (["--ros-args", "mesh:=book"], "-p NAME:=VALUE"),
         (["--ros-args", "-p", "mass:=1", "--", "--mas"], "no option --mas"),
     ],
 )
@@ -311,9 +311,11 @@ def test_help_of_the_node_lists_options_and_parameters_and_starts_nothing(capfd)
     assert "--until" in text and all(f"\n  {name}\n" in text for name in PARAMETERS)
 
 
-def test_what_ros_itself_hands_a_node_is_no_mistake():
+def test_what_ros_itself_hands_a_node_is_no_mistake(tmp_path):
     """As `ros2 launch` and `ros2 run` start it, with every kind of ROS argument."""
-    ros = "--ros-args -r __node:=a -r __ns:=/b --remap ~/wrench:=/w --params-file f.yaml -p mass:=1 --log-level debug"
+    scene = tmp_path / "f.yaml"
+    scene.write_text(scene_text("mass: 1.0"))
+    ros = f"--ros-args -r __node:=a -r __ns:=/b --remap ~/wrench:=/w --params-file {scene} -p mass:=1 --log-level debug"
     ros += " --log-level rigid_body:=info --enable-rosout-logs --disable-stdout-logs -e /enclave"
     assert own_arguments(["node", *ros.split()]).until is None
     assert own_arguments(["node", *ros.split(), "--", "--until", "3"]).until == 3.0

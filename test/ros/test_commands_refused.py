@@ -208,7 +208,7 @@ def test_refusals_are_warned_of_at_most_once_a_second(rig):
     start = time.monotonic()
 
     def warned_twice() -> bool:
-        rig.do("repeat", topic=rig.name("wrench"), content=wrench_message(0, "mars"), count=100, rate=100.0)
+        rig.do("repeat", topics=[rig.name("wrench")], content=wrench_message(0, "mars"), count=100, rate=100.0)
         rig.sent += 100
         rig.until_received(rig.sent)
         return log.read_text().count("refused:") - warned >= 2
