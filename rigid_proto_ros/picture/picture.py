@@ -218,8 +218,8 @@ class Picture:
         first = self.ghost is None
         self.ghost = ghost
         self.backend.begin(np.array([time_ns]))
-        if first:
-            self.backend.mesh(style.GHOST_MESH, self._mesh)
+        if first or ghost is None:
+            self.backend.mesh(style.GHOST_MESH, None if ghost is None else self._mesh)
         self._describe_ghost(self.backend)
 
     def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:

@@ -115,16 +115,11 @@ class BodyTab:
         gui, controls = self._gui, self._controls
         with gui.add_folder("Size and mass"):
             controls.factor("Size ×", "All three scales together (scale)", 1.0, self._size_factor, self._set_size)
-            controls.vector("scale", "Scale x y z", 3)
-            controls.factor(
-                "Mass ×",
-                "Times the original mass, without ballast (mass)",
-                2.0,
-                self._mass_factor,
-                self._set_mass,
-            )
-            controls.number("mass", "Mass [kg]; 0: by density")
-            controls.number("density", "Density [kg/m³]")
+            controls.numbers("scale", "Scale x y z", 3)
+            hint = "Times the original mass, without ballast (mass)"
+            controls.factor("Mass ×", hint, 2.0, self._mass_factor, self._set_mass)
+            controls.numbers("mass", "Mass [kg]; 0: by density")
+            controls.numbers("density", "Density [kg/m³]")
 
     def _size_factor(self, values: Mapping[str, Any]) -> float:
         scale = values["scale"]

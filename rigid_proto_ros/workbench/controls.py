@@ -9,10 +9,11 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import viser
 
 from ..scene.parameters import parameter_named
@@ -90,23 +91,25 @@ class Controls:
 
         return self.bind(handle, shown, lambda value: {name: "" if value == "–" else value})
 
-    def number(self, name: str, label: str) -> Handle:
-        """A number of any size, as text."""
-        accepted = parameter_named(name).accepted
-        return self._text(
-            label, _hint(name), lambda values: _written([values[name]]), lambda text: _numbers(name, text, 1), accepted
-        )
-
-    def vector(self, name: str, label: str, length: int) -> Handle:
+    def numbers(self, name: str, label: str, length: int = 1) -> Handle:
         """Numbers of any size, as text with blanks between them."""
+        handle = self._gui.add_text(label, "", hint=_hint(name))
 
-        def shown(values: Values) -> str:
-            numbers = values[name]
-            return _written([numbers[0]] * length if len(numbers) == 1 else numbers)
+        def changes(text: object) -> Changes | None:
+            numbers = parse_numbers(text, length)
+            if numbers is None:
+                return None
+            return {name: numbers[0] if parameter_named(name).type == "double" else numbers}
 
-        return self._text(
-            label, _hint(name), shown, lambda text: _numbers(name, text, length), parameter_named(name).accepted
-        )
+        def shown(values: Values) -> object:
+            # "1.50" means what is in force, so it may stay as it was typed.
+            value: Any = values[name]
+            mine: Any = changes(handle.value)
+            if mine is not None and np.array_equal(mine[name], value):
+                return handle.value
+            return " ".join(f"{x:.9g}" for x in np.broadcast_to(value, length))
+
+        return self.bind(handle, shown, changes, TYPING_S, parameter_named(name).accepted)
 
     def slider(self, name: str, label: str, lower: float, upper: float, step: float) -> Handle:
         """A number within what is usual; one beyond it stands at the end."""
@@ -123,36 +126,13 @@ class Controls:
         shown: Callable[[Values], float],
         changes: Callable[[float], Changes | None],
     ) -> Handle:
-        """How many times of something: shown(values) > 0 gives it, changes(factor) sets it. The box holds the factor
-        itself, the slider below it is logarithmic.
-        """
+        """A slider of how many times of something: shown(values) > 0 gives it, changes(factor) sets it."""
+        slider = log_slider(self._gui, label, decades, hint)
 
-        def typed(text: object) -> Changes | None:
-            numbers = parse_numbers(text, 1)
-            return changes(numbers[0]) if numbers is not None and numbers[0] > 0.0 else None
+        def chosen(value: tuple[float]) -> Changes | None:
+            return changes(float(f"{10.0 ** value[0]:.3g}"))
 
-        box = self._text(label, hint, lambda values: f"{shown(values):.4g}", typed, "a number > 0")
-        slider = log_slider(self._gui, decades, hint)
-        self.bind(slider, lambda values: on_slider(shown(values), decades), lambda value: changes(10.0 ** value[0]))
-        return box
-
-    def _text(
-        self,
-        label: str,
-        hint: str,
-        shown: Callable[[Values], object],
-        changes: Callable[[Any], Changes | None],
-        accepted: str,
-    ) -> Handle:
-        handle = self._gui.add_text(label, "", hint=hint)
-
-        def place(values: Values) -> object:
-            # "1.50" means what is in force, so it may stay as it was typed.
-            mine = changes(handle.value)
-            in_force = mine is not None and all(_equal(values.get(name), value) for name, value in mine.items())
-            return handle.value if in_force else shown(values)
-
-        return self.bind(handle, place, changes, TYPING_S, accepted)
+        return self.bind(slider, lambda values: on_slider(shown(values), decades), chosen)
 
     def bind(
         self,
@@ -197,23 +177,15 @@ def _hint(name: str) -> str:
     return f"{parameter.description}{unit} ({name})"
 
 
-def log_slider(gui: viser.GuiApi, decades: float, hint: str) -> Handle:
+def log_slider(gui: viser.GuiApi, label: str, decades: float, hint: str) -> Handle:
     """A slider of factors whose value is (log10,); viser's slider for one number would show that beside it."""
-    return gui.add_multi_slider(" ", -decades, decades, 0.01, (0.0,), hint=hint, marks=_marks(decades))
+    marks = tuple((float(k), f"×{10.0**k:g}") for k in range(-int(decades), int(decades) + 1))
+    return gui.add_multi_slider(label, -decades, decades, 0.01, (0.0,), hint=hint, marks=marks)
 
 
 def on_slider(factor: float, decades: float) -> tuple[float]:
     """Where a factor stands on a slider of so many decades up and down."""
     return (round(min(max(math.log10(factor), -decades), decades), 2) if factor > 0.0 else 0.0,)
-
-
-def _marks(decades: float) -> tuple[tuple[float, str], ...]:
-    whole = range(-int(decades), int(decades) + 1)
-    return tuple((float(k), f"×{10.0**k:g}") for k in whole) if decades >= 1.0 else ((0.0, "×1"),)
-
-
-def _written(numbers: Iterable[float]) -> str:
-    return " ".join(f"{x:.9g}" for x in numbers)
 
 
 def parse_numbers(text: object, length: int) -> list[float] | None:
@@ -224,19 +196,6 @@ def parse_numbers(text: object, length: int) -> list[float] | None:
     except ValueError:
         return None
     return numbers if len(numbers) == length and all(abs(x) < 1e308 for x in numbers) else None
-
-
-def _numbers(name: str, text: object, length: int) -> Changes | None:
-    numbers = parse_numbers(text, length)
-    if numbers is None:
-        return None
-    return {name: numbers[0] if parameter_named(name).type == "double" else numbers}
-
-
-def _equal(a: object, b: object) -> bool:
-    if isinstance(a, (list, tuple)) and isinstance(b, (list, tuple)):
-        return len(a) == len(b) and all(x == y for x, y in zip(a, b, strict=True))
-    return a == b
 
 
 def _same(a: object, b: object) -> bool:

@@ -38,6 +38,9 @@ SEEN_INTO = 0.35
 LABEL = "-"
 """A label's text before it is first shown: one that is empty as it is made stays empty in viser 1.1."""
 
+LINE_PIXELS = 3.0
+"""Thickness of lines, however far off they are: those of a telephone's picture would be seen in pieces."""
+
 HEAD = 2.6
 """Radius of an arrow's head, in those of its shaft."""
 
@@ -209,8 +212,9 @@ class ViserBackend(Backend):
     def _segments(self, name: str, segments: np.ndarray, colour: style.Colour) -> None:
         node = self._nodes.get(name)
         if node is None:
-            thickness = 2.0 * style.STYLES[name].width
-            self._nodes[name] = self._scene.add_line_segments(f"/{name}", segments, colour, thickness=thickness)
+            self._nodes[name] = self._scene.add_line_segments(
+                f"/{name}", segments, colour, thickness=LINE_PIXELS, thickness_units="screen"
+            )
         else:
             node.points = segments
             if tuple(int(c) for c in np.ravel(node.colors)) != tuple(colour):

@@ -42,7 +42,7 @@ LOOKS = frozenset(
 )
 """Parameters that a lesson leaves as they are: how one looks at the motion, not the motion."""
 
-COMPILING = "compiling, first start only"
+COMPILING = "compiling, once only"
 
 Entry = dict[str, Any]
 """One entry of a poke script."""

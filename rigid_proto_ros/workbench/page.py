@@ -183,7 +183,7 @@ class Page:
             self._centre,
             lambda name: self.lessons.did(f"show {name}"),
         )
-        add_keys(gui, self.bar, flight, self._centre, say)
+        add_keys(gui, self.bar, flight, self._centre)
 
     def deliver(self, function: Callable[..., object], *arguments: object) -> None:
         """Run a function on the page's thread soon; from any thread."""
@@ -396,7 +396,7 @@ class Page:
             picture.set_ghost(times[-1], picture.body)
         if ghost is not None and picture.ghost is not None:
             picture.draw_ghost(np.array(times[-1:]), ghost[np.newaxis])
-        elif picture.ghost is not None and self.flight.left is not None:
+        elif picture.ghost is not None and self.live.scenario.ghost is None:
             picture.set_ghost(times[-1], None)
         for time_ns, row in zip(times[:-1], rows[:-1], strict=True):
             if self.readings.is_due(time_ns):

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """How the page is laid out on narrow screens and on paper. On a telephone, and on any narrow window that is higher than
 wide, the picture is above and the panel below it, not over it; a narrow window that is wider than high leaves it three
-fifths of the width. On paper the whole panel is below the picture, however far it was scrolled. What is said in the
-corner keeps its lines.
+fifths of the width. On paper the whole panel is below the picture, however far it was scrolled.
 
 viser lays its controls over the lower 60 % of a narrow page, where the body is, and puts other panels below them, a
 long way down; wider pages get a panel of one width, however little is left beside it. It has no setting for any of
@@ -52,7 +51,6 @@ _BAR = f".mantine-Paper-root:has(> .mantine-Collapse-root .{MARK})"
 STYLE = f"""<style>
 .mantine-Notification-root {{ max-height: 60vh !important; }}
 .mantine-Notification-root:has(.tabler-icon-check) {{ display: none; }}
-.mantine-Notification-description {{ white-space: pre-line; }}
 .{MARK} {{ padding: 0 0.6em; font-size: 0.95em; white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }}
 .{MARK} b {{ font-size: 1.35em; font-weight: 500; font-variant-numeric: tabular-nums; display: inline-block; min-width:
 4.6em; }} .{MARK} span {{ opacity: 0.7; }} {_BAR} {{ position: sticky; top: 0; z-index: 20; background: var(--mantine-
@@ -62,7 +60,10 @@ color-body); margin-top: 0.4em; }} .{ANSWERS} {{ display: none; }}
   {_SHEET} [style*="width: 20em"] {{ width: 100% !important; }}
   {_PICTURE} {{ height: {PICTURE_SHARE}% !important; }}
 }}
-@media {MEDIUM} {{ {_DOCKED_ROW} {{ width: 100% !important; }} }}
+@media {MEDIUM} {{
+  {_DOCKED_ROW} {{ width: 100% !important; }}
+  .mantine-Tabs-tab {{ padding: 0.6em 0.55em; }}
+}}
 @media {MEDIUM} and (orientation: landscape) {{
   {_DOCK} {{ width: {100 - BESIDE_SHARE}% !important; }}
   {_DOCKED_PICTURE} {{ right: {100 - BESIDE_SHARE}% !important; }}

@@ -50,20 +50,18 @@ class PhysicsTab:
 
     def _start_folder(self) -> None:
         with self._gui.add_folder("Start, at the next reset"):
-            self._controls.vector("initial.position", "Initial position [m]", 3)
-            self._controls.vector("initial.orientation_xyzw", "Initial attitude x y z w", 4)
-            self._controls.vector("initial.angular_velocity", "Initial spin [rad/s]", 3)
-            self._controls.vector("initial.linear_velocity", "Initial velocity [m/s]", 3)
+            self._controls.numbers("initial.position", "Initial position [m]", 3)
+            self._controls.numbers("initial.orientation_xyzw", "Initial attitude x y z w", 4)
+            self._controls.numbers("initial.angular_velocity", "Initial spin [rad/s]", 3)
+            self._controls.numbers("initial.linear_velocity", "Initial velocity [m/s]", 3)
 
     def show_force(self) -> None:
-        """The poke's force, as it is now, in all its inputs."""
+        """The poke's force, as it is now, in both of its inputs."""
         force = self._tools.force
-        times = force / self._tools.usual_force
-        for box, text in ((self._force, f"{force:.4g}"), (self._times, f"{times:.4g}")):
-            # "2." means what is in force, so it may stay as it is typed.
-            if parse_numbers(box.value, 1) != parse_numbers(text, 1):
-                box.value = text
-        place = on_slider(abs(times), FORCE_DECADES)
+        # "2." means what is in force, so it may stay as it is typed.
+        if parse_numbers(self._force.value, 1) != [force]:
+            self._force.value = f"{force:.4g}"
+        place = on_slider(abs(force / self._tools.usual_force), FORCE_DECADES)
         if self._slider.value != place:
             self._slider.value = place
 
@@ -75,9 +73,8 @@ class PhysicsTab:
             )
             self._force: Any = gui.add_text("Force [N]", "1", hint="Force of a poke; its duration is the next input")
             suits = "Times a force that suits the body's mass and size"
-            self._times: Any = gui.add_text("Force ×", "1", hint=suits)
-            self._slider: Any = log_slider(gui, FORCE_DECADES, suits)
-            self._controls.number("poke_duration", "Duration [s]")
+            self._slider: Any = log_slider(gui, "Force ×", FORCE_DECADES, suits)
+            self._controls.numbers("poke_duration", "Duration [s]")
 
         @click.on_update
         async def _(_: viser.GuiEvent[Any]) -> None:
@@ -87,24 +84,20 @@ class PhysicsTab:
             tools.force = float(f"{force:.9g}")
             self.show_force()
 
-        def typed(box: viser.GuiInputHandle[Any], unit: Callable[[], float]) -> None:
-            def complain(text: str) -> None:
-                if box.value == text:  # else somebody is still typing
-                    self._say(f"{box.label}: got {text[:40]!r}; accepted: a number, up to {STRONGEST:g} N")
-                    self.show_force()
+        def complain(text: str) -> None:
+            if self._force.value == text:  # else somebody is still typing
+                self._say(f"Force: got {text[:40]!r}; accepted: a number, up to {STRONGEST:g} N")
+                self.show_force()
 
-            @box.on_update
-            async def _(event: viser.GuiEvent[Any]) -> None:
-                if event.client is None:
-                    return
-                numbers = parse_numbers(box.value, 1)
-                if numbers is not None and abs(numbers[0] * unit()) <= STRONGEST:
-                    take(numbers[0] * unit())
-                else:
-                    asyncio.get_running_loop().call_later(TYPING_S, complain, box.value)
-
-        typed(self._force, lambda: 1.0)
-        typed(self._times, lambda: tools.usual_force)
+        @self._force.on_update
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is None:
+                return
+            numbers = parse_numbers(self._force.value, 1)
+            if numbers is not None and abs(numbers[0]) <= STRONGEST:
+                take(numbers[0])
+            else:
+                asyncio.get_running_loop().call_later(TYPING_S, complain, self._force.value)
 
         @self._slider.on_update
         async def _(event: viser.GuiEvent[Any]) -> None:
@@ -121,13 +114,13 @@ class PhysicsTab:
             strength = gui.add_slider("Strength [rad/s]", 1.0, 40.0, 0.5, tools.frequency, hint=hint)
             hint = "Light and heavy bodies then respond alike"
             scaled = gui.add_checkbox("Same feel for any mass", True, hint=hint)
-            controls.number("string.stiffness", "Stiffness [N/m]")
+            controls.numbers("string.stiffness", "Stiffness [N/m]")
             controls.slider("string.damping_ratio", "Damping ratio", 0.0, 2.0, 0.05)
-            controls.number("string.rest_length", "Rest length [m]")
+            controls.numbers("string.rest_length", "Rest length [m]")
             controls.checkbox("string.bilateral", "Pushes too")
             controls.checkbox("string.attached", "Tied from the start")
-            controls.vector("string.attach", "Tied at x y z", 3)
-            controls.number("string.timeout", "Released after [s]")
+            controls.numbers("string.attach", "Tied at x y z", 3)
+            controls.numbers("string.timeout", "Released after [s]")
 
         @at.on_update
         async def _(_: viser.GuiEvent[Any]) -> None:
@@ -145,13 +138,13 @@ class PhysicsTab:
         gui, controls = self._gui, self._controls
         with gui.add_folder("Physics"):
             controls.checkbox("gyroscopic", "Gyroscopic term ω × Iω")
-            controls.vector("gravity", "Gravity [m/s²]", 3)
+            controls.numbers("gravity", "Gravity [m/s²]", 3)
             gravity = gui.add_button_group("Gravity is", tuple(GRAVITIES))
-            controls.number("linear_damping", "Linear damping [N s/m]")
-            controls.number("angular_damping", "Angular damping [N m s]")
+            controls.numbers("linear_damping", "Linear damping [N s/m]")
+            controls.numbers("angular_damping", "Angular damping [N m s]")
             controls.choice("integrator", "Integrator", tuple(INTEGRATORS))
-            controls.number("step", "Step [s]")
-            controls.number("accuracy", "Accuracy [1/s]")
+            controls.numbers("step", "Step [s]")
+            controls.numbers("accuracy", "Accuracy [1/s]")
         with gui.add_folder("Ghost beside it", expand_by_default=False):
             controls.choice("ghost.inertia_model", "Its tensor")
             controls.choice("ghost.integrator", "Its integrator")

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import Any
 
 import viser
@@ -84,25 +83,9 @@ class TimeBar:
             self._line.content = content
 
 
-@dataclass(frozen=True)
-class Key:
-    """hotkey and modifier as viser takes them; shown: as it is written on a keyboard."""
-
-    shown: str
-    hotkey: str
-    does: str
-    act: Callable[[], Awaitable[None]]
-    modifier: str | None = None
-
-
-def add_keys(
-    gui: viser.GuiApi, bar: TimeBar, flight: Flight, centre: Callable[[], None], say: Callable[[str], None]
-) -> None:
+def add_keys(gui: viser.GuiApi, bar: TimeBar, flight: Flight, centre: Callable[[], None]) -> None:
     """Give all pages the keys, as viser's commands: Ctrl-K lists them. Browsers send no key that is typed into an
-    input.
-
-    "?" isn't among the hotkeys that viser 1.1 names, but its pages take any key by the name that browsers give it; H
-    does the same where another version doesn't. Letters W A S D Q E move viser's camera and are left to it.
+    input. Letters W A S D Q E move viser's camera and are left to it.
     """
 
     async def back() -> None:
@@ -114,28 +97,17 @@ def add_keys(
     async def centred() -> None:
         centre()
 
-    async def listed() -> None:
-        lines = [f"{key.shown}: {key.does}" for key in keys if key.hotkey != "H"]
-        say("\n".join([*lines, "right button: move the view"]))
-
-    keys = (
-        Key("Space", "space", "pause or resume; after rewinding, continue from there", bar.play_or_pause),
-        Key("→", "arrowright", "one step forward; pauses first", bar.step),
-        Key("←", "arrowleft", "one step back", bar.step_back),
-        Key("Backspace", "backspace", f"rewind {BACK_S:g} s", back),
-        Key("N", "N", "return to now after rewinding", now),
-        Key("R", "R", "reset", bar.reset),
-        Key("C", "C", "centre on the body", centred),
-        Key("?", "?", "list the keys", listed, "shift"),
-        Key("H", "H", "list the keys too", listed),
+    keys: tuple[tuple[Any, str, Callable[[], Awaitable[None]]], ...] = (
+        ("space", "Pause or resume; after rewinding, continue from there", bar.play_or_pause),
+        ("arrowright", "One step forward; pauses first", bar.step),
+        ("arrowleft", "One step back", bar.step_back),
+        ("backspace", f"Rewind {BACK_S:g} s", back),
+        ("N", "Return to now after rewinding", now),
+        ("R", "Reset", bar.reset),
+        ("C", "Centre on the body", centred),
     )
-    for key in keys:
-        hotkey: Any = key.hotkey
-        modifier: Any = key.modifier
-        command = gui.add_command(
-            f"{key.does[0].upper()}{key.does[1:]}", hotkey=hotkey, modifier=modifier, description=f"Key {key.shown}"
-        )
+    for hotkey, does, act in keys:
 
-        @command.on_trigger
-        async def _(_: Any, key: Key = key) -> None:
-            await key.act()
+        @gui.add_command(does, hotkey=hotkey).on_trigger
+        async def _(_: Any, act: Callable[[], Awaitable[None]] = act) -> None:
+            await act()

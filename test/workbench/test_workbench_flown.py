@@ -229,10 +229,10 @@ def test_a_body_of_any_size_fills_the_picture_alike_and_grows_in_sight(flown: Fl
     backend, picture = flown.page.backend, flown.page.picture
     assert backend.unit == picture.shape.size
     before = backend.unit
-    flown.set("Size ×", "1.5")
+    flown.set("Size ×", (np.log10(1.5),))
     flown.fly(0.1)
     assert backend.unit == before and picture.shape.size == pytest.approx(1.5 * before)
-    flown.set("Size ×", "9")
+    flown.set("Size ×", (np.log10(9.0),))
     flown.fly(0.1)
     assert backend.unit == picture.shape.size
 
@@ -289,6 +289,8 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
     for _ in range(8):
         flown.fly(0.25)
         assert np.abs(body_seen()).max() < 1.05, f"the body is beside the picture at {1e-9 * page.state.time_ns} s"
+    ghost = backend._nodes.get(style.GHOST_MESH)
+    assert (ghost is not None and ghost.visible) == (flown.scenario.ghost is not None), "a ghost of the lesson before"
 
 
 def test_before_time_begins_the_body_is_seen_above_the_floor() -> None:

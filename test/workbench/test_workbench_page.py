@@ -19,6 +19,7 @@ from workbench_page import CHROMIUM, FLAGS, NO_CHROMIUM, Browser, Flown, chromiu
 
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
+from rigid_proto_ros.workbench.flight import COMPILING
 
 pytestmark = [pytest.mark.drawn, pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)]
 
@@ -171,6 +172,26 @@ def test_body_and_controls_of_time_are_in_sight_in_windows_of_every_size(page, w
     assert box["x"] < x < box["x"] + box["width"] and box["y"] < y < box["y"] + box["height"]
     # Nothing of the panel lies over the body.
     assert page.page.evaluate("([x, y]) => document.elementFromPoint(x, y).tagName", [x, y]) == "CANVAS"
+    # What is waited for, and for how long, is to be read whole.
+    page.flown.page.announcements.busy(COMPILING)
+    page.until(lambda: f"{COMPILING} … 1 s" in page.text, "word of what is waited for")
+    cut = page.page.locator(".rp-bar").first.evaluate("bar => bar.scrollWidth - bar.clientWidth")
+    page.flown.page.announcements.busy("")
+    assert cut <= 0
+
+
+def test_a_string_is_seen_whole_on_a_telephone(page) -> None:
+    page.page.set_viewport_size({"width": 390, "height": 844})
+    fly(page, lesson("top_on_string").path.read_text("utf-8"))
+    page.flown.live.pause(True)
+    string = page.until(lambda: page.flown.node(style.STRING), "string")
+    page.drawn()
+    picture, ends = page.look(), page.pixel(string.points[0])
+    places = np.round(np.linspace(*ends, 50)[2:-8]).astype(int)
+    seen = [picture[y - 2 : y + 3, x - 2 : x + 3] for x, y in places]
+    orange = [(patch[..., 0] - patch[..., 2]).max() > 60 for patch in seen]
+    page.flown.live.pause(False)
+    assert np.mean(orange) > 0.95
 
 
 def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_buttons_are_left(page) -> None:
