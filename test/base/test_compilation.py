@@ -20,56 +20,33 @@ BROKEN = (
 CALL = "from package.base.outer import outer; print(outer(1), sum(outer.stats.cache_hits.values()))"
 
 
-def own_cache(folder: Path) -> dict[str, str]:
-    """An environment in which no kernel of an earlier run is found."""
-    return {**os.environ, "XDG_CACHE_HOME": str(folder / "cache")}
+def called(folder: Path, place: Path) -> list[str]:
+    """What the kernel says in a process of its own, with no kernel of an earlier run but those below ``place``."""
+    # -B: Python takes bytecode of a source of the same length and second for this one's.
+    command, settings = [sys.executable, "-B", "-c", CALL], {**os.environ, "XDG_CACHE_HOME": str(place / "cache")}
+    return subprocess.run(command, cwd=folder, env=settings, capture_output=True, text=True, check=True).stdout.split()
 
 
-def test_a_kernel_is_compiled_anew_when_a_file_behind_its_imports_has_changed(tmp_path):
-    base = tmp_path / "package" / "base"
-    base.mkdir(parents=True)
-    shutil.copy(compilation.__file__, base)
-    (base / "outer.py").write_text(OUTER)
-    (base / "between.py").write_text("from .inner import inner\n")
-    said = []
-    for added in (1, 1, 2):
-        (base / "inner.py").write_text(INNER.format(added))
-        # -B: Python takes bytecode of a source of the same length and second for this one's.
-        ran = subprocess.run(
-            [sys.executable, "-B", "-c", CALL],
-            cwd=tmp_path,
-            env=own_cache(tmp_path),
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        said.append(ran.stdout.split())
-    # Value, and whether it came from the disk.
-    assert said == [["2", "0"], ["2", "1"], ["3", "0"]], BROKEN
-
-
-def test_a_copy_elsewhere_finds_the_kernels_of_the_same_sources_and_old_ones_are_removed(tmp_path):
+def test_a_kernel_on_disk_is_that_of_its_file_and_of_all_behind_its_imports_and_old_ones_are_removed(tmp_path):
     said = []
     for checkout, added in (("one", 1), ("two", 1), ("two", 2), ("one", 1)):
         base = tmp_path / checkout / "package" / "base"
         base.mkdir(parents=True, exist_ok=True)
         shutil.copy(compilation.__file__, base)
+        (base / "outer.py").write_text(OUTER)
+        (base / "between.py").write_text("from .inner import inner\n")
         (base / "inner.py").write_text(INNER.format(added))
-        call = CALL.replace("outer", "inner")
-        command = [sys.executable, "-B", "-c", call]
-        ran = subprocess.run(
-            command, cwd=base.parents[1], env=own_cache(tmp_path), capture_output=True, text=True, check=True
-        )
-        said.append(ran.stdout.split())
-    # Value, and whether it came from the disk: neither of two versions drives out the other.
-    assert said == [["2", "0"], ["2", "1"], ["3", "0"], ["2", "1"]]
+        said.append(called(base.parents[1], tmp_path))
+    # Value, and whether it came from the disk: a copy elsewhere finds it, and neither of two versions drives out the other.
+    assert said == [["2", "0"], ["2", "1"], ["3", "0"], ["2", "1"]], BROKEN
     kept = sorted((tmp_path / "cache" / "rigid_proto_ros" / "kernels").iterdir())
-    assert len(kept) == 2
+    # Two versions of outer and inner.
+    assert len(kept) == 4
     for folder in kept:
         os.utime(folder, (1.0, time.time() - compilation.UNUSED_S - 60.0))
     (base / "inner.py").write_text(INNER.format(3))
-    subprocess.run(command, cwd=base.parents[1], env=own_cache(tmp_path), check=True, capture_output=True)
-    assert len(list(kept[0].parent.iterdir())) == 1
+    assert called(base.parents[1], tmp_path) == ["4", "0"]
+    assert len(list(kept[0].parent.iterdir())) == 2
 
 
 def test_every_kernel_of_the_package_is_kept_that_way():
