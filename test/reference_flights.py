@@ -370,35 +370,6 @@ def _fly(P, load, move, end, disturbance, ways, a, b, c):
     return _row(P, Y)
 
 
-class StillFlight:
-    """The equations of a flight with numbers P, its wrench always at work and its free end at rest, for a method of somebody else's.
-
-    start (13,): x, q, v, angular momentum in world axes.
-    """
-
-    def __init__(self, P: np.ndarray) -> None:
-        self._P, self.start = P, _begun(P)
-        self._hand = np.concatenate([P[_TARGET : _TARGET + 3], np.zeros(3)])
-
-    def rates(self, Y: np.ndarray, pulls: bool) -> np.ndarray:
-        """Y' (13,) with a string that pulls or doesn't."""
-        dY = np.empty(13)
-        _rates(Y, self._P, self._hand, 0.0, True, pulls, dY, np.empty(8))
-        return dY
-
-    def law(self, Y: np.ndarray, pulls: bool) -> np.ndarray:
-        """l² − rest² and its rate, k x + c l' and its rate."""
-        law = np.zeros(8)
-        _rates(Y, self._P, self._hand, 0.0, True, pulls, np.empty(13), law)
-        return law[:4]
-
-    def row(self, Y: np.ndarray) -> np.ndarray:
-        """The state row (13,)."""
-        row = _row(self._P, Y)
-        row[3:7] /= np.linalg.norm(row[3:7])
-        return row
-
-
 NO_WAYS = np.zeros((DIRECTIONS, 4, 3))
 
 

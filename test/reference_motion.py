@@ -18,13 +18,7 @@ DIGITS = 50
 def angle_between(q, matrix) -> float:
     """Angle [rad] of the rotation from a reference attitude, matrix 3 × 3 mpf, to a quaternion q (4,) xyzw of doubles."""
     with mp.workdps(DIGITS):
-        x, y, z, w = (mpf(float(c)) for c in q)
-        s = 2 / (x * x + y * y + z * z + w * w)
-        R = [
-            [1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
-            [s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)],
-            [s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)],
-        ]
+        R = rotation_of([float(c) for c in q])
         squares = sum((R[i][j] - matrix[i][j]) ** 2 for i in range(3) for j in range(3))
         # |A - B|² = 8 sin²(angle/2) for two rotations: exact, and without cancellation for small angles.
         return float(2 * mpmath.asin(min(mpf(1), mpmath.sqrt(squares / 8))))

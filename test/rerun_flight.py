@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""A hand-made sequence of observer calls, for the tests of recordings and pictures."""
+"""A hand-made sequence of observer calls, and what tests of recordings and viewers share."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -78,7 +84,20 @@ def event_line(time_ns: int, kind: str) -> str:
     return f'{{"time_ns": {time_ns}, "kind": "{kind}", "content": {{"force": [0.0, 3.0, 0.0]}}, "sha256": "00"}}'
 
 
-def flush(observer: Observer, timeout_s: float = 60.0) -> None:
+WAIT_S = 180.0
+"""Longer than anything takes on a machine that is busy with other things."""
+
+
+def wait_for(condition: Callable[[], Any]) -> Any:
+    """The first true value of ``condition()``, asked for again and again."""
+    deadline = time.monotonic() + WAIT_S
+    while not (value := condition()):
+        assert time.monotonic() < deadline, f"no such thing within {WAIT_S} s"
+        time.sleep(0.05)
+    return value
+
+
+def flush(observer: Observer) -> None:
     """Wait until everything so far was handed to the file and the viewers."""
     flusher, passes = observer._flusher, []
     own = flusher._flush
@@ -89,8 +108,30 @@ def flush(observer: Observer, timeout_s: float = 60.0) -> None:
 
     flusher._flush = counted
     flusher.mailbox.wake()
-    deadline = time.monotonic() + timeout_s
-    while not passes:
-        assert time.monotonic() < deadline, "nothing was flushed"
-        time.sleep(0.001)
+    wait_for(lambda: passes)
     flusher._flush = own
+
+
+def cells(path: Path, entity: str, name: str) -> tuple[list[int], list]:
+    """Simulated times [ns] and values of a component over all chunks of an entity, what holds at all times left out."""
+    from rigid_proto_ros.rerun_view import entities as e
+    from rigid_proto_ros.rerun_view.reader import record_batches
+
+    times, found = [], []
+    for chunk_entity, static, batch in record_batches(path):
+        if chunk_entity == entity and not static and name in batch.schema.names:
+            times.extend(batch.column(e.SIM_TIME).to_numpy(zero_copy_only=False).astype(np.int64).tolist())
+            found.extend(batch.column(name).to_pylist())
+    return times, found
+
+
+def child(code: str, *arguments: object) -> subprocess.Popen:
+    """A Python process that runs ``code`` and imports what tests import."""
+    path = os.pathsep.join([*sys.path, str(Path(__file__).parent)])
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *map(str, arguments)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": path},
+    )

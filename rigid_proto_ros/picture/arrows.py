@@ -12,8 +12,11 @@ import numpy as np
 from ..simulation.observer import ShownLoad
 from .style import LOAD_COLOURS
 
-USUAL = 0.6
+FIRST = 0.6
 """Body sizes of the first arrow of its kind: it reaches out of most bodies, and one four times as long can be seen."""
+
+FIRST_MOMENTUM = 0.75
+"""That of L: where ω has the same direction, the ends of the two, and their labels, are apart."""
 
 LEAST, LONGEST = 0.005, 3.0
 """Body sizes: a shorter arrow isn't drawn, nor its label; none is drawn longer, and a label says its value."""
@@ -38,7 +41,7 @@ class ArrowScales:
         known = self._per_metre.get(kind, 0.0)
         if known == 0.0 and len(values):
             first = float(values[0])
-            known = (first if first > 1e-6 * usual else usual) / (USUAL * size)
+            known = (first if first > 1e-6 * usual else usual) / ((FIRST_MOMENTUM if kind == "L" else FIRST) * size)
             self._per_metre[kind] = known
         if not known > 0.0:
             return np.zeros(len(values))

@@ -26,7 +26,7 @@ from ..simulation.quantities import attitude_angle
 from . import style
 from .arrows import ArrowScales, Loads
 from .backend import Backend, DrawnMesh
-from .plots import Plots
+from .plots import angle_to, energies
 from .poinsot import PoinsotPicture
 from .string import StringRows, Strings, string_curves
 from .surface import ball_mesh, box_edges, box_mesh, shaded_surface
@@ -37,8 +37,8 @@ RATE = 250
 REDRAWN_RATE = 20
 """[1/s, simulated] How often Poinsot's curve and plane are drawn anew while a torque changes T and L."""
 
-AXIS_LENGTH = 0.25
-"""In body sizes."""
+AXIS_LENGTH, PRINCIPAL_LENGTH = 0.25, 0.88
+"""In body sizes. The principal axes end outside the body and beyond the first ω and L, which may lie on one of them."""
 
 LABEL_BEYOND = 1.06
 """Of an arrow's length: where its label stands."""
@@ -158,7 +158,7 @@ class Picture:
         """A new run: simulated time starts again at 0; mesh, body and scales stay."""
         self.redraw()
         self._trail, self._com_trail = Trail(), Trail()
-        self._plots = Plots()
+        self._momentum_at_start: np.ndarray | None = None
         self._poinsot = PoinsotPicture()
         self.loads = Loads()
         self.string = Strings()
@@ -266,9 +266,7 @@ class Picture:
                 backend.place(name, attitudes=principal, scale=sizes)
         three = np.array([3])
         backend.arrows(style.BODY_AXES, three, AXIS_LENGTH * shape.size * np.eye(3))
-        # All end outside the body, the shortest of a rod too.
-        lengths = 0.5 * shape.size * (1.0 + 0.35 * np.sqrt(shape.moments / shape.moments[2]))
-        ends = lengths[:, np.newaxis] * shape.axes.T
+        ends = PRINCIPAL_LENGTH * shape.size * shape.axes.T
         backend.arrows(style.PRINCIPAL_AXES, three, ends)
         backend.labels(style.PRINCIPAL_AXES, three, LABEL_BEYOND * ends, ["I₁", "I₂", "I₃"])
         if self._wanted(style.POINSOT):
@@ -304,7 +302,7 @@ class Picture:
             return
         times_ns, rows = times_ns[chosen], rows[chosen]
         backend.begin(times_ns)
-        body, shape = self.body, self.shape
+        body = self.body
         R = matrix_from_quaternion(rows[:, 3:7])
         spin = np.einsum("nij,nj->ni", R, rows[:, 10:13])
         L = np.einsum("nij,jk,nk->ni", R, body.inertia, rows[:, 10:13])
@@ -322,7 +320,26 @@ class Picture:
             self._draw_string(string, rows)
             self.string.forget_before(int(times_ns[-1]))
         if self._wanted("plots"):
-            self._plots.draw(backend, rows, L, rows[:, 10:13] @ shape.axes, body, string_energy)
+            self._plot(rows, L, string_energy)
+
+    def _plot(self, rows: np.ndarray, L: np.ndarray, string_energy: np.ndarray | None) -> None:
+        """Plot states (n, 13) with their angular momenta (n, 3) in world axes.
+
+        string_energy (n,) [J] is None as long as the run has had no string.
+        """
+        assert self.body is not None and self.shape is not None
+        if self._momentum_at_start is None:
+            self._momentum_at_start = L[0].copy()
+        own, backend = energies(rows, self.body), self.backend
+        total = own.sum(axis=1) if string_energy is None else own.sum(axis=1) + string_energy
+        shown = [own, total] if string_energy is None else [own, total, string_energy]
+        backend.scalars(style.ENERGY, np.column_stack(shown))
+        backend.scalars(style.ANGULAR_MOMENTUM, np.column_stack([L, np.linalg.norm(L, axis=1)]))
+        angle = np.degrees(angle_to(self._momentum_at_start, L))
+        backend.scalars(style.ANGULAR_MOMENTUM_ANGLE, angle[:, np.newaxis])
+        backend.scalars(style.ANGULAR_VELOCITY_PRINCIPAL, rows[:, 10:13] @ self.shape.axes)
+        if np.any(self.body.gravity) or rows[:, 7:10].any():
+            backend.scalars(style.POSITION, rows[:, 0:3])
 
     def _draw_motion(self, spin: np.ndarray, L: np.ndarray) -> None:
         """Arrows of ω and L at the COM (n, 3)."""

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..simulation.observer import BodySnapshot
-from . import style
-from .backend import Backend
 
 
 def energies(rows: np.ndarray, body: BodySnapshot) -> np.ndarray:
@@ -28,39 +26,6 @@ def energies(rows: np.ndarray, body: BodySnapshot) -> np.ndarray:
 def angle_to(reference: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Angle [rad] between reference (3,) and vectors (n, 3), accurate near 0 and π; 0 where either vanishes."""
     return np.arctan2(np.linalg.norm(np.cross(reference, vectors), axis=1), vectors @ reference)
-
-
-class Plots:
-    """Remembers the run's start."""
-
-    def __init__(self) -> None:
-        self._momentum_at_start: np.ndarray | None = None
-
-    def draw(
-        self,
-        backend: Backend,
-        rows: np.ndarray,
-        L: np.ndarray,
-        w_principal: np.ndarray,
-        body: BodySnapshot,
-        string_energy: np.ndarray | None,
-    ) -> None:
-        """Plot states (n, 13) with their angular momenta (n, 3) in world axes and spins (n, 3) in principal ones.
-
-        string_energy (n,) [J] is None as long as the run has had no string.
-        """
-        own = energies(rows, body)
-        total = own.sum(axis=1) if string_energy is None else own.sum(axis=1) + string_energy
-        if self._momentum_at_start is None:
-            self._momentum_at_start = L[0].copy()
-        shown = [own, total] if string_energy is None else [own, total, string_energy]
-        backend.scalars(style.ENERGY, np.column_stack(shown))
-        backend.scalars(style.ANGULAR_MOMENTUM, np.column_stack([L, np.linalg.norm(L, axis=1)]))
-        angle = np.degrees(angle_to(self._momentum_at_start, L))
-        backend.scalars(style.ANGULAR_MOMENTUM_ANGLE, angle[:, np.newaxis])
-        backend.scalars(style.ANGULAR_VELOCITY_PRINCIPAL, w_principal)
-        if np.any(body.gravity) or rows[:, 7:10].any():
-            backend.scalars(style.POSITION, rows[:, 0:3])
 
 
 # Axes
@@ -117,31 +82,7 @@ def plot_range(values: np.ndarray, least: float = 0.0) -> PlotRange:
     return PlotRange(exponent, round(low, 9), round(high, 9))
 
 
-TICKS_IN_SMALL_PLOT = 5.0
-"""Rerun numbers ticks at one power of ten, the least of which no more than these fit between the ends of
-a small plot.
-"""
-
-BEYOND_TICK = 0.06
-"""Of the axis, between its end and a tick whose number is to be read."""
-
-
-def with_two_ticks(low: float, high: float) -> tuple[float, float]:
-    """An axis, widened at one end where fewer than two of the ticks that Rerun numbers would lie on it."""
-    step = nice_step((high - low) / TICKS_IN_SMALL_PLOT, (1.0,))
-    first, last = math.ceil(low / step), math.floor(high / step)
-    if last > first:
-        return low, high
-    # One tick or none: up or down to the next ones, whichever is nearer.
-    up, down = step * (first + 1), step * (last - 1)
-    if up - high <= low - down:
-        return low, up + BEYOND_TICK * (up - low)
-    return down - BEYOND_TICK * (high - down), high
-
-
-def nice_step(length: float, steps: tuple[float, ...] = (1.0, 2.0, 5.0)) -> float:
-    """The next above a positive length, or equal to it, of ``steps`` (ascending, from 1 to below 10)
-    times a power of ten.
-    """
+def nice_step(length: float) -> float:
+    """The next above a positive length, or equal to it, of 1, 2 and 5 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(length))
-    return next(step * power for step in (*steps, 10.0) if step * power >= length * (1.0 - 1e-12))
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= length * (1.0 - 1e-12))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..base.errors import InputError
-from ..session.mailbox import Block, Mailbox, Note
+from ..session.mailbox import Mailbox, Note
 from ..simulation.observer import Reset
 from .rerun_internals import forget_closed_recordings
 from .streams import (
@@ -52,14 +52,13 @@ class _Show:
 
 
 class Flusher:
-    """Owns the writer and its streams. ``mailbox`` and ``ghosts`` take rows and events from the stepping thread.
+    """Owns the writer and its streams. ``mailbox`` takes rows and events from the stepping thread.
 
     file is what is being recorded to; error says why a recording stopped, and on_error is called with the same.
     """
 
-    def __init__(self, name: str, initial_view: str, on_error: Callable[[str], None], open_ended: bool = False) -> None:
+    def __init__(self, name: str, on_error: Callable[[str], None], open_ended: bool = False) -> None:
         self.mailbox = Mailbox(lambda: self._lost("recording stopped: nothing can be written to the disk any more"))
-        self.ghosts = Mailbox()
         self.file: FileStream | None = None
         self.server: LiveServer | None = None
         self.run_id = uuid.uuid4().hex
@@ -68,9 +67,7 @@ class Flusher:
         self._run = 1
         self._on_error = on_error
         self._open_ended = open_ended
-        self._writer = SceneWriter(initial_view)
-        self._ghost_block: Block | None = None
-        self._ghost_sent = 0
+        self._writer = SceneWriter()
         self._flushing_since_s: float | None = None
         self._thread = threading.Thread(target=self._flush_until_closed, name="rerun", daemon=True)
         self._thread.start()
@@ -119,7 +116,6 @@ class Flusher:
     def close(self) -> None:
         """Send the rest, finish the file, end the thread."""
         self.mailbox.close()
-        self.ghosts.close()
         self._thread.join(TIMEOUT_S)
         if self._thread.is_alive():
             end_without_waiting()
@@ -154,12 +150,11 @@ class Flusher:
         """Send the blocks that wait and what has been put since; not what arrives meanwhile, a few rows a time."""
         more = True
         while more:
-            block, waiting = self.mailbox.take()
+            block = self.mailbox.take()
             if block is None:
                 break
             more = block.handed_over
-            self._writer.write(block, self._on_note, skip_live=waiting > 1)
-        self._flush_ghost()
+            self._writer.write(block, self._on_note)
         for stream in list(self._writer.streams):
             try:
                 stream.flush()
@@ -168,31 +163,9 @@ class Flusher:
             if stream.missed and not stream.behind:
                 self._writer.catch_up(stream)
 
-    def _flush_ghost(self, upto_reset: bool = False) -> None:
-        """Send the ghost's states that wait, or those of the run that ends."""
-        while True:
-            if self._ghost_block is None:
-                self._ghost_block, _ = self.ghosts.take()
-                self._ghost_sent = 0
-            block = self._ghost_block
-            if block is None:
-                return
-            reset = block.notes[0] if block.notes else None
-            end = reset.after_rows if reset else block.count
-            self._writer.write_ghost(block, self._ghost_sent, end)
-            self._ghost_sent = end
-            if reset is not None:
-                if not upto_reset:
-                    # The body's own reset hasn't come yet: what follows belongs to the next run.
-                    return
-                block.notes.pop(0)
-                return
-            self._ghost_block = None
-
     def _on_note(self, note: Note) -> None:
         asked = note.event
         if isinstance(asked, Reset):
-            self._flush_ghost(upto_reset=True)
             self._next_run()
             self._forget_closed_recordings()
         elif isinstance(asked, _Record):

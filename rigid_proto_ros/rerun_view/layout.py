@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,18 @@ LEGEND_ROOM = 0.45
 """Width left free for the legend at the right end of a plot, in widths of the curves; the longest takes
 .42 of a small plot.
 """
+
+LEAST_SPANS = {style.ANGULAR_MOMENTUM_ANGLE: 1.0, style.GHOST_ANGLE: 1.0}
+"""[°] That the axis of an angle spans at least: rounding doesn't fill the plot."""
+
+NARROWEST = 0.05
+"""Of the largest value: an axis isn't narrower, so that rounding isn't blown up to fill the plot."""
+
+NUMBERED_TICKS_MAX = 5.0
+"""Rerun numbers ticks at one power of ten, the least of which no more than these fit on the axis of a small plot."""
+
+ROOM = 0.08
+"""Of what is plotted, at both ends of an axis: no curve lies on the frame, and no number on the time axis."""
 
 FAR_SECONDS = 3600.0
 """[simulated s] Of the path of a COM that falls: all of it."""
@@ -78,13 +91,36 @@ PLAIN_HIDES = (
 
 @dataclass(frozen=True)
 class Finished:
-    """A run that is complete: duration_s [simulated], the ends of the axis of each plot that has values, by name, and
-    whether any command was logged.
+    """A run that is complete: duration_s [simulated], the least and the largest value of each plot that has any, by
+    name, and whether any command was logged.
     """
 
     duration_s: float
-    axes: dict[str, tuple[float, float]]
+    plotted: dict[str, tuple[float, float]]
     commanded: bool
+
+
+def value_axis(low: float, high: float, least: float = 0.0) -> tuple[float, float]:
+    """The ends of an axis for values from ``low`` to ``high``, on which two ticks have numbers. ``least``: it spans no
+    less.
+    """
+    span = max(high - low, NARROWEST * max(abs(low), abs(high)), least) or 2.0
+    middle = 0.5 * (low + high)
+    low, high = min(low, middle - 0.5 * span), max(high, middle + 0.5 * span)
+    step = 10.0 ** math.ceil(math.log10((1.0 + 2.0 * ROOM) * (high - low) / NUMBERED_TICKS_MAX))
+    first, last = math.ceil(low / step), math.floor(high / step)
+    if last < first:
+        low, high = step * last, step * first
+    elif last == first:
+        # One tick: up or down to the next one, whichever is nearer.
+        up, down = step * (first + 1), step * (first - 1)
+        low, high = (low, up) if up - high <= low - down else (down, high)
+    room = ROOM * (high - low)
+    # A tick that the room would reach has room of its own.
+    below, above = step * math.floor(low / step), step * math.ceil(high / step)
+    low = below if below >= low - room else low
+    high = above if above <= high + room else high
+    return low - room, high + room
 
 
 class Layout:
@@ -96,17 +132,16 @@ class Layout:
         self._subject = subject
         self._finished = finished
 
-    def blueprint(self, initial_view: str) -> Any:
-        """Three tabs, ``initial_view`` in front."""
+    def blueprint(self) -> Any:
+        """Three tabs, the lesson in front."""
         boxed = self._subject.boxed
         hidden = tuple(name for name in LESSON_HIDES if not (boxed and name == style.BOUNDING_BOX))
-        tabs = {
-            "lesson": self._lesson(self._body_view("Motion", hidden)),
-            "debugging": self._debugging(self._body_view("All shapes", ())),
-            "plain": self._body_view("Plain", PLAIN_HIDES),
-        }
         return rrb.Blueprint(
-            rrb.Tabs(*tabs.values(), active_tab=list(tabs).index(initial_view)),
+            rrb.Tabs(
+                self._lesson(self._body_view("Motion", hidden)),
+                self._debugging(self._body_view("All shapes", ())),
+                self._body_view("Plain", PLAIN_HIDES),
+            ),
             rrb.TimePanel(state="collapsed", timeline=e.SIM_TIME),
             rrb.BlueprintPanel(state="collapsed"),
             rrb.SelectionPanel(state="collapsed"),
@@ -162,18 +197,20 @@ class Layout:
     def _shows(self, plot: str) -> bool:
         """Whether a plot has, or may come to have, something to show."""
         if self._finished is not None:
-            return plot in self._finished.axes
+            return plot in self._finished.plotted
         return self._subject.ghost or plot != style.GHOST_ANGLE
 
     def _plot(self, name: str) -> Any:
         """Scalars of one entity over time."""
+        finished = self._finished
+        ends = None if finished is None else value_axis(*finished.plotted[name], LEAST_SPANS.get(name, 0.0))
         return rrb.TimeSeriesView(
             origin="/" + name,
             name=TITLES[name],
             plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=len(style.SERIES[name]) > 1),
-            axis_x=_time_axis(None if self._finished is None else self._finished.duration_s),
+            axis_x=_time_axis(None if finished is None else finished.duration_s),
             time_ranges=_up_to_cursor(rrb.TimeRangeBoundary.infinite()),
-            axis_y=None if self._finished is None else rrb.ScalarAxis(range=self._finished.axes[name]),
+            axis_y=None if ends is None else rrb.ScalarAxis(range=ends),
         )
 
     def _body_view(self, name: str, hidden: tuple[str, ...]) -> Any:
@@ -200,7 +237,8 @@ def camera(subject: Subject) -> Any:
         # Beside the plane of a throw along x, and above the body, where it has come from.
         middle = np.array([-0.1, 0.0, 0.2])
         return _orbital(PATH_SIZES * (middle + [0.3, -1.2, 0.2]), PATH_SIZES * middle)
-    return _orbital(np.array([1.25, -1.0, 0.65]), np.zeros(3))
+    # So far off that the arrow of a force at the body's end is seen whole, with its label.
+    return _orbital(np.array([1.65, -1.3, 0.85]), np.zeros(3))
 
 
 def _orbital(position: np.ndarray, target: np.ndarray) -> Any:

@@ -47,8 +47,6 @@ if TYPE_CHECKING:
     from .viewers import ViewerProcess
 
 VIEWERS = ("none", "web", "native", "serve")
-INITIAL_VIEWS = ("lesson", "debugging", "plain")
-"""Tabs of the layout; the others are a click away."""
 
 DEFAULT_RERUN_PORT = 9876
 DEFAULT_WEB_PORT = 9090
@@ -68,7 +66,7 @@ class RerunObserver(Observer):
 
     viewer: ``none``; ``serve`` hosts the live stream on loopback; ``web`` serves the web viewer too; ``native`` opens
     the viewer's window. rerun_port and web_port: None takes the first free port from the default on; a number is used
-    or refused. initial_view: the tab of the layout that is in front. open_ended: the recording may go on for hours, and
+    or refused. open_ended: the recording may go on for hours, and
     memory must not grow; its file then has no index. ``report`` gets one line for every address and
     every warning, ``on_error`` one line when recording has stopped because the file can't be written; both may be
     called from another thread.
@@ -93,19 +91,15 @@ class RerunObserver(Observer):
         report: Callable[[str], None] | None = None,
         on_error: Callable[[str], None] | None = None,
         live_memory_limit: str = LIVE_MEMORY_LIMIT,
-        initial_view: str = "lesson",
         open_ended: bool = False,
     ) -> None:
         if viewer not in VIEWERS:
             raise InputError("viewer", viewer, "one of " + ", ".join(VIEWERS))
-        if initial_view not in INITIAL_VIEWS:
-            raise InputError("initial_view", initial_view, "one of " + ", ".join(INITIAL_VIEWS))
         if (record or viewer != "none") and importlib.util.find_spec("rerun") is None:
             raise InputError("record" if record else "viewer", is_missing("rerun-sdk", "rerun"))
         self.live_address = ""
         self.web_address = ""
         self._name = name
-        self._initial_view = initial_view
         self._open_ended = open_ended
         self._report = report or _logger.info
         self._on_error = on_error or _logger.error
@@ -134,10 +128,8 @@ class RerunObserver(Observer):
         elif isinstance(event, Published):
             flusher.mailbox.put(event.time_ns, event.row)
         elif isinstance(event, GhostPublished):
-            flusher.ghosts.put(event.time_ns, event.row)
+            flusher.mailbox.put(event.time_ns, event.row, ghost=True)
         elif type(event) in self.takes:
-            if isinstance(event, Reset):
-                flusher.ghosts.note(event)
             flusher.mailbox.note(_with_copies(event))
             if isinstance(event, (Started, Reset)):
                 flusher.mailbox.hurry()
@@ -185,7 +177,7 @@ class RerunObserver(Observer):
         if self._flusher is None:
             from .flusher import Flusher
 
-            self._flusher = Flusher(self._name, self._initial_view, self._on_error, self._open_ended)
+            self._flusher = Flusher(self._name, self._on_error, self._open_ended)
             for event in self._remembered.values():
                 self._flusher.mailbox.note(event)
             self._remembered.clear()

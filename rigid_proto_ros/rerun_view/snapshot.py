@@ -207,28 +207,30 @@ def bring_to_front(client: Any, name: str) -> str | None:
     names there are.
     """
     blueprint = client.get_blueprint(of="recording").blueprint
-    views = {f"view/{view.view_id}": view.name for view in client.get_state().views}
-    found = _walk(blueprint, f"container/{blueprint['/viewport']['ViewportBlueprint']['root_container']}", views, ())
+    views = {f"/view/{view.view_id}": view.name for view in client.get_state().views}
+    found = _walk(blueprint, f"/container/{blueprint['/viewport']['ViewportBlueprint']['root_container']}", views, ())
     wanted = name.strip().lower()
     path = next((path for path, called in found if called.lower() == wanted), None)
     if path is None:
         raise InputError("--view", name, one_of(name, sorted({called for _, called in found})))
     for parent, child in zip(path[:-1], path[1:], strict=True):
-        container = blueprint["/" + parent]["ContainerBlueprint"]
+        container = blueprint[parent]["ContainerBlueprint"]
         if container["container_kind"] == "Tabs":
             container["active_tab"] = child
     client.set_blueprint(blueprint, of="recording")
-    return path[-1].removeprefix("view/") if path[-1] in views else None
+    return path[-1].removeprefix("/view/") if path[-1] in views else None
 
 
 def _walk(
     blueprint: dict[str, Any], node: str, views: dict[str, str], above: tuple[str, ...]
 ) -> list[tuple[tuple[str, ...], str]]:
     """(path from the root, name) of everything that has a name at or below ``node``, what is in front first."""
+    # The viewer names parts with or without the slash, as their layout came to it.
+    node = f"/{node.lstrip('/')}"
     path = (*above, node)
     if node in views:
         return [(path, views[node])]
-    container = blueprint.get("/" + node, {}).get("ContainerBlueprint", {})
+    container = blueprint.get(node, {}).get("ContainerBlueprint", {})
     found = [(path, container["display_name"])] if "display_name" in container else []
     contents = container.get("contents", [])
     for child in sorted(contents, key=lambda child: child != container.get("active_tab")):

@@ -27,6 +27,7 @@ from .rerun_internals import send_blueprint
 from .rrd_file import end_without_index
 
 APPLICATION_ID = "rigid_proto_ros"
+"""Of live streams: viewers keep one layout for all recordings of an application."""
 FLUSH_TIMEOUT_S = 5.0
 """A disk that takes longer than this to take half a second of data counts as lost."""
 
@@ -44,9 +45,6 @@ class RecordingLostError(OSError):
 class Stream(ABC):
     """A Rerun recording: one run of the simulation, with simulated time from 0."""
 
-    may_skip = False
-    """Whether states may be left out when the machine doesn't keep up."""
-
     behind = False
     """Whether what was sent hasn't been taken yet, so that nothing more should be."""
 
@@ -59,12 +57,13 @@ class Stream(ABC):
     subject: Subject | None = None
     """What the layout is for that its viewers were sent."""
 
-    def __init__(self, recording_id: str, sink: Any, name: str) -> None:
+    def __init__(self, recording_id: str, sink: Any, name: str, application_id: str = APPLICATION_ID) -> None:
+        self.application_id = application_id
         self.meshes: dict[str, tuple[int, DrawnMesh]] = {}
         """By part the mesh that it was sent last, and how many before it, from 1."""
         self.styled: dict[str, float] = {}
         """By entity what its style was sent for: a size, or a number of columns."""
-        self.recording = rr.RecordingStream(APPLICATION_ID, recording_id=recording_id)
+        self.recording = rr.RecordingStream(application_id, recording_id=recording_id)
         rr.set_sinks(sink, recording=self.recording)
         self.recording.send_recording_name(name)
         self.recording.send_property(
@@ -86,7 +85,7 @@ class Stream(ABC):
         batches = [batch for value in values for batch in value.as_component_batches()]
         self.send(entity, [], [batch.partition([len(batch.as_arrow_array())]) for batch in batches])
 
-    def send_layout(self, initial_view: str, subject: Subject, finished: Finished | None = None) -> None:
+    def send_layout(self, subject: Subject, finished: Finished | None = None) -> None:
         """Make a viewer open with the layout for what the flight is about.
 
         A run that begins with a ghost, after one without, or the other way round, brings another layout; within a run,
@@ -97,7 +96,7 @@ class Stream(ABC):
         if finished is None and not self.shown_from_start:
             return
         self.subject = subject
-        send_blueprint(APPLICATION_ID, Layout(subject, finished).blueprint(initial_view), self.recording)
+        send_blueprint(self.application_id, Layout(subject, finished).blueprint(), self.recording)
 
     @abstractmethod
     def flush(self) -> None:
@@ -122,7 +121,9 @@ class FileStream(Stream):
             raise InputError("record", str(path), "a path that ends in .rrd or .mcap")
         output_file("record", path)
         try:
-            super().__init__(recording_id, rr.FileSink(path, write_footer=not open_ended), name)
+            # An application of its own: in a viewer that shows another recording, too, it has its own layout.
+            application_id = f"{APPLICATION_ID}_{recording_id[:8]}"
+            super().__init__(recording_id, rr.FileSink(path, write_footer=not open_ended), name, application_id)
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
             self._inode = path.stat().st_ino
         except (RuntimeError, OSError) as error:
@@ -158,8 +159,6 @@ class FileStream(Stream):
 
 class LiveStream(Stream):
     """One run for viewers; the first one hosts the server, later ones send to it."""
-
-    may_skip = True
 
     def flush(self) -> None:
         """Ask whether the server has taken everything. It waits for its slowest viewer, and so would all

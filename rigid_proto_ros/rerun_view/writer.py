@@ -13,7 +13,6 @@ import rerun as rr
 
 from ..picture import style
 from ..picture.picture import Picture, skewed
-from ..picture.plots import plot_range, with_two_ticks
 from ..session.mailbox import Block, Note
 from ..simulation.observer import (
     AccuracyFloor,
@@ -34,7 +33,7 @@ from ..simulation.observer import (
 from . import entities as e
 from .backend import RerunBackend, scalar_columns, time_columns
 from .layout import Finished, Subject
-from .streams import Stream
+from .streams import LiveStream, Stream
 
 REPEATED_ROWS = 16384
 """After as many states viewers are told again what holds since long: a fourth of what the live server keeps."""
@@ -47,8 +46,15 @@ the live server.
 VIEW_PER_REACH = 1.7
 """A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
 
-LEAST_RANGES = {style.ANGULAR_MOMENTUM_ANGLE: 1.0, style.GHOST_ANGLE: 1.0}
-"""[°] That the axis of an angle spans at least: rounding doesn't fill the plot."""
+
+ALONG_WITH_STATES = (
+    *(LoadBegan, LoadEnded, StringChanged, SceneChanged),
+    *(StatusChanged, AccuracyFloor, Effort, Logged, Refused),
+)
+"""Events that are told at their times, without regard to the states around them."""
+
+BETWEEN_STATES = (Started, MeshChanged, BodyChanged, GhostChanged)
+"""Events that change what the states after them mean."""
 
 
 class SceneWriter:
@@ -57,10 +63,8 @@ class SceneWriter:
     ``streams`` receive everything; ``attach`` brings a new one up to date. Not for several threads.
     """
 
-    def __init__(self, initial_view: str) -> None:
+    def __init__(self) -> None:
         self.streams: list[Stream] = []
-        self._initial_view = initial_view
-        self._skip_live = False
         self._backend = RerunBackend()
         self._picture = Picture(self._backend)
         self._scene = self._scene_in_force = ""
@@ -78,8 +82,11 @@ class SceneWriter:
         self._last_time_ns = 0
         self._picture.restart()
         self._backend.plotted = {}
-        self._text_log = TextLog()
-        self._state_timeline = StateTimeline()
+        self._between = BetweenStates()
+        self._commanded = False
+        if self._picture.body is not None:
+            self._tell_body(0, time.time_ns(), self._picture.body)
+            self._loads_changed(0, time.time_ns())
         self._effort_before: Effort | None = None
         self._efforts: list[tuple[int, int, float, float]] = []
 
@@ -95,43 +102,38 @@ class SceneWriter:
         self._backend.streams = [stream]
         self._at(self._last_time_ns, time.time_ns())
         self._picture.describe(self._backend)
-        self._state_timeline.repeat(self._last_time_ns, time.time_ns(), stream.send)
+        self._between.repeat(self._last_time_ns, time.time_ns(), stream.send)
         if self._picture.body is not None:
             self._send_view()
             self._backend.send(e.SESSION_BODY, _numbers(self._picture.body))
-            stream.send_layout(self._initial_view, self._subject())
+            stream.send_layout(self._subject())
 
     def finish(self, stream: Stream) -> None:
         """Give a run that is complete the layout for what it holds."""
         if self._picture.body is None:
             return
-        axes = {}
-        for name, found in self._backend.plotted.items():
-            # No curve lies on the frame's edge, and two ticks have numbers.
-            suited = plot_range(np.array(found), LEAST_RANGES.get(name, 0.0))
-            axes[name] = with_two_ticks(*suited.bounds)
-        finished = Finished(1e-9 * self._last_time_ns, axes, self._text_log.used)
-        stream.send_layout(self._initial_view, self._subject(), finished)
+        finished = Finished(1e-9 * self._last_time_ns, self._backend.plotted, self._commanded)
+        stream.send_layout(self._subject(), finished)
 
     # What happens in it
 
-    def write(self, block: Block, on_note: Callable[[Note], None], skip_live: bool = False) -> None:
-        """Send a block; notes that aren't about the scene (a reset, a stream that comes or goes) go to ``on_note``.
-
-        With ``skip_live`` the states go to files alone: viewers miss some where the machine doesn't keep up.
-        """
-        self._skip_live = skip_live
+    def write(self, block: Block, on_note: Callable[[Note], None]) -> None:
+        """Send a block; notes that aren't about the scene (a reset, a stream that comes or goes) go to ``on_note``."""
         sent = 0
         for note in block.notes:
-            time_ns = getattr(note.event, "time_ns", 0)
+            event = note.event
+            time_ns = getattr(event, "time_ns", 0)
             self._note_time(time_ns)
-            if self._show_along_with_rows(note):
+            if isinstance(event, ALONG_WITH_STATES):
+                self._tell(event, note.wall_ns)
                 continue
             self._write_upto(block, sent, note.after_rows)
             sent = note.after_rows
             self._backend.streams = self._listening()
             self._at(time_ns, note.wall_ns)
-            if not self._show_between_rows(note):
+            if isinstance(event, BETWEEN_STATES):
+                self._change(event, note.wall_ns)
+            else:
                 on_note(note)
         self._write_upto(block, sent, block.count)
         self._rows_since_repeat += block.count
@@ -139,38 +141,36 @@ class SceneWriter:
             # The live server drops the oldest, so what was said long ago is lost on viewers that come late.
             self._rows_since_repeat = 0
             for stream in self._listening():
-                if stream.may_skip:
+                if isinstance(stream, LiveStream):
                     self.catch_up(stream)
-
-    def write_ghost(self, block: Block, begin: int, end: int) -> None:
-        """Send states begin..end of the ghost, after the body's of the same times."""
-        self._backend.streams = self._row_streams()
-        self._backend.clock(block.times[begin:end], block.walls[begin:end])
-        self._picture.draw_ghost(block.times[begin:end], block.rows[begin:end])
 
     def _write_upto(self, block: Block, begin: int, end: int) -> None:
         """Exact states and picture of rows begin..end, which all belong to the present body, and what happened."""
-        # Lines come first: a file that is cut between them and the states has every line that acted on its states.
-        self._text_log.send(self._send)
-        if begin < end:
-            times_ns, walls, rows = block.times[begin:end], block.walls[begin:end], block.rows[begin:end]
+        # What happened comes first: a file that is cut behind it has every line that acted on its states.
+        self._between.send(self._send)
+        streams = self._backend.streams = self._listening()
+        for ghost in (False, True):
+            chosen = block.ghosts[begin:end] == ghost
+            if not chosen.any():
+                continue
+            times_ns, walls, rows = (own[begin:end][chosen] for own in (block.times, block.walls, block.rows))
             self._note_time(int(times_ns[-1]))
-            self._backend.streams = self._row_streams()
             self._backend.clock(times_ns, walls)
+            if ghost:
+                self._picture.draw_ghost(times_ns, rows)
+                continue
             self._backend.begin(times_ns)
             self._backend.send(e.STATE, scalar_columns(rows))
             self._picture.draw(times_ns, rows)
-        streams = self._backend.streams = self._listening()
         if self._efforts:
             times, wall_times, *rates = zip(*self._efforts, strict=True)
             self._backend.clock(np.array(times), np.array(wall_times))
             self._backend.begin(np.array(times))
             self._backend.scalars(style.EFFORT, np.column_stack(rates))
             self._efforts.clear()
-        self._state_timeline.send(self._send)
         if begin < end and self._picture.body is not None:
             for stream in streams:
-                stream.send_layout(self._initial_view, self._subject())
+                stream.send_layout(self._subject())
 
     def _at(self, time_ns: int, wall_ns: int) -> None:
         """What follows is of this moment."""
@@ -180,9 +180,6 @@ class SceneWriter:
     def _note_time(self, time_ns: int) -> None:
         self.moved = self.moved or time_ns > 0
         self._last_time_ns = max(self._last_time_ns, time_ns)
-
-    def _row_streams(self) -> list[Stream]:
-        return [s for s in self._listening() if not (self._skip_live and s.may_skip)]
 
     def _listening(self) -> list[Stream]:
         """The streams that take what they are sent; the others must be told later how things are then."""
@@ -194,36 +191,32 @@ class SceneWriter:
         for stream in self._listening():
             stream.send(entity, times, columns)
 
-    def _show_along_with_rows(self, note: Note) -> bool:
-        """What doesn't concern the rows before it; whether this is such an event."""
-        wall_ns = note.wall_ns
-        match note.event:
-            case LoadBegan(time_ns, load_id, load):
-                self._picture.load_began(time_ns, load_id, load)
+    def _tell(self, event: Any, wall_ns: int) -> None:
+        """What doesn't concern the states before it."""
+        match event:
+            case LoadBegan(time_ns=time_ns) | LoadEnded(time_ns=time_ns):
+                self._picture.on(event)
                 self._loads_changed(time_ns, wall_ns)
-            case LoadEnded(time_ns, load_id):
-                self._picture.load_ended(time_ns, load_id)
-                self._loads_changed(time_ns, wall_ns)
-            case StringChanged(time_ns, string):
-                self._picture.set_string(time_ns, string)
+            case StringChanged():
+                self._picture.on(event)
             case SceneChanged(time_ns, scene):
                 self._change_scene(time_ns, wall_ns, scene)
             case StatusChanged(time_ns, track, value):
-                self._state_timeline.change(time_ns, wall_ns, track, value)
+                self._between.state(time_ns, wall_ns, track, value)
             case AccuracyFloor(time_ns, floor):
-                self._state_timeline.change(time_ns, wall_ns, "accuracy", floor)
+                self._between.state(time_ns, wall_ns, "accuracy", floor)
             case Effort():
-                self._add_effort(note.event, wall_ns)
+                self._add_effort(event, wall_ns)
             case Logged(time_ns, line):
-                self._text_log.event(time_ns, wall_ns, line)
+                self._commanded = True
+                self._between.line(e.EVENTS, time_ns, wall_ns, line)
+                self._between.line(e.COMMAND_LOG, time_ns, wall_ns, readable(line))
             case Refused(time_ns, reason, message):
-                self._text_log.refusal(time_ns, wall_ns, reason, message)
-            case _:
-                return False
-        return True
+                self._commanded = True
+                self._between.line(e.REFUSAL_LOG, time_ns, wall_ns, f"refused ({reason}): {message}", "WARN")
 
     def _loads_changed(self, time_ns: int, wall_ns: int) -> None:
-        self._state_timeline.change(time_ns, wall_ns, "loads", " + ".join(self._picture.loads.kinds) or "none")
+        self._between.state(time_ns, wall_ns, "loads", " + ".join(self._picture.loads.kinds) or "none")
 
     def _change_scene(self, time_ns: int, wall_ns: int, scene: str) -> None:
         self._scene_in_force = scene
@@ -241,24 +234,26 @@ class SceneWriter:
             steps, evaluations = effort.steps - before.steps, effort.force_evaluations - before.force_evaluations
             self._efforts.append((effort.time_ns, wall_ns, steps / seconds, evaluations / seconds))
 
-    def _show_between_rows(self, note: Note) -> bool:
-        """What changes the meaning of rows; whether this is such an event."""
-        match note.event:
+    def _change(self, event: Any, wall_ns: int) -> None:
+        """What changes the meaning of states."""
+        first_body, first_ghost = self._picture.body is None, self._picture.ghost is None
+        self._picture.on(event)
+        match event:
             case Started(scene, vertices, triangles, mesh_sha256):
                 self._scene = scene
                 self._mesh = vertices, triangles, mesh_sha256
-                self._picture.set_mesh(0, vertices, triangles)
                 self._send_scene(self._listening())
-            case MeshChanged(time_ns, vertices, triangles, mesh_sha256):
+            case MeshChanged(_, vertices, triangles, mesh_sha256):
                 self._mesh = vertices, triangles, mesh_sha256
-                self._picture.set_mesh(time_ns, vertices, triangles)
             case BodyChanged(time_ns, body):
-                self._change_body(time_ns, note.wall_ns, body)
-            case GhostChanged(time_ns, body):
-                self._change_ghost(time_ns, body)
-            case _:
-                return False
-        return True
+                self._fit_view()
+                self._backend.send(e.SESSION_BODY, _numbers(body))
+                self._tell_body(time_ns, wall_ns, body)
+                if first_body:
+                    self._loads_changed(time_ns, wall_ns)
+            case GhostChanged() if first_ghost:
+                self._view_size = 0.0
+                self._fit_view()
 
     def _send_scene(self, streams: list[Stream]) -> None:
         """What holds for a run: the scene as text, the mesh's exact numbers."""
@@ -271,7 +266,7 @@ class SceneWriter:
             stream.log_static(e.SCENE, rr.TextDocument(self._scene, media_type="text/plain"))
             if vertices is None or triangles is None:
                 continue
-            if stream.may_skip and vertices.nbytes + triangles.nbytes > LIVE_NUMBERS_MAX:
+            if isinstance(stream, LiveStream) and vertices.nbytes + triangles.nbytes > LIVE_NUMBERS_MAX:
                 continue
             numbers = rr.AnyValues(
                 sha256=sha256,
@@ -280,26 +275,10 @@ class SceneWriter:
             )
             stream.log_static(e.SESSION_MESH, numbers)
 
-    def _change_body(self, time_ns: int, wall_ns: int, body: BodySnapshot) -> None:
-        first = self._picture.body is None
-        self._picture.set_body(time_ns, body)
-        self._fit_view()
-        self._backend.send(e.SESSION_BODY, _numbers(body))
-        tracks = {
-            "inertia_model": body.inertia_model,
-            "integrator": body.integrator + ("" if body.gyroscopic else ", not gyroscopic"),
-        }
-        if first:
-            tracks["loads"] = "none"
-        for track, value in tracks.items():
-            self._state_timeline.change(time_ns, wall_ns, track, value)
-
-    def _change_ghost(self, time_ns: int, body: BodySnapshot) -> None:
-        first = self._picture.ghost is None
-        self._picture.set_ghost(time_ns, body)
-        if first:
-            self._view_size = 0.0
-            self._fit_view()
+    def _tell_body(self, time_ns: int, wall_ns: int, body: BodySnapshot) -> None:
+        integrator = body.integrator + ("" if body.gyroscopic else ", not gyroscopic")
+        self._between.state(time_ns, wall_ns, "inertia_model", body.inertia_model)
+        self._between.state(time_ns, wall_ns, "integrator", integrator)
 
     def _fit_view(self) -> None:
         """Growing is seen as such, until the body no longer suits the views: they keep this length [m] in sight around
@@ -355,67 +334,45 @@ Send = Callable[[str, list[Any], Any], None]
 """Sends (entity, time columns, component columns) to whoever is to get them."""
 
 
-class StateTimeline:
-    """Collects changes and sends them together; what is undone at the same instant never shows."""
+class BetweenStates:
+    """What happens between states, by entity: collected, and sent together."""
 
     def __init__(self) -> None:
-        self._sent: dict[str, str] = {}
-        self._changes: dict[str, list[tuple[int, int, str]]] = {}
+        self._rows: dict[str, list[tuple[int, int, str, str]]] = {}
+        self._states: dict[str, str] = {}
 
-    def change(self, time_ns: int, wall_ns: int, track: str, value: str) -> None:
-        """From ``time_ns`` on the track has this value."""
-        changes = self._changes.setdefault(track, [])
+    def line(self, entity: str, time_ns: int, wall_ns: int, text: str, level: str = "INFO") -> None:
+        """A line of text."""
+        self._rows.setdefault(entity, []).append((time_ns, wall_ns, text, level))
+
+    def state(self, time_ns: int, wall_ns: int, track: str, value: str) -> None:
+        """From ``time_ns`` on the track has this value; what is undone at the same instant never shows."""
+        entity = f"{e.STATUS}/{track}"
+        changes = self._rows.setdefault(entity, [])
         if changes and changes[-1][0] == time_ns:
             changes.pop()
-        before = changes[-1][2] if changes else self._sent.get(track)
+        before = changes[-1][2] if changes else self._states.get(entity)
         if value != before:
-            changes.append((time_ns, wall_ns, value))
+            changes.append((time_ns, wall_ns, value, ""))
 
     def send(self, send: Send) -> None:
-        """Send the changes collected so far."""
-        for track, changes in self._changes.items():
-            if changes:
-                times_ns, walls, values = zip(*changes, strict=True)
-                columns = rr.StateChange.columns(state=list(values))
-                send(f"{e.STATUS}/{track}", time_columns(np.array(times_ns), np.array(walls)), columns)
-                self._sent[track] = values[-1]
-        self._changes.clear()
+        """Send what was collected so far."""
+        for entity, rows in self._rows.items():
+            if not rows:
+                continue
+            times_ns, walls, texts, levels = zip(*rows, strict=True)
+            columns = rr.TextLog.columns(text=texts, level=levels)
+            if entity.startswith(e.STATUS):
+                self._states[entity] = texts[-1]
+                columns = rr.StateChange.columns(state=texts)
+            send(entity, time_columns(np.array(times_ns), np.array(walls)), columns)
+        self._rows.clear()
 
     def repeat(self, time_ns: int, wall_ns: int, send: Send) -> None:
-        """Send the present values to a stream that knows none."""
+        """Send the present states to a stream that knows none."""
         times = time_columns(np.array([time_ns]), np.array([wall_ns]))
-        for track, value in self._sent.items():
-            send(f"{e.STATUS}/{track}", times, rr.StateChange.columns(state=[value]))
-
-
-class TextLog:
-    """Collects lines of text and sends them together."""
-
-    def __init__(self) -> None:
-        self._lines: dict[str, list[tuple[int, int, str, str]]] = {}
-        self.used = False
-        """Whether there was any."""
-
-    def event(self, time_ns: int, wall_ns: int, line: str) -> None:
-        """A line of the event log: exactly as it is, and readable."""
-        self._add(e.EVENTS, time_ns, wall_ns, line, "INFO")
-        self._add(e.COMMAND_LOG, time_ns, wall_ns, readable(line), "INFO")
-
-    def refusal(self, time_ns: int, wall_ns: int, reason: str, message: str) -> None:
-        """A command that was refused."""
-        self._add(e.REFUSAL_LOG, time_ns, wall_ns, f"refused ({reason}): {message}", "WARN")
-
-    def _add(self, entity: str, *line: Any) -> None:
-        self._lines.setdefault(entity, []).append(line)
-        self.used = True
-
-    def send(self, send: Send) -> None:
-        """Send the lines collected so far."""
-        for entity, lines in self._lines.items():
-            times_ns, walls, texts, levels = zip(*lines, strict=True)
-            columns = rr.TextLog.columns(text=texts, level=levels)
-            send(entity, time_columns(np.array(times_ns), np.array(walls)), columns)
-        self._lines.clear()
+        for entity, value in self._states.items():
+            send(entity, times, rr.StateChange.columns(state=[value]))
 
 
 def readable(line: str) -> str:

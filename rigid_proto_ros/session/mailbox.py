@@ -34,7 +34,7 @@ class Note:
 
 @dataclass
 class Block:
-    """States in the order of their publication, with what happened between them.
+    """States of the body and of its ghost in the order of their publication, with what happened between them.
 
     handed_over: by the producer, full or in a hurry, so that others follow it; else it was taken while it was filling.
     """
@@ -44,6 +44,7 @@ class Block:
     times: np.ndarray = field(default_factory=lambda: np.empty(BLOCK_ROWS, np.int64))
     walls: np.ndarray = field(default_factory=lambda: np.empty(BLOCK_ROWS, np.int64))
     rows: np.ndarray = field(default_factory=lambda: np.empty((BLOCK_ROWS, 13)))
+    ghosts: np.ndarray = field(default_factory=lambda: np.empty(BLOCK_ROWS, np.bool_))
     notes: list[Note] = field(default_factory=list)
 
 
@@ -67,14 +68,15 @@ class Mailbox:
         self._woken = False
         self._hurried = False
 
-    def put(self, time_ns: int, row: np.ndarray) -> None:
-        """Copy one state row (13,)."""
+    def put(self, time_ns: int, row: np.ndarray, ghost: bool = False) -> None:
+        """Copy one state row (13,) of the body, or of its ghost."""
         with self._lock:
             block = self._filling
             i = block.count
             block.times[i] = time_ns
             block.walls[i] = _wall_ns()
             block.rows[i] = row
+            block.ghosts[i] = ghost
             block.count = i + 1
             if self._hurried or i + 1 == BLOCK_ROWS:
                 self._hand_over()
@@ -105,8 +107,8 @@ class Mailbox:
         self._filling = Block()
         self._changed.notify_all()
 
-    def take(self) -> tuple[Block | None, int]:
-        """The oldest block, or what has been put since, and how many more full ones wait; None when empty."""
+    def take(self) -> Block | None:
+        """The oldest block, or what has been put since; None when empty."""
         with self._changed:
             self._taken_at = time.monotonic()
             if self._waiting:
@@ -117,7 +119,7 @@ class Mailbox:
                 self._filling = Block()
             else:
                 block = None
-            return block, len(self._waiting)
+            return block
 
     def wait(self, seconds: float) -> None:
         """Return after ``seconds``, or at once when a block is full, on ``wake`` and when the mailbox is closed."""

@@ -166,7 +166,7 @@ class McapObserver(Observer):
         """Empty the mailbox into the file; without one, throw away what is in it."""
         more = True
         while more:
-            block, _ = self._mailbox.take()
+            block = self._mailbox.take()
             if block is None:
                 break
             more = block.handed_over

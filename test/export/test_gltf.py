@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -149,30 +148,6 @@ def test_a_flight_of_no_length_is_one_key(tmp_path):
     file = tmp_path / "still.glb"
     assert main(["simulate", "book", "--duration", "0", "--gltf", str(file), "--with", "ghost,trail"]) == 0
     assert len(Player(file).keys("body", "translation")[0]) == 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--gltf", "a.gltf"], ("--gltf", ".glb")),
-        (["--gltf", "{tmp}/a.glb", "--fps", "-1"], ("--fps", "-1.0")),
-        (["--gltf", "{tmp}/a.glb", "--with", "goat"], ("--with", "did you mean ghost?")),
-        (["--fps", "10"], ("--fps", "needs --gltf")),
-        (["--gltf", "{tmp}/a.glb", "--fps", "nan"], ("--fps", "nan")),
-    ],
-)
-def test_what_makes_no_animation_is_refused_in_one_line(arguments, words, tmp_path, capsys):
-    arguments = [word.replace("{tmp}", str(tmp_path)) for word in arguments]
-    assert main(["simulate", "book", "--duration", "0.1", *arguments]) == 2
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1 and all(word in err for word in words)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_library_that_is_missing_is_named_with_the_extra_that_brings_it(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "pygltflib", None)
-    assert main(["simulate", "book", "--gltf", str(Path(tmp_path) / "a.glb")]) == 2
-    assert "pip install 'rigid_proto_ros[export]'" in capsys.readouterr().err
 
 
 def test_in_the_lesson_the_ghost_with_the_boxs_centre_turns_about_a_point_2_4_cm_off(tmp_path):

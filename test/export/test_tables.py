@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -76,6 +77,12 @@ def test_one_json_object_is_all_that_json_prints_beside_an_export(tmp_path, caps
         (["--parquet", "a.csv"], ("--parquet", ".parquet")),
         (["--csv", "{tmp}/file/a.csv"], ("--csv", "folder that can be made")),
         (["--csv", "{tmp}/folder.csv"], ("--csv", "this is a folder")),
+        (["--gltf", "a.gltf"], ("--gltf", ".glb")),
+        (["--gltf", "{tmp}/a.glb", "--fps", "-1"], ("--fps", "-1.0")),
+        (["--gltf", "{tmp}/a.glb", "--fps", "nan"], ("--fps", "nan")),
+        (["--gltf", "{tmp}/a.glb", "--with", "goat"], ("--with", "did you mean ghost?")),
+        (["--fps", "10"], ("--fps", "needs --gltf")),
+        (["--usd", "a.usdz"], ("--usd", ".usda or .usdc")),
     ],
 )
 def test_what_cannot_be_written_is_refused_in_one_line_before_the_flight(arguments, words, tmp_path, capsys):
@@ -85,6 +92,17 @@ def test_what_cannot_be_written_is_refused_in_one_line_before_the_flight(argumen
     assert main(["simulate", "book", "--duration", "0.1", *arguments]) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and all(word in err for word in words)
+    assert {path.name for path in tmp_path.iterdir()} == {"file", "folder.csv"}
+
+
+@pytest.mark.parametrize(
+    ("module", "file"), [("pygltflib", "a.glb"), ("pxr", "a.usda"), ("pyarrow.parquet", "a.parquet")]
+)
+def test_a_library_that_is_missing_is_named_with_the_extra_that_brings_it(module, file, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, module, None)
+    option = {"glb": "--gltf", "usda": "--usd", "parquet": "--parquet"}[file.partition(".")[2]]
+    assert main(["simulate", "book", option, str(tmp_path / file)]) == 2
+    assert "pip install 'rigid_proto_ros[export]'" in capsys.readouterr().err
 
 
 def test_a_flight_without_a_state_is_refused():

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.picture import style
-from rigid_proto_ros.picture.arrows import LONGEST, USUAL, ArrowScales
+from rigid_proto_ros.picture.arrows import FIRST, LONGEST, ArrowScales
 from rigid_proto_ros.picture.picture import Picture, Shape, Trail
 from rigid_proto_ros.picture.plots import angle_to
 from rigid_proto_ros.picture.poinsot import inverse, plane_rotation, polhode, semi_axes, separatrix
@@ -189,7 +189,7 @@ def test_arrows_are_as_long_as_their_values_through_all_runs_of_a_body():
         picture.restart()
     for found in lengths.values():
         assert np.allclose(np.divide(found, found[0]), [1.0, 2.0, 4.0], rtol=1e-12)
-    assert lengths[style.OMEGA][0] == pytest.approx(USUAL * picture.shape.size)
+    assert lengths[style.OMEGA][0] == pytest.approx(FIRST * picture.shape.size)
 
 
 def test_of_a_body_at_rest_no_arrow_and_no_label_is_drawn():
@@ -210,17 +210,21 @@ def test_of_a_body_at_rest_no_arrow_and_no_label_is_drawn():
 def test_a_stronger_load_has_a_longer_arrow_that_never_leaves_the_picture(first, size, factor):
     scales = ArrowScales()
     own, other = scales.lengths("N", np.array([first, factor * first]), size)
-    assert own == pytest.approx(USUAL * size)
-    if 0.01 < factor < LONGEST / USUAL:
+    assert own == pytest.approx(FIRST * size)
+    if 0.01 < factor < LONGEST / FIRST:
         assert other == pytest.approx(factor * own)
     assert other <= LONGEST * size
 
 
-def test_labels_stand_beyond_the_tips_of_their_arrows():
+def test_labels_stand_beyond_the_tips_of_their_arrows_and_apart_on_one_axis():
     picture, drawn = pictured(WEIGHTLESS)
     picture.draw(times(20), spinning(15.0))
     (tip,), (label,) = drawn.at_end(style.MOMENTUM), drawn.at_end(style.MOMENTUM + "/label")
     assert np.allclose(np.cross(tip, label), 0.0, atol=1e-12) and np.linalg.norm(label) > 1.02 * np.linalg.norm(tip)
+    # The body turns about a principal axis: its name, ω and L stand on one line.
+    names = [style.OMEGA, style.MOMENTUM, style.PRINCIPAL_AXES]
+    heights = [np.abs(drawn.at_end(name + "/label")[:, 2]).max() / picture.shape.size for name in names]
+    assert np.diff(heights).min() > 0.1  # of the body's size: some 15 pixels of a small view
 
 
 def test_arrows_stand_at_their_points_and_only_while_the_load_acts():

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import socket
-import subprocess
 import sys
 import time
 import urllib.request
@@ -14,13 +13,16 @@ from pathlib import Path
 
 import pytest
 import rerun_flight as flight
+from rerun_flight import wait_for
 
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.picture import style
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view import ports, viewers
+from rigid_proto_ros.rerun_view.layout import TITLES
 from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session
-from rigid_proto_ros.rerun_view.snapshot import DRIVERS, headless_viewer, show
+from rigid_proto_ros.rerun_view.snapshot import DRIVERS, bring_to_front, headless_viewer, show
 from rigid_proto_ros.simulation.observer import (
     BodyChanged,
     GhostChanged,
@@ -52,9 +54,6 @@ def complaints(client) -> list[str]:
     return reports + logged
 
 
-WAIT_S = 180.0
-
-
 @pytest.fixture
 def viewer():
     try:
@@ -64,17 +63,6 @@ def viewer():
         if DRIVERS in str(error):
             pytest.skip(str(error))
         raise
-
-
-def wait_for(condition):
-    """The first true value of ``condition()``, asked for again and again."""
-    deadline = time.monotonic() + WAIT_S
-    while time.monotonic() < deadline:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.1)
-    raise AssertionError("nothing came of it in time")
 
 
 def listening_addresses(port: int) -> set[str]:
@@ -168,12 +156,7 @@ time.sleep(600)
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux ends a child with its parent")
 def test_a_killed_run_leaves_no_viewer_behind():
-    run = subprocess.Popen(
-        [sys.executable, "-c", WATCHED_RUN],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-    )
+    run = flight.child(WATCHED_RUN)
     try:
         viewer_pid = int(run.stdout.readline())
         assert _is_running(viewer_pid)
@@ -270,20 +253,24 @@ def test_a_viewer_killed_in_the_middle_disturbs_neither_run_nor_file(tmp_path, m
     assert read_session(path).rows.tobytes() == states.tobytes()
 
 
-@pytest.mark.parametrize("initial_view", ["lesson", "debugging", "plain"])
-def test_every_layout_of_a_recording_is_shown_without_errors(tmp_path, viewer, initial_view):
-    path = tmp_path / "session.rrd"
-    observer = RerunObserver(record=str(path), initial_view=initial_view)
-    flight.fly(observer, flight.rows(80))
-    observer.on(MeshChanged(780_000_000, 0.5 * flight.VERTICES, flight.TRIANGLES, "ab" * 32))
-    observer.on(BodyChanged(780_000_000, flight.BODY))
-    observer.on(GhostChanged(790_000_000, flight.BODY))
-    observer.on(GhostPublished(790_000_000, flight.rows(80)[79]))
-    observer.close()
-    show(viewer, path)
-    for at_s in (0.0, 0.25, 0.35, 0.79):
-        viewer.set_time(e.SIM_TIME, duration=at_s, play_state="paused")
-        viewer.take_screenshot()
-        assert complaints(viewer) == []
-    expected = {"lesson": "Motion", "debugging": "All shapes", "plain": "Plain"}[initial_view]
-    assert expected in {view.name for view in viewer.get_state().views if view.visible}
+def test_recordings_opened_in_one_viewer_have_their_own_layouts_without_errors(tmp_path, viewer):
+    shown = []
+    for tab, ghost in (("Lesson", True), ("Debugging", False), ("Plain", True)):
+        path = tmp_path / f"{tab}.rrd"
+        observer = RerunObserver(record=str(path))
+        flight.fly(observer, flight.rows(80))
+        observer.on(MeshChanged(780_000_000, 0.5 * flight.VERTICES, flight.TRIANGLES, "ab" * 32))
+        observer.on(BodyChanged(780_000_000, flight.BODY))
+        if ghost:
+            observer.on(GhostChanged(780_000_000, flight.BODY))
+            observer.on(Published(800_000_000, flight.rows(81)[80]))
+            observer.on(GhostPublished(800_000_000, flight.rows(80)[79]))
+        observer.close()
+        show(viewer, path)
+        bring_to_front(viewer, tab)
+        for at_s in (0.0, 0.25, 0.35, 0.79):
+            viewer.set_time(e.SIM_TIME, duration=at_s, play_state="paused")
+            viewer.take_screenshot()
+            assert complaints(viewer) == []
+        shown.append({view.name for view in viewer.get_state().views})
+    assert [TITLES[style.GHOST_ANGLE] in names for names in shown] == [True, False, True]

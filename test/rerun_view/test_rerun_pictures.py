@@ -6,11 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import rerun_flight as flight
+from rerun_flight import cells
 
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view.observer import RerunObserver
-from rigid_proto_ros.rerun_view.reader import read_session, record_batches
+from rigid_proto_ros.rerun_view.reader import read_session
 from rigid_proto_ros.rerun_view.writer import readable
 from rigid_proto_ros.simulation.observer import (
     BodyChanged,
@@ -27,15 +28,6 @@ from rigid_proto_ros.simulation.observer import (
     StatusChanged,
 )
 from rigid_proto_ros.simulation.quantities import attitude_angle
-
-
-def cells(path, entity: str, name: str) -> tuple[list[int], list]:
-    times, found = [], []
-    for chunk_entity, static, batch in record_batches(path):
-        if chunk_entity == entity and not static and name in batch.schema.names:
-            times.extend(batch.column(e.SIM_TIME).to_numpy(zero_copy_only=False).astype(np.int64).tolist())
-            found.extend(batch.column(name).to_pylist())
-    return times, found
 
 
 def test_the_ghost_is_compared_with_the_body_at_equal_times_and_per_run(tmp_path):
@@ -83,6 +75,17 @@ def test_the_state_line_shows_what_acts_and_who_integrates(tmp_path):
     ]
     assert np.ravel(cells(path, f"{e.STATUS}/integrator", "StateChange:state")[1]).tolist() == ["rk4"]
     assert cells(path, f"{e.STATUS}/motion", "StateChange:state")[0] == [590_000_000]
+
+
+def test_the_state_line_of_a_run_after_a_reset_begins_with_what_holds(tmp_path):
+    path = tmp_path / "again.rrd"
+    observer = RerunObserver(record=str(path))
+    flight.fly(observer, flight.rows(30))  # which ends while a poke acts
+    observer.on(Reset())
+    observer.on(Published(0, flight.rows(1)[0]))
+    observer.close()
+    for track, value in (("loads", "none"), ("integrator", "rk4"), ("inertia_model", "solid")):
+        assert cells(path, f"{e.STATUS}/{track}", "StateChange:state") == ([0], [[value]])
 
 
 def test_effort_is_plotted_as_a_rate_since_it_was_told_before(tmp_path):

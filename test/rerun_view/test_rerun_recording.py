@@ -7,19 +7,19 @@ import os
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rerun as rr
 import rerun_flight as flight
+from rerun_flight import cells
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.picture import style
-from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view.flusher import FLUSH_PERIOD_S, STALLED_S
 from rigid_proto_ros.rerun_view.observer import RerunObserver
-from rigid_proto_ros.rerun_view.reader import read_session, record_batches
+from rigid_proto_ros.rerun_view.reader import read_session
 from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, whole_bytes
 from rigid_proto_ros.simulation.observer import BodyChanged, BodySnapshot, MeshChanged, Published, Reset, Started
 
@@ -42,13 +42,8 @@ def recording(tmp_path_factory, states) -> Path:
 
 
 def column(path: Path, entity: str, name: str) -> tuple[np.ndarray, list]:
-    """(sim times [ns], cells) of a component over all chunks of an entity, static ones left out."""
-    times, cells = [], []
-    for found, static, batch in record_batches(path):
-        if found == entity and not static and name in batch.schema.names:
-            times.extend(batch.column(e.SIM_TIME).to_numpy(zero_copy_only=False).astype(np.int64).tolist())
-            cells.extend(batch.column(name).to_pylist())
-    return np.array(times), cells
+    times, found = cells(path, entity, name)
+    return np.array(times), found
 
 
 def test_states_come_back_bit_for_bit_with_their_times(recording, states):
@@ -284,14 +279,9 @@ assert not session.complete and 0 < len(session.times) < 12_000, session.summary
 
 def test_a_file_that_cannot_grow_in_flight_stops_the_recording_and_keeps_what_is_there(tmp_path):
     # A limit on the file's size stands in for a full disk: the write fails in the same place.
-    done = subprocess.run(
-        [sys.executable, "-c", FULL_IN_FLIGHT, str(tmp_path / "session.rrd")],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    run = flight.child(FULL_IN_FLIGHT, tmp_path / "session.rrd")
+    run.communicate(timeout=flight.WAIT_S)
+    assert run.returncode == 0
 
 
 @pytest.mark.parametrize("hangs", ["flush", "disconnect"])
@@ -311,10 +301,13 @@ def test_a_library_that_hangs_on_a_full_disk_is_told_of_within_two_seconds(tmp_p
     monkeypatch.setattr(rr.RecordingStream, "flush", full)
     if hangs == "disconnect":
         monkeypatch.setattr(rr.RecordingStream, "disconnect", lambda _: released.wait(20.0))
-    deadline = time.monotonic() + 2.0
-    while not (observer.stalled or observer.error) and time.monotonic() < deadline:
+
+    def told() -> bool:
         observer.on(Published(200_000_000, states[20]))
-        time.sleep(0.05)
+        return bool(observer.stalled or observer.error)
+
+    flight.wait_for(told)
+    assert FLUSH_PERIOD_S + STALLED_S <= 2.0
     try:
         assert str(path) in (observer.stalled if hangs == "flush" else observer.error)
         assert observer.error or not errors

@@ -5,10 +5,7 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
-import threading
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,8 +19,6 @@ from rigid_proto_ros.rerun_view import viewers
 from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session
 from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started, StatusChanged
-
-WAIT_S = 180.0
 
 RUN_WITH_A_STOPPED_VIEWER = """
 import sys, time
@@ -55,21 +50,15 @@ print("behind" if behind else "never behind", k, repr(observer.error), flush=Tru
 
 def test_a_viewer_that_no_longer_reads_holds_up_neither_the_run_nor_its_end(tmp_path):
     path = tmp_path / "session.rrd"
-    run = subprocess.Popen(
-        [sys.executable, "-c", RUN_WITH_A_STOPPED_VIEWER, str(path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(Path(__file__).parents[1])])},
-    )
+    run = flight.child(RUN_WITH_A_STOPPED_VIEWER, path)
     watcher = None
     try:
         address = run.stdout.readline().strip()
         saved = tmp_path / "seen.rrd"
         watcher = viewers.ViewerProcess("--connect", address, "--save", str(saved))
-        _wait_for(lambda: saved.exists() and saved.stat().st_size > 10_000)
+        flight.wait_for(lambda: saved.exists() and saved.stat().st_size > 10_000)
         watcher.process.send_signal(signal.SIGSTOP)
-        said, _ = run.communicate("go\n", timeout=WAIT_S)
+        said, _ = run.communicate("go\n", timeout=flight.WAIT_S)
         assert said.splitlines()[-1] == "behind 200 ''"
         assert run.returncode == 0
     finally:
@@ -100,7 +89,7 @@ def test_resets_and_bodies_of_every_size_leave_no_threads_behind(tmp_path):
         for _ in range(12):
             one_more_run()
         # A run that has just ended may still be leaving.
-        _wait_for(lambda: one_more_run() or _threads_of_this_process() <= before + 2)
+        flight.wait_for(lambda: one_more_run() or _threads_of_this_process() <= before + 2)
     finally:
         observer.close()
 
@@ -125,7 +114,7 @@ def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_b
                 # Or viewers would be spared most of it, and nothing would have to be dropped.
                 flight.flush(observer)
         watcher = viewers.ViewerProcess("--connect", observer.live_address, "--save", str(saved))
-        _wait_for(lambda: style.BODY_MESH in (seen := _entities(saved)) and f"{e.STATUS}/motion" in seen)
+        flight.wait_for(lambda: style.BODY_MESH in (seen := _entities(saved)) and f"{e.STATUS}/motion" in seen)
         seen = _entities(saved)
         assert min(seen[e.STATE]) > 0, "nothing was dropped, so nothing is shown"
         for entity in (
@@ -159,10 +148,3 @@ def _entities(path: Path) -> dict[str, list[int]]:
         # Cut where the viewer has got to.
         pass
     return found
-
-
-def _wait_for(condition) -> None:
-    deadline = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline, "nothing came of it in time"
-        threading.Event().wait(0.1)

@@ -15,14 +15,13 @@ def test_rows_and_notes_come_out_in_the_order_in_which_they_went_in():
         box.put(k, np.full(13, float(k)))
         if k in (1, BLOCK_ROWS):
             box.note(k)
-    first, waiting = box.take()
-    second, _ = box.take()
-    assert (first.count, second.count, waiting) == (BLOCK_ROWS, 3, 0)
+    first, second = box.take(), box.take()
+    assert (first.count, second.count) == (BLOCK_ROWS, 3)
     assert [(n.after_rows, n.event) for n in first.notes + second.notes] == [(2, 1), (1, BLOCK_ROWS)]
     times = np.concatenate([first.times, second.times[:3]])
     rows = np.concatenate([first.rows, second.rows[:3]])
     assert (times == np.arange(BLOCK_ROWS + 3)).all() and (rows[:, 12] == times).all()
-    assert box.take() == (None, 0)
+    assert box.take() is None
 
 
 def test_the_next_row_is_handed_over_at_once_where_that_was_asked_for():
@@ -31,9 +30,9 @@ def test_the_next_row_is_handed_over_at_once_where_that_was_asked_for():
     box.hurry()
     box.put(0, np.zeros(13))
     box.put(1, np.zeros(13))
-    first, waiting = box.take()
-    assert ([n.event for n in first.notes], first.count, waiting) == (["began"], 1, 0)
-    assert box.take()[0].count == 1
+    first = box.take()
+    assert ([n.event for n in first.notes], first.count) == (["began"], 1)
+    assert box.take().count == 1
 
 
 def test_a_recorder_that_is_stuck_is_given_up_and_what_waits_has_no_gap(monkeypatch):
@@ -45,6 +44,6 @@ def test_a_recorder_that_is_stuck_is_given_up_and_what_waits_has_no_gap(monkeypa
         box.put(k, row)
     assert given_up == [True]
     taken = []
-    while (block := box.take()[0]) is not None:
+    while (block := box.take()) is not None:
         taken.append(block.times[: block.count].copy())
     assert (np.concatenate(taken) == np.arange(BLOCKS_WAITING_MAX * BLOCK_ROWS)).all()
