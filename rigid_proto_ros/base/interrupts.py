@@ -123,6 +123,6 @@ def leave(status: int) -> NoReturn:
     the process when Python ends it.
     """
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, AttributeError):  # nobody reads any more; the stream was closed from the start
+        with suppress(OSError, ValueError, AttributeError):  # nobody reads any more; the stream was closed
             stream.flush()
     os._exit(status)
