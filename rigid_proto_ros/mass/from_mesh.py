@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..mesh.hull import box_surface, convex_hull
 from ..mesh.reading import Mesh, load_mesh
 from ..mesh.union import can_unite
 from .moments import referenced_vertices
-from .properties import MeshMoments
+from .properties import MeshMoments, Surface
 from .repair import CRACK, close_surface, repair_surface, unite_components, weld_cracks
 from .verdict import INFO, NESTED, OVERLAPPING, UNREFERENCED, WARNING, Finding, Verdict, check_surface
 
@@ -85,11 +86,11 @@ def mesh_body(
         verdict, _ = check_surface(vertices, triangles)
         message = f"closed with flat caps, on which at most {effect:.2g} of volume and tensor depend: {reason}"
         verdict.findings.insert(0, Finding("open_accepted", WARNING, message))
-    stand_in = None
+    stand_in: Callable[[], Surface] | None = None
     if verdict.united:
-        stand_in = "united", functools.cache(lambda: unite_components(vertices, triangles, None)[:2])
+        stand_in = functools.cache(lambda: unite_components(vertices, triangles, None)[:2])
     elif fallback and verdict.usable and not verdict.closed:
-        stand_in = fallback, functools.cache(lambda: _stand_in(vertices, triangles, fallback))
+        stand_in = functools.cache(lambda: _stand_in(vertices, triangles, fallback))
         shape = "convex hull" if fallback == "hull" else "bounding box"
         message = f"fallback: the mass properties are those of its {shape}"
         verdict.findings.append(Finding("fallback", WARNING, message))

@@ -19,7 +19,7 @@ Sums stand in the order 1, x, y, z, xx, xy, xz, yy, yz, zz, each a pair of doubl
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,6 +66,11 @@ class Moments:
     def centroid(self) -> np.ndarray:
         """Centroid (3,) in mesh coordinates, rounded once."""
         return self.reference + self.center
+
+    def outward(self) -> Moments:
+        """The same solid wound outward."""
+        sign = math.copysign(1.0, self.measure)
+        return replace(self, measure=sign * self.measure, second=sign * self.second)
 
 
 @njit(cache=True, nogil=True)

@@ -74,9 +74,9 @@ class MeshMoments:
 
     vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as ``shell_moments`` takes it. ``no_solid``
     says why the surface bounds no solid and what helps, "" that it bounds one: the solid model, and a density, are then
-    refused with it. ``stand_in`` is another solid's name and what makes its vertices (k, 3) and triangles (l, 3): it is
+    refused with it. ``stand_in`` makes another solid's vertices (k, 3) and triangles (l, 3), which is
     then taken instead, for a surface that bounds none or whose parts overlap.
-    A surface wound inward throughout is turned; ``turned`` says so.
+    Of a surface wound inward throughout the results are those of the outward one.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class MeshMoments:
         *,
         no_solid: str = "",
         name: str = "mesh",
-        stand_in: tuple[str, Callable[[], Surface]] | None = None,
+        stand_in: Callable[[], Surface] | None = None,
     ) -> None:
         self.vertices = vertices
         self.triangles = triangles
@@ -97,20 +97,10 @@ class MeshMoments:
         self.stand_in = stand_in
         self._moments: dict[str | tuple, Moments] = {}
 
-    @property
-    def turned(self) -> bool:
-        """The file's surface is wound inward throughout; results are those of the outward one."""
-        return self.solid_raw().measure < 0.0
-
-    def solid_raw(self) -> Moments:
-        """The solid's signed moments as the file winds it; raises MeshError when the surface isn't closed."""
-        name = "solid" if self.stand_in is None else self.stand_in[0]
-        return self._get(name, lambda: solid_moments(*self.solid_surface()))
-
     def solid_surface(self) -> Surface:
         """Vertices and triangles of the solid's surface; raises MeshError when the mesh's isn't closed."""
         if self.stand_in is not None:
-            return self.stand_in[1]()
+            return self.stand_in()
         if self.no_solid:
             raise MeshError(self.name, f"{self.no_solid}, or another model with --mass (mass)")
         return self.vertices, self.triangles
@@ -127,9 +117,7 @@ class MeshMoments:
         kept per ratio of the components. Its moments are then those of the shape stretched by scale/|scale_x|.
         """
         if model == "solid":
-            raw = self.solid_raw()
-            sign = math.copysign(1.0, raw.measure)
-            return Moments(sign * raw.measure, raw.reference, raw.center, raw.center_low, sign * raw.second, raw.path)
+            return self._get("solid", lambda: solid_moments(*self.solid_surface()).outward())
         if model == "points":
             return self._get("points", lambda: point_moments(self.vertices, self.triangles))
         if model == "bounding_box":

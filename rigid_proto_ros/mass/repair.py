@@ -15,7 +15,7 @@ from ..base.rotation import length, times
 from ..mesh.holes import fan, rims
 from ..mesh.nesting import component_nesting
 from ..mesh.topology import Topology, component_sums, joined_sets, mesh_topology, referenced_extent, surplus_copies
-from ..mesh.union import counted_once, united
+from ..mesh.union import counted_once, united_surface
 from .verdict import MAX_NESTED_COMPONENTS, counted
 
 CRACK = 1e-12
@@ -170,7 +170,7 @@ def unite_components(
     if not nesting.complete:
         raise MeshError("mesh_repair", "union: too many faces to say how the components lie to each other")
     if nesting.crossing:
-        solid = united(vertices, topology.corners, topology.component, sums.volume, nesting.depth)
+        solid = united_surface(vertices, topology.corners, topology.component, sums.volume, nesting.depth)
         joined = np.concatenate([vertices, solid[0]])
         done = f"united {topology.components} components, of which {counted(len(nesting.crossing), 'pair')} overlapped"
         return joined, solid[1] + len(vertices), None, done

@@ -37,12 +37,21 @@ def counted_once(volume: np.ndarray, inside: np.ndarray) -> np.ndarray:
     return (around + sign > 0.0).astype(float) - (around > 0.0)
 
 
-def _solid(
+def united(
     vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, volume: np.ndarray, depth: np.ndarray
-) -> manifold3d.Manifold:
-    """The components, outermost first, united where they are wound outward and cut out where inward."""
+) -> tuple[manifold3d.Manifold, np.ndarray]:
+    """The union of closed components as manifold3d has it, and the point (3,) that is its origin, near their centre.
+
+    component (t,) numbers them; volume (k,): signed; depth (k,): in how many others each lies. Outermost first, they
+    are united where they are wound outward and cut out where inward. Raises MeshError without manifold3d, and for a
+    component that it can't take.
+    """
+    if not can_unite():
+        raise MeshError("mesh_repair", f"union: {is_missing('manifold3d', 'meshes')}")
     import manifold3d
 
+    corners = vertices[triangles.ravel()]
+    middle = 0.5 * corners.min(axis=0) + 0.5 * corners.max(axis=0)
     result = manifold3d.Manifold()
     for c in np.argsort(depth, kind="stable").tolist():
         part = triangles[component == c]
@@ -50,26 +59,19 @@ def _solid(
             part = part[:, [0, 2, 1]]
         used, local = np.unique(part, return_inverse=True)
         local = local.reshape(-1, 3).astype(np.uint64)
-        solid = manifold3d.Manifold(manifold3d.Mesh64(vert_properties=vertices[used], tri_verts=local))
+        solid = manifold3d.Manifold(manifold3d.Mesh64(vert_properties=vertices[used] - middle, tri_verts=local))
         if solid.status() != manifold3d.Error.NoError:
             raise MeshError("mesh_repair", f"component {c} can't be united: manifold3d says {solid.status().name}")
         result = result - solid if volume[c] < 0.0 else result + solid
-    return result
+    return result, middle
 
 
-def united(
+def united_surface(
     vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, volume: np.ndarray, depth: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and triangles (m, 3) of the union of closed components.
-
-    component (t,) numbers them; volume (k,): signed; depth (k,): in how many others each lies. Raises MeshError without
-    manifold3d, and for a component that it can't take.
-    """
-    if not can_unite():
-        raise MeshError("mesh_repair", f"union: {is_missing('manifold3d', 'meshes')}")
-    used = vertices[triangles.ravel()]
-    middle = 0.5 * used.min(axis=0) + 0.5 * used.max(axis=0)
-    mesh = _solid(vertices - middle, triangles, component, volume, depth).to_mesh64()
+    """Vertices (n, 3) and triangles (m, 3) of the union, which takes what ``united`` does."""
+    solid, middle = united(vertices, triangles, component, volume, depth)
+    mesh = solid.to_mesh64()
     return np.asarray(mesh.vert_properties)[:, :3] + middle, np.asarray(mesh.tri_verts).astype(np.int64)
 
 
@@ -79,10 +81,7 @@ def united_volume(
     """The union's volume; None where it can't be had, or would take long."""
     if not can_unite() or len(triangles) > MAX_UNITED:
         return None
-    used = vertices[triangles.ravel()]
     try:
-        return float(
-            _solid(vertices - 0.5 * (used.min(axis=0) + used.max(axis=0)), triangles, component, volume, depth).volume()
-        )
+        return float(united(vertices, triangles, component, volume, depth)[0].volume())
     except MeshError:
         return None
