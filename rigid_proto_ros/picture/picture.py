@@ -313,14 +313,11 @@ class Picture:
         self._draw_trails(times_ns, rows, R)
         string = self.string.rows(times_ns, rows, R) if self.string.was_tied else None
         self._draw_loads(times_ns, rows, R)
-        string_energy = None
         if string is not None:
-            string_energy = np.zeros(len(rows))
-            string_energy[string.tied] = string.energies
             self._draw_string(string, rows)
             self.string.forget_before(int(times_ns[-1]))
         if self._wanted("plots"):
-            self._plot(rows, L, string_energy)
+            self._plot(rows, L, None if string is None else string.held)
 
     def _plot(self, rows: np.ndarray, L: np.ndarray, string_energy: np.ndarray | None) -> None:
         """Plot states (n, 13) with their angular momenta (n, 3) in world axes.

@@ -107,6 +107,13 @@ class StringRows:
         spans = self.knots - self.free
         return spans / np.maximum(np.linalg.norm(spans, axis=1, keepdims=True), np.finfo(float).tiny)
 
+    @property
+    def held(self) -> np.ndarray:
+        """What the string holds at each of the n states (n,) [J]: nothing where none is tied."""
+        found = np.zeros(len(self.tied))
+        found[self.tied] = self.energies
+        return found
+
 
 class Strings:
     """The string of one run, by the times from which it is tied as it is."""
@@ -129,7 +136,7 @@ class Strings:
     def _spells(self, times_ns: np.ndarray) -> Iterator[tuple[slice, ShownString]]:
         """The string that is tied at each of the times (n,), by slices of them."""
         begins = np.searchsorted(times_ns, [change_ns for change_ns, _ in self._changes], side="left").tolist()
-        for begin, end, (_, string) in zip(begins, [*begins[1:], len(times_ns)], self._changes, strict=True):
+        for begin, end, (_, string) in zip(begins, [*begins, len(times_ns)][1:], self._changes, strict=True):
             if string is not None and end > begin:
                 yield slice(begin, end), string
 

@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
+from ..base.rotation import matrix_from_quaternion
 from ..live.live_simulation import LiveSimulation
 from ..motion.state import State
 from ..picture import style
@@ -35,6 +36,7 @@ from ..simulation.observer import (
     Reset,
     SceneChanged,
     ShownLoad,
+    ShownString,
     Started,
     StatusChanged,
     StringChanged,
@@ -148,6 +150,7 @@ class Page:
         self._scenario = live.scenario
         self._tracks: dict[str, str] = {}
         self._loads: dict[int, tuple[int, ShownLoad]] = {}
+        self._strings: list[tuple[int, ShownString | None]] = []
         self._ghost_row: np.ndarray | None = None
         self._drawn_moment_ns: int | None = None
         self._new_scene = True
@@ -313,6 +316,7 @@ class Page:
             case LoadEnded(time_ns, load_id):
                 self._load_ended(time_ns, load_id)
             case StringChanged(time_ns, string):
+                self._strings.append((time_ns, string))
                 self.picture.set_string(time_ns, string)
                 if string is not None and self.pointer.dragging:
                     self.lessons.did("drag")
@@ -374,6 +378,7 @@ class Page:
         self.poses.forget()
         self.readings.restart()
         self._loads.clear()
+        self._strings.clear()
         self._tracks.clear()
         self._centre()
         self.lessons.did("reset")
@@ -388,6 +393,7 @@ class Page:
         self.state = State(times[-1], last)
         self._follow(last[0:3])
         picture = self.picture
+        held = self._string_energies(np.array(times), np.array(rows))
         picture.draw(np.array(times), np.array(rows))
         ghost = self.flight.left_row(times[-1])
         if ghost is None:
@@ -398,16 +404,15 @@ class Page:
             picture.draw_ghost(np.array(times[-1:]), ghost[np.newaxis])
         elif picture.ghost is not None and self.live.scenario.ghost is None:
             picture.set_ghost(times[-1], None)
-        for time_ns, row in zip(times[:-1], rows[:-1], strict=True):
+        for time_ns, row, energy in zip(times[:-1], rows[:-1], held[:-1], strict=True):
             if self.readings.is_due(time_ns):
-                self._read(State(time_ns, row), None)
-        self._read(self.state, ghost)
+                self.readings.take(self._scenario, State(time_ns, row), energy, None)
+        self.readings.take(self._scenario, self.state, held[-1], ghost)
         self.lessons.watched(times)
 
-    def _read(self, state: State, ghost: np.ndarray | None) -> None:
-        string = self.live.loop.simulation.string
-        held = 0.0 if string is None else string.potential_energy(self._scenario.setup.body, state)
-        self.readings.take(self._scenario, state, held, ghost)
+    def _string_energies(self, times: np.ndarray, rows: np.ndarray) -> list[float]:
+        """Of the string at each of the times (n,), of states (n, 13) [J]."""
+        return self.picture.string.rows(times, rows, matrix_from_quaternion(rows[:, 3:7])).held.tolist()
 
     def _draw_past(self) -> None:
         moment_ns = self.flight.moment_ns
@@ -419,8 +424,12 @@ class Page:
         self.backend.forget()
         self.state = State(moment_ns, rows[-1])
         self._follow(rows[-1][0:3])
+        for time_ns, string in self._strings:
+            if time_ns <= moment_ns:
+                self.picture.set_string(time_ns, string)
+        held = self._string_energies(times, rows)
         self.picture.draw(times, rows)
-        self.readings.take(self._scenario, self.state, 0.0, None)
+        self.readings.take(self._scenario, self.state, held[-1], None)
 
     def _return_to_present(self) -> None:
         self._drawn_moment_ns = None

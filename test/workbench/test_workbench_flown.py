@@ -30,7 +30,7 @@ from rigid_proto_ros.workbench import page as page_module
 from rigid_proto_ros.workbench.flight import COMPILING
 from rigid_proto_ros.workbench.lesson_course import COURSES
 from rigid_proto_ros.workbench.lesson_panel import FREE
-from rigid_proto_ros.workbench.readouts import PLOTTED_S, SPEED
+from rigid_proto_ros.workbench.readouts import ENERGY, PLOTTED_S, SPEED
 from rigid_proto_ros.workbench.show_tab import SEE_INTO
 from rigid_proto_ros.workbench.status import motion_words
 
@@ -179,6 +179,25 @@ def test_a_branch_begins_at_the_moment_looked_at_and_the_left_future_is_its_ghos
     flown.reset()
     assert flown.live.state.row.tobytes() == read_scene("t_handle").setup.initial.tobytes()
     assert flown.page.flight.left is None
+
+
+def test_the_energy_holds_the_string_of_its_moment_also_of_one_that_is_looked_back_at(flown: FlownPage) -> None:
+    flown.do(lambda: flown.page.flight.do({"string": {"attach": "tip", "target": [0.3, 0.0, 0.2]}}))
+    flown.fly(0.2)
+    simulation = flown.live.loop.simulation
+    tied = simulation.string.potential_energy(simulation.setup.body, simulation.state)
+    total, held = flown.page.readings.samples[-1][5], flown.page.readings.samples[-1][4]
+    assert held == pytest.approx(tied, rel=1e-9) and tied > 0.0
+    flown.fly(0.1)
+    flown.do(lambda: flown.page.flight.do({"string": "release"}))
+    flown.fly(0.5)
+    assert flown.page.readings.samples[-1][4] == 0.0
+    flown._update(flown.widget("Seconds back"), 0.6)
+    moment_ns = flown.until(lambda: flown.page.flight.moment_ns, "moment of the past")
+    assert moment_ns == 200_000_000
+    assert flown.until(lambda: flown.page.state.time_ns == moment_ns, "state of the past")
+    assert float(flown.page.readings.values[ENERGY].split()[0]) == pytest.approx(total, rel=1e-4)
+    assert flown.page.picture.string.tied
 
 
 def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -> None:
