@@ -111,13 +111,6 @@ class Controls:
 
         return self.bind(handle, shown, changes, TYPING_S, parameter_named(name).accepted)
 
-    def slider(self, name: str, label: str, lower: float, upper: float, step: float) -> Handle:
-        """A number within what is usual; one beyond it stands at the end."""
-        handle = self._gui.add_slider(label, lower, upper, step, lower, hint=_hint(name))
-        return self.bind(
-            handle, lambda values: min(max(float(values[name]), lower), upper), lambda value: {name: float(value)}
-        )
-
     def factor(
         self,
         label: str,

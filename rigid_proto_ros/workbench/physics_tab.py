@@ -115,7 +115,7 @@ class PhysicsTab:
             hint = "Light and heavy bodies then respond alike"
             scaled = gui.add_checkbox("Same feel for any mass", True, hint=hint)
             controls.numbers("string.stiffness", "Stiffness [N/m]")
-            controls.slider("string.damping_ratio", "Damping ratio", 0.0, 2.0, 0.05)
+            controls.numbers("string.damping_ratio", "Damping ratio")
             controls.numbers("string.rest_length", "Rest length [m]")
             controls.checkbox("string.bilateral", "Pushes too")
             controls.checkbox("string.attached", "Tied from the start")

@@ -26,7 +26,7 @@ from ..base.errors import InputError, MeshError
 from ..mass.from_mesh import mesh_body
 from ..mass.inspection import Inspection, as_json, inspect_mesh
 from ..mesh.cache import PASSING
-from ..mesh.reading import BYTES_PER_TRIANGLE, MAX_TRIANGLES, OWN_FORMATS, load_mesh
+from ..mesh.reading import OWN_FORMATS, load_mesh
 from .flight import Flight
 
 MAX_BYTES = 256_000_000
@@ -114,9 +114,7 @@ class Upload:
 class Uploads:
     """The files of one page; ``close`` leaves nothing on the disk, and so does the end of the process."""
 
-    def __init__(self, max_triangles: int = MAX_TRIANGLES) -> None:
-        self._limit = min(MAX_BYTES, BYTES_PER_TRIANGLE * max_triangles)
-        self._max_triangles = max_triangles
+    def __init__(self) -> None:
         self._home: tempfile.TemporaryDirectory[str] | None = None
         self._count = 0
 
@@ -127,8 +125,8 @@ class Uploads:
         name, suffix = shown_name(file_name)
         if suffix not in ACCEPTED:
             raise MeshError("upload", name, f"a file named .{', .'.join(ACCEPTED)}")
-        if len(data) > self._limit:
-            limit = f"at most {self._limit} are accepted, so name a larger file by its path"
+        if len(data) > MAX_BYTES:
+            limit = f"at most {MAX_BYTES} are accepted, so name a larger file by its path"
             raise MeshError("upload", f"{name} has {len(data)} bytes; {limit}")
         if suffix == "glb":
             refuse_other_files(name, data)
@@ -140,7 +138,7 @@ class Uploads:
         try:
             path.parent.mkdir()
             path.write_bytes(data)
-            body = mesh_body(load_mesh(str(path), max_triangles=self._max_triangles))
+            body = mesh_body(load_mesh(str(path)))
             inspection = inspect_mesh(body)
         except OSError as error:
             shutil.rmtree(path.parent, ignore_errors=True)

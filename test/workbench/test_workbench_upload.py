@@ -157,12 +157,6 @@ def test_500_megabytes_are_refused_unwritten_and_unread(place: Path) -> None:
     assert MAX_BYTES < 500_000_000
 
 
-def test_more_triangles_than_allowed_are_refused(place: Path) -> None:
-    with pytest.raises(MeshError):
-        Uploads(max_triangles=8).take("book.obj", BOOK)
-    assert not files(place)
-
-
 @pytest.mark.parametrize(
     "name",
     [
