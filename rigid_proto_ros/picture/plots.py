@@ -52,11 +52,6 @@ class PlotRange:
     low: float
     high: float
 
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """The axis in the values' own unit."""
-        return self.low * 10.0**self.exponent, self.high * 10.0**self.exponent
-
     def title(self, name: str, unit: str) -> str:
         """The plot's title: the quantity, its power of ten and its unit."""
         power = f"10{self.exponent}".translate(SUPERSCRIPTS).replace("¹⁰", "10", 1) if self.exponent else ""

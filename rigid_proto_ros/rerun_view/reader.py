@@ -66,14 +66,13 @@ def record_batches(path: Path) -> Iterator[tuple[str, bool, Any]]:
 
 def drawn_times(path: Path) -> tuple[int, int] | None:
     """The first and the last simulated time [ns] at which anything is drawn, also of a recording that is no session."""
-    ends = [(int(times.min()), int(times.max())) for times in _all_times(path) if len(times)]
-    return (min(first for first, _ in ends), max(last for _, last in ends)) if ends else None
-
-
-def _all_times(path: Path) -> Iterator[np.ndarray]:
+    first, last = [], []
     for _, is_static, batch in record_batches(path):
-        if not is_static and e.SIM_TIME in batch.schema.names:
-            yield _sim_times(batch)
+        if not is_static and e.SIM_TIME in batch.schema.names and batch.num_rows:
+            times = _sim_times(batch)
+            first.append(int(times.min()))
+            last.append(int(times.max()))
+    return (min(first), max(last)) if first else None
 
 
 def _read(path: Path, session: RecordedSession) -> None:
