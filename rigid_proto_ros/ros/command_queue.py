@@ -5,7 +5,7 @@ requests it takes likewise.
 A message taken like this costs a third of one that an executor hands to a callback, and is taken at the moment that the
 motion needs it. rclpy has no public way for it, so this one file uses what its own executors use: ``take_message`` of a
 subscription's handle, ``service_take_request`` of a service's, and the callback groups of its executors. Tried with
-rclpy 7.1.6 (Jazzy); test/ros/test_command_queue.py says when a release breaks it.
+rclpy 7.1.6 (Jazzy).
 
 Lost messages are counted by the middleware, which tells the executor of them in the public way: those that a sender had
 to drop before they were fetched. What this side's own queue drops when it is full nobody counts.

@@ -8,6 +8,7 @@ import threading
 import time
 
 import pytest
+from ros_process import READY_S
 
 from rigid_proto_ros.live import warm_up
 from rigid_proto_ros.live.endpoints import Endpoints
@@ -44,11 +45,10 @@ class Rig(Endpoints):
         self.commands.receive_schedule(lambda: text)
 
     def tick_until(self, condition) -> None:
-        for _ in range(1_000_000):
-            if condition():
-                return
+        deadline = time.monotonic() + READY_S
+        while not condition():
+            assert time.monotonic() < deadline, "it never came"
             self.loop.tick()
-        raise AssertionError("it never came")
 
 
 def test_a_scheduled_mesh_is_loaded_once_and_never_by_the_thread_that_carries_the_body(monkeypatch) -> None:

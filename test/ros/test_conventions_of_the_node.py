@@ -12,7 +12,6 @@ from rigid_proto_ros.scene.parameters import PARAMETERS, is_ros_parameter
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
 
-PACKAGES = {"String": "std_msgs", "Odometry": "nav_msgs", "Imu": "sensor_msgs"}
 KEYS = (
     *(
         "sim_time_ns",
@@ -53,18 +52,6 @@ KEYS = (
     ),
     *("integrator", "state", "recording"),
 )
-
-
-def test_all_topics_have_their_private_names_and_standard_types(rig):
-    expected = {rig.name(name): [f"{PACKAGES.get(kind, 'geometry_msgs')}/msg/{kind}"] for name, kind in TYPES.items()}
-    del expected[rig.name("thrusters")]  # of bodies that have some
-    found = rig.until(lambda: expected.keys() <= (t := dict(rig.do("topics"))).keys() and t, "all topics")
-    assert {name: found[name] for name in expected} == expected
-    triggers = ("reset", "step", "clear_wrench", "string/release")
-    expected = {rig.name(name): ["std_srvs/srv/Trigger"] for name in triggers}
-    expected[rig.name("pause")] = ["std_srvs/srv/SetBool"]
-    found = rig.until(lambda: expected.keys() <= (s := dict(rig.do("services"))).keys() and s, "all services")
-    assert {name: found[name] for name in expected} == expected
 
 
 def test_all_topics_are_reliable_and_the_latched_ones_stay_for_who_comes_late(rig):
@@ -180,16 +167,18 @@ def test_what_ros_itself_declares_is_refused_together_with_ours_or_not_at_all(ri
     assert rig.get(*before) == before
 
 
-def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_environment, tmp_path):
+def test_two_nodes_of_one_domain_do_not_mix_and_two_of_one_name_are_both_warned_of(ros_environment, tmp_path):
     with held_domain() as domain:
         environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
-        plain = NodeProcess(environment, tmp_path / "plain.log", {"mesh": "t_handle"})
-        other = NodeProcess(
-            environment,
-            tmp_path / "other.log",
-            {"mesh": "hammer", "world_frame": "map", "qos_overrides./lab/tool/pose.publisher.depth": 3},
-            *("-r", "__node:=tool", "-r", "__ns:=/lab", "-r", "~/poke:=/lab/hit"),
-        )
+        nodes = [
+            NodeProcess(environment, tmp_path / "plain.log", {"mesh": "t_handle"}),
+            NodeProcess(
+                environment,
+                tmp_path / "other.log",
+                {"mesh": "hammer", "world_frame": "map", "qos_overrides./lab/tool/pose.publisher.depth": 3},
+                *("-r", "__node:=tool", "-r", "__ns:=/lab", "-r", "~/poke:=/lab/hit"),
+            ),
+        ]
         one, two = RosClient(environment), RosClient(environment, "/lab/tool")
         try:
             for client in (one, two):
@@ -216,22 +205,15 @@ def test_two_nodes_of_one_domain_one_namespaced_and_remapped_do_not_mix(ros_envi
             two.trigger("reset")
             two.until(lambda: two.events()[-1]["kind"] == "reset", "the reset")
             assert one.events() == []
+            nodes.append(NodeProcess(environment, tmp_path / "namesake.log", {"mesh": "t_handle"}))
+            said = "another node publishes /rigid_body/pose"
+            plain, other, namesake = (node.log for node in nodes)
+            one.until(lambda: all(log.read_text().count(said) == 1 for log in (plain, namesake)), "a warning of each")
+            assert said not in other.read_text()
         finally:
             one.close()
             two.close()
-            assert (plain.stop(), other.stop()) == (0, 0)
-
-
-def test_a_second_node_of_the_same_name_is_warned_of_by_both(ros_environment, tmp_path):
-    with held_domain() as domain:
-        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
-        nodes = [NodeProcess(environment, tmp_path / f"{k}.log", {"mesh": "t_handle"}) for k in (1, 2)]
-        said = "another node publishes /rigid_body/pose"
-        try:
-            with RosClient(environment) as client:
-                client.until(lambda: all(node.log.read_text().count(said) == 1 for node in nodes), "a warning of each")
-        finally:
-            assert [node.stop() for node in nodes] == [0, 0]
+            assert {node.stop() for node in nodes} == {0}
 
 
 def test_depth_and_reliability_of_each_topic_are_parameters_like_others(rig):

@@ -28,7 +28,9 @@ def test_a_wrench_by_topic_is_read_off_the_page_of_the_node_which_ends_by_sigint
             while not (found := re.findall(SPEED, said(page))):
                 pass
             assert found[-1] == "0"
-            sent = run("poke_client", "wrench", "--force", 1, 0, 0, "--for", 0.5, environment=ros_environment)
+            sent = run(
+                "poke_client", "wrench", "--force", 1, 0, 0, "--for", 0.5, "--timeout", 0, environment=ros_environment
+            )
             assert sent.returncode == 0, sent.stderr
             while not (found := [x for x in re.findall(SPEED, said(page)) if float(x) > 0.0]):
                 pass

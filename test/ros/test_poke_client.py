@@ -275,7 +275,7 @@ def test_never_more_than_500_commands_are_ahead_of_what_the_node_has_confirmed(r
     path.write_text("- {t: 1.0, impulse: [1.0e-6, 0, 0], repeat: 1600, every: 0.001}\n")
     slow = SlowNode(ros_environment, 1600)
     try:
-        done = run("poke_client", path, "--node", "slow", "--reset", environment=ros_environment)
+        done = run("poke_client", path, "--node", "slow", "--reset", "--timeout", 0, environment=ros_environment)
         assert done.returncode == 0, done.stdout + done.stderr
         # Its time doesn't move: the client says so, and waits no longer for the last command to act.
         assert "the last acts at 2.599 s, but simulated time stands still at 0 s" in done.stdout
