@@ -245,14 +245,6 @@ class Client:
         _until(future.done, f"an answer of {service}")
         return {n: plain(parameter_value_to_python(v)) for n, v in zip(names, future.result().values, strict=True)}
 
-    def topics(self):
-        """Names and types of all topics."""
-        return self.node.get_topic_names_and_types()
-
-    def services(self):
-        """Names and types of all services."""
-        return self.node.get_service_names_and_types()
-
     def endpoints(self, topic):
         """QoS of the topic's publishers and subscriptions: [side, node, reliability, durability]."""
         found = []

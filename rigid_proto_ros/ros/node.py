@@ -26,7 +26,7 @@ from .command_subscriber import CommandSubscriber
 from .diagnostics import Diagnostics
 from .event_publisher import EventPublisher
 from .parameters import LiveParameters, declare_parameters
-from .services import Services, StepService
+from .services import StepService, offer_services
 from .simulation_interfaces import offer_simulation_interfaces
 from .state_publisher import StatePublisher
 
@@ -61,7 +61,7 @@ class RigidBodyNode(Node):
         has_thrusters = bool(scenario.parameters.thrusters)
         self._endpoints.subscriber = CommandSubscriber(self, self.live.commands, frames, has_thrusters)
         self._live_parameters = LiveParameters(self, super().set_parameters_atomically, self.live, self.states)
-        Services(self.live).offer(self)
+        offer_services(self, self.live)
         self._endpoints.steps = StepService(self, self.live, ManualCallbackGroup())
         offer_simulation_interfaces(self, self.live)
         self.diagnostics = Diagnostics(self, self.live)

@@ -96,7 +96,11 @@ Store = Callable[[list[RosParameter]], SetParametersResult]
 
 
 class LiveParameters:
-    """The parameters of a node. All but ``changed`` runs on the executor's thread."""
+    """The parameters of a node. All but ``changed`` runs on the executor's thread.
+
+    The node's ``set_parameters_atomically`` calls ``set_together``: rclpy's pre-set callback can't refuse; before its
+    on-set callback all that is read-only or of another type is refused, also where it is in force already.
+    """
 
     def __init__(self, node: Node, store: Store, live: LiveSimulation, states: StatePublisher) -> None:
         self._node = node

@@ -9,7 +9,6 @@ executor, which gathers all that it waits for anew each time, costs several time
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
@@ -21,49 +20,26 @@ from ..live.live_simulation import LiveSimulation
 from .command_queue import Request, RequestQueue
 
 
-class Services:
-    """Reset, pause and the ends of wrench and string; call ``offer`` once."""
+def offer_services(node: Node, live: LiveSimulation) -> None:
+    """Create reset, pause and the ends of wrench and string, private to the node."""
 
-    def __init__(self, live: LiveSimulation) -> None:
-        self._live = live
+    def offer(service_type: Any, name: str, function: Callable[[Any], None], done: Callable[[Any], str]) -> None:
+        """A service that calls function(request) and answers with done(request), or with what was wrong."""
 
-    def offer(self, node: Node) -> None:
-        """Create the services, private to the node."""
-        live = self._live
-        triggers = {
-            "reset": (live.reset, "simulated time is 0"),
-            "clear_wrench": (live.clear_wrench, "no wrench acts; scheduled ones stay"),
-            "string/release": (live.release_string, "the string is loose"),
-        }
-        for name, (function, done) in triggers.items():
-            node.create_service(Trigger, f"~/{name}", _answering(partial(_call, function), partial(_text, done)))
-        node.create_service(
-            SetBool,
-            "~/pause",
-            _answering(lambda request: live.pause(request.data), lambda r: "paused" if r.data else "running"),
-        )
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                function(request)
+                response.success, response.message = True, done(request)
+            except InputError as error:
+                response.success, response.message = False, str(error)
+            return response
 
+        node.create_service(service_type, f"~/{name}", answer)
 
-def _call(function: Callable[[], None], _: Any) -> None:
-    function()
-
-
-def _text(text: str, _: Any) -> str:
-    return text
-
-
-def _answering(function: Callable[[Any], None], done: Callable[[Any], str]) -> Callable[[Any, Any], Any]:
-    """A service callback that calls function(request) and answers with done(request), or with what was wrong."""
-
-    def answer(request: Any, response: Any) -> Any:
-        try:
-            function(request)
-            response.success, response.message = True, done(request)
-        except InputError as error:
-            response.success, response.message = False, str(error)
-        return response
-
-    return answer
+    offer(Trigger, "reset", lambda _: live.reset(), lambda _: "simulated time is 0")
+    offer(Trigger, "clear_wrench", lambda _: live.clear_wrench(), lambda _: "no wrench acts; scheduled ones stay")
+    offer(Trigger, "string/release", lambda _: live.release_string(), lambda _: "the string is loose")
+    offer(SetBool, "pause", lambda request: live.pause(request.data), lambda r: "paused" if r.data else "running")
 
 
 EXPECTED_NS = 1_000_000_000
