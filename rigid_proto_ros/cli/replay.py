@@ -64,8 +64,7 @@ def run(args: argparse.Namespace) -> int:
     if args.repair:
         repair(args.session, args.repair)
     runs = read_runs(args.session, "" if args.publish == "commands" else args.node)
-    if args.scene and not runs[-1].missing:
-        raise InputError("--scene", args.scene, "no scene: the session has its own")
+    given = given_scene(args.scene, runs[-1])
     for number, session in enumerate(runs, 1):
         _print_session(args.session if len(runs) == 1 else f"{args.session}, run {number} of {len(runs)}", session)
     if args.repair:
@@ -74,12 +73,12 @@ def run(args: argparse.Namespace) -> int:
         from ..rerun_view.session_files import record
 
         with Progress(f"recording {args.record}") as progress:
-            record(runs, args.record, given_scene(args.scene), progress.fraction)
+            record(runs, args.record, given, progress.fraction)
     if asked(args):
-        _export(runs, args)
+        _export(runs, args, given)
     _print_how_to_view(args)
     if args.as_scene:
-        _branch(runs[-1], args)
+        _branch(runs[-1], args, given)
     status = _verify(runs, args) if args.verify else 0
     if status == 0 and args.publish:
         status = _publish(runs[-1], args)
@@ -151,11 +150,11 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
     return 0
 
 
-def _export(runs: list[RecordedSession], args: argparse.Namespace) -> None:
+def _export(runs: list[RecordedSession], args: argparse.Namespace, given: Scenario | None) -> None:
     from ..export.flight_record import FlightRecord, source_of_session
     from ..session.replay import play
 
-    session, record, given = runs[-1], FlightRecord(), given_scene(args.scene)
+    session, record = runs[-1], FlightRecord()
     with Progress("reading the motion") as progress:
         play(session, record, given, progress.fraction)
     if len(runs) > 1:
@@ -184,20 +183,24 @@ def _print_difference(difference: Difference, session: RecordedSession) -> None:
         print(f"  {name:{wide[0]}}  recorded {was:{wide[1]}}  here {now}{mark}", file=sys.stderr)
 
 
-def given_scene(path: str | None) -> Scenario | None:
-    """The scene of this file, which was given for a session that lacks its own; None without one."""
+def given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
+    """The scene of this file, which was given for a session that lacks its own; None without one. Raises InputError
+    for a session that has all it needs.
+    """
     if not path:
         return None
+    if not session.missing:
+        raise InputError("--scene", path, "no scene: the session has its own")
     from ..scene.offline import read_scene
 
     return read_scene(path, None, lambda text: print(f"rigid_proto: {text}", file=sys.stderr))
 
 
-def _branch(session: RecordedSession, args: argparse.Namespace) -> None:
+def _branch(session: RecordedSession, args: argparse.Namespace, given: Scenario | None) -> None:
     from ..scene.scenario import nanoseconds
     from ..session.branch import branch_at, recorded_branch
 
-    given, time_ns = given_scene(args.scene), nanoseconds(args.at)
+    time_ns = nanoseconds(args.at)
     if given is None and session.missing:
         raise InputError(
             "--as-scene", f"the recording has no {', '.join(session.missing)}; give its scene with --scene FILE"

@@ -48,6 +48,9 @@ def run(args: argparse.Namespace) -> int:
             raise InputError("snapshot", is_missing(package, "rerun"))
     size = _pixels(args.size, 200)
     if not is_bag(Path(args.session)):
+        for option in ("scene", "node"):
+            if value := getattr(args, option):
+                raise InputError(f"--{option}", value, "a bag: an .rrd recording has its own scene and one body")
         _draw(args, args.session, size)
         return 0
     with tempfile.TemporaryDirectory() as folder:
@@ -70,12 +73,13 @@ def _drawn(args: argparse.Namespace, folder: Path) -> Path:
     from .replay import given_scene
 
     session = read_runs(args.session, args.node)[-1]
+    given = given_scene(args.scene, session)
     # What is refused is refused before the long work.
     check_time(session, args.at)
     check_picture(args.output)
     path = folder / "session.rrd"
     with Progress("reading the bag") as progress:
-        record([session], path, given_scene(args.scene), progress.fraction)
+        record([session], path, given, progress.fraction)
     return path
 
 

@@ -59,8 +59,11 @@ def test_what_a_recording_has_itself_is_not_taken_from_elsewhere(tmp_path, capsy
     session = str(tmp_path / "s.mcap")
     assert main(["simulate", "book", "--duration", "0.2", "--bag", session]) == 0
     capsys.readouterr()
-    assert main(["replay", session, "--scene", "config/hammer.yaml", "--verify"]) == 2
-    assert "the session has its own" in capsys.readouterr().err
+    for words in (["replay", session, "--verify"], ["snapshot", session, "--at", "0.1", "-o", str(tmp_path / "x.png")]):
+        if words[0] == "snapshot":
+            pytest.importorskip("rerun")
+        assert main([*words, "--scene", "config/hammer.yaml"]) == 2
+        assert "the session has its own" in capsys.readouterr().err
 
 
 @needs_rerun
@@ -71,6 +74,8 @@ def test_a_node_that_a_recording_does_not_hold_is_refused(tmp_path, capsys):
     capsys.readouterr()
     assert main(["replay", session, "--node", "other"]) == 2
     assert "accepted: rigid_body" in capsys.readouterr().err
+    assert main(["snapshot", session, "--at", "0.1", "-o", str(tmp_path / "x.png"), "--node", "other"]) == 2
+    assert "an .rrd recording has its own scene" in capsys.readouterr().err
 
 
 def test_a_folder_of_several_recordings_is_no_bag(tmp_path, capsys):
