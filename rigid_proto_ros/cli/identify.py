@@ -130,7 +130,7 @@ def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], li
     from dataclasses import replace
 
     from ..identify.bag_reading import bag_flight
-    from ..identify.session_reading import is_own_session, session_flight
+    from ..identify.session_reading import session_flight
     from ..rerun_view.session_files import is_bag, read_runs
 
     flights, scenes = [], []
@@ -140,7 +140,7 @@ def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], li
             raise InputError("session", f"there is no file and no folder {name!r}")
         runs = []
         if not choice.topics and path.suffix != ".bag" and (not is_bag(path) or has_scene(path)):
-            runs = [run for run in read_runs(path) if is_own_session(run)]
+            runs = [run for run in read_runs(path) if run.scene]
         if not runs:
             flights.append(bag_flight(path, choice))
         for number, run in enumerate(runs, 1):

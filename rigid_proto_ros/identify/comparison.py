@@ -32,14 +32,13 @@ class ModelComparison:
     """log_likelihood: of the candidate less that of the free fit, at most 0. freedoms: how many numbers it fixes that
     are identified otherwise.
 
-    probability: of a true tensor fitting so badly. weight: the candidate's share of likelihood among all candidates.
+    probability: of a true tensor fitting so badly.
     """
 
     name: str
     log_likelihood: float
     freedoms: int
     probability: float
-    weight: float
     problem: str = ""
 
     @property
@@ -68,13 +67,9 @@ def compare(
             unknowns = make_unknowns(fixed[candidate.fixes_mass], topics_of(flights))
             cost = fit_flights(flights, unknowns, values, known=estimate).cost
         except InputError as error:
-            found.append(ModelComparison(name, -np.inf, 0, 0.0, 0.0, str(error)))
+            found.append(ModelComparison(name, -np.inf, 0, 0.0, str(error)))
             continue
         fewer = max(1, identified - unknowns.count("mass", "inertia", "com"))
         gain = max(cost - estimate.cost, 0.0)
-        found.append(ModelComparison(name, -0.5 * gain, fewer, float(chi2.sf(gain, fewer)), 0.0))
-    best = max((one.log_likelihood for one in found), default=0.0)
-    weights = [float(np.exp(one.log_likelihood - best)) if np.isfinite(best) else 0.0 for one in found]
-    total = sum(weights) or 1.0
-    found = [replace(one, weight=weight / total) for one, weight in zip(found, weights, strict=True)]
+        found.append(ModelComparison(name, -0.5 * gain, fewer, float(chi2.sf(gain, fewer))))
     return sorted(found, key=lambda one: -one.log_likelihood)

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..motion import loads as ld
 from . import measurements as ms
 from . import rotations as rot
-from .impulses import Impulses, impulses_of
 from .incremental_qr import upper_triangle
 from .unknowns import Unknowns, Values, possible_tensor
 
@@ -33,6 +33,9 @@ LOOSE = 3.0
 """Standard deviation of what is assumed of shape and, in sizes of the body, of the centre of mass."""
 MOST_LEFT_OUT = 0.3
 """Part of the rates that may be left out because a load begins or ends within them."""
+POINTS = 8
+"""Impulses that stand for a load between two samples, and at least for each load."""
+MOST_POINTS = 200
 _SHAPES = [
     np.array(rows, float)
     for rows in (
@@ -44,6 +47,36 @@ _SHAPES = [
     )
 ]
 """What the shape may have beside a third of the unit tensor: symmetric, of trace 0."""
+
+
+@dataclass(frozen=True)
+class Impulses:
+    """A flight's loads as small impulses, whose sums are the integrals that the balance of momentum needs.
+
+    seconds (k,) ascending, impulses (k, 3) [N s, world], and angular ones about the tracked frame's origin (k, 3)
+    [N m s, world], or about the centre of mass where ``at_com`` (k,); attitudes (k, 4): of the body then.
+    """
+
+    seconds: np.ndarray
+    impulses: np.ndarray
+    angular: np.ndarray
+    at_com: np.ndarray
+    attitudes: np.ndarray
+
+    def about(self, com: np.ndarray) -> np.ndarray:
+        """Angular impulses (k, 3) about the centre of mass [N m s, world]."""
+        moved = self.angular - rot.cross(rot.turned(self.attitudes, com), self.impulses)
+        return np.where(self.at_com[:, None], self.angular, moved)
+
+    def momentum(self, seconds: np.ndarray, impulses: np.ndarray) -> np.ndarray:
+        """Sums (n, 3) of ``impulses`` (k, 3) up to each time."""
+        sums = np.vstack([np.zeros(3), np.cumsum(impulses, axis=0)])
+        return sums[np.searchsorted(self.seconds, seconds, side="right")]
+
+    def path(self, seconds: np.ndarray) -> np.ndarray:
+        """∬ F dt² (n, 3) up to each time [N s²]."""
+        sums = self.momentum(seconds, self.impulses * self.seconds[:, None])
+        return self.momentum(seconds, self.impulses) * seconds[:, None] - sums
 
 
 @dataclass(frozen=True)
@@ -80,8 +113,39 @@ def _poses_of(flight: ms.MeasuredFlight, values: Values) -> _Poses:
     position, attitude = flight.pose
     seconds = 1e-9 * (attitude.times_ns - flight.begin_ns) + values.offset(attitude.topic)
     loads = flight.load_history.moved(values.offset(flight.load_history.topic), np.zeros(0))
-    impulses = impulses_of(loads, flight.begin_ns, seconds, attitude.values)
+    impulses = _impulses_of(loads, flight.begin_ns, seconds, attitude.values)
     return _Poses(seconds, position.values, attitude.values, impulses)
+
+
+def _attitudes_at(seconds: np.ndarray, known_s: np.ndarray, attitudes: np.ndarray) -> np.ndarray:
+    """Attitudes (m, 4) at times between the samples (n, 4) at ``known_s`` (n,)."""
+    after = np.clip(np.searchsorted(known_s, seconds), 1, len(known_s) - 1)
+    first, last = attitudes[after - 1], attitudes[after]
+    part = np.clip((seconds - known_s[after - 1]) / (known_s[after] - known_s[after - 1]), 0.0, 1.0)
+    return rot.product(first, rot.exponential(part[:, None] * rot.logarithm(rot.product(rot.inverse(first), last))))
+
+
+def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: np.ndarray, attitudes: np.ndarray) -> Impulses:
+    """Of a flight's loads, turned by its attitudes (n, 4) at seconds (n,) since ``begin_ns``."""
+    begin, end = (1e-9 * (edge - begin_ns) for edge in (history.begin_ns, history.end_ns))
+    apart = float(np.median(np.diff(seconds)))
+    counts = np.clip(np.ceil(POINTS * (end - begin) / apart), POINTS, MOST_POINTS).astype(int)
+    counts[begin == end] = 1
+    which = np.repeat(np.arange(len(counts)), counts)
+    number = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
+    length = np.where(begin == end, 1.0, end - begin)[which] / counts[which]
+    middles = begin[which] + (end - begin)[which] * (number + 0.5) / counts[which]
+    order = np.argsort(middles, kind="stable")
+    middles, length = middles[order], length[order, None]
+    rows, turns = history.loads[which[order]], _attitudes_at(middles, seconds, attitudes)
+    in_body = rows[:, ld.LOAD_AXES, None] != ld.WORLD_AXES
+    force, torque = (
+        np.where(in_body, rot.turned(turns, vectors), vectors)
+        for vectors in (rows[:, ld.FORCE : ld.FORCE + 3], rows[:, ld.TORQUE : ld.TORQUE + 3])
+    )
+    has_point = rows[:, ld.HAS_POINT] != 0.0
+    arm = np.where(has_point[:, None], rot.turned(turns, rows[:, ld.POINT : ld.POINT + 3]), 0.0)
+    return Impulses(middles, length * force, length * (torque + rot.cross(arm, force)), ~has_point, turns)
 
 
 def _from_path(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> Values:

@@ -167,7 +167,6 @@ def as_json(found: Identification) -> dict:
                 "log_likelihood": one.log_likelihood if np.isfinite(one.log_likelihood) else None,
                 "freedoms": one.freedoms,
                 "probability": one.probability,
-                "weight": one.weight,
                 "contradicted": one.is_contradicted,
                 "problem": one.problem,
             }

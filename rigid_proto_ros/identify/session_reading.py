@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError
+from ..base.vectors import vector
 from ..motion.loads import Load, resolve_load
 from ..scene.command_codec import frame_names, of_event
 from ..scene.scenario import Scenario
@@ -15,11 +16,6 @@ from ..session.runs import decode_event
 from ..simulation.commands import ClearWrench, WrenchCommand
 from ..simulation.setup import Setup
 from .measurements import ATTITUDE, POSITION, RATE, VELOCITY, LoadHistory, MeasuredFlight, Series, load_history
-
-
-def is_own_session(session: RecordedSession) -> bool:
-    """Whether it says what was flown."""
-    return bool(session.scene)
 
 
 def session_flight(
@@ -130,12 +126,7 @@ def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> n
         )
     except CommandRefused as refusal:
         raise InputError("session", f"{name} has a command that the simulation refuses: {refusal}") from None
-    point = None if load.mesh_point is None else _three(load.arm(setup.body))
+    point = None if load.mesh_point is None else vector(load.arm(setup.body))
     if load.axes == "normal":
-        return Load("body", point, _three(load.own_force(setup.body)), load.torque).row
+        return Load("body", point, vector(load.own_force(setup.body)), load.torque).row
     return Load(load.axes, point, load.force, load.torque).row
-
-
-def _three(vector: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = vector.tolist()
-    return x, y, z

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -74,8 +75,8 @@ def _candidate_shapes(parts: LinkShapes, mass: float) -> list[tuple[str, MassPro
         except InputError:
             continue
         shapes.append((phrase and f"tensor of {phrase}, not of the solid", properties))
-    hull = parts.hull(mass)
-    if hull is not None:
+    if parts.hull is not None:
+        hull = replace(parts.hull, mass=mass, inertia=mass * parts.hull.inertia)
         shapes.append(("tensor of the convex hull, not of the solid", hull))
     return shapes
 
@@ -236,9 +237,8 @@ def explain_center(
             guesses.append((f"COM at the {phrase}", parts.properties(truth.mass, model).center_of_mass))
         except InputError:
             pass
-    hull = parts.hull(truth.mass)
-    if hull is not None:
-        guesses.append(("COM of the convex hull", hull.center_of_mass))
+    if parts.hull is not None:
+        guesses.append(("COM of the convex hull", parts.hull.center_of_mass))
     for text, guess in guesses:
         if np.max(np.abs(given - guess)) <= limit * max(parts.diagonal, float(np.max(np.abs(guess)))):
             return (text,)

@@ -254,14 +254,10 @@ class Doctor:
         return judged(link, min(found, key=_quality, default=bare), inside)
 
     def fitting(self, body: MeshBody) -> list[tuple[Link, Shape]]:
-        """The links' shapes that are the mesh: by its whole path, else by as many of the path's last parts as agree."""
+        """The links' shapes that are the mesh: by its whole path, else by its name without the ending."""
         shapes = [(link, shape) for link in self.links for shape in link.shapes if shape.kind == "mesh"]
-        same = [(link, shape) for link, shape in shapes if self._is_file(shape.file, Path(body.mesh.path))]
-        if same:
-            return same
-        alike = [_common_parts(shape.file, body.mesh.path) for _, shape in shapes]
-        most = max(alike, default=0)
-        return [pair for pair, count in zip(shapes, alike, strict=True) if count == most > 0]
+        same = [pair for pair in shapes if self._is_file(pair[1].file, Path(body.mesh.path))]
+        return same or [pair for pair in shapes if Path(pair[1].file).stem == Path(body.mesh.path).stem]
 
     def _is_file(self, name: str, path: Path) -> bool:
         try:
@@ -289,15 +285,6 @@ def _quality(diagnosis: LinkDiagnosis) -> tuple[int, bool, float]:
     """The better of two diagnoses of a link has the smaller one: the closest verdict, then by error."""
     order = {UNIFORM: 0, EXPLAINED: 1, NOT_UNIFORM: 2, UNKNOWN: 3}[diagnosis.status]
     return order, diagnosis.expected is None, diagnosis.error
-
-
-def _common_parts(first: str, second: str) -> int:
-    """How many parts two paths have in common from the end on, the endings of their names apart."""
-    a, b = (list(reversed(Path(name).with_suffix("").parts)) for name in (first, second))
-    count = 0
-    while count < min(len(a), len(b)) and a[count] == b[count]:
-        count += 1
-    return count
 
 
 def _by_mesh(doctor: Doctor, mesh: str, scale: np.ndarray | None, link_name: str | None) -> LinkDiagnosis:

@@ -15,6 +15,7 @@ from ..base.errors import InputError
 from ..mass.from_mesh import MeshBody, mesh_body
 from ..mass.moments import referenced_vertices, solid_moments
 from ..mass.properties import MassProperties
+from ..mass.tensor import tensor_from_six
 from ..mass.verdict import COUNTED_TWICE, OVERLAPPING, WARNING
 from ..mesh.hull import box_surface, convex_hull
 from ..mesh.locate import Search
@@ -216,20 +217,14 @@ class LinkShapes:
             moment += own
         return mass / measure * (np.trace(moment) * np.eye(3) - moment)
 
-    def hull(self, mass: float) -> MassProperties | None:
-        """The convex hull of a single mesh as a solid of ``mass``; None when it has no volume."""
-        if self._hull is None:
-            return None
-        center, unit = self._hull
-        return MassProperties(mass, center, mass * unit)
-
     @cached_property
-    def _hull(self) -> tuple[np.ndarray, np.ndarray] | None:
+    def hull(self) -> MassProperties | None:
+        """The convex hull of a single mesh as a solid of 1 kg; None when it has no volume."""
         if len(self.parts) > 1 or self.parts[0][1] is None:
             return None
         try:
             hull = solid_moments(self.points, convex_hull(self.points))
         except InputError:
             return None
-        xx, xy, xz, yy, yz, zz = hull.second / hull.measure
-        return hull.centroid, np.array([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
+        second = tensor_from_six((hull.second / hull.measure).tolist())
+        return MassProperties(1.0, hull.centroid, np.trace(second) * np.eye(3) - second)

@@ -291,18 +291,6 @@ def test_xacro_is_found_beside_the_python_that_runs(tmp_path, monkeypatch):
     assert judge(path)["l0"].status == "uniform"
 
 
-def test_each_meshs_hull_is_made_once_a_link(tmp_path, monkeypatch):
-    from rigid_proto_ros.robots import link_shapes
-
-    calls = []
-    hull = link_shapes.convex_hull
-    monkeypatch.setattr(link_shapes, "convex_hull", lambda points: calls.append(1) or hull(points))
-    vertices, triangles = box((1.0, 2.0, 3.0), 3)
-    (tmp_path / "part.obj").write_bytes(obj(vertices, triangles))
-    assert judge(urdf(tmp_path, mesh("part.obj") + inertial(moment=7.0, center="0.2 0.3 0.4")))["l0"].causes
-    assert len(calls) == 1
-
-
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, -0.7, 1.1)])
 def test_primitives_and_their_meshes_agree_wherever_they_lie(turn):
     from rigid_proto_ros.mass.from_mesh import mesh_body
