@@ -327,16 +327,16 @@ def _check_keys(entry: dict, known: Set[str], others: Set[str] = frozenset()) ->
 
 
 def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
+    number: Any = value
     if isinstance(value, str):
         # YAML reads 1e-3 without a point as text.
         try:
-            value = float(value)
+            number = float(value)
         except ValueError:
             pass
-    is_number = isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool))
-    if not is_number or not lower <= value <= upper:
+    if isinstance(number, bool) or not isinstance(number, (int, float)) or not lower <= number <= upper:
         raise InputError(field, value, f"a number from {lower:g} to {upper:g}")
-    return float(value)
+    return float(number)
 
 
 def _vector(value: Any, field: str) -> Vector:
