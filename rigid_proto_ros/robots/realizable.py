@@ -30,15 +30,15 @@ REFINED = (0.1, 0.03, 0.01, 0.003, 0.001)
 
 def impossible_inertial(link: Link) -> tuple[str, ...]:
     """Why no body has the link's inertial; empty when one has."""
+    remedy = "" if np.any(link.inertia) else "; a link that only marks a frame needs no inertial"
     if not 0.0 < link.mass < math.inf:
-        remedy = "; a link without mass needs no inertial" if link.mass == 0.0 and not np.any(link.inertia) else ""
         return (f"mass {link.mass:g}, which isn't a positive number{remedy}",)
     if not np.all(np.isfinite(link.center_of_mass)):
         return ("a COM that isn't finite",)
     try:
         check_tensor(link.inertia)
     except InputError as error:
-        return (f"no rigid body has this tensor: {error}",)
+        return (f"no rigid body has this tensor: {error}{remedy}",)
     return ()
 
 

@@ -43,6 +43,7 @@ def verdicts(path) -> dict:
         ("1.0000", (1, 2, 0, 1, 0, 1)),
         ("1.0000", (-1, 0, 0, 1, 0, 1)),
         ("0", (0, 0, 0, 0, 0, 0)),
+        ("1e-9", (0, 0, 0, 0, 0, 0)),
         ("-1", (1, 0, 0, 1, 0, 1)),
         ("nan", (1, 0, 0, 1, 0, 1)),
     ],
@@ -52,6 +53,7 @@ def test_what_no_body_has_is_impossible_with_and_without_shapes(tmp_path, capsys
     assert main(["inspect", "--compare", str(path), "--json"]) == 1
     (link,) = json.loads(capsys.readouterr().out)["links"]
     assert link["status"] == "impossible" and link["causes"]
+    assert any("needs no inertial" in cause for cause in link["causes"]) == (not any(six))
 
 
 def test_each_verdict_and_its_exit_status(tmp_path, capsys):
