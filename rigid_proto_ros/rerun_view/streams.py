@@ -35,8 +35,8 @@ TAKEN_S = 0.05
 """A live stream that hasn't taken half a second of data in this time is behind: some viewer doesn't read."""
 
 ASK_AFTER = 256
-"""Times that something may be sent before it is asked whether that is taken: of thousands that aren't the next would wait
-without limit, and the file with it.
+"""Times that something may be sent before it is asked whether that is taken: of thousands that aren't, the next would
+wait without limit, and the file with it.
 """
 
 LEAVE_S = 2.0
