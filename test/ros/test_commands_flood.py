@@ -57,20 +57,20 @@ def taken(gained: dict[str, int]) -> int:
     return gained["wrench_received"] + gained["poke_received"]
 
 
-def all_known_or_told(rig, before: dict[str, int], sent: int, publishers: int) -> dict[str, int]:
-    """Wait until what was sent is accounted for: received or counted as lost, or else a full queue is told. The last
-    message of each publisher is LAST.
+def all_known_or_told(rig, before: dict[str, int], sent: int, publishers: int, told: bool = True) -> dict[str, int]:
+    """Wait until what was sent is accounted for: received or counted as lost, or else, where that may be, a full queue
+    is told. The last message of each publisher is LAST.
     """
 
     def accounted_for(gained) -> bool:
         if gained["refused_total"] < publishers:
             return False
-        return taken(gained) + gained["messages_lost"] >= sent or gained["queue_full"] > 0
+        return taken(gained) + gained["messages_lost"] >= sent or (told and gained["queue_full"] > 0)
 
     gained = gained_when(rig, before, accounted_for)
     known = taken(gained) + gained["messages_lost"]
     assert gained["refused_total"] == publishers
-    assert known == sent or (known < sent and gained["queue_full"] > 0), gained
+    assert known == sent or (told and known < sent and gained["queue_full"] > 0), gained
     rig.sent += taken(gained)
     return gained
 
@@ -128,7 +128,7 @@ def held_up(rig):
         rig.node_process.process.send_signal(signal.SIGCONT)
 
 
-@pytest.mark.parametrize(("publishers", "kept"), [(1, 4_000), (2, 2_000), (2, 5_000)])
+@pytest.mark.parametrize(("publishers", "kept"), [(1, 2_000), (2, 1_000), (2, 5_000)])
 def test_with_the_node_held_up_losses_are_counted_exactly_or_a_full_queue_is_told(rig, publishers, kept):
     """Each sends far more than the ``kept`` messages that it holds for a reader that doesn't answer."""
     names = [f"{rig.name('poke')}#{k} of {publishers}, {kept}" for k in range(publishers)]
@@ -142,8 +142,6 @@ def test_with_the_node_held_up_losses_are_counted_exactly_or_a_full_queue_is_tol
         rig.do("acknowledged", topic=name)
     # The last of each shows what was lost before it.
     repeat(rig, names, LAST, 1)
-    gained = all_known_or_told(rig, before, publishers * 7_002, publishers)
-    if publishers * kept < 5_000:
-        # The node's own queue has room for all that was kept: none but what the middleware counts is lost.
-        assert gained["queue_full"] == 0
+    # Where the node's own queue has room for all that was kept, none but what the middleware counts is lost.
+    gained = all_known_or_told(rig, before, publishers * 7_002, publishers, told=publishers * kept > 5_000)
     assert gained["messages_lost"] > 0 or gained["queue_full"] > 0
