@@ -34,7 +34,7 @@ from rigid_proto_ros.motion import loads as ld
 from rigid_proto_ros.motion.integrators.integrator import ADAPTIVE
 from rigid_proto_ros.simulation import flight as fl
 from rigid_proto_ros.simulation.batch import EXPLICIT, ROW, Batch, fly_rows
-from rigid_proto_ros.simulation.command_kinds import UNNAMED_SLOT
+from rigid_proto_ros.simulation.commands import HELD_WRENCH, IMPULSE, NO_SLOT, PULSE, UNNAMED_SLOT
 from rigid_proto_ros.simulation.flight_arrays import _arrays
 from rigid_proto_ros.simulation.quantities import CODE, MEASURE
 from work_precision_ours import prepare_simulation, setup_of, simulation_of
@@ -137,9 +137,9 @@ def sweep_runs(problem: Problem, accuracy: float):
     own["initial_angular_velocity"] = spin * (1.0 + 1e-3 * np.arange(ROWS)[:, None] / ROWS)
     commands = np.zeros((1, len(problem.wrenches)), fl.LOAD_ROW)
     for command, w in zip(commands[0], problem.wrenches, strict=True):
-        command.kind = fl.IMPULSE if w.impulse else fl.HELD_WRENCH if w.end is None else fl.PULSE
+        command.kind = IMPULSE if w.impulse else HELD_WRENCH if w.end is None else PULSE
         command.duration_ns = -1 if w.end is None else round(w.end * 1e9) - round(w.begin * 1e9)
-        command.slot = UNNAMED_SLOT if command.kind == fl.HELD_WRENCH else fl.NO_SLOT
+        command.slot = UNNAMED_SLOT if command.kind == HELD_WRENCH else NO_SLOT
         load, command.at_ns = command.load, round(w.begin * 1e9)
         load[ld.LOAD_AXES] = ld.BODY_AXES if w.axes == "body" else ld.WORLD_AXES
         load[ld.HAS_POINT], load[ld.POINT : ld.POINT + 3] = 1.0, w.point

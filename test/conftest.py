@@ -40,7 +40,7 @@ LONG = (
     ),
     *("string_scenes", "node_flight", "stress_free_body", "lockstep", "demo", "stress_auto", "commands_flood"),
     *("order_of_commands", "string_pendulum", "rerun_live", "rerun_slow_viewers", "snapshot", "packaging", "fitting"),
-    *("rerun_crash", "simulate_bad_input", "session_bag", "node_work", "interface", "node_warnings", "sweep_cluster"),
+    *("rerun_crash", "simulate_bad_input", "session_bag", "node_work", "interface", "node_warnings"),
     *("workbench_lessons", "workbench_script_node", "mesh_fuzz", "architecture", "stress_extremes", "sweep_bits"),
 )
 """Files that take longest, waiting and computing ones by turns: workers begin with them, so that none has one left at the end."""

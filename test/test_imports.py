@@ -61,7 +61,6 @@ ALLOWED = {
     "pygltflib": ("export.gltf",),
     "pxr": ("export.usd",),
     "scipy": ("mesh.hull", "sweep.sampling", "identify"),
-    "distributed": ("sweep.run",),
     "matplotlib": ("sweep.plot",),
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
     "viser": ("workbench",),

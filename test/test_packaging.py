@@ -172,7 +172,7 @@ def test_all_but_ros_is_an_extra_and_every_extra_allows_what_is_pinned() -> None
                 if pin.marker is None or pin.marker.evaluate():
                     pins[pin.name.lower()] = next(iter(pin.specifier)).version
     needed = [r for r in requirements if r.marker is None or r.marker.evaluate({"extra": "all"})]
-    assert {"numba", "rerun-sdk", "mcap", "viser", "distributed"} <= {r.name for r in needed}
+    assert {"numba", "rerun-sdk", "mcap", "viser", "pyarrow"} <= {r.name for r in needed}
     assert not [r.name for r in needed if r.name.startswith("ros-")], "a ROS installation keeps its own"
     for requirement in requirements:
         if any(requirement.marker is None or requirement.marker.evaluate({"extra": e}) for e in ("all", "ros", "test")):

@@ -21,7 +21,7 @@ MOTION = "2026-11-23b"
 give the same ones, on any machine.
 """
 
-PACKAGES = ("numpy", "numba", "scipy", "pyarrow", "distributed")
+PACKAGES = ("numpy", "numba", "scipy", "pyarrow")
 
 
 @cache

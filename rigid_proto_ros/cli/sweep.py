@@ -33,7 +33,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--threads", type=int, default=0, metavar="N", help="threads on this machine (default: one per core)"
     )
-    parser.add_argument("--dask", default="", metavar="ADDRESS", help="run on the Dask cluster of this scheduler")
     parser.add_argument("--resume", action="store_true", help="continue a run that was stopped or killed")
     parser.add_argument("--yes", action="store_true", help="allow more than ten million rows")
     parser.add_argument("--row", type=int, metavar="N", help="simulate one row only")
@@ -54,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     for option in ("record", "as_scene"):
         if getattr(args, option) and args.row is None:
             raise InputError(f"--{option.replace('_', '-')}", "needs --row")
-    for option in ("output", "resume", "plot", "dask"):
+    for option in ("output", "resume", "plot"):
         if getattr(args, option) and args.row is not None:
             raise InputError(f"--{option}", "can't be combined with --row, which writes no table")
     study = read_study(args.study, args.yes)
@@ -79,7 +78,7 @@ def _whole(study: Study, args: argparse.Namespace) -> int:
         with notify_when_compiling(lambda: _print("kernels are being compiled, which takes a while the first time")):
             if plot:
                 check_plot(plot, run_chunk(study, 0, 0).columns)
-            metadata = run_study(study, file, workers=args.threads, dask=args.dask, resume=args.resume)
+            metadata = run_study(study, file, workers=args.threads, resume=args.resume)
     except Interrupted as stopped:
         done = stopped.metadata["rows_done"]
         if done:

@@ -23,6 +23,7 @@ from ..motion.integrators.series_steps import degree_for
 from ..motion.integrators.stepping import METHOD, method_table, provide_kernel, workspace_size
 from ..motion.problem import ENVIRONMENT, begin_body
 from ..simulation import flight as fl
+from ..simulation.commands import NO_SLOT
 
 ACCURACY = 1e-11
 """Local error rate: differences over steps of 1e-5 then keep five digits, more than an estimate needs."""
@@ -146,7 +147,7 @@ def _fly_all(
         flight.accuracy, flight.degree = ACCURACY, degree
         for c in range(count):
             row = rows[c]
-            row.at_ns, row.duration_ns, row.kind, row.slot = commands[c, 0], commands[c, 1], commands[c, 2], fl.NO_SLOT
+            row.at_ns, row.duration_ns, row.kind, row.slot = commands[c, 0], commands[c, 1], commands[c, 2], NO_SLOT
             copy_numbers(loads[c], row.load)
         flight.due_end = count
         fl.begin_segment(flight, rows, methods, room)

@@ -15,8 +15,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..scene.scenario import Scenario, make_scenario
 from ..scene.yaml_text import flow
-from ..simulation.command_kinds import HELD_WRENCH, UNNAMED_SLOT
-from ..simulation.commands import slot_name
+from ..simulation.commands import HELD_WRENCH, UNNAMED_SLOT, slot_name
 from ..simulation.flight import NEVER
 from ..simulation.flight_arrays import ActingLoad
 from ..simulation.simulation import Simulation

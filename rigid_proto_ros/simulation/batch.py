@@ -33,6 +33,7 @@ from ..motion.problem import ENVIRONMENT_FIELDS, KNOT, ORIGIN, PUSHES, REST, TAR
 from ..motion.state import fill_initial_row, shift_com
 from ..motion.string import effective_mass, energy_of, free_end_at, most_yielding, span_of, spring_of
 from . import flight as fl
+from .commands import CLEAR
 from .quantities import CONTEXT, STATE, begin, first_satisfied, measure_flight
 from .setup import Setup
 
@@ -80,7 +81,7 @@ PARAMETERS = (*NUMBERS, "string_attached", "string_bilateral")
 
 EXPLICIT, ORDINARY, SHELL = range(3)
 
-TIE, MOVE, UNTIE, CUT, CHANGE = range(fl.CLEAR + 1, fl.CLEAR + 6)
+TIE, MOVE, UNTIE, CUT, CHANGE = range(CLEAR + 1, CLEAR + 6)
 """Commands in a table of loads that act between two calls of the compiled flight. TIE: load holds the target (3,) [m,
 world], the knot (3,) [mesh coordinates] and whether that counts, or the row's own. MOVE: the target, which the free end
 reaches after duration_ns. CUT: nothing but that another segment begins. CHANGE: the row's numbers are those of its next
@@ -325,7 +326,7 @@ def _take_body(own: np.record, ballast: np.ndarray, flight: np.record) -> bool:
 @njit(cache=True, error_model="numpy", allocates=False)
 def _are_within_magnitude(commands: np.ndarray, first: int, body: np.ndarray) -> bool:
     for c in range(first, commands.shape[0]):
-        if commands[c].kind < fl.CLEAR and not is_within_magnitude(commands[c].load, body):
+        if commands[c].kind < CLEAR and not is_within_magnitude(commands[c].load, body):
             return False
     return True
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The commands: one union, as scripts, messages and event lines say them and as the simulation takes them.
+"""The commands: one union, as scripts, messages and event lines say them and as the simulation takes them; without
+numba, which who only sends commands has no use for.
 
 ``order_of`` says in which order those of equal times act.
 """
@@ -15,10 +16,13 @@ from typing import TYPE_CHECKING, Any
 from ..base.errors import CommandRefused
 from ..base.vectors import Vector
 from ..motion.frames import Frame
-from .command_kinds import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE, UNNAMED_SLOT
 
 if TYPE_CHECKING:
     from .setup import Setup
+
+NO_SLOT, UNNAMED_SLOT = 0, 1
+HELD_WRENCH, PULSE, IMPULSE, CLEAR = range(4)
+"""What a command is to a flight, as its tables hold it."""
 
 FARTHEST = 1e100
 """Metres: a place beyond it has no squared distance in a double."""
@@ -82,7 +86,7 @@ class WrenchCommand(Stamped):
         return "wrench" if self.held else "poke"
 
     @property
-    def content(self) -> dict:
+    def content(self) -> dict[str, Any]:
         """The message as the event log keeps it."""
         return {
             "stamp_ns": self.stamp_ns,
@@ -125,7 +129,7 @@ class ThrusterCommand(Stamped):
     rank = Rank.THRUSTERS
 
     @property
-    def content(self) -> dict:
+    def content(self) -> dict[str, Any]:
         """What an event line holds of it."""
         return {"forces": list(self.forces)}
 
@@ -152,7 +156,7 @@ class SetState(Stamped):
             raise CommandRefused("state", "state, orientation_xyzw", [0.0] * 4, "four numbers, not all zero")
 
     @property
-    def content(self) -> dict:
+    def content(self) -> dict[str, Any]:
         """What an event line holds of it."""
         return {name: list(numbers) for name, numbers in self.values.items()}
 
@@ -165,7 +169,7 @@ class ClearWrench(Stamped):
     rank = Rank.CHANGE
 
     @property
-    def content(self) -> dict:
+    def content(self) -> dict[str, Any]:
         """What an event line holds of it."""
         return {}
 
@@ -210,7 +214,7 @@ class TieString(Stamped):
         _check_point("string attach", self.point)
 
     @property
-    def content(self) -> dict:
+    def content(self) -> dict[str, Any]:
         """What an event line holds of it."""
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "axes": self.axes, "point": list(self.point)}
 
@@ -228,7 +232,7 @@ class MoveString(Stamped):
         _check_point("string target", self.point)
 
     @property
-    def content(self) -> dict:
+    def content(self) -> dict[str, Any]:
         """What an event line holds of it."""
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "point": list(self.point)}
 
@@ -241,7 +245,7 @@ class ReleaseString(Stamped):
     rank = Rank.CHANGE
 
     @property
-    def content(self) -> dict:
+    def content(self) -> dict[str, Any]:
         """What an event line holds of it."""
         return {}
 
@@ -307,3 +311,7 @@ class Pending:
         """The load of the command, a wrench or poke, was resolved under this setup."""
         self.resolved_for, self.row = setup, row
         self.kind, self.duration_ns, self.slot = command.flight_kind, command.duration_ns, command.slot
+
+
+Waiting = tuple[int, tuple[int, int, int, int], Pending]
+"""A command in a heap."""

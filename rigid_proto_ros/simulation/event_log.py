@@ -11,7 +11,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from .commands import Command, Pending, WrenchCommand
 
@@ -23,7 +23,7 @@ class OtherEvent(NamedTuple):
     """An event that is no command, or not any more."""
 
     kind: str
-    content: dict
+    content: dict[str, Any]
 
 
 class EventLog:
@@ -46,7 +46,7 @@ class EventLog:
         self._chain_noted()
         return self._hash.hexdigest()
 
-    def append(self, time_ns: int, kind: str, content: dict) -> str:
+    def append(self, time_ns: int, kind: str, content: dict[str, Any]) -> str:
         """Add an event and return its line."""
         self._chain_noted()
         line = json.dumps({"time_ns": time_ns, "kind": kind, "content": content})

@@ -27,7 +27,7 @@ from ..motion.integrators.stepping import commit, is_provided, reach
 from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
 from ..motion.problem import PROBLEM, STRING, begin_problem, begin_string
 from ..motion.variables import HAND_WORK, HEAT, MAX_SPEED, STORED, to_good_row, to_variables
-from .command_kinds import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE
+from .commands import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE
 
 FLIGHT = record_type(
     [
@@ -289,7 +289,7 @@ def stop_in_last_good_state(flight: np.record) -> None:
 @njit(cache=True, error_model="numpy", allocates=False)
 def steps_of_segment(flight: np.record) -> int:
     """Steps committed in the segment."""
-    return flight.taken + flight.control.steps
+    return int(flight.taken + flight.control.steps)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -297,7 +297,7 @@ def evaluations_of_segment(flight: np.record, methods: np.ndarray) -> int:
     """Evaluations of the equations of motion in them."""
     # The step that ends a segment takes the series of the one that waits.
     counted = flight.control.evaluations + flight.control.pending
-    return flight.taken * methods[flight.method].evaluations + counted
+    return int(flight.taken * methods[flight.method].evaluations + counted)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -376,7 +376,7 @@ def end_due(flight: np.record, loads: np.ndarray, events: np.ndarray) -> bool:
             _write(flight, events, ENDED, loads[row].id, row)
     ended = kept != flight.acting
     flight.acting = kept
-    return ended
+    return bool(ended)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)

@@ -20,7 +20,7 @@ from ..motion.loads import Load, load_of_row
 from ..motion.state import State
 from ..motion.string import StringState
 from . import flight as fl
-from .commands import Pending
+from .commands import HELD_WRENCH, NO_SLOT, Pending
 from .flight import EVENT, FLIGHT, LOAD_ROW
 from .setup import FlightStart, Setup
 
@@ -76,12 +76,12 @@ class ActingLoad(NamedTuple):
     @property
     def thruster(self) -> int:
         """The number of the thruster whose load it is, or −1."""
-        return -1 - self.slot if self.slot < fl.NO_SLOT else -1
+        return -1 - self.slot if self.slot < NO_SLOT else -1
 
     @property
     def shown_kind(self) -> str:
         """As observers are told: wrench, poke or thruster."""
-        return "thruster" if self.thruster >= 0 else "wrench" if self.kind == fl.HELD_WRENCH else "poke"
+        return "thruster" if self.thruster >= 0 else "wrench" if self.kind == HELD_WRENCH else "poke"
 
 
 @njit(cache=True, error_model="numpy")
@@ -157,7 +157,8 @@ class FlightArrays:
     @functools.cached_property
     def flight(self) -> np.record:
         """The record (simulation/flight.py)."""
-        return np.ndarray(1, HELD, self._memory)[0].flight
+        found: np.record = np.ndarray(1, HELD, self._memory)[0].flight
+        return found
 
     def _take_methods(self, setup: Setup, start: FlightStart) -> None:
         self.integrator, self.methods = setup.integrator, start.methods
@@ -242,7 +243,8 @@ class FlightArrays:
 
     def last_events(self) -> list[list[int]]:
         """What the last call began and ended: time_ns, what, load_id and row of each."""
-        return self._events[: self.integers[_EVENTS], :4].tolist()
+        events: list[list[int]] = self._events[: self.integers[_EVENTS], :4].tolist()
+        return events
 
     def attitude_at(self, number: int) -> np.ndarray:
         """The body's attitude (4,) xyzw when a command acted, by the number of its event among the last."""

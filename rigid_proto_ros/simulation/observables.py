@@ -21,6 +21,7 @@ from ..motion.state import State, angular_momentum
 from ..motion.string import StringState
 from ..motion.variables import STORED
 from . import flight as fl
+from .commands import Waiting
 from .flight_arrays import ActingLoad, FlightArrays
 from .setup import Setup
 from .string_control import StringControl
@@ -52,7 +53,7 @@ class Observables:
     setup: Setup
     state: State
     time_ns: int
-    _pending: list
+    _pending: list[Waiting]
     _string: StringControl
     _arrays: FlightArrays
     thrusters: ThrusterControl
@@ -108,7 +109,7 @@ class Observables:
             return [0.0] * fl.FLOOR_KINDS
         floors = self.flight.floors.copy()
         fl.note_floors(self.flight, self._arrays.methods, floors)
-        return floors.tolist()
+        return [float(floor) for floor in floors]
 
     @property
     def too_coarse(self) -> str:
@@ -230,7 +231,7 @@ class Observables:
         """
         linear, angular = self._accelerations()
         w = self.state.angular_velocity_body
-        own = transposed_times(self.state.rotation, linear - self.setup.gravity)
+        own: np.ndarray = transposed_times(self.state.rotation, linear - self.setup.gravity)
         return own + cross(angular, point) + cross(w, cross(w, point))
 
     def _accelerations(self) -> tuple[np.ndarray, np.ndarray]:

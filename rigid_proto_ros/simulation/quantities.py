@@ -73,7 +73,7 @@ def _kinetic(row: np.ndarray, context: np.ndarray) -> float:
 def _potential(row: np.ndarray, context: np.ndarray) -> float:
     g = GRAVITY
     fallen = context[g] * row[0] + context[g + 1] * row[1] + context[g + 2] * row[2]
-    return row[13] - context[MASS] * fallen
+    return float(row[13] - context[MASS] * fallen)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -102,7 +102,7 @@ def begin(mass: float, inertia: np.ndarray, gravity: np.ndarray, row: np.ndarray
 def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
     """The quantity NAMES[code] of a state row (STATE,)."""
     if code < 13:
-        return row[code]
+        return float(row[code])
     if code == SPEED:
         return norm(row[7], row[8], row[9])
     if code == SPIN:
@@ -118,9 +118,8 @@ def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
     if code == ENERGY:
         return _kinetic(row, context) + _potential(row, context)
     if code == DRIFT:
-        return abs(_kinetic(row, context) + _potential(row, context) - context[START_ENERGY]) / abs(
-            context[START_ENERGY]
-        )
+        start = context[START_ENERGY]
+        return float(abs(_kinetic(row, context) + _potential(row, context) - start) / abs(start))
     lx, ly, lz = _momentum(row, context)
     if code == MOMENTUM:
         return norm(lx, ly, lz)
@@ -149,7 +148,8 @@ STOP_CODE, STOP_SIGN, STOP_LIMIT = range(3)
 @njit(cache=True, error_model="numpy", allocates=False)
 def _is_met(condition: np.ndarray, row: np.ndarray, context: np.ndarray) -> bool:
     """Whether a condition (code, sign, limit) holds: the quantity is above the limit (sign 1) or below it (−1)."""
-    return condition[STOP_SIGN] * (quantity(int(condition[STOP_CODE]), row, context) - condition[STOP_LIMIT]) > 0.0
+    beyond = quantity(int(condition[STOP_CODE]), row, context) - condition[STOP_LIMIT]
+    return bool(condition[STOP_SIGN] * beyond > 0.0)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)

@@ -49,7 +49,7 @@ class Setup(Environment):
     body: Body
     inertia_model: str
     surface: Surface | None
-    geometry: tuple
+    geometry: tuple[object, ...]
     contacts: Mapping[str, tuple[float, float, float]]
     integrator: Integrator
     step_ns: int

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
-from typing import Protocol
+from typing import Any, Protocol
 
 from ..base.errors import CommandRefused, InputError
 from ..motion.integrators import check_supported
@@ -21,6 +21,9 @@ from ..motion.variables import MAX_SPEED
 from . import flight as fl
 from .checks import check_command, check_load_supported, check_rates, check_start, check_thrust, load_row, needs_of
 from .commands import (
+    HELD_WRENCH,
+    IMPULSE,
+    PULSE,
     Change,
     ClearWrench,
     Command,
@@ -31,6 +34,7 @@ from .commands import (
     SetState,
     ThrusterCommand,
     TieString,
+    Waiting,
     WrenchCommand,
     order_of,
     slot_name,
@@ -51,7 +55,7 @@ def thrusts(loads: list[tuple[int, Load]], at_ns: int) -> list[Pending]:
     """What thrusters, by number, push with from ``at_ns`` on, as commands of a flight."""
     rows = []
     for number, load in loads:
-        kind = fl.HELD_WRENCH if load.is_zero else fl.PULSE
+        kind = HELD_WRENCH if load.is_zero else PULSE
         row = Pending(at_ns, ClearWrench(), kind=kind, duration_ns=_UNTIL_REPLACED_NS, row=load.packed)
         row.slot = -1 - number
         rows.append(row)
@@ -118,7 +122,7 @@ class Simulation(Observables):
         """The body as an observer is told of it; of another setup, when one is given."""
         return snapshot(setup or self.setup)
 
-    def log(self, kind: str, content: dict) -> None:
+    def log(self, kind: str, content: dict[str, Any]) -> None:
         """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever causes it."""
         if self.observer.wants(Logged):
             self.observer.on(Logged(self.time_ns, self.events.append(self.time_ns, kind, content)))
@@ -272,7 +276,7 @@ class Simulation(Observables):
             if what == fl.APPLIED:
                 observer.on(Applied(now_ns, command, load, self.setup.body, arrays.attitude_at(number)))
             else:
-                kind = "impulse" if pending.kind == fl.IMPULSE else command.kind
+                kind = "impulse" if pending.kind == IMPULSE else command.kind
                 notifier.load_began(self, load_id, kind, load)
 
     def _log_command(self, command: Command) -> None:
@@ -396,7 +400,7 @@ class Simulation(Observables):
     # The beginning and a bad end
 
     def _start_over(self) -> None:
-        self._pending: list[tuple] = []
+        self._pending: list[Waiting] = []
         self.listed = None
         self.failure = ""
         self.time_ns = 0

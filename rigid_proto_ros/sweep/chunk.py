@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Some rows of a study, flown and measured: what a thread here and a worker of a cluster both do.
+"""Some rows of a study, flown and measured: what a thread or a process of a sweep does.
 
 Rows that differ in numbers alone go through the compiled batch together. Those that it can't fly or check are flown
 one by one by ``Simulation``, which is what a row is by definition, with the same bits.

@@ -21,8 +21,9 @@ from typing import TypeVar
 from ..base.errors import CommandRefused, InputError
 from ..motion.state import State
 from ..scene.offline import OfflineRun, read_scene
-from ..scene.scenario import Scenario, nanoseconds
+from ..scene.scenario import Scenario
 from ..scene.script import expand_script, with_contacts
+from ..simulation.commands import nanoseconds
 from ..simulation.observer import Observer
 from .run import cores, in_processes
 

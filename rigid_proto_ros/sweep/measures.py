@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..scene.scenario import nanoseconds, publication_ns
+from ..scene.scenario import publication_ns
 from ..simulation import quantities as fm
+from ..simulation.commands import nanoseconds
 from ..simulation.quantities import DIFFERENCES, NAMES, QUANTITIES, TURNED
 from .fields import known_name, mapping, names, number
 

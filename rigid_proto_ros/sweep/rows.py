@@ -28,6 +28,8 @@ from ..simulation import batch
 from ..simulation import flight as fl
 from ..simulation.checks import check_command, check_start
 from ..simulation.commands import (
+    CLEAR,
+    NO_SLOT,
     Change,
     ClearWrench,
     Command,
@@ -120,7 +122,7 @@ class Timetable:
     @property
     def has_loads_alone(self) -> bool:
         """There is nothing that thrusters and strings do."""
-        return bool(((self.rows["kind"] < batch.TIE) & (self.rows["slot"] >= fl.NO_SLOT)).all())
+        return bool(((self.rows["kind"] < batch.TIE) & (self.rows["slot"] >= NO_SLOT)).all())
 
     @property
     def by_entry(self) -> Timetable:
@@ -322,7 +324,7 @@ class Group:
                 tables.append(self._table[:0])
                 good[i] = False
         commands = np.zeros((len(good), max(map(len, tables), default=0)), fl.LOAD_ROW)
-        commands["at_ns"], commands["kind"] = fl.NEVER, fl.CLEAR
+        commands["at_ns"], commands["kind"] = fl.NEVER, CLEAR
         for own, table in zip(commands, tables, strict=True):
             own[: len(table)] = table
         return commands

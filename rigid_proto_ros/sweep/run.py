@@ -3,9 +3,8 @@
 joined.
 
 Here chunks are flown by threads around the compiled batch, which leaves the interpreter's lock alone; rows that only
-the simulation can fly would wait for that lock, so a study of such rows is given to processes. On a Dask cluster the
-scheduler deals them out, and gives those of a lost worker to another; workers need this package and the study's meshes
-under the same names. A chunk is a function of study and rows alone, so it doesn't matter who computes it, or how often.
+the simulation can fly would wait for that lock, so a study of such rows is given to processes. A chunk is a function of
+study and rows alone, so it doesn't matter who computes it, or how often.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import multiprocessing.connection
 import os
 import signal
 import threading
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from contextlib import closing
 from pathlib import Path
@@ -23,21 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError, is_missing
 from ..base.progress import Progress
 from .chunk import Chunk, is_batchable, run_chunk
 from .study import Study
 from .table import Parts, metadata_of
-
-CONNECT_S = 10.0
-"""[s] A scheduler that is there answers in this time."""
-AHEAD = 3
-"""Chunks that each worker thread has before it, so that it never waits and the client never holds many."""
-RETRIES = 3
-"""Of a chunk that failed. One whose worker died is given to another anyway."""
-
-Chunks = Generator[tuple[int, Chunk], None, None]
-"""Chunks by number, as they get done."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -49,10 +37,10 @@ class Interrupted(KeyboardInterrupt):
 
 
 def run_study(
-    study: Study, file: Path, *, workers: int = 0, dask: str = "", resume: bool = False, progress: bool = True
+    study: Study, file: Path, *, workers: int = 0, resume: bool = False, progress: bool = True
 ) -> dict[str, Any]:
-    """Fly all rows that aren't done yet and write the table; returns its metadata. workers 0: one a core; dask: address
-    of a scheduler. Raises Interrupted on Ctrl-C, with a readable table of what was done.
+    """Fly all rows that aren't done yet and write the table; returns its metadata. workers 0: one a core. Raises
+    Interrupted on Ctrl-C, with a readable table of what was done.
     """
     workers = workers or cores()
     known = metadata_of(file) if resume and file.is_file() else {}
@@ -60,9 +48,8 @@ def run_study(
         return known
     parts = Parts(file, study, chunk_rows(study, workers), resume)
     done = sum(last - first for first, last in map(parts.bounds, parts.finished()))
-    flown = _on_cluster(study, parts, dask) if dask else _here(study, parts, workers)
     try:
-        with Progress("sweep", large=progress, unit="rows") as shown, closing(flown) as chunks:
+        with Progress("sweep", large=progress, unit="rows") as shown, closing(_flown(study, parts, workers)) as chunks:
             shown.fraction(done, study.rows)
             for k, chunk in chunks:
                 parts.write(k, chunk)
@@ -71,9 +58,6 @@ def run_study(
     except KeyboardInterrupt:
         raise Interrupted(parts.join()) from None
     return parts.join()
-
-
-# Here
 
 
 def cores() -> int:
@@ -94,8 +78,8 @@ def _goes_in_batches(study: Study) -> bool:
     return is_batchable(study, np.unique(np.linspace(0, study.rows - 1, min(study.rows, 9)).astype(np.int64)))
 
 
-def _here(study: Study, parts: Parts, workers: int) -> Chunks:
-    """A few chunks ahead of whoever takes them."""
+def _flown(study: Study, parts: Parts, workers: int) -> Generator[tuple[int, Chunk], None, None]:
+    """Chunks by number, as they get done, a few ahead of whoever takes them."""
     pool = ThreadPoolExecutor(workers) if _goes_in_batches(study) else in_processes(workers)
     pending: dict[Future[Chunk], int] = {}
     waiting = parts.missing()
@@ -129,48 +113,3 @@ def _end_with_the_parent() -> None:
     if parent is not None:
         multiprocessing.connection.wait([parent.sentinel])
     os._exit(1)
-
-
-# On a cluster
-
-
-def _on_cluster(study: Study, parts: Parts, address: str) -> Chunks:
-    """Raises InputError when nobody answers at the scheduler's address."""
-    distributed: Any  # it has no types
-    try:
-        import distributed
-    except ImportError:
-        raise InputError("--dask", is_missing("distributed", "sweep")) from None
-    try:
-        client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
-        raise InputError("--dask", address, f"the address of a scheduler, such as tcp://host:8786 ({error})") from None
-    try:
-        # A task and not scattered data, which would be lost with the worker that holds it.
-        content = client.submit(_same, study, pure=False)
-        pending = distributed.as_completed(with_results=True, loop=client.loop)
-        numbers: dict[Any, int] = {}
-
-        def submit(waiting: Iterator[int]) -> None:
-            if (k := next(waiting, None)) is not None:
-                future = client.submit(run_chunk, content, *parts.bounds(k), retries=RETRIES, pure=False)
-                numbers[future.key] = k
-                pending.add(future)
-
-        waiting = parts.missing()
-        for _ in range(AHEAD * max(1, sum(client.nthreads().values()))):
-            submit(waiting)
-        for future, chunk in pending:
-            if not isinstance(chunk, Chunk):
-                raise chunk
-            k = numbers.pop(future.key)
-            future.release()
-            submit(waiting)
-            yield k, chunk
-    finally:
-        client.close()
-
-
-def _same(study: Study) -> Study:
-    """What the scheduler keeps of the study, so that any worker can have it again."""
-    return study

@@ -22,10 +22,11 @@ from ..base.errors import InputError, did_you_mean
 from ..scene.declaration import READ_ONLY, Value
 from ..scene.offline import OfflineRun, scene_values
 from ..scene.parameters import Parameters, convert_all, parameter_named, with_mass_of_density
-from ..scene.scenario import Scenario, make_scenario, nanoseconds
+from ..scene.scenario import Scenario, make_scenario
 from ..scene.scene_file import scene_file
 from ..scene.script import expand_script
 from ..scene.yaml_text import load_plain_yaml, read_text
+from ..simulation.commands import nanoseconds
 from .fields import mapping, number, whole
 from .measures import Measures, read_measures
 from .sampling import GRID, LIST, MAX_SOBOL, SAMPLERS, Draw, Points, read_form, uniforms
