@@ -32,10 +32,24 @@ def flown(script: str = SCRIPT, until_s: float = 4.0, **scene) -> tuple[OfflineR
     return run, lines
 
 
-def test_each_slot_is_replaced_and_timed_out_by_itself() -> None:
-    run, _ = flown()
-    # left: 1 N for 1 s, then 3 N for the timeout of 1.5 s; right: 2 N for 1.5 s; the unnamed one 4 N for 1 s.
-    assert run.simulation.state.linear_velocity == pytest.approx([1.0 + 4.5, 3.0, 4.0], rel=1e-12)
+@pytest.mark.parametrize(
+    ("script", "velocity", "timeouts"),
+    [
+        # left: 1 N for 1 s, then 3 N for the timeout of 1.5 s; right: 2 N for 1.5 s; the unnamed one 4 N for 1 s.
+        (SCRIPT, [1.0 + 4.5, 3.0, 4.0], 2),
+        (SCRIPT + "- {t: 1.25, service: clear_wrench}", [1.0 + 0.75, 2.5, 4.0], 0),
+        (SCRIPT + "- {t: 0.5, force: [0, 8, 0], duration: 0.25, slot: right}", [1.0 + 4.5, 1.0 + 2.0, 4.0], 1),
+        # What has a duration ends by it, and nothing else: no other slot, no timeout, no change of the timeout.
+        ("[{t: 0, wrench: {force: [1, 0, 0], duration: 2, slot: a}}, {t: 0, wrench: {force: [0, 1, 0]}}]", [2, 1.5, 0], 1),
+        ("[{t: 0, wrench: {force: [1, 0, 0], duration: 2, slot: a}}, {t: 1, force: [0, 1, 0], duration: 2, slot: a}]", [1, 2, 0], 0),
+        ("[{t: 0, wrench: {force: [1, 0, 0], duration: 2}}, {t: 1, set: {wrench_timeout: 0.25}}]", [2, 0, 0], 0),
+    ],
+    ids=["replaced and timed out", "cleared", "poked", "its own end", "replaced by a poke", "timeout changed"],
+)  # fmt: skip
+def test_each_slot_is_replaced_and_ends_by_itself(script: str, velocity: list[float], timeouts: int) -> None:
+    run, told = flown(script)
+    assert run.simulation.state.linear_velocity == pytest.approx(velocity, rel=1e-12)
+    assert sum('"timeout"' in line for line in told.lines) == timeouts
 
 
 def test_a_held_wrench_that_times_out_is_an_event_and_one_that_is_replaced_is_none() -> None:
@@ -63,18 +77,6 @@ def test_slots_replay_to_the_bit_also_from_recordings_without_timeouts(timeouts_
     assert not timeouts_recorded or again_told.lines == told.lines
 
 
-def test_clear_wrench_ends_all_slots() -> None:
-    run, told = flown(SCRIPT + "- {t: 1.25, service: clear_wrench}\n")
-    assert run.simulation.state.linear_velocity == pytest.approx([1.0 + 0.75, 2.5, 4.0], rel=1e-12)
-    assert not any('"timeout"' in line for line in told.lines)
-
-
-def test_a_poke_in_a_slot_replaces_what_acts_there() -> None:
-    poke = "- {t: 0.5, force: [0, 8, 0], duration: 0.25, slot: right}\n"
-    run, _ = flown(SCRIPT + poke)
-    assert run.simulation.state.linear_velocity[1] == pytest.approx(1.0 + 2.0, rel=1e-12)
-
-
 def test_slots_have_a_number_each() -> None:
     names = ["a", "z", "a_b", "a0", "left", "z" * 12, "a" * 12, "z___________"]
     assert [slot_name(slot_number(name)) for name in names] == names
@@ -98,11 +100,6 @@ def test_an_entry_keeps_its_slot_and_a_wrong_one_is_named() -> None:
         parse_script("[{t: 0, wrench: {force: [0, 0, 1], slot: 3}}]")
 
 
-def test_a_wrench_that_ends_by_its_duration_ends_its_own_slot() -> None:
-    run, _ = flown("- {t: 0, wrench: {force: [1, 0, 0], duration: 2, slot: a}}\n- {t: 0, wrench: {force: [0, 1, 0]}}\n")
-    assert run.simulation.state.linear_velocity == pytest.approx([2.0, 1.5, 0.0], rel=1e-12)
-
-
 @pytest.mark.parametrize("timeout", [0.0, 0.4, 1.5])
 def test_a_wrench_with_a_duration_holds_that_long_unless_replaced_whatever_the_timeout(timeout: float) -> None:
     one = {"mesh": "", "inertia_model": "explicit", "explicit_inertia.mass": 1.0, "wrench_timeout": timeout}
@@ -115,16 +112,3 @@ def test_a_wrench_with_a_duration_holds_that_long_unless_replaced_whatever_the_t
     assert [json.loads(line)["kind"] for line in told.lines] == ["wrench", "wrench"]
     apart, _ = flown(both.replace("duration: 3", "duration: 3, slot: x"), mass=0.0, **one)
     assert apart.simulation.state.linear_velocity == pytest.approx([0.3, 0.2, 0.0], rel=1e-12)
-
-
-def test_a_poke_that_replaces_a_wrench_with_a_duration_lasts_to_its_own_end() -> None:
-    script = (
-        "- {t: 0, wrench: {force: [1, 0, 0], duration: 2, slot: a}}\n- {t: 1, force: [0, 1, 0], duration: 2, slot: a}\n"
-    )
-    run, _ = flown(script)
-    assert run.simulation.state.linear_velocity == pytest.approx([1.0, 2.0, 0.0], rel=1e-12)
-
-
-def test_a_change_of_the_timeout_leaves_a_wrench_with_a_duration_as_it_is() -> None:
-    run, _ = flown("- {t: 0, wrench: {force: [1, 0, 0], duration: 2}}\n- {t: 1, set: {wrench_timeout: 0.25}}\n")
-    assert run.simulation.state.linear_velocity == pytest.approx([2.0, 0.0, 0.0], rel=1e-12)
