@@ -231,8 +231,9 @@ class Observables:
         """
         linear, angular = self._accelerations()
         w = self.state.angular_velocity_body
-        own: np.ndarray = transposed_times(self.state.rotation, linear - self.setup.gravity)
-        return own + cross(angular, point) + cross(w, cross(w, point))
+        own = transposed_times(self.state.rotation, linear - self.setup.gravity)
+        shown: np.ndarray = own + cross(angular, point) + cross(w, cross(w, point))
+        return shown
 
     def _accelerations(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the COM (3,) [m/s², world] and angular (3,) [rad/s², body axes], now."""

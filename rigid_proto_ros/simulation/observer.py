@@ -81,8 +81,8 @@ class ShownString:
         """Places (n, 3) [m, world] of the free end at times (n,) [ns]."""
         lasts_ns = self.end_ns - self.begin_ns
         done = np.clip((times_ns - self.begin_ns) / lasts_ns, 0.0, 1.0) if lasts_ns > 0 else np.ones(len(times_ns))
-        way: np.ndarray = np.asarray(self.target, dtype=float) - self.origin
-        return self.origin + done[:, np.newaxis] * way
+        places: np.ndarray = self.origin + done[:, np.newaxis] * (np.asarray(self.target, dtype=float) - self.origin)
+        return places
 
 
 class Started(NamedTuple):
