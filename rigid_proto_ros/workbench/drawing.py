@@ -232,7 +232,7 @@ class ViserBackend(Backend):
             node = self._nodes.get(name)
             if node is None:
                 look = style.STYLES[name]
-                node = self._scene.add_icosphere(f"/{name}", look.width, look.colours[0])
+                node = self._scene.add_icosphere(f"/{name}", look.width, look.colours[0], cast_shadow=False)
                 self._nodes[name] = node
             node.position = self.drawn(name, positions[-1])
         if name in self._nodes:
