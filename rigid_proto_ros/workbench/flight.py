@@ -207,7 +207,7 @@ class Flight:
         """Begin a scene (parameter-file text, or its parameters) and a poke script (YAML text) at time 0; paused: or as
         it was; speed: simulated seconds per second, or as they were. Returns whether it was taken.
         """
-        self.look_at_present()
+        goes_on = self._leave_past()
 
         def begin() -> bool:
             values: dict[str, object] = {}
@@ -215,7 +215,7 @@ class Flight:
             values.update(self._kept)
             if speed is not None:
                 values["real_time_factor"] = speed
-            self._begin(make_scenario(values), script, self.paused if paused is None else paused)
+            self._begin(make_scenario(values), script, (self.paused and not goes_on) if paused is None else paused)
             self._start = {}
             self.left = None
             return True
@@ -287,10 +287,14 @@ class Flight:
 
     def look_at_present(self) -> None:
         """Show the present again, which goes on if it did."""
-        if self._past is not None:
-            self._past = self.moment_ns = None
-            if self._ran_before:
-                self.pause(False)
+        if self._leave_past():
+            self.pause(False)
+
+    def _leave_past(self) -> bool:
+        """Show the present again; returns whether it went on until the past was looked at."""
+        goes_on = self._past is not None and self._ran_before
+        self._past = self.moment_ns = None
+        return goes_on
 
     def past_rows(self, lasting_ns: int) -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) and states (n, 13) up to the one that is looked at."""

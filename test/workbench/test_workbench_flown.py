@@ -198,6 +198,11 @@ def test_the_energy_holds_the_string_of_its_moment_also_of_one_that_is_looked_ba
     assert flown.until(lambda: flown.page.state.time_ns == moment_ns, "state of the past")
     assert float(flown.page.readings.values[ENERGY].split()[0]) == pytest.approx(total, rel=1e-4)
     assert flown.page.picture.string.tied
+    # Nor does what is looked back at let the next lesson's time begin before its question is answered.
+    flown.set("Lesson", lesson("book").title)
+    flown.until(lambda: flown.page.lessons._asked, "question")
+    flown.fly(0.0)
+    assert flown.live.paused and flown.page.lessons._asked
 
 
 def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -> None:
