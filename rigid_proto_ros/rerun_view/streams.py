@@ -34,11 +34,6 @@ FLUSH_TIMEOUT_S = 5.0
 TAKEN_S = 0.05
 """A live stream that hasn't taken half a second of data in this time is behind: some viewer doesn't read."""
 
-ASK_AFTER = 256
-"""Times that something may be sent before it is asked whether that is taken: of thousands that aren't, the next would
-wait without limit, and the file with it.
-"""
-
 LEAVE_S = 2.0
 """How long the end of a run waits for live streams; a viewer that doesn't read holds nobody up."""
 
@@ -165,21 +160,10 @@ class FileStream(Stream):
 class LiveStream(Stream):
     """One run for viewers; the first one hosts the server, later ones send to it."""
 
-    _unasked = 0
-    """How often something was sent since it was asked whether that is taken."""
-
-    def send(self, entity: str, times: Iterable[Any], columns: Iterable[Any]) -> None:
-        """As the base does; of much that is sent at once it is asked in between whether it is taken."""
-        super().send(entity, times, columns)
-        self._unasked += 1
-        if self._unasked >= ASK_AFTER:
-            self.flush()
-
     def flush(self) -> None:
         """Ask whether the server has taken everything. It waits for its slowest viewer, and so would all
         that is sent.
         """
-        self._unasked = 0
         try:
             self.recording.flush(timeout_sec=TAKEN_S)
             self.behind = False
