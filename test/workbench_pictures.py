@@ -116,7 +116,7 @@ def pull(page: Browser, steps: int) -> list[Image.Image]:
     pictures = []
     for k in range(1, steps + 1):
         page.page.mouse.move(x - 130.0 * k / steps, y - 60.0 * k / steps)
-        time.sleep(0.15)  # a page says at most every 0.05 s where the pointer is
+        time.sleep(0.6)  # a page says at most every 0.05 s where the pointer is, and a slow one seldom
         pictures += play(page, 1.0 / RATE)
     return pictures
 
