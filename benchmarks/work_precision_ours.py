@@ -163,12 +163,12 @@ def prepare_kernel(problem: Problem, step: float, integrator: str) -> Run | None
         return None
     # A command at time 0 acts with the first advance beyond it.
     simulation.advance(1)
-    segment = simulation._segment
-    p, kernel = segment.problem, INTEGRATORS[integrator].kernel
+    flight = simulation.flight
+    p, kernel = flight.problem, INTEGRATORS[integrator].kernel
     if kernel is None:
         return None
     begin = time.perf_counter()
-    start = segment.variables.copy()
+    start = flight.variables.copy()
     kernel(start.copy(), p, 1e-9, 1)
     compile_s = time.perf_counter() - begin
     now = {}
