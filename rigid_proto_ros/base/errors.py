@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import difflib
+import os
+import sys
 from collections.abc import Iterable
 
 
@@ -36,6 +38,20 @@ class CommandRefused(InputError):
     def __init__(self, reason: str, field: str, received: object, accepted: str = "") -> None:
         self.reason = reason
         super().__init__(field, received, accepted)
+
+
+def tell(program: str, error: Exception) -> int:
+    """Print one line on stderr of what was refused or couldn't be written, and return the exit status; any other error
+    is raised again.
+    """
+    if isinstance(error, BrokenPipeError):
+        # The reader of our output went away, as `| head` does; Python would complain again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    if isinstance(error, InputError | OSError):
+        print(f"{program}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    raise error
 
 
 def is_missing(package: str, extra: str) -> str:

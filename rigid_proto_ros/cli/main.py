@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import gc
 import importlib
-import os
 import sys
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +17,7 @@ from typing import Any
 from .. import __version__
 from ..base import interrupts
 from ..base.command_line import Parser, complete, completing
-from ..base.errors import InputError
+from ..base.errors import tell
 
 COMMANDS = {
     "inspect": "mass properties of a mesh, and what is wrong with it",
@@ -64,19 +63,20 @@ def main(argv: list[str] | None = None) -> int:
             command.set_defaults(run=module.run)
     complete(parser)
     args = parser.parse_args(argv)
+    program = f"rigid_proto {args.command}"
     if own_process:
         # All commands need it, and while it is imported there is nothing to close.
         importlib.import_module("..base.compilation", __package__)
         _without_unused_libraries()
         gc.freeze()
         gc.enable()
-        return interrupts.run(lambda: _run(args), lambda error: _tell(args.command, error))
+        return interrupts.run(lambda: _run(args), lambda error: tell(program, error))
     try:
         return args.run(args)
     except KeyboardInterrupt:
         return 130
     except Exception as error:
-        return _tell(args.command, error)
+        return tell(program, error)
 
 
 def _run(args: argparse.Namespace) -> int:
@@ -88,18 +88,6 @@ def _run(args: argparse.Namespace) -> int:
         status = args.run(args)
     print(end="", flush=True)  # in here: what can't be written is told as any other file
     return status
-
-
-def _tell(command: str, error: Exception) -> int:
-    """One line on stderr of what was refused, and the exit status; anything else is raised again."""
-    if isinstance(error, BrokenPipeError):
-        # The reader of our output went away, as `| head` does; Python would complain again at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    if isinstance(error, InputError | OSError):
-        print(f"rigid_proto {command}: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    raise error
 
 
 def _without_unused_libraries() -> None:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from ..base import interrupts
 from ..base.command_line import Parser, complete, completes
-from ..base.errors import InputError
+from ..base.errors import InputError, tell
 
 if TYPE_CHECKING:
     from ..simulation.commands import Command
@@ -37,22 +37,15 @@ def main(argv: list[str] | None = None) -> int:
         script = _script(args)
         if args.dry_run:
             _print_plan(script)
+            print(end="", flush=True)  # in here: what can't be written is told
             return 0
         # Half a second, in which there is nothing to close yet.
         importlib.import_module(".script_sender", __package__)
         if own_process:
-            return interrupts.run(lambda: _send(script, args, argv), _tell)
+            return interrupts.run(lambda: _send(script, args, argv), lambda error: tell("poke_client", error))
         return _send(script, args, argv)
-    except InputError as error:
-        return _tell(error)
-
-
-def _tell(error: Exception) -> int:
-    """What was refused, in one line on stderr, and the exit status; anything else is raised again."""
-    if not isinstance(error, InputError):
-        raise error
-    print(f"poke_client: {' '.join(str(error).split())}", file=sys.stderr)
-    return 2
+    except (InputError, OSError) as error:
+        return tell("poke_client", error)
 
 
 EXAMPLES = (

@@ -105,6 +105,11 @@ def test_an_output_that_nobody_reads_or_that_takes_nothing_is_told_in_a_line_at_
         done = subprocess.run(inspect, stdout=full, stderr=subprocess.PIPE, text=True, env=buffered(), check=False)
     assert done.returncode == 2
     assert done.stderr == "rigid_proto inspect: [Errno 28] No space left on device\n"
+    with open("/dev/full", "w") as full:
+        plan = command("poke_client", "poke", "--at", "tip", "--push", "0.05", "--dry-run")
+        done = subprocess.run(plan, stdout=full, stderr=subprocess.PIPE, text=True, env=buffered(), check=False)
+    if importlib.util.find_spec("rclpy"):
+        assert (done.returncode, done.stderr) == (2, "poke_client: [Errno 28] No space left on device\n")
     read, write = os.pipe()
     os.close(read)
     done = subprocess.run(inspect, stdout=write, stderr=subprocess.PIPE, text=True, env=buffered(), check=False)
