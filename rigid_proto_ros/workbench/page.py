@@ -290,6 +290,8 @@ class Page:
         self._draw(times, rows)
         state = self.live.state
         if self._undrawn and (self.live.paused or state.time_ns == 0):
+            # What was told last, as a string, is drawn with a state that may have been drawn without it.
+            self.picture.redraw()
             # While time stands, or hasn't begun because kernels are being compiled, nothing is published.
             self._draw([state.time_ns], [state.row])
 

@@ -305,7 +305,9 @@ def test_a_client_without_a_time_limit_waits_for_a_node_that_starts_later(ros_en
 
 LOADED = """
 import sys
+from rigid_proto_ros.base import interrupts
 from rigid_proto_ros.cli.executables import poke_client
+interrupts.leave = lambda status: status
 status = poke_client()
 print(status, [module for module in ("numba", "scipy") if module in sys.modules])
 """

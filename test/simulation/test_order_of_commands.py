@@ -71,7 +71,7 @@ def clients(commanded):
     """Four processes that publish commands."""
     made = [RosClient(commanded.environment, commanded.node) for _ in range(4)]
     for client in made:
-        client.send("topics")
+        client.send("forget", topics=[])
     for client in made:
         client.answer()
     for client in made:

@@ -137,7 +137,7 @@ def test_what_one_page_sets_another_one_shows(server) -> None:
     sent: list[dict] = []
     with server.gui.add_folder("Two pages"):
         controls = Controls(server.gui, sent.append, [].append)
-        field = controls.number("mass", "Mass")
+        field = controls.numbers("mass", "Mass")
     address, protocol = f"ws://{LOOPBACK}:{server.get_port()}", f"viser-v{viser.__version__}"
     with connect(address, subprotocols=[protocol]) as one, connect(address, subprotocols=[protocol]) as other:
         update = {"type": "GuiUpdateMessage", "uuid": field._impl.uuid, "updates": {"value": "0.28125"}}
