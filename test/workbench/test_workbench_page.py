@@ -219,7 +219,7 @@ def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_button
 
 
 def test_plots_show_their_curves_also_after_a_lesson_was_begun(page) -> None:
-    page.page.set_viewport_size({"width": 1400, "height": 1200})
+    page.page.set_viewport_size({"width": 900, "height": 1000})
     page.tab("Plots")
     for name in ("t_handle", "dropped_term"):
         fly(page, lesson(name).path.read_text("utf-8"))
