@@ -26,7 +26,7 @@ ROS = [
 MCAP = ["mcap>=1.6,<2"]
 # Reads MJCF files.
 ROBOTS = ["mujoco>=3.3"]
-SWEEP = ["pyarrow>=15", "scipy>=1.15", "matplotlib>=3.8"]
+SWEEP = ["pyarrow>=15"]
 # Motion for other tools: tables, glTF, USD.
 EXPORT = ["pyarrow>=15", "pygltflib>=1.16,<2", "usd-core>=25.5"]
 TERMINAL = ["argcomplete>=3"]

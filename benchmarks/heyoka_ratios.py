@@ -144,7 +144,7 @@ def sweep_runs(problem: Problem, accuracy: float):
         load[ld.LOAD_AXES] = ld.BODY_AXES if w.axes == "body" else ld.WORLD_AXES
         load[ld.HAS_POINT], load[ld.POINT : ld.POINT + 3] = 1.0, w.point
         load[ld.FORCE : ld.FORCE + 3], load[ld.TORQUE : ld.TORQUE + 3] = w.force, w.torque
-    batch = Batch(own[:, None], np.zeros((0, 4)), setup_of(problem, "auto", 1e-3, accuracy), commands)
+    batch = Batch(own, np.zeros((0, 4)), setup_of(problem, "auto", 1e-3, accuracy), commands)
     end = np.zeros((13, MEASURE))  # of kind FINAL
     end[:, CODE] = np.arange(13)
     looks = np.array([round(problem.duration * 1e9)]), np.ones(1, bool), np.zeros((0, 3)), end

@@ -27,9 +27,9 @@ sys.path.insert(0, str(HERE.parent))
 
 from result_table import ResultTable
 from rigid_proto_ros.scene.offline import OfflineRun
-from rigid_proto_ros.sweep.chunk import run_chunk
-from rigid_proto_ros.sweep.run import cores, run_study
+from rigid_proto_ros.sweep.rows import run_chunk
 from rigid_proto_ros.sweep.study import Study, make_study
+from rigid_proto_ros.sweep.table import cores, run_study
 from rigid_proto_ros.sweep.variation import variation
 
 POKES = [(1.0, 0.1), (4.0, 0.2)]
@@ -107,11 +107,11 @@ def reference_attitude(study: Study, row: int) -> np.ndarray:
     return y[:4] / np.linalg.norm(y[:4])
 
 
-def sweep_time(study: Study, threads: int) -> float:
+def sweep_time(study: Study) -> float:
     """Seconds of a whole run, the table included, with everything compiled and loaded."""
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        run_study(study, Path(folder) / "t.parquet", workers=threads, progress=False)
+        run_study(study, Path(folder) / "t.parquet", progress=False)
         return time.perf_counter() - start
 
 
@@ -178,7 +178,7 @@ def compare(table: ResultTable, rows: int) -> None:
     """Part 1."""
     study, threads = flights(rows), cores()
     run_chunk(study, 0, 2)
-    taken = [sweep_time(study, threads) for _ in range(3)]
+    taken = [sweep_time(study) for _ in range(3)]
     ours = float(np.median(taken)) / rows
     loop_rows = min(rows, 300)
     loop = loop_time(study, loop_rows) / loop_rows
@@ -211,14 +211,14 @@ def compare(table: ResultTable, rows: int) -> None:
 def scale_one(rows: int) -> dict:
     """Part 2 for one size, in a process of its own: time a row and the peak of memory beyond the start."""
     study = short(rows)
-    sweep_time(short(1000), cores())
+    sweep_time(short(1000))
     # Compiling takes more memory than flying: the mark is set back to what is in use now.
     Path("/proc/self/clear_refs").write_text("5")
     repeats = max(1, min(15, 100_000 // rows))
     walls, works = [], []
     for _ in range(repeats):
         worked = time.process_time()
-        walls.append(sweep_time(study, cores()))
+        walls.append(sweep_time(study))
         works.append(time.process_time() - worked)
     status = Path("/proc/self/status").read_text()
     peak = int(next(line for line in status.splitlines() if line.startswith("VmHWM")).split()[1]) / 1024

@@ -19,4 +19,4 @@ reference: {inertia_model: bounding_box}
 measure: {final: [spin], difference: [attitude]}
 STUDY
 rigid_proto sweep out/box_error.yaml -o out/box_error.parquet
-rigid_proto sweep out/box_error.yaml -o out/box_error.parquet --resume --plot x=mesh,y=difference.attitude,log=y,to=out/box_error.svg
+rigid_proto sweep out/box_error.yaml --row 7

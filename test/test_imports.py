@@ -60,8 +60,7 @@ ALLOWED = {
     "PIL": ("rerun_view",),
     "pygltflib": ("export.gltf",),
     "pxr": ("export.usd",),
-    "scipy": ("mesh.hull", "sweep.sampling", "identify"),
-    "matplotlib": ("sweep.plot",),
+    "scipy": ("mesh.hull", "identify"),
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
     "viser": ("workbench",),
     "websockets": ("workbench",),  # comes with viser

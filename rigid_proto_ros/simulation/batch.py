@@ -3,8 +3,8 @@
 
 A row begins with the record of a setup's flight, filled with the numbers in which it differs, and is flown by the
 functions of simulation/flight.py. Every operation stands in the order in which a scene's setup and a simulation's
-commands do it, so the bits are theirs. Whatever is out of the ordinary (a bound, a doubtful tensor, a string that pulls
-too hard) gives no result: the caller then asks the simulation, which knows what to say.
+commands do it, so the bits are theirs. Whatever is out of the ordinary (a bound, a doubtful tensor, a string that is
+too fast) gives no result: the caller then asks the simulation, which knows what to say.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from ..base.vectors import Vector
 from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
-from ..motion.body import AXES, BODY_SCALE, COM, INERTIA, LENGTH, MASS, MOMENTS, arm, fill_body
+from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, arm, fill_body
 from ..motion.integrators.auto import FASTEST
 from ..motion.integrators.stepping import provide_kernel
-from ..motion.loads import MAX_ACCELERATION, accumulate_load, is_within_magnitude
+from ..motion.loads import is_within_magnitude
 from ..motion.problem import ENVIRONMENT_FIELDS, KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_body
-from ..motion.state import fill_initial_row, shift_com
-from ..motion.string import effective_mass, energy_of, free_end_at, most_yielding, span_of, spring_of
+from ..motion.state import fill_initial_row
+from ..motion.string import effective_mass, energy_of, most_yielding, span_of, spring_of
 from . import flight as fl
 from .commands import CLEAR
 from .quantities import CONTEXT, STATE, begin, first_satisfied, measure_flight
@@ -81,13 +81,6 @@ PARAMETERS = (*NUMBERS, "string_attached", "string_bilateral")
 
 EXPLICIT, ORDINARY, SHELL = range(3)
 
-TIE, MOVE, UNTIE, CUT, CHANGE = range(CLEAR + 1, CLEAR + 6)
-"""Commands in a table of loads that act between two calls of the compiled flight. TIE: load holds the target (3,) [m,
-world], the knot (3,) [mesh coordinates] and whether that counts, or the row's own. MOVE: the target, which the free end
-reaches after duration_ns. CUT: nothing but that another segment begins. CHANGE: the row's numbers are those of its next
-stage.
-"""
-
 CERTAIN = 0.999
 """Of a limit: nearer to it the simulation decides."""
 
@@ -98,9 +91,8 @@ _Side = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 @dataclass
 class Batch:
-    """rows (n, s) ROW: at first, and after each of s − 1 changes in flight. ballast (k, 4): masses [kg] above 0, and
-    where they are [mesh coordinates]. setup: of the scene. commands (n or 1, c) LOAD_ROW: in the order in which they
-    act, those beyond a row's number at NEVER.
+    """rows (n,) ROW. ballast (k, 4): masses [kg] above 0, and where they are [mesh coordinates]. setup: of the scene.
+    commands (n or 1, c) LOAD_ROW: loads, in the order in which they act.
     """
 
     rows: NDArray[np.void]
@@ -118,7 +110,7 @@ class Batch:
         """What the compiled call takes of it."""
         start = self.setup.flight_start
         integrator = self.setup.integrator
-        strings = bool(self.rows["string_attached"].any() or (self.commands["kind"] >= TIE).any())
+        strings = bool(self.rows["string_attached"].any())
         for number, method in enumerate(integrator.methods):
             if strings or not method.on_string:
                 provide_kernel(integrator, start.methods, number)
@@ -212,18 +204,11 @@ def _make_body(own: np.record, ballast: np.ndarray, body: np.ndarray) -> bool:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _free_end(flight: np.record) -> Vector:
-    """Where the string's free end is now: three numbers [m, world]."""
-    ends = flight.string[ORIGIN:], flight.string[TARGET:]
-    return free_end_at(flight.now_ns, *ends, flight.string_begin_ns, flight.string_end_ns)[0]
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _span_to(flight: np.record, x: float, y: float, z: float) -> Vector:
-    """From a place x, y, z [m, world] to the knot: three numbers [m, world]."""
+def _span(flight: np.record) -> Vector:
+    """From the string's free end, which stays where it is, to the knot: three numbers [m, world]."""
     string = flight.string
     rx, ry, rz = arm(flight.body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
-    return span_of(rx, ry, rz, flight.row, x, y, z)
+    return span_of(rx, ry, rz, flight.row, string[TARGET], string[TARGET + 1], string[TARGET + 2])
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -232,185 +217,59 @@ def _string_energy(flight: np.record) -> float:
     if not flight.tied:
         return 0.0
     string = flight.string
-    return energy_of(_span_to(flight, *_free_end(flight)), string[K], string[REST], string[PUSHES] != 0.0)
+    return energy_of(_span(flight), string[K], string[REST], string[PUSHES] != 0.0)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _most_yielding(body: np.ndarray, x: float, y: float, z: float) -> float:
-    """A bound of 1/m_eff [1/kg] of the knot at x, y, z [mesh coordinates]."""
-    P, M = AXES, MOMENTS
-    rx, ry, rz = arm(body, x, y, z)
-    a = body[P] * rx + body[P + 3] * ry + body[P + 6] * rz
-    b = body[P + 1] * rx + body[P + 4] * ry + body[P + 7] * rz
-    c = body[P + 2] * rx + body[P + 5] * ry + body[P + 8] * rz
-    return most_yielding(body[MASS], body[M], body[M + 1], body[M + 2], a, b, c)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _take_spring(own: np.record, flight: np.record) -> bool:
-    """Stiffness and damping of the string anew, by the body as it is; False when its rates may be beyond what the
-    integrator follows.
-    """
+def _tie(own: np.record, flight: np.record) -> bool:
+    """Tie the string of a row; False when its rates may be beyond what the integrator follows."""
     string, body = flight.string, flight.body
+    for k in range(3):
+        string[KNOT + k] = own.string_attach[k]
+        string[ORIGIN + k] = string[TARGET + k] = own.string_target[k]
+    flight.tied = True
+    flight.string_begin_ns = flight.string_end_ns = flight.now_ns
     stiffness, frequency, ratio = own.string_stiffness, own.string_frequency, own.string_damping_ratio
     rest = own.string_rest_length
+    rx, ry, rz = arm(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
     if flight.chooses:
-        yields = _most_yielding(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
+        P, M = AXES, MOMENTS
+        a = body[P] * rx + body[P + 3] * ry + body[P + 6] * rz
+        b = body[P + 1] * rx + body[P + 4] * ry + body[P + 7] * rz
+        c = body[P + 2] * rx + body[P + 5] * ry + body[P + 8] * rz
+        yields = most_yielding(body[MASS], body[M], body[M + 1], body[M + 2], a, b, c)
         # No point shows more than the whole mass.
         largest, damping = spring_of(body[MASS], stiffness, frequency, ratio)
         if math.sqrt(largest * yields) > CERTAIN * FASTEST or damping * yields > CERTAIN * FASTEST:
             return False
-    rx, ry, rz = arm(body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
-    mass = effective_mass(body, rx, ry, rz, flight.row, _span_to(flight, *_free_end(flight)), rest)
+    mass = effective_mass(body, rx, ry, rz, flight.row, _span(flight), rest)
     string[K], string[C] = spring_of(mass, stiffness, frequency, ratio)
     string[REST], string[PUSHES] = rest, 1.0 if own.string_bilateral else 0.0
     return True
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _tie(own: np.record, flight: np.record, knot: np.ndarray, target: np.ndarray) -> bool:
-    """Tie the string at ``knot`` (3,) [mesh coordinates] with its free end at ``target`` (3,) [m, world]; as
-    ``_take_spring`` returns.
-    """
-    string = flight.string
-    for k in range(3):
-        string[KNOT + k] = knot[k]
-        string[ORIGIN + k] = string[TARGET + k] = target[k]
-    flight.tied = True
-    flight.string_begin_ns = flight.string_end_ns = flight.now_ns
-    return _take_spring(own, flight)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _pulls_within(flight: np.record, x: float, y: float, z: float) -> bool:
-    """Whether the string pulls with plainly less than MAX_ACCELERATION from a free end at x, y, z [m, world]."""
-    string = flight.string
-    yields = _most_yielding(flight.body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
-    x, y, z = _span_to(flight, x, y, z)
-    return bool(string[K] * yields * max(abs(x), abs(y), abs(z)) <= CERTAIN * MAX_ACCELERATION)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _act_on_string(own: np.record, flight: np.record, command: np.record) -> bool:
-    """Apply TIE, MOVE, UNTIE or CUT now; False when the simulation must say whether that can be."""
-    if command.kind >= UNTIE:
-        flight.tied = flight.tied and command.kind == CUT
-        return True
-    target = command.load[:3]
-    if command.kind == TIE:
-        knot = command.load[3:6] if command.load[6] != 0.0 else own.string_attach[:]
-        return _tie(own, flight, knot, target) and _pulls_within(flight, target[0], target[1], target[2])
-    x, y, z = _free_end(flight)
-    string = flight.string
-    string[ORIGIN], string[ORIGIN + 1], string[ORIGIN + 2] = x, y, z
-    for k in range(3):
-        string[TARGET + k] = target[k]
-    flight.string_begin_ns, flight.string_end_ns = flight.now_ns, flight.now_ns + command.duration_ns
-    return _pulls_within(flight, x, y, z) and _pulls_within(flight, target[0], target[1], target[2])
 
 
 # A row's flight
 
 
 @njit(cache=True, error_model="numpy")
-def _take_body(own: np.record, ballast: np.ndarray, flight: np.record) -> bool:
-    """Body, gravity and damping are the row's from now on; False when the simulation must do it."""
+def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.ndarray, loads: np.ndarray) -> bool:
+    """Time 0 of a row, in a copy of its setup's flight; fills loads. False: the simulation must do it."""
     body = flight.body
     if not _make_body(own, ballast, body):
         return False
-    linear, angular = own.linear_damping / body[MASS], own.angular_damping / body[MOMENTS]
     begin_body(flight.common, body, own, flight.common.gyroscopic)
-    return not flight.chooses or (linear <= FASTEST and angular <= FASTEST)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _are_within_magnitude(commands: np.ndarray, first: int, body: np.ndarray) -> bool:
-    for c in range(first, commands.shape[0]):
+    linear, angular = own.linear_damping / body[MASS], own.angular_damping / body[MOMENTS]
+    if flight.chooses and not (linear <= FASTEST and angular <= FASTEST):
+        return False
+    for c in range(commands.shape[0]):
         if commands[c].kind < CLEAR and not is_within_magnitude(commands[c].load, body):
             return False
-    return True
-
-
-@njit(cache=True, error_model="numpy")
-def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.ndarray, loads: np.ndarray) -> bool:
-    """Time 0 of a row, in a copy of its setup's flight; fills loads. False: the simulation must do it."""
+        loads[c] = commands[c]
     attitude, velocity, spin = own.initial_orientation_xyzw, own.initial_linear_velocity, own.initial_angular_velocity
-    if not _take_body(own, ballast, flight) or not _are_within_magnitude(commands, 0, flight.body):
-        return False
     if not fill_initial_row(own.initial_position, attitude, velocity, spin, flight.row):
         return False
     copy_numbers(flight.row, flight.start)
-    for c in range(commands.shape[0]):
-        loads[c] = commands[c]
-    return not own.string_attached or _tie(own, flight, own.string_attach, own.string_target)
-
-
-@njit(cache=True, error_model="numpy")
-def _change(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.ndarray, loads: np.ndarray) -> bool:
-    """Take other numbers in flight, as ``Simulation`` takes another setup: where the mesh keeps its size it stays where
-    it is, so a COM that moves within it takes position and velocity along.
-    """
-    body = flight.body
-    x, y, z = body[COM], body[COM + 1], body[COM + 2]
-    a, b, c = body[BODY_SCALE], body[BODY_SCALE + 1], body[BODY_SCALE + 2]
-    if not _take_body(own, ballast, flight) or not _are_within_magnitude(commands, flight.due, body):
-        return False
-    x, y, z = body[COM] - x, body[COM + 1] - y, body[COM + 2] - z
-    kept = body[BODY_SCALE] == a and body[BODY_SCALE + 1] == b and body[BODY_SCALE + 2] == c
-    if kept and (x != 0.0 or y != 0.0 or z != 0.0):
-        shift_com(flight.row, x, y, z)
-    for k in range(flight.acting):
-        accumulate_load(loads[k].load, body, loads[k].share)
-    return not flight.tied or _take_spring(own, flight)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _advance(
-    stages: np.ndarray,
-    ballast: np.ndarray,
-    flight: np.record,
-    commands: np.ndarray,
-    until_ns: int,
-    methods: np.ndarray,
-    tables: tuple[Any, ...],
-) -> bool:
-    """Carry the body to ``until_ns``, before what acts at that very time; False when the simulation must do it.
-
-    As ``Simulation.advance`` does: the compiled flight takes all loads; at any other command all that acts at this
-    instant acts, in its order. stages (s,): the row, at first and after each change.
-    """
-    loads, events, room = tables
-    count, stage = commands.shape[0], 0
-    for c in range(flight.due):
-        stage += commands[c].kind == CHANGE
-    while True:
-        first = flight.due
-        act = first
-        while act < count and commands[act].kind < TIE and commands[act].at_ns < until_ns:
-            act += 1
-        special = act < count and commands[act].kind >= TIE and commands[act].at_ns < until_ns
-        event_ns = commands[act].at_ns if special else until_ns
-        while special and act > first and commands[act - 1].at_ns == event_ns:
-            act -= 1
-        flight.due_end = act
-        if fl.fly(flight, loads, events, methods, room, event_ns) != fl.REACHED:
-            return False
-        if not special:
-            return True
-        flight.events = 0
-        fl.end_due(flight, loads, events)
-        while flight.due < count and commands[flight.due].at_ns == event_ns:
-            kind = commands[flight.due].kind
-            if kind < TIE:
-                fl.apply(flight, loads, events, flight.due)
-            elif kind == CHANGE:
-                stage += 1
-                if not _change(stages[stage], ballast, flight, commands, loads):
-                    return False
-            elif not _act_on_string(stages[stage], flight, commands[flight.due]):
-                return False
-            flight.due += 1
-        fl.cut_segment(flight, loads, methods, room)
+    return not own.string_attached or _tie(own, flight)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -433,19 +292,20 @@ def _fly_row(
     stops (k, 3): the flight ends at the first sample at which one holds. context: simulation/quantities.py, filled
     here. Returns how many samples it reached, and which stop held or −1; 0 samples: the simulation must do it.
     """
-    stages = rows[i]
-    own, due = stages[0], commands[i if commands.shape[0] > 1 else 0]
+    due = commands[i if commands.shape[0] > 1 else 0]
     flights[0] = start[0]
-    flight, (loads, _, room) = flights[0], tables
-    if not _begin(own, ballast, flight, due, loads):
+    flight, (loads, events, room) = flights[0], tables
+    if not _begin(rows[i], ballast, flight, due, loads):
         return 0, -1
     copy_numbers(flight.row, states[0, :13])
     states[0, 13] = _string_energy(flight)
     body = flight.body
-    begin(body[MASS], body[INERTIA : INERTIA + 9], own.gravity, states[0], context)
+    begin(body[MASS], body[INERTIA : INERTIA + 9], rows[i].gravity, states[0], context)
     fl.begin_segment(flight, loads, methods, room)
     for sample in range(sample_ns.shape[0]):
-        if not _advance(stages, ballast, flight, due, sample_ns[sample], methods, tables):
+        while flight.due_end < due.shape[0] and due[flight.due_end].at_ns < sample_ns[sample]:
+            flight.due_end += 1
+        if fl.fly(flight, loads, events, methods, room, sample_ns[sample]) != fl.REACHED:
             return 0, -1
         copy_numbers(flight.row, states[sample, :13])
         states[sample, 13] = _string_energy(flight)

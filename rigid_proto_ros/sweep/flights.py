@@ -13,8 +13,14 @@ replays to the bit. msg_examples/06_python_flight.py tunes a controller.
 
 from __future__ import annotations
 
+import multiprocessing
+import multiprocessing.connection
+import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import TypeVar
 
@@ -25,7 +31,7 @@ from ..scene.scenario import Scenario
 from ..scene.script import expand_script, with_contacts
 from ..simulation.commands import nanoseconds
 from ..simulation.observer import Observer
-from .run import cores, in_processes
+from .table import cores
 
 Scene = Scenario
 """A checked scene. It can be flown any number of times, and goes to other processes."""
@@ -107,10 +113,24 @@ class Flight:
 
 
 def fly_all(function: Callable[[Value], Result], values: Iterable[Value], workers: int = 0) -> Iterator[Result]:
-    """``function`` of each value, in their order, on all cores or so many: by the processes in which sweeps fly what
-    the compiled batch can't. function: one that other processes can import.
+    """``function`` of each value, in their order, by so many processes, or one a core. function: one that other
+    processes can import.
     """
     values = list(values)
     workers = workers or cores()
-    with in_processes(workers) as pool:
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_depend_on_the_parent) as pool:
         yield from pool.map(function, values, chunksize=max(1, min(32, len(values) // (4 * workers))))
+
+
+def _depend_on_the_parent() -> None:
+    """Interrupts are the parent's to handle; and a worker doesn't outlive a parent that was killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+
+
+def _end_with_the_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        multiprocessing.connection.wait([parent.sentinel])
+    os._exit(1)

@@ -8,10 +8,9 @@ one another and count as one more grid; each combination is drawn ``samples`` ti
 from __future__ import annotations
 
 import copy
-import hashlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,21 +21,18 @@ from ..base.errors import InputError, did_you_mean
 from ..scene.declaration import READ_ONLY, Value
 from ..scene.offline import OfflineRun, scene_values
 from ..scene.parameters import Parameters, convert_all, parameter_named, with_mass_of_density
-from ..scene.scenario import Scenario, make_scenario
+from ..scene.scenario import make_scenario
 from ..scene.scene_file import scene_file
 from ..scene.script import expand_script
 from ..scene.yaml_text import load_plain_yaml, read_text
 from ..simulation.commands import nanoseconds
 from .fields import mapping, number, whole
 from .measures import Measures, read_measures
-from .sampling import GRID, LIST, MAX_SOBOL, SAMPLERS, Draw, Points, read_form, uniforms
+from .sampling import GRID, LIST, Draw, Points, read_form, row_uniforms
 from .targets import Target, read_target
 
-MANY_ROWS = 10_000_000
-"""More rows than this are likelier a slip than a wish."""
-MOST_ROWS = 1 << 53
-_MOTION_KEYS = ("scene", "script", "duration", "set", "vary", "reference")
-_KEYS = (*_MOTION_KEYS, "seed", "sampler", "samples", "watch", "measure", "stop")
+MAX_ROWS = 10_000_000
+_KEYS = ("scene", "script", "duration", "set", "vary", "reference", "seed", "samples", "watch", "measure", "stop")
 
 
 @dataclass(frozen=True)
@@ -49,35 +45,20 @@ class Vary:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Studies of the same content, which ``fingerprint`` tells, are equal.
-
-    parameters: of the scene that the study varies. script: as YAML gives it; ``entries`` are its list.
+    """parameters: of the scene that the study varies. script: as YAML gives it; ``entries`` are its list.
     samples: rows for each combination of grid and list. reference: parameters that the reference flight has otherwise,
     or None.
     """
 
     name: str
     parameters: Parameters
-    script: object
+    script: list[Any]
     duration_ns: int
     seed: int
-    sampler: str
     samples: int
     vary: tuple[Vary, ...]
     reference: Mapping[str, Value] | None
     measures: Measures
-    fingerprint: str
-
-    def __hash__(self) -> int:
-        return hash(self.fingerprint)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Study) and self.fingerprint == other.fingerprint
-
-    @property
-    def entries(self) -> list[Any]:
-        """The script's entries."""
-        return script_entries(self.script)
 
     @property
     def density_decides(self) -> bool:
@@ -101,8 +82,7 @@ class Study:
         """The varied values of rows (n,), one array for each of ``vary``: numbers (n,) or (n, k), or objects (n,)."""
         points = self._points(rows)
         dimensions = sum(v.form.uniforms for v in self.vary if isinstance(v.form, Draw))
-        none = np.empty((len(rows), 0))
-        drawn = uniforms(self.sampler, self.seed, rows, self.samples, dimensions) if dimensions else none
+        drawn = row_uniforms(self.seed, rows, dimensions) if dimensions else np.empty((len(rows), 0))
         found, at = [], 0
         for vary, index in zip(self.vary, points, strict=True):
             if isinstance(vary.form, Draw):
@@ -131,11 +111,6 @@ class Study:
         return found
 
 
-def script_entries(script: Any) -> list[Any]:
-    """The list of entries in a script as YAML gives it."""
-    return script or []
-
-
 def study_file(name: str) -> Path:
     """The file of a study given by path or bundled name."""
     path = Path(name)
@@ -150,19 +125,17 @@ def study_file(name: str) -> Path:
     return path
 
 
-def _yaml(path: Path) -> object:
+def _yaml(path: Path) -> Any:
     return load_plain_yaml(read_text(path, "a YAML file"), str(path))
 
 
-def read_study(name: str, yes: bool = False) -> Study:
-    """A study file, by path or bundled name, checked whole; raises InputError naming the field. yes:
-    however many rows.
-    """
+def read_study(name: str) -> Study:
+    """A study file, by path or bundled name, checked whole; raises InputError naming the field."""
     path = study_file(name)
-    return make_study(_yaml(path), str(path), path.parent, yes)
+    return make_study(_yaml(path), str(path), path.parent)
 
 
-def make_study(spec: Any, name: str = "study", folder: Path = Path(), yes: bool = False) -> Study:
+def make_study(spec: Any, name: str = "study", folder: Path = Path()) -> Study:
     """The same from what YAML gives; scene and script are found from ``folder`` on."""
     spec = mapping(spec, name, _KEYS, ("scene", "duration", "vary"))
     scene = str(spec["scene"])
@@ -173,24 +146,22 @@ def make_study(spec: Any, name: str = "study", folder: Path = Path(), yes: bool 
     script = _script(spec.get("script"), folder, f"{name}, script")
     duration_s = number(spec["duration"], f"{name}, duration", 1e-9, 1e9)
     seed = whole(spec.get("seed", 0), f"{name}, seed", 0, 1 << 128)
-    sampler = spec.get("sampler", "random")
-    if sampler not in SAMPLERS:
-        raise InputError(f"{name}, sampler", sampler, ", ".join(SAMPLERS))
     watch = number(spec.get("watch", 50.0), f"{name}, watch", 1e-6, 1e6)
     measures = read_measures(spec.get("measure"), spec.get("stop"), watch, duration_s, f"{name}, measure")
-    vary = _vary(spec["vary"], name, base.parameters, script_entries(script))
+    vary = _vary(spec["vary"], name, base.parameters, script)
     reference = _reference(spec.get("reference"), f"{name}, reference")
     if measures.needs_reference and reference is None:
         raise InputError(f"{name}, reference", None, "parameters of a reference, as a difference is measured")
-    samples = _samples(spec.get("samples"), f"{name}, samples", vary, sampler)
-    study = Study(
-        name, base.parameters, script, nanoseconds(duration_s), seed, sampler, samples, vary, reference, measures, ""
-    )
-    _check_rows(study, f"{name}, samples", yes)
-    _check_flyable(study, base)
-    # In the order of the file: that of what varies decides which row is which.
-    content = repr([spec, base.parameters.named(), script])
-    return replace(study, fingerprint=hashlib.sha256(content.encode()).hexdigest())
+    samples = _samples(spec.get("samples"), f"{name}, samples", vary)
+    study = Study(name, base.parameters, script, nanoseconds(duration_s), seed, samples, vary, reference, measures)
+    if study.rows > MAX_ROWS:
+        raise InputError(f"{name}, samples", f"{study.rows} rows in all", f"at most {MAX_ROWS}")
+    # The scene as it stands takes off with its script, and so does its reference: what fails later is the row's own.
+    commands = expand_script(script, "script")
+    OfflineRun(base, commands)
+    if reference is not None:
+        OfflineRun(base.with_changes(reference), commands)
+    return study
 
 
 def _settings(spec: Any, field: str) -> dict[str, Any]:
@@ -211,7 +182,7 @@ def _settings(spec: Any, field: str) -> dict[str, Any]:
     return found
 
 
-def _script(spec: Any, folder: Path, field: str) -> Any:
+def _script(spec: Any, folder: Path, field: str) -> list[Any]:
     if spec is None:
         return []
     if isinstance(spec, str):
@@ -222,7 +193,7 @@ def _script(spec: Any, folder: Path, field: str) -> Any:
             raise InputError(field, spec, f"a script file, or one of the bundled {', '.join(example_names())}")
         field, spec = str(beside), _yaml(beside)
     expand_script(spec, field)
-    return spec
+    return list(spec or [])
 
 
 def _vary(spec: Any, name: str, parameters: Parameters, entries: list[Any]) -> tuple[Vary, ...]:
@@ -272,31 +243,11 @@ def _reference(spec: Any, field: str) -> dict[str, Any] | None:
     return changes
 
 
-def _samples(spec: Any, field: str, vary: tuple[Vary, ...], sampler: str) -> int:
-    random = any(isinstance(v.form, Draw) for v in vary)
-    points = any(isinstance(v.form, Points) for v in vary)
-    if not random:
+def _samples(spec: Any, field: str, vary: tuple[Vary, ...]) -> int:
+    if all(isinstance(v.form, Points) for v in vary):
         if spec not in (None, 1):
             raise InputError(field, spec, "no samples: nothing in the study is random")
         return 1
-    if spec is None and not points:
+    if spec is None and all(isinstance(v.form, Draw) for v in vary):
         raise InputError(field, None, "how many rows to draw")
-    most = MAX_SOBOL if sampler == "sobol" else MOST_ROWS
-    return whole(1 if spec is None else spec, field, 1, most)
-
-
-def _check_rows(study: Study, field: str, yes: bool) -> None:
-    if study.rows > MANY_ROWS and not yes:
-        raise InputError(field, f"{study.rows} rows in all", f"at most {MANY_ROWS} without --yes")
-    if study.rows > MOST_ROWS:
-        raise InputError(field, f"{study.rows} rows in all", f"at most {MOST_ROWS}")
-
-
-def _check_flyable(study: Study, base: Scenario) -> None:
-    """The scene as it stands takes off with its script, and so does its reference: what fails later is
-    the row's own.
-    """
-    commands = expand_script(study.script, "script")
-    OfflineRun(base, commands)
-    if study.reference is not None:
-        OfflineRun(base.with_changes(study.reference), commands)
+    return whole(1 if spec is None else spec, field, 1, MAX_ROWS)

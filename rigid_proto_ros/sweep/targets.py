@@ -15,11 +15,11 @@ from typing import Any
 from ..base.errors import InputError, one_of
 from ..scene.declaration import READ_ONLY, Parameter, Value
 from ..scene.parameters import parameter_named
+from ..scene.script import ENTRY_KEYS
 
 _COMPONENTS = {3: "x y z", 4: "x y z w", 6: "ixx ixy ixz iyy iyz izz"}
 _BALLAST = "mass x y z"
-_LOAD_FIELDS = ("at", "force", "push", "impulse", "torque", "angular_impulse", "axes", "duration")
-SCRIPT_FIELDS = ("t", *_LOAD_FIELDS, "repeat", "every", "jitter", "seed", "wrench", "string", "set")
+_SCRIPT_FIELDS = sorted(ENTRY_KEYS["timing"] | ENTRY_KEYS["poke"] | ENTRY_KEYS["other"])
 
 
 @dataclass(frozen=True)
@@ -116,8 +116,8 @@ def _script_target(name: str, field: str, entries: list[Any]) -> Target:
         raise InputError(field, name, "a study with a script")
     if not number.isdigit() or not 1 <= int(number) <= len(entries) or not keys:
         raise InputError(field, name, accepted)
-    if keys[0] not in SCRIPT_FIELDS:
-        raise InputError(field, keys[0], one_of(keys[0], SCRIPT_FIELDS))
+    if keys[0] not in _SCRIPT_FIELDS:
+        raise InputError(field, keys[0], one_of(keys[0], _SCRIPT_FIELDS))
     if keys[0] == "set":
         # A parameter's name has dots of its own.
         keys = ["set", ".".join(keys[1:])]

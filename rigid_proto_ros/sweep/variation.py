@@ -6,7 +6,6 @@ from __future__ import annotations
 import copy
 import shlex
 from collections import ChainMap
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -23,7 +22,7 @@ from ..scene.script import expand_script
 from ..scene.yaml_text import dump_yaml
 from ..simulation.commands import Command
 from .sampling import VERTEX, Draw
-from .study import Study, script_entries
+from .study import Study
 
 MESHES_KEPT = 16
 """Meshes with their moments that a process keeps."""
@@ -31,10 +30,10 @@ MESHES_KEPT = 16
 
 @dataclass(frozen=True)
 class Variation:
-    """script: as YAML gives it."""
+    """script: its entries, as YAML gives them."""
 
     parameters: Parameters
-    script: object
+    script: list[Any]
 
     @property
     def scenario(self) -> Scenario:
@@ -46,11 +45,6 @@ class Variation:
         """The script's commands; raises InputError."""
         return expand_script(self.script, "script")
 
-    @property
-    def script_text(self) -> str:
-        """The script as a file."""
-        return dump_yaml(self.script)
-
 
 def variation(study: Study, row: int) -> Variation:
     """Row ``row`` of a study."""
@@ -60,32 +54,19 @@ def variation(study: Study, row: int) -> Variation:
 def apply(study: Study, chosen: list[Any]) -> Variation:
     """The variation with these values of what varies."""
     changes: dict[str, Value] = {}
-    values, script = ChainMap(changes, study.parameters.named()), copy.deepcopy(study.script)
-    entries = script_entries(script)
+    values, entries = ChainMap(changes, study.parameters.named()), copy.deepcopy(study.script)
     if study.density_decides:
         values["mass"] = 0.0
     vertices = []
     for vary, value in zip(study.vary, chosen, strict=True):
         if isinstance(vary.form, Draw) and vary.form.shape == VERTEX:
-            vertices.append((vary, value))
+            vertices.append((vary.target, value))
         else:
             vary.target.put(values, entries, plain(value))
-    for vary, value in vertices:
-        body_mesh = body_mesh_of(study.parameters.replaced(changes))
-        vary.target.put(values, entries, {"vertex": vertex_number(value, body_mesh)})
-    return Variation(study.parameters.replaced(changes), script)
-
-
-def parameters_of(study: Study, values: Mapping[str, Value]) -> Parameters:
-    """The study's parameters with these values of some that vary, by name."""
-    changes: dict[str, Value] = {}
-    named = ChainMap(changes, study.parameters.named())
-    for vary in study.vary:
-        if vary.target.name in values:
-            vary.target.put(named, [], plain(values[vary.target.name]))
-    if study.density_decides:
-        changes["mass"] = 0.0
-    return study.parameters.replaced(changes)
+    parameters = study.parameters.replaced(changes)
+    for target, value in vertices:
+        target.put(values, entries, {"vertex": vertex_number(value, body_mesh_of(parameters))})
+    return Variation(parameters, entries)
 
 
 def vertex_number(uniform: float, body_mesh: BodyMesh | None) -> int:
@@ -126,7 +107,7 @@ def write_scene(study: Study, row: Variation, file: Path, time: float | None) ->
         words = ["rigid_proto", "simulate", str(file), "--duration", repr(duration)]
         if commands:
             script = file.with_name(f"{file.stem}_script.yaml")
-            script.write_text(row.script_text, encoding="utf-8")
+            script.write_text(dump_yaml(row.script), encoding="utf-8")
             words += ["--script", str(script)]
     except OSError as error:
         raise InputError("--as-scene", str(file), f"a file that can be written ({error.strerror})") from None

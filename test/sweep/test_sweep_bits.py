@@ -3,13 +3,13 @@
 
 import numpy as np
 import pytest
-from sweep_studies import HONEY, HUNG, POKES, PULLED, STRUCTURE, TIED, study
+from sweep_studies import HONEY, HUNG, POKES, STRUCTURE, TIED, study
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.simulation.batch import new_results
 from rigid_proto_ros.simulation.observables import floor_text
-from rigid_proto_ros.sweep.chunk import Chunk, FailedFlight, run_chunk, simulate_row
+from rigid_proto_ros.sweep.rows import Chunk, FailedFlight, run_chunk, simulate_row
 from rigid_proto_ros.sweep.variation import variation
 
 
@@ -39,34 +39,23 @@ def differing_rows(own, chunk: Chunk) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "spec",
-    [POKES, STRUCTURE, PULLED, HUNG, TIED, HONEY],
-    ids=["pokes", "structure", "changed", "hung", "tied", "damped"],
+    ("spec", "is_simulated"),
+    [(POKES, False), (HUNG, False), (HONEY, False), (STRUCTURE, True), (TIED, True)],
+    ids=["pokes", "hung", "damped", "structure", "tied"],
 )
-def test_compiled_rows_have_the_bits_of_the_simulation(spec) -> None:
+def test_rows_have_the_bits_of_the_simulation_whatever_chunk_they_are_in(spec, is_simulated: bool) -> None:
     own = study(spec)
-    chunk = run_chunk(own, 0, own.rows)
-    assert differing_rows(own, chunk) == []
-    failed = sum(reason is not None for reason in chunk.columns["failure"])
-    if spec is PULLED:
-        assert chunk.simulated == own.rows and failed == 0
-    elif spec in (POKES, HUNG, TIED, HONEY):
-        assert chunk.simulated == 0
-    else:
-        # A ballast below zero is a row with its reason, and the others go through the batch.
-        assert 0 < failed == chunk.simulated < own.rows / 2
-        assert any("ballast" in reason for reason in chunk.columns["failure"] if reason)
-        assert "far" in chunk.columns["stopped"].tolist() and None in chunk.columns["stopped"].tolist()
-
-
-@pytest.mark.parametrize("spec", [POKES, STRUCTURE], ids=["pokes", "structure"])
-@pytest.mark.parametrize("sampler", ["random", "latin_hypercube", "sobol"])
-def test_a_row_is_the_same_whatever_chunk_it_is_in(spec, sampler: str) -> None:
-    own = study(spec, sampler=sampler)
-    whole = run_chunk(own, 0, own.rows).columns
-    for first, last in ((0, 1), (5, 12), (own.rows - 3, own.rows)):
+    whole = run_chunk(own, 0, own.rows)
+    assert differing_rows(own, whole) == []
+    assert whole.simulated == (own.rows if is_simulated else 0)
+    for first, last in ((0, 1), (own.rows - 3, own.rows)):
         part = run_chunk(own, first, last).columns
-        assert all(same(part[name], whole[name][first:last]) for name in whole)
+        assert all(same(part[name], whole.columns[name][first:last]) for name in part)
+    if spec is STRUCTURE:
+        # A ballast below zero is a row with its reason.
+        reasons = [reason for reason in whole.columns["failure"].tolist() if reason]
+        assert 0 < len(reasons) < own.rows / 2 and any("ballast" in reason for reason in reasons)
+        assert "far" in whole.columns["stopped"].tolist() and None in whole.columns["stopped"].tolist()
 
 
 OFTEN = ("free_body", "rk4", "semi_implicit_euler")
@@ -109,14 +98,10 @@ def test_a_row_that_is_too_fast_for_auto_is_refused_with_what_its_body_takes() -
 
 
 def test_a_floor_of_accuracy_is_in_the_table_whoever_flew_the_row() -> None:
-    vary = {
-        "initial.angular_velocity": {"list": [[0.1, 0.2, 3.0], [6e4, 7e4, -3e4]]},
-        "accuracy": {"list": [1e-9, 1e-12]},
-    }
-    flown = study({"scene": "t_handle", "duration": 0.01, "samples": 1, "vary": vary})
+    vary = {"initial.angular_velocity": {"list": [[0.1, 0.2, 3.0], [6e4, 7e4, -3e4]]}}
+    spec = {"scene": "t_handle", "set": {"accuracy": 1e-12}, "duration": 0.01, "vary": vary}
     moved = [{"t": 0.005, "state": {"position": [0.0, 0.0, 1.0]}}]
-    by_simulation = study({"scene": "t_handle", "script": moved, "duration": 0.01, "samples": 1, "vary": vary})
-    for own, simulated in ((flown, 0), (by_simulation, 2)):
+    for own, simulated in ((study(spec), 0), (study(spec, script=moved), 2)):
         chunk = run_chunk(own, 0, own.rows)
         assert chunk.simulated == simulated
         slow, *others = chunk.columns["accuracy_floor"].tolist()
