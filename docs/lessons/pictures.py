@@ -32,8 +32,6 @@ def draw(page: Path) -> int:
         f"out/{page.stem}.rrd",
         "--at",
         moment[1],
-        "--view",
-        "Lesson",
         "--size",
         SIZE,
         "-o",

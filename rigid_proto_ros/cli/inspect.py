@@ -94,7 +94,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--verify", action="store_true", help="compare with exact rational arithmetic (exit 1 above 1e-13)"
     )
     add_robot_arguments(parser)
-    parser.add_argument("--record", metavar="FILE.rrd", help="record mesh, COM, axes and boxes for the Rerun viewer")
     output = parser.add_mutually_exclusive_group()
     output.add_argument("--json", action="store_true", help="print one JSON object")
     output.add_argument("--urdf", action="store_true", help="a URDF <inertial> on stdout")
@@ -152,8 +151,6 @@ def run(args: argparse.Namespace) -> int:
     mass, density = given_mass.everywhere or 0.0, given_density.everywhere or DENSITY
     if not meshes:
         raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
-    if len(meshes) > 1 and args.record:
-        raise InputError("--record", "needs exactly one MESH")
     found = [_inspect(args, name, scale, mass, density) for name in meshes]
     if len(meshes) == 1:
         one = found[0]
@@ -191,10 +188,6 @@ def _inspect(args: argparse.Namespace, name: str, scale: list[float], mass: floa
         if inspection.refusal is not None:
             raise inspection.refusal
         status = _verify(inspection, report) if args.verify else 0
-        if args.record:
-            from ..rerun_view.inspection import record_inspection
-
-            record_inspection(args.record, inspection)
     except InputError as error:
         if len(args.mesh) > 1:
             print(f"rigid_proto inspect: {' '.join(str(error).split())}", file=sys.stderr)

@@ -12,10 +12,7 @@ from ..base.errors import InputError, is_missing
 from ..base.progress import Progress
 from .options import add_session
 
-EXAMPLES = (
-    ("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "the whole layout at 4 s"),
-    ("rigid_proto snapshot out/flight.rrd --at 4 -o out/view.png --view Motion --size 800x600", "one view of it"),
-)
+EXAMPLES = (("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "what the viewer shows at 4 s"),)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,15 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_session(parser, node="the body, in a bag with several")
     parser.add_argument("--at", metavar="T", type=float, required=True, help="simulated time [s]")
     parser.add_argument("-o", "--output", metavar="X.png", required=True, help="the picture to write")
-    parser.add_argument(
-        "--view",
-        metavar="NAME",
-        default="",
-        help="a tab of the layout (Lesson, Debugging, Plain), or one of its views alone, such as Motion",
-    )
-    parser.add_argument(
-        "--size", metavar="WxH", default="1600x900", help="pixels of the whole layout (default %(default)s)"
-    )
+    parser.add_argument("--size", metavar="WxH", default="1600x900", help="pixels of the picture (default %(default)s)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -62,7 +51,7 @@ def _draw(args: argparse.Namespace, recording: str | Path, size: tuple[int, int]
     from ..rerun_view.snapshot import take_picture
 
     with Progress("drawing") as progress:
-        take_picture(recording, args.at, args.output, args.view, size, progress.fraction)
+        take_picture(recording, args.at, args.output, size, progress.fraction)
     print(f"wrote {args.output}")
 
 

@@ -11,19 +11,12 @@ import threading
 import time
 import uuid
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 from ..base.errors import InputError
 from ..session.mailbox import Mailbox, Note
 from ..simulation.observer import Reset
-from .rerun_internals import forget_closed_recordings
-from .streams import (
-    FileStream,
-    LiveServer,
-    LiveStream,
-    end_without_waiting,
-)
+from .streams import FileStream, LiveServer, LiveStream, Stream, end_without_waiting, forget_closed_recordings
 from .writer import SceneWriter
 
 FLUSH_PERIOD_S = 0.5
@@ -36,86 +29,56 @@ STALLED_S = 0.9
 """A flush that takes longer is told of: a report comes once a second, and a stalled file is to be told within two."""
 
 
-@dataclass(frozen=True)
-class _Record:
-    """Asks to record to this file from here on, or to none, and to say when the one before is whole."""
-
-    file: FileStream | None
-    finished: threading.Event
-
-
-@dataclass(frozen=True)
-class _Show:
-    """Asks to show what follows on this stream."""
-
-    stream: LiveStream
-
-
 class Flusher:
     """Owns the writer and its streams. ``mailbox`` takes rows and events from the stepping thread.
 
-    file is what is being recorded to; error says why a recording stopped, and on_error is called with the same.
+    error says why the recording stopped, and on_error is called with the same. Nothing is sent before ``start``.
     """
 
-    def __init__(self, name: str, on_error: Callable[[str], None], open_ended: bool = False) -> None:
+    def __init__(self, name: str, on_error: Callable[[str], None]) -> None:
         self.mailbox = Mailbox(lambda: self._lost("recording stopped: nothing can be written to the disk any more"))
-        self.file: FileStream | None = None
-        self.server: LiveServer | None = None
-        self.run_id = uuid.uuid4().hex
         self.error = ""
         self._name = name
         self._run = 1
+        self._run_id = uuid.uuid4().hex
         self._on_error = on_error
-        self._open_ended = open_ended
         self._writer = SceneWriter()
+        self._path: Path | None = None
+        self._server: LiveServer | None = None
         self._flushing_since_s: float | None = None
         self._thread = threading.Thread(target=self._flush_until_closed, name="rerun", daemon=True)
-        self._thread.start()
 
     # Called from other threads
 
     @property
-    def run_name(self) -> str:
-        """The name of the present run's recording."""
-        return self._name if self._run == 1 else f"{self._name}, run {self._run}"
-
-    @property
     def stalled(self) -> str:
         """Says that the file hasn't taken what was sent for longer than STALLED_S; empty while it does."""
-        since_s, file = self._flushing_since_s, self.file
-        if since_s is None or file is None or time.monotonic() < since_s + STALLED_S:
+        since_s = self._flushing_since_s
+        if since_s is None or self._path is None or time.monotonic() < since_s + STALLED_S:
             return ""
-        return f"recording {file.path}: nothing could be written for {time.monotonic() - since_s:.1f} s"
+        return f"recording {self._path}: nothing could be written for {time.monotonic() - since_s:.1f} s"
 
-    def open_file(self, path: Any) -> None:
-        """Record to ``path`` from now on; raises InputError where that can't be written."""
-        self.close_file()
-        file = FileStream(path, self.run_id, self.run_name, self._open_ended)
-        self.error = ""
-        self.file = file
-        self.mailbox.note(_Record(file, threading.Event()))
-        self.mailbox.hurry()
-
-    def close_file(self) -> None:
-        """Finish the file, if there is one; returns when it is whole."""
-        if self.file is not None:
-            self.file = None
-            finished = threading.Event()
-            self.mailbox.note(_Record(None, finished))
-            self.mailbox.wake()
-            finished.wait(TIMEOUT_S)
+    def open_file(self, path: Path) -> None:
+        """Record to ``path``; raises InputError where that can't be written."""
+        self._writer.streams.append(FileStream(path, self._run_id, self._name))
+        self._path = path
 
     def serve(self, port: int, memory_limit: str) -> str:
         """Host the live stream; returns its address. Raises PortTakenError."""
-        server = LiveServer(port, memory_limit)
-        stream = server.open_run(self.run_id, self.run_name)
-        self.server = server
-        self.mailbox.note(_Show(stream))
-        return server.address
+        self._server = LiveServer(port, memory_limit, self._run_id, self._name)
+        self._writer.streams.append(self._server.host)
+        return self._server.address
+
+    def start(self) -> None:
+        """Begin to send."""
+        self._thread.start()
 
     def close(self) -> None:
         """Send the rest, finish the file, end the thread."""
         self.mailbox.close()
+        if self._thread.ident is None:
+            self._finish()
+            return
         self._thread.join(TIMEOUT_S)
         if self._thread.is_alive():
             end_without_waiting()
@@ -131,20 +94,14 @@ class Flusher:
                 self._flush()
             except Exception as error:
                 # Whatever goes wrong here must not reach the flight: go on without a recording.
-                self._finish_file()
-                self._writer.streams.clear()
                 self._lost(f"recording stopped: {type(error).__name__}: {error}")
+                self._finish_files()
+                self._writer.streams.clear()
             self._flushing_since_s = None
             if closing:
                 break
             self.mailbox.wait(FLUSH_PERIOD_S)
-        self._finish_file()
-        if self.server is not None:
-            for stream in self._writer.streams:
-                if isinstance(stream, LiveStream):
-                    self.server.end_run(stream)
-            if not self.server.close():
-                end_without_waiting()
+        self._finish()
 
     def _flush(self) -> None:
         """Send the blocks that wait and what has been put since; not what arrives meanwhile, a few rows a time."""
@@ -159,78 +116,62 @@ class Flusher:
             try:
                 stream.flush()
             except OSError as error:
-                self._give_up_file(error)
+                self._give_up(stream, error)
             if stream.missed and not stream.behind:
                 self._writer.catch_up(stream)
 
     def _on_note(self, note: Note) -> None:
-        asked = note.event
-        if isinstance(asked, Reset):
-            self._next_run()
-            self._forget_closed_recordings()
-        elif isinstance(asked, _Record):
-            self._finish_file()
-            if asked.file is not None:
-                self._writer.attach(asked.file)
-            asked.finished.set()
-            self._forget_closed_recordings()
-        elif isinstance(asked, _Show):
-            self._writer.attach(asked.stream)
-
-    def _next_run(self) -> None:
-        writer = self._writer
-        moved = writer.moved
-        streams = list(writer.streams)
-        if moved:
-            self._run += 1
-        self.run_id = uuid.uuid4().hex
+        """A reset: another run, in a recording of its own."""
+        if not isinstance(note.event, Reset):
+            return
+        moved, streams = self._writer.moved, list(self._writer.streams)
+        self._run += moved
+        self._run_id = uuid.uuid4().hex
+        name = self._name if self._run == 1 else f"{self._name}, run {self._run}"
+        self._finish_files()
+        self._writer.streams.clear()
+        self._writer.restart()
         for stream in streams:
-            if isinstance(stream, FileStream):
-                writer.finish(stream)
-        writer.streams.clear()
-        writer.restart()
-        for stream in streams:
-            if isinstance(stream, LiveStream) and self.server is not None:
-                live = self.server.open_run(self.run_id, self.run_name)
-                live.subject = stream.subject  # viewers keep the layout from run to run
-                self.server.end_run(stream)
-                writer.attach(live)
-            elif isinstance(stream, FileStream):
+            if isinstance(stream, LiveStream) and self._server is not None:
+                self._writer.attach(self._server.next_run(stream, self._run_id, name))
+            elif isinstance(stream, FileStream) and not self.error:
+                path = stream.path
                 try:
-                    stream.close()
                     if moved:
-                        kept = f"{stream.path.stem}.run{self._run - 1}{stream.path.suffix}"
-                        stream.path.rename(stream.path.with_name(kept))
-                    file = FileStream(stream.path, self.run_id, self.run_name, self._open_ended)
+                        path.rename(path.with_name(f"{path.stem}.run{self._run - 1}{path.suffix}"))
+                    self._writer.attach(FileStream(path, self._run_id, name))
                 except (OSError, InputError) as error:
                     self._lost(str(error))
-                    continue
-                if self.file is stream:
-                    self.file = file
-                writer.attach(file)
-
-    def _forget_closed_recordings(self) -> None:
         if not any(stream.behind for stream in self._writer.streams):
             forget_closed_recordings()
 
-    def _finish_file(self) -> None:
-        for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:
-            self._writer.streams.remove(stream)
+    def _finish(self) -> None:
+        self._finish_files()
+        if self._server is None:
+            return
+        for stream in self._writer.streams:
+            if isinstance(stream, LiveStream):
+                self._server.end_run(stream)
+        if not self._server.close():
+            end_without_waiting()
+
+    def _finish_files(self) -> None:
+        for stream in [stream for stream in self._writer.streams if isinstance(stream, FileStream)]:
             try:
                 self._writer.finish(stream)
                 stream.close()
+                self._writer.streams.remove(stream)
             except OSError as error:
-                self._lost(str(error))
+                self._give_up(stream, error)
 
-    def _give_up_file(self, error: OSError) -> None:
+    def _give_up(self, stream: Stream, error: OSError) -> None:
         # Told first: what the library does with a file that it can't write may take for ever.
         self._lost(f"recording stopped: {error}")
         end_without_waiting()
-        for stream in [s for s in self._writer.streams if isinstance(s, FileStream)]:
-            self._writer.streams.remove(stream)
-            stream.abandon()
+        self._writer.streams.remove(stream)
+        stream.leave()
 
     def _lost(self, message: str) -> None:
-        self.file = None
+        self._path = None
         self.error = message
         self._on_error(message)

@@ -64,17 +64,6 @@ def record_batches(path: Path) -> Iterator[tuple[str, bool, Any]]:
             yield chunk.entity_path.lstrip("/"), chunk.is_static, chunk.to_record_batch()
 
 
-def drawn_times(path: Path) -> tuple[int, int] | None:
-    """The first and the last simulated time [ns] at which anything is drawn, also of a recording that is no session."""
-    first, last = [], []
-    for _, is_static, batch in record_batches(path):
-        if not is_static and e.SIM_TIME in batch.schema.names and batch.num_rows:
-            times = _sim_times(batch)
-            first.append(int(times.min()))
-            last.append(int(times.max()))
-    return (min(first), max(last)) if first else None
-
-
 def _read(path: Path, session: RecordedSession) -> None:
     times, rows = [], []
     events: list[tuple[int, str]] = []
@@ -84,7 +73,7 @@ def _read(path: Path, session: RecordedSession) -> None:
         if entity == e.STATE:
             times.append(_sim_times(batch))
             rows.append(_flat(batch, STATES).reshape(-1, 13))
-        elif entity in (e.EVENTS, e.REFUSAL_LOG):
+        elif entity in (e.EVENTS, e.REFUSALS):
             target = events if entity == e.EVENTS else refusals
             texts = [cell[0] for cell in batch.column(TEXT).to_pylist()]
             target.extend(zip(_sim_times(batch).tolist(), texts, strict=True))

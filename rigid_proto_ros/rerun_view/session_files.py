@@ -39,8 +39,8 @@ def make_recorder(
 ) -> Recorder:
     """An observer that records to ``path``; raises InputError where it can't.
 
-    parameters: the scene's, of which frames' names count. simulated_log: messages are logged at simulated time, as
-    suits a run without a clock; else at the wall's, for as long as the run may go on.
+    parameters: the scene's, of which frames' names count. simulated_log: messages of an .mcap are logged at simulated
+    time, as suits a run without a clock; else at the wall's.
     """
     if is_mcap(path):
         try:
@@ -51,7 +51,7 @@ def make_recorder(
             raise InputError("record", is_missing("mcap", "mcap")) from None
     from .observer import RerunObserver
 
-    return RerunObserver(record=path, name=node_name, on_error=on_error, open_ended=not simulated_log)
+    return RerunObserver(record=path, name=node_name, on_error=on_error)
 
 
 @contextmanager
@@ -98,9 +98,11 @@ def repair(path: str | Path, repaired: str | Path) -> None:
         raise InputError("--repair", str(repaired), "another file than the one that is repaired")
     output_file("--repair", repaired)
     if not bag:
-        from .rrd_file import repair_rrd
+        from .rrd_file import copy_whole
 
-        repair_rrd(path, repaired)
+        # What is damaged inside is refused here.
+        _rerun_reader().read_session(path)
+        copy_whole(path, repaired)
         return
     bags = _bag_reader()
     files = bags.bag_files(path)

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from ..base.errors import InputError, one_of
+from ..base.errors import InputError
 from ..base.files import output_file
 from ..session.recorded_session import RecordedSession
 from . import entities as e
 from .ports import LOOPBACK, PortTakenError, is_free, listens, serve_on_port
-from .reader import drawn_times, read_session
+from .reader import read_session
 from .rrd_file import whole_part
 from .viewers import ViewerProcess, open_headless
 
@@ -36,7 +36,6 @@ NOTICE_GONE_S = 6.0
 
 DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan-drivers` draws without a graphics card"
 
-
 STAGES = 4
 """Of a picture: read, viewer started, recording loaded, drawn."""
 
@@ -45,24 +44,18 @@ def take_picture(
     session_path: str | Path,
     at_s: float,
     picture: str | Path,
-    view: str = "",
     size: tuple[int, int] = (1600, 900),
     progress: Callable[[float, float], None] = lambda *_: None,
 ) -> None:
-    """Write a .png of the recording at simulated time ``at_s``: the whole layout, its tab of this name, or the view.
-    ``progress`` is called with (stages done, all stages).
+    """Write a .png of the recording at simulated time ``at_s``. ``progress`` is called with (stages done, all stages).
 
-    Raises InputError for a time that wasn't recorded, a view that isn't there, a picture that can't be written, and a
-    machine without the drivers.
+    Raises InputError for a time that wasn't recorded, a picture that can't be written, and a machine without the
+    drivers.
     """
     session_path, picture = Path(session_path), Path(picture).absolute()
     progress(0, STAGES)
     session = read_session(session_path)
-    if len(session.times):
-        check_time(session, at_s)
-    else:
-        # Of an estimate, say, which is no session.
-        _check_between(drawn_times(session_path) if session.complete else None, at_s)
+    check_time(session, at_s)
     check_picture(picture)
     progress(1, STAGES)
     with ExitStack() as stack:
@@ -73,13 +66,8 @@ def take_picture(
         show(client, readable)
         progress(3, STAGES)
         client.set_time(e.SIM_TIME, duration=float(at_s), play_state="paused")
-        view_id = bring_to_front(client, view) if view else None
-        if view_id is not None:
-            pixels = _stable_picture(client, view_id)
-        else:
-            client.run_command("ui.toggle_top_panel")
-            time.sleep(max(0.0, started + NOTICE_GONE_S - time.monotonic()))
-            pixels = _without_empty_top(_stable_picture(client, None))
+        time.sleep(max(0.0, started + NOTICE_GONE_S - time.monotonic()))
+        pixels = _stable_picture(client)
         if is_one_colour(pixels):
             raise InputError("--at", at_s, "a time at which the view shows something; this picture came out blank")
         try:
@@ -97,14 +85,10 @@ def check_picture(picture: str | Path) -> None:
 
 def check_time(session: RecordedSession, at_s: float) -> None:
     """Raise InputError unless the session has states around ``at_s``."""
-    _check_between((int(session.times[0]), session.end_ns) if len(session.times) else None, at_s)
-
-
-def _check_between(ends_ns: tuple[int, int] | None, at_s: float) -> None:
-    if ends_ns is None:
+    if not len(session.times):
         raise InputError("session", "the recording has no states")
-    begin, end = (1e-9 * time_ns for time_ns in ends_ns)
-    if not (np.isfinite(at_s) and begin <= at_s <= end):
+    begin, end = 1e-9 * int(session.times[0]), 1e-9 * session.end_ns
+    if not begin <= at_s <= end:
         raise InputError("--at", at_s, f"a time within the recording, {begin:g} to {end:g} s")
 
 
@@ -174,68 +158,16 @@ def show(client: Any, recording: Path) -> None:
     raise InputError("session", str(recording), f"a recording that the viewer loads within {LOAD_TIMEOUT_S:g} s")
 
 
-def _stable_picture(client: Any, view_id: str | None) -> bytes:
-    """A screenshot of the view, or the window, once two in a row are alike (the first ones still load)."""
+def _stable_picture(client: Any) -> bytes:
+    """A screenshot of the window, once two in a row are alike (the first ones still load)."""
     deadline = time.monotonic() + DRAWN_STEADY_S
-    before = client.take_screenshot(view_id)
+    before = client.take_screenshot(None)
     while True:
         time.sleep(0.3)
-        after = client.take_screenshot(view_id)
+        after = client.take_screenshot(None)
         if after == before and not is_one_colour(after) or time.monotonic() > deadline:
             return after
         before = after
-
-
-def _without_empty_top(png: bytes) -> bytes:
-    """The picture without the rows of one colour at its top, where the viewer's menu was."""
-    with Image.open(io.BytesIO(png)) as image:
-        pixels = np.asarray(image.convert("RGB"), dtype=int)
-        inner = pixels[:, 8:-8]
-        busy = np.flatnonzero((np.abs(inner - inner[:, :1]) > 12).any(axis=(1, 2)))
-        # The window's own border is the first few rows.
-        busy = busy[busy > 4]
-        top = int(busy[0]) if len(busy) else 0
-        kept = io.BytesIO()
-        image.crop((0, max(0, top - 8), image.width, image.height)).save(kept, format="png")
-    return kept.getvalue()
-
-
-def bring_to_front(client: Any, name: str) -> str | None:
-    """The id of the view of this name, in front now; None for a name of a whole tab, such as ``Lesson``.
-
-    Case doesn't matter; of views with equal names that of the tab in front comes first. Raises InputError with the
-    names there are.
-    """
-    blueprint = client.get_blueprint(of="recording").blueprint
-    views = {f"/view/{view.view_id}": view.name for view in client.get_state().views}
-    found = _walk(blueprint, f"/container/{blueprint['/viewport']['ViewportBlueprint']['root_container']}", views, ())
-    wanted = name.strip().lower()
-    path = next((path for path, called in found if called.lower() == wanted), None)
-    if path is None:
-        raise InputError("--view", name, one_of(name, sorted({called for _, called in found})))
-    for parent, child in zip(path[:-1], path[1:], strict=True):
-        container = blueprint[parent]["ContainerBlueprint"]
-        if container["container_kind"] == "Tabs":
-            container["active_tab"] = child
-    client.set_blueprint(blueprint, of="recording")
-    return path[-1].removeprefix("/view/") if path[-1] in views else None
-
-
-def _walk(
-    blueprint: dict[str, Any], node: str, views: dict[str, str], above: tuple[str, ...]
-) -> list[tuple[tuple[str, ...], str]]:
-    """(path from the root, name) of everything that has a name at or below ``node``, what is in front first."""
-    # The viewer names parts with or without the slash, as their layout came to it.
-    node = f"/{node.lstrip('/')}"
-    path = (*above, node)
-    if node in views:
-        return [(path, views[node])]
-    container = blueprint.get(node, {}).get("ContainerBlueprint", {})
-    found = [(path, container["display_name"])] if "display_name" in container else []
-    contents = container.get("contents", [])
-    for child in sorted(contents, key=lambda child: child != container.get("active_tab")):
-        found += _walk(blueprint, child, views, path)
-    return found
 
 
 def is_one_colour(png: bytes) -> bool:

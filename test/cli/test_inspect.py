@@ -7,7 +7,6 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import needs_rerun
 from mesh_files import CUBE_TRIANGLES, obj
 
 from rigid_proto_ros.cli.main import main
@@ -174,8 +173,6 @@ def test_millimetres_are_suspected(capsys, meshes):
         (("book", "--mass", "1", "--density", "2"), "not both"),
         (("book", "--ballast", "-1", "0", "0", "0"), "mass >= 0"),
         (("book", "--max-triangles", "0"), ">= 1"),
-        pytest.param(("book", "--record", "picture.png"), ".rrd", marks=needs_rerun),
-        pytest.param(("book", "--record", "/dev/null/x.rrd"), "folder", marks=needs_rerun),
         (("--lump", "robot.urdf", "--scale", "2"), "the robot's own inertials"),
         (("--lump", "robot.urdf", "--model", "shell"), "the robot's own inertials"),
         ((), "--compare"),
@@ -230,33 +227,6 @@ def test_trimesh_and_rerun_are_not_imported_for_an_obj():
     assert done.returncode == 0, done.stderr
 
 
-def test_the_picture_holds_mesh_axes_shapes_and_the_report(capsys, tmp_path):
-    pytest.importorskip("rerun")
-    from rerun.chunk import RrdReader
-
-    target = tmp_path / "hammer.rrd"
-    report(capsys, "hammer", "--record", str(target), "--scale", "1", "1", "-1")
-    chunks = [(chunk.entity_path.strip("/"), chunk.to_record_batch()) for chunk in RrdReader(target).stream()]
-    shapes = ("mesh", "principal_axes", "bounding_box", "equimomental_box", "equimomental_ellipsoid")
-    assert {"report", *(f"world/body/{shape}" for shape in shapes)} <= {name for name, _ in chunks}
-    (drawn_axes,) = [
-        batch
-        for name, batch in chunks
-        if name == "world/body/principal_axes" and "Arrows3D:vectors" in batch.schema.names
-    ]
-    vectors = drawn_axes.column("Arrows3D:vectors")[0].as_py()
-    axes = np.array(report(capsys, "hammer", "--scale", "1", "1", "-1")["principal_axes"])
-    drawn = np.array(vectors).T
-    assert drawn / np.linalg.norm(drawn, axis=0) == pytest.approx(axes, abs=1e-6)
-    text = dict(chunks)["report"].column("TextDocument:text")[0].as_py()[0]
-    found = report(capsys, "hammer")
-    solid = np.array(found["models"]["solid"]["inertia"])
-    for name, label in (("shell", "shell"), ("points", "vertices"), ("bounding_box", "bounding box")):
-        off = np.max(np.abs(np.array(found["models"][name]["inertia"]) - solid)) / np.max(np.abs(solid))
-        (row,) = [line for line in text.splitlines() if line.startswith(f"| {label} |")]
-        assert row.endswith(f"| {off:.3g} |")
-
-
 def test_several_meshes_are_inspected_in_turn_and_the_worst_status_counts(tmp_path, capsys):
     (tmp_path / "open.obj").write_bytes(obj(faces=CUBE_TRIANGLES[:-1]))
     broken = str(tmp_path / "open.obj")
@@ -272,5 +242,4 @@ def test_several_meshes_are_inspected_in_turn_and_the_worst_status_counts(tmp_pa
     assert third["mass"] is None and "nothing.obj" in third["verdict"][0]["message"]
     status, out, _ = inspect(capsys, "--repair", broken, "hammer", "--json")
     assert status == 0 and [one["watertight"] for one in json.loads(out)["meshes"]] == [True, True]
-    assert inspect(capsys, "hammer", "book", "--record", str(tmp_path / "x.rrd"))[0] == 2
     assert inspect(capsys, "hammer", "book", "--compare", broken)[0] == 2

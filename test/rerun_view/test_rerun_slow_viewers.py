@@ -18,12 +18,12 @@ from rigid_proto_ros.rerun_view import entities as e
 from rigid_proto_ros.rerun_view import viewers
 from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session
-from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started, StatusChanged
+from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started
 
 RUN_WITH_A_STOPPED_VIEWER = """
 import sys, time
 import rerun_flight as flight
-from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started, StatusChanged
+from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started
 from rigid_proto_ros.rerun_view.observer import RerunObserver
 path, states = sys.argv[1], flight.rows(200)
 observer = RerunObserver(record=path, viewer="serve")
@@ -107,7 +107,6 @@ def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_b
     try:
         observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
         observer.on(BodyChanged(0, flight.BODY))
-        observer.on(StatusChanged(0, "motion", "flying"))
         states = flight.rows(1000)
         for k in range(40_000):
             observer.on(Published(k * 1_000_000, states[k % 1000]))
@@ -115,7 +114,7 @@ def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_b
                 # Or viewers would be spared most of it, and nothing would have to be dropped.
                 flight.flush(observer)
         watcher = viewers.ViewerProcess("--connect", observer.live_address, "--save", str(saved))
-        flight.wait_for(lambda: style.BODY_MESH in (seen := _entities(saved)) and f"{e.STATUS}/motion" in seen)
+        flight.wait_for(lambda: style.BODY_MESH in (seen := _entities(saved)) and style.BOUNDING_BOX in seen)
         seen = _entities(saved)
         assert min(seen[e.STATE]) > 0, "nothing was dropped, so nothing is shown"
         for entity in (
