@@ -94,15 +94,6 @@ def interleaved() -> bytes:
     return "\n".join([*lines, ""]).encode()
 
 
-def strips() -> bytes:
-    header = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
-    header += "element face 4\nproperty list uchar int vertex_index\n"
-    header += "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
-    body = "\n".join(" ".join(map(str, v)) for v in CUBE_VERTICES.tolist()) + "\n"
-    body += "\n".join("4 " + " ".join(map(str, q)) for q in CUBE_QUADS[2:]) + "\n"
-    return (header + body + "9 0 1 2 3 -1 4 6 5 7\n").encode()
-
-
 def coloured_off() -> bytes:
     lines = off(faces=CUBE_QUADS).decode().splitlines()
     lines[0] = "COFF # with colours"
@@ -125,7 +116,6 @@ def small_files() -> dict[tuple[str, str], tuple[bytes, int]]:
         (".off", "colours and a comment"): (coloured_off(), 8),
         (".off", "counts on the first line"): (off().replace(b"OFF\n", b"OFF ", 1), 8),
         (".ply", "quads"): (ply(faces=CUBE_QUADS), 8),
-        (".ply", "triangle strips"): (strips(), 8),
         (".ply", "binary, big-endian, quads"): (ply_binary(faces=CUBE_QUADS, big=True), 8),
         (".stl", "binary, a header that begins with solid"): (b"solid".ljust(80) + stl()[80:], 8),
         (".stl", "text with bare carriage returns"): (bare_cr, 8),

@@ -49,9 +49,8 @@ ALLOWED = {
     "llvmlite": ("base.simd", "base.elementary", "base.provenance"),  # comes with numba
     "argcomplete": ("base.command_line",),
     "yaml": ("scene", "session", "sweep", "ros", "cli"),
-    "trimesh": ("mesh.other_formats",),
-    "collada": ("mesh.collada",),
-    "DracoPy": ("mesh.gltf",),
+    "trimesh": ("mesh.assembly",),
+    "collada": ("mesh.assembly",),
     "mujoco": ("robots.mjcf",),
     "manifold3d": ("mesh.union", "bodies.surfaces"),
     "rerun": ("rerun_view",),

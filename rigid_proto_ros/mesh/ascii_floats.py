@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import itertools
-import re
 import warnings
 
 import numpy as np
@@ -33,12 +31,6 @@ def as_numbers(text: bytes, count: int = -1, kind: type = float) -> tuple[np.nda
         except (ValueError, OverflowError):
             break
     return np.array(values), False
-
-
-def word_position(text: bytes, count: int) -> int:
-    """Where the word behind the first ``count`` ones begins."""
-    word = next(itertools.islice(re.finditer(rb"\S+", text), count, None), None)
-    return len(text) if word is None else word.start()
 
 
 def error_at(data: bytes, position: int, name: str, accepted: str, first_line: int = 1) -> MeshError:

@@ -1,11 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""Parts of a scene, each placed by a matrix, as one surface."""
+"""Scenes of placed parts as one surface, and those that a library reads: COLLADA through pycollada, without looks,
+lights and motion, and formats that have no reader here through trimesh.
+"""
 
 from __future__ import annotations
 
+import io
+import xml.etree.ElementTree as ElementTree
+from typing import Any
+
 import numpy as np
 
-from ..base.errors import MeshError
+from ..base.errors import MeshError, is_missing
+
+_LIBRARIES = ("images", "effects", "materials", "cameras", "lights", "animations", "animation_clips", "controllers")
+_UNUSED = (*(f"library_{kind}" for kind in _LIBRARIES), "bind_material", "instance_camera", "instance_light", "extra")
+"""Elements that no triangle depends on. pycollada drops a geometry whose material it can't read."""
+_ARCHIVES = ("zip", "bz2", "tar.bz2", "tar.gz", "zae")
 
 
 class Assembly:
@@ -48,3 +59,68 @@ class Assembly:
         if not self._vertices:
             return np.empty((0, 3)), np.empty((0, 3), np.int64)
         return np.concatenate(self._vertices), np.concatenate(self._triangles)
+
+
+def _tag(element: ElementTree.Element) -> str:
+    return str(element.tag).rpartition("}")[2]
+
+
+def _geometry_alone(data: bytes, name: str) -> bytes:
+    """The document without what isn't geometry."""
+    root = ElementTree.fromstring(data)
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if _tag(child) in _UNUSED:
+                parent.remove(child)
+            elif _tag(child) == "instance_controller":
+                raise MeshError(name, f"{child.get('url')} deforms its mesh; apply skin or morph before the export")
+            elif _tag(child) in ("convex_mesh", "spline", "brep", "ph", "skew"):
+                raise MeshError(name, f"it has <{_tag(child)}>", "triangles and polygons without holes, not skewed")
+    return ElementTree.tostring(root)
+
+
+def add_collada(data: bytes, assembly: Assembly) -> float:
+    """Add the geometry of the scene in a file's bytes, in its unit; returns the metres in that unit.
+
+    Raises MeshError, or pycollada's errors.
+    """
+    try:
+        import collada
+    except ImportError:
+        raise MeshError(assembly.name, is_missing("pycollada", "meshes")) from None
+    document = collada.Collada(io.BytesIO(_geometry_alone(data, assembly.name)))
+    if document.scene is None:
+        raise MeshError(assembly.name, "the file has no scene that says which of its geometry is to be shown")
+    for bound in document.scene.objects("geometry"):
+        for primitive in bound.original.primitives:
+            if isinstance(primitive, collada.polylist.Polylist):
+                primitive = primitive.triangleset()
+            if isinstance(primitive, collada.triangleset.TriangleSet) and primitive.vertex is not None:
+                assembly.add(primitive.vertex, primitive.vertex_index, bound.matrix, f"geometry {bound.original.id}")
+    return 1.0 if document.assetInfo.unitmeter is None else float(document.assetInfo.unitmeter)
+
+
+def other_formats() -> tuple[str, ...]:
+    """Endings that trimesh, as it is installed, reads."""
+    import trimesh
+
+    return tuple(sorted(set(trimesh.available_formats()) - set(_ARCHIVES)))
+
+
+def add_by_trimesh(data: bytes, suffix: str, assembly: Assembly) -> float:
+    """Add what trimesh reads of a file's bytes; returns the metres in its unit, 1 if it says none.
+
+    Vertices stay as the file has them: nothing is merged or sorted. Raises MeshError for a file that shows something
+    else than triangles, for which the rest would stand in silence, and trimesh's errors.
+    """
+    import trimesh
+
+    load: Any = trimesh.load_scene
+    scene = load(io.BytesIO(data), file_type=suffix, process=False, maintain_order=True, skip_materials=True)
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        part = scene.geometry[name]
+        if not isinstance(part, trimesh.Trimesh):
+            raise MeshError(assembly.name, f"{name} is a {type(part).__name__}", "triangles alone")
+        assembly.add(np.asarray(part.vertices), np.asarray(part.faces), np.asarray(matrix), name)
+    return 1.0 if scene.units is None else float(trimesh.units.unit_conversion(scene.units, "meters"))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """glTF 2.0 (.gltf, .glb), as the Khronos specification has it: the triangles of the default scene.
 
-Read besides the core: KHR_mesh_quantization, EXT_mesh_gpu_instancing, and KHR_draco_mesh_compression with DracoPy.
+Read besides the core: KHR_mesh_quantization. Instances, sparse accessors and Draco's compression are refused by name.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .assembly import Assembly
 TRIANGLES, STRIP, FAN = 4, 5, 6
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-_READ = ("KHR_mesh_quantization", "EXT_mesh_gpu_instancing", "KHR_draco_mesh_compression")
+_READ = "KHR_mesh_quantization"
 _LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_")
 """Beginnings of the names of extensions that change no triangle."""
 
@@ -79,82 +79,44 @@ class _Document:
             raise MeshError(self.name, f"buffer {index} ends before bufferView {number}; the file may be truncated")
         return content[start : start + view["byteLength"]]
 
-    def _rows(self, source: dict, kind: str, width: int, count: int) -> np.ndarray:
-        """Rows (count, width) of numbers of a type, from the byteOffset in the bufferView that ``source`` names."""
-        dtype = np.dtype(kind)
-        stride = self.item("bufferViews", source["bufferView"]).get("byteStride") or dtype.itemsize * width
-        content, start = self.view(source["bufferView"]), source.get("byteOffset", 0)
-        if count and (start < 0 or start + stride * (count - 1) + dtype.itemsize * width > len(content)):
-            raise MeshError(self.name, f"an accessor reads beyond bufferView {source['bufferView']}")
-        if not count:
-            return np.empty((0, width), dtype)
-        return np.ndarray((count, width), dtype, content, start, (stride, dtype.itemsize))
-
     def numbers(self, accessor_number: int) -> np.ndarray:
         """The rows (n, k) of an accessor, normalized integers as fractions."""
         accessor = self.item("accessors", accessor_number)
-        kind, width, count = _TYPES[accessor["componentType"]], _WIDTHS[accessor["type"]], accessor["count"]
+        if "sparse" in accessor or "bufferView" not in accessor:
+            kind = "is sparse" if "sparse" in accessor else "has no bufferView"
+            raise MeshError(
+                self.name, f"accessor {accessor_number} {kind}", "a file whose numbers are all in it, exported anew"
+            )
+        dtype, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
+        count, start = accessor["count"], accessor.get("byteOffset", 0)
         if not 0 <= count <= self._limit:
             raise MeshError(self.name, f"an accessor of {count} entries; --max-triangles raises the limit")
-        if "bufferView" in accessor:
-            rows = self._rows(accessor, kind, width, count).copy()
-        else:
-            rows = np.zeros((count, width), kind)
-        if "sparse" in accessor:
-            sparse = accessor["sparse"]
-            places, values = sparse["indices"], sparse["values"]
-            where = self._rows(places, _TYPES[places["componentType"]], 1, sparse["count"])[:, 0]
-            rows[where] = self._rows(values, kind, width, sparse["count"])
-        if accessor.get("normalized") and rows.dtype.kind != "f":
-            return np.maximum(rows.astype(np.float64) / np.iinfo(rows.dtype).max, -1.0)
+        content = self.view(accessor["bufferView"])
+        stride = self.item("bufferViews", accessor["bufferView"]).get("byteStride") or dtype.itemsize * width
+        if count and (start < 0 or start + stride * (count - 1) + dtype.itemsize * width > len(content)):
+            raise MeshError(self.name, f"an accessor reads beyond bufferView {accessor['bufferView']}")
+        rows = np.ndarray((count, width), dtype, content if count else None, start, (stride, dtype.itemsize))
+        if accessor.get("normalized") and dtype.kind != "f":
+            return np.maximum(rows.astype(np.float64) / np.iinfo(dtype).max, -1.0)
         return rows
 
 
 def _check_extensions(document: _Document) -> None:
     """Refuse an extension that the file requires and that isn't read here."""
     for extension in document.json.get("extensionsRequired", []):
-        if extension not in _READ and not extension.startswith(_LOOKS):
-            raise MeshError(document.name, f"it requires the extension {extension}", f"a file with {', '.join(_READ)}")
-
-
-def _placement(translation: Any, rotation: Any, scale: Any) -> np.ndarray:
-    """The matrix (4, 4) that scales, then turns, then shifts."""
-    matrix = np.eye(4)
-    quaternion = normalize(*np.asarray(rotation, dtype=np.float64).tolist())
-    matrix[:3, :3] = matrix_from_quaternion(quaternion) * np.asarray(scale, dtype=np.float64)
-    matrix[:3, 3] = translation
-    return matrix
+        if extension != _READ and not extension.startswith(_LOOKS):
+            raise MeshError(document.name, f"it requires the extension {extension}", f"no other than {_READ}")
 
 
 def _node_matrix(node: dict) -> np.ndarray:
+    """The matrix (4, 4) that scales, then turns, then shifts, or the given one."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    rotation, scale = node.get("rotation", (0, 0, 0, 1)), node.get("scale", (1, 1, 1))
-    return _placement(node.get("translation", (0, 0, 0)), rotation, scale)
-
-
-def _instances(document: _Document, node: dict) -> list[np.ndarray]:
-    """Where EXT_mesh_gpu_instancing puts copies of the node's mesh, seen from the node; else one unit matrix."""
-    instancing = node.get("extensions", {}).get("EXT_mesh_gpu_instancing")
-    if instancing is None:
-        return [np.eye(4)]
-    given = {name: document.numbers(number) for name, number in instancing["attributes"].items()}
-    rows = []
-    for k in range(min((len(values) for values in given.values()), default=0)):
-        translation = given["TRANSLATION"][k] if "TRANSLATION" in given else (0, 0, 0)
-        rotation = given["ROTATION"][k] if "ROTATION" in given else (0, 0, 0, 1)
-        rows.append(_placement(translation, rotation, given["SCALE"][k] if "SCALE" in given else (1, 1, 1)))
-    return rows
-
-
-def _draco(document: _Document, extension: dict) -> tuple[np.ndarray, np.ndarray]:
-    try:
-        import DracoPy
-    except ImportError:
-        wanted = "DracoPy installed (pip install DracoPy), or the file exported without compression"
-        raise MeshError(document.name, "its meshes are compressed with Draco", wanted) from None
-    mesh = DracoPy.decode(document.view(extension["bufferView"]))
-    return np.asarray(mesh.points, dtype=np.float64).reshape(-1, 3), np.asarray(mesh.faces, dtype=np.int64)
+    matrix = np.eye(4)
+    quaternion = normalize(*np.asarray(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64).tolist())
+    matrix[:3, :3] = matrix_from_quaternion(quaternion) * np.asarray(node.get("scale", (1, 1, 1)), dtype=np.float64)
+    matrix[:3, 3] = node.get("translation", (0, 0, 0))
+    return matrix
 
 
 def _triangles(document: _Document, primitive: dict) -> tuple[np.ndarray, np.ndarray]:
@@ -162,11 +124,9 @@ def _triangles(document: _Document, primitive: dict) -> tuple[np.ndarray, np.nda
     mode = primitive.get("mode", TRIANGLES)
     if mode < TRIANGLES:
         return np.empty((0, 3)), np.empty((0, 3), np.int64)
-    position = primitive["attributes"]["POSITION"]
-    draco = primitive.get("extensions", {}).get("KHR_draco_mesh_compression")
-    if draco is not None and "bufferView" not in document.item("accessors", position):
-        return _draco(document, draco)
-    vertices = document.numbers(position)
+    if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
+        raise MeshError(document.name, "its meshes are compressed with Draco", "a file exported without compression")
+    vertices = document.numbers(primitive["attributes"]["POSITION"])
     if "indices" in primitive:
         corners = document.numbers(primitive["indices"])[:, 0].astype(np.int64)
     else:
@@ -197,10 +157,10 @@ def _add_node(document: _Document, number: int, above: np.ndarray, seen: set[int
             raise MeshError(document.name, f"mesh {node['mesh']} is deformed by a skin; apply it before the export")
         if any(node.get("weights", mesh.get("weights", []))):
             raise MeshError(document.name, f"mesh {node['mesh']} is morphed; apply the targets before the export")
+        if "EXT_mesh_gpu_instancing" in node.get("extensions", {}):
+            raise MeshError(document.name, f"node {number} uses EXT_mesh_gpu_instancing; apply it before the export")
         for k, primitive in enumerate(mesh["primitives"]):
-            vertices, triangles = _triangles(document, primitive)
-            for instance in _instances(document, node):
-                assembly.add(vertices, triangles, matrix @ instance, f"primitive {k} of mesh {node['mesh']}")
+            assembly.add(*_triangles(document, primitive), matrix, f"primitive {k} of mesh {node['mesh']}")
     for child in node.get("children", []):
         _add_node(document, child, matrix, seen, assembly)
 

@@ -68,7 +68,7 @@ def _known(text: bytes) -> np.ndarray:
     return np.cumsum(letters == ord("v"))[letters == ord("f")]
 
 
-def read_obj(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def read_obj(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices (n, 3) float64, polygon corners (c,) int64 and their starts (p + 1,) of the file's bytes.
 
     Raises MeshError with the file's name and line.
@@ -86,9 +86,6 @@ def read_obj(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
     text = _INDENTED.sub(b"\n", text)
     vertices = _vertices(text, name)
     numbers, sizes = _faces(text, name)
-    if len(numbers) - 2 * len(sizes) > max_triangles:
-        received = f"{len(numbers) - 2 * len(sizes)} triangles are more than {max_triangles}"
-        raise MeshError(name, f"{received}; --max-triangles raises the limit")
     starts = np.cumsum(np.concatenate([np.zeros(1, np.int64), sizes]))
     corners = numbers - 1
     if len(numbers) and numbers.min() < 0:

@@ -4,10 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-import io
-import lzma
 import re
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
@@ -17,20 +14,17 @@ import numpy as np
 from ..base.errors import InputError, MeshError
 from ..base.files import read_bounded
 from . import cache as mesh_cache
-from .assembly import Assembly
-from .collada import add_collada
+from .assembly import Assembly, add_by_trimesh, add_collada, other_formats
 from .gltf import add_gltf
 from .locate import NOWHERE_ELSE, Search, resolve_mesh
 from .obj import read_obj
 from .off import read_off
-from .other_formats import add_by_trimesh, other_formats
 from .ply import read_ply
 from .stl import is_ascii_stl, read_stl
 from .threemf import add_threemf
 
 OWN_FORMATS = ("obj", "off", "ply", "stl")
-"""Formats of one surface. trimesh 5.2 misreads some files of each in silence (tab-separated .obj, negative indices,
-strips and lists of several lengths in .ply, cut .off and .stl: benchmarks/mesh_readers.py) and keeps no polygons."""
+"""Formats of one surface. trimesh 5.2 misreads some files of each in silence (benchmarks/mesh_readers.py)."""
 FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae")
 """Formats read as they are specified; those beyond OWN_FORMATS are scenes of placed parts. What else trimesh reads is
 taken from it."""
@@ -140,7 +134,7 @@ def _read(data: bytes, path: Path, max_triangles: int) -> _Content:
         content = _Content(*read_stl(data, path.name, max_triangles))
     else:
         reader = {"obj": read_obj, "off": read_off, "ply": read_ply}[suffix]
-        vertices, corners, starts = reader(data, path.name, max_triangles)
+        vertices, corners, starts = reader(data, path.name)
         _check_triangles(len(corners) - 2 * (len(starts) - 1), max_triangles, path.name)
         content = _Content(vertices, *fan_polygons(corners, starts))
     _check_triangles(len(content.triangles), max_triangles, path.name)
@@ -150,17 +144,6 @@ def _read(data: bytes, path: Path, max_triangles: int) -> _Content:
 def _check_triangles(count: int, max_triangles: int, name: str) -> None:
     if count > max_triangles:
         raise MeshError(name, f"{count} triangles are more than {max_triangles}; --max-triangles raises the limit")
-
-
-def _check_archive(data: bytes, name: str, max_bytes: int) -> None:
-    """Refuse an archive whose files, unpacked, are larger than a mesh of the limit can be."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-    except (zipfile.BadZipFile, OSError, ValueError, lzma.LZMAError) as error:
-        raise MeshError(name, f"the archive can't be read ({error})") from None
-    if size > max_bytes:
-        raise MeshError(name, f"{size} bytes unpacked are more than {max_bytes}; --max-triangles raises the limit")
 
 
 def _read_scene(data: bytes, suffix: str, path: Path, max_triangles: int) -> _Content:
@@ -178,13 +161,11 @@ def _read_scene(data: bytes, suffix: str, path: Path, max_triangles: int) -> _Co
         return content
 
     assembly, unit = Assembly(path.name, max_triangles), 1.0
-    if suffix == "3mf":
-        _check_archive(data, path.name, max_bytes)
     try:
         if suffix in ("glb", "gltf"):
             add_gltf(data, beside, assembly)
         elif suffix == "3mf":
-            unit = add_threemf(data, assembly)
+            unit = add_threemf(data, assembly, max_bytes)
         elif suffix == "dae":
             unit = add_collada(data, assembly)
         else:

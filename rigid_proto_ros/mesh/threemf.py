@@ -119,12 +119,18 @@ class _Package:
         return np.array(vertices).reshape(-1, 3), np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
-def add_threemf(data: bytes, assembly: Assembly) -> float:
+def add_threemf(data: bytes, assembly: Assembly, max_bytes: int) -> float:
     """Add the items to be built by a file's bytes, in its unit, but for supports; returns the metres in that unit.
+
+    An archive of more than ``max_bytes``, unpacked, is refused.
 
     Raises MeshError, or other errors where the file isn't built as the specification says.
     """
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        size = sum(entry.file_size for entry in archive.infolist())
+        if size > max_bytes:
+            limit = f"{size} bytes unpacked are more than {max_bytes}; --max-triangles raises the limit"
+            raise MeshError(assembly.name, limit)
         package = _Package(archive, assembly)
         root = package.root()
         unit = package.unit(root)

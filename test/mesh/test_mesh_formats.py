@@ -15,7 +15,7 @@ from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mesh import cache as mesh_cache
 from rigid_proto_ros.mesh import reading as mesh_io
-from rigid_proto_ros.mesh.ascii_floats import as_numbers, word_position
+from rigid_proto_ros.mesh.ascii_floats import as_numbers
 from rigid_proto_ros.mesh.reading import load_mesh
 
 WHOLE = {
@@ -103,17 +103,27 @@ def test_coff_colours_and_comments_are_skipped(tmp_path):
     assert volume(load(tmp_path, "d.off", one_line)) == 1.0
 
 
-def test_ply_triangle_strips_turn_every_other_triangle_and_restart(tmp_path):
-    # Two faces of the cube as strips of four, the other four as quads.
-    header = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
-    header += "element face 4\nproperty list uchar int vertex_index\n"
-    header += "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
-    body = "\n".join(" ".join(map(str, v)) for v in CUBE_VERTICES.tolist()) + "\n"
-    body += "\n".join("4 " + " ".join(map(str, q)) for q in CUBE_QUADS[2:]) + "\n"
-    body += "9 0 1 2 3 -1 4 6 5 7\n"
-    mesh = load(tmp_path, "strips.ply", (header + body).encode())
-    assert volume(mesh) == 1.0
-    assert mesh.polygons == 4 + 4
+def test_a_ply_of_strips_or_of_polygons_of_several_sizes_is_refused_with_the_remedy(tmp_path):
+    mixed = [*CUBE_QUADS[1:], *CUBE_TRIANGLES[:2].tolist()]
+    strip = ply(faces=CUBE_QUADS).replace(b"element face", b"element tristrips")
+    texts = [ply(faces=mixed), ply_binary(faces=mixed), ply_binary(faces=mixed[::-1], big=True), strip]
+    # Sizes of which the sum is that of triangles alone: the faces' numbers betray it, not the file's length.
+    texts.append(ply_binary(faces=[CUBE_TRIANGLES[0], CUBE_QUADS[1], (0, 1)]))
+    for text in texts:
+        with pytest.raises(MeshError, match=r"lists of different|truncated|triangle strips|follow"):
+            load(tmp_path, "a.ply", text)
+    with pytest.raises(MeshError, match=r"save the mesh as \.obj or \.stl"):
+        load(tmp_path, "a.ply", strip)
+
+
+def test_a_textured_ply_keeps_the_order_of_its_vertices(tmp_path):
+    """As many would be renumbered, one for each place on the texture."""
+    header = ply().replace(b"property double z\n", b"property double z\nproperty float s\nproperty float t\n", 1)
+    lines = header.decode().split("\n")
+    first = lines.index("end_header") + 1
+    lines[first : first + 8] = [f"{line} 0.{k} 0.5" for k, line in enumerate(lines[first : first + 8])]
+    mesh = load(tmp_path, "a.ply", "\n".join(lines).encode())
+    assert np.array_equal(mesh.vertices, CUBE_VERTICES) and np.array_equal(mesh.triangles, CUBE_TRIANGLES)
 
 
 def test_concave_polygons_are_fanned_exactly(tmp_path):
@@ -142,7 +152,7 @@ def test_decimal_numbers_are_read_as_python_reads_them(values, form):
 def test_words_that_are_no_numbers_are_told(word):
     text = f"1 2 {word} 4".encode()
     read, whole = as_numbers(text)
-    assert (read.tolist(), whole, word_position(text, len(read))) == ([1.0, 2.0], False, 4)
+    assert (read.tolist(), whole) == ([1.0, 2.0], False)
 
 
 @pytest.mark.parametrize(

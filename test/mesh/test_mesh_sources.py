@@ -100,7 +100,7 @@ def test_packed_files_are_to_be_unpacked_first(tmp_path, name):
 
 
 def test_an_archive_that_is_none_or_would_fill_the_memory_says_so(tmp_path):
-    for data, words in ((b"PK\3\4no archive", "archive"), (threemf(" " * 10**6), "bytes unpacked")):
+    for data, words in ((b"PK\3\4no archive", "zip file"), (threemf(" " * 10**6), "bytes unpacked")):
         (tmp_path / "a.3mf").write_bytes(data)
         with pytest.raises(MeshError, match=words):
             load_mesh(str(tmp_path / "a.3mf"), max_triangles=100)
