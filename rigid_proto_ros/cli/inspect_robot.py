@@ -181,7 +181,7 @@ def lump(args: argparse.Namespace) -> int:
     from ..robots.composite_inertia import lump_robot
 
     unused = {"scale": ["1"], "model": "solid"}  # with their defaults; the others' are false
-    for flag in ("verify", "record", "ballast", "mass", "density", "repair", "fallback", "accept-open", *unused):
+    for flag in ("verify", "ballast", "mass", "density", "repair", "fallback", "accept-open", *unused):
         value = getattr(args, flag.replace("-", "_"))
         if value and value != unused.get(flag):
             raise InputError(f"--{flag}", "can't be used with --lump, which takes the robot's own inertials")
@@ -240,7 +240,7 @@ def _write_scene(whole: Lump, name: str) -> tuple[str, ...]:
 
 def _check(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> None:
     """Refuse what makes no sense with a robot."""
-    for flag in ("verify", "record", "urdf", "sdf", "mjcf"):
+    for flag in ("verify", "urdf", "sdf", "mjcf"):
         if getattr(args, flag):
             raise InputError(f"--{flag}", "can't be used with --compare, which takes --json alone")
     # Solids of one density are what a robot's inertials are compared with.
