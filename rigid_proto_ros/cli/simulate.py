@@ -114,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         # Only who records has a ghost.
         flight = OfflineRun(scenario, script, Observers(*watching, Refusals(_warn_of_ghost)) if watching else None)
-        wall_time = run_with_progress(flight, duration_ns, _warn)
+        wall_time = run_with_progress(flight, duration_ns)
         result = summary(flight, wall_time)
     finally:
         for recorder in recorders.values():

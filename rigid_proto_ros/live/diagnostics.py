@@ -52,9 +52,7 @@ def report(live: LiveSimulation) -> dict[str, object]:
         "force_evaluations": simulation.force_evaluations,
         "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",
         "recording": loop.scenario.parameters.record,
-        "warning": (
-            simulation.failure or live.observers.recording_trouble or simulation.too_coarse or simulation.too_slow
-        ),
+        "warning": simulation.failure or live.observers.recording_trouble or simulation.too_coarse,
     }
 
 

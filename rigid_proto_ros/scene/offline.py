@@ -119,17 +119,11 @@ class OfflineRun(ScenarioRun):
             self.simulation.notify_end()
 
 
-def run_with_progress(run: OfflineRun, duration_ns: int, warn: Callable[[str], None] | None = None) -> float:
-    """Advance by a hundredth of the duration at a time, and show how far it is; returns the wall time [s].
-
-    warn: told once, as soon as it is known, that the motion takes more computing than the clock leaves time for.
-    """
+def run_with_progress(run: OfflineRun, duration_ns: int) -> float:
+    """Advance by a hundredth of the duration at a time, and show how far it is; returns the wall time [s]."""
     start = time.perf_counter()
     with Progress(f"simulating {duration_ns / 1e9:g} s") as progress:
         for part in range(1, 101):
-            if warn is not None and (slow := run.simulation.too_slow):
-                warn(slow)
-                warn = None
             if not run.advance(duration_ns * part // 100):
                 break
             progress.fraction(part, 100)

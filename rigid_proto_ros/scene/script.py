@@ -327,6 +327,8 @@ def _check_keys(entry: dict, known: Set[str], others: Set[str] = frozenset()) ->
 
 
 def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
+    if type(value) is float and lower <= value <= upper:
+        return value  # as most are: a script may have thousands
     number: Any = value
     if isinstance(value, str):
         # YAML reads 1e-3 without a point as text.

@@ -22,7 +22,6 @@ from ..motion.state import State
 from ..motion.string import most_yielding
 from .commands import Command, MoveString, ThrusterCommand, WrenchCommand
 from .setup import Setup
-from .thrusters import check_forces
 
 
 def check_command(command: Command, setup: Setup) -> bytes:
@@ -40,9 +39,16 @@ def check_command(command: Command, setup: Setup) -> bytes:
 
 
 def check_thrust(forces: tuple[float, ...], setup: Setup) -> None:
-    """Raises CommandRefused for forces of thrusters that body or integrator can't take."""
-    check_forces(setup.thrusters, forces, setup.body)
-    for thruster in setup.thrusters.values():
+    """Raises CommandRefused unless there is a force [N] for each thruster that body and integrator can take."""
+    thrusters = setup.thrusters
+    if len(forces) != len(thrusters):
+        names = ", ".join(thrusters) or "none is declared by thrusters.<name>"
+        accepted = f"{len(thrusters)} numbers, one a thruster ({names})"
+        raise CommandRefused("thrusters", "thrusters", f"{len(forces)} numbers", accepted)
+    if not all(map(math.isfinite, forces)):
+        raise CommandRefused("nonfinite", "thrusters", list(forces), "finite numbers")
+    for thruster, force in zip(thrusters.values(), forces, strict=True):
+        thruster.load(thruster.within(force)).check_magnitude(setup.body)
         check_supported(setup.integrator, needs_of_load(thruster.load(1.0)))
 
 

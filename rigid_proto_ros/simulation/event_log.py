@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
 
-from .commands import Command, Pending, WrenchCommand
+from .commands import Command
 
 MOST_NOTED = 10_000
 """Events that may wait to be chained: some megabytes."""
@@ -61,39 +59,8 @@ class EventLog:
         if len(self._noted) >= MOST_NOTED:
             self._chain_noted()
 
-    def note_all(self, acted: Sequence[Pending]) -> None:
-        """Add commands that acted, likewise."""
-        noted = self._noted
-        for pending in acted:
-            noted.append((pending.time_ns, pending.command))
-        self.count += len(acted)
-        if len(noted) >= MOST_NOTED:
-            self._chain_noted()
-
     def _chain_noted(self) -> None:
-        if self._noted:
-            noted, self._noted = self._noted, []
-            self._hash.update("".join([_line(time_ns, command) for time_ns, command in noted]).encode())
-
-
-_quoted = lru_cache(maxsize=256)(json.dumps)
-"""Frames come again and again."""
-
-
-def _line(time_ns: int, command: Command | OtherEvent) -> str:
-    """The line of a command, as ``json.dumps`` writes it."""
-    if isinstance(command, WrenchCommand):
-        try:
-            force, torque = ", ".join(map(_written, command.force)), ", ".join(map(_written, command.torque))
-        except TypeError:
-            pass  # not all of them floats
-        else:
-            return (
-                f'{{"time_ns": {time_ns}, "kind": "{command.kind}", "content": {{"stamp_ns": {command.stamp_ns}, '
-                f'"frame_id": {_quoted(command.frame_id)}, "force": [{force}], "torque": [{torque}]}}}}\n'
-            )
-    return json.dumps({"time_ns": time_ns, "kind": command.kind, "content": command.content}) + "\n"
-
-
-_written = float.__repr__
-"""Of a finite float what JSON writes too; no other command acts."""
+        noted, self._noted = self._noted, []
+        for time_ns, event in noted:
+            line = json.dumps({"time_ns": time_ns, "kind": event.kind, "content": event.content})
+            self._hash.update((line + "\n").encode())

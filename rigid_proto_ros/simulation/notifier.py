@@ -92,6 +92,8 @@ class EventNotifier:
 
     def cost(self, readings: Observables) -> None:
         """What the motion has cost, and what has held it to less than its accuracy."""
+        if not self._shows_cost:
+            return
         self._next_cost_ns = readings.time_ns + COST_PERIOD_NS
         self.observer.on(Effort(readings.time_ns, readings.steps, readings.force_evaluations))
         floor = readings.accuracy_floor

@@ -12,8 +12,6 @@ import numpy as np
 from ..base.rotation import cross, dot, length, times, transposed_times
 from ..base.vectors import Numbers, Vector
 from ..motion.integrators.auto import fastest_swing
-from ..motion.integrators.equations import stretch
-from ..motion.integrators.integrator import FIXED_STEPS, Method
 from ..motion.integrators.series_steps import degree_of_motion
 from ..motion.loads import LoadSum
 from ..motion.problem import PROBLEM
@@ -26,11 +24,6 @@ from .flight_arrays import ActingLoad, FlightArrays
 from .setup import Setup
 from .string_control import StringControl
 from .thrusters import ThrusterControl
-
-FEWEST_EVALUATIONS = 20_000
-"""In a segment, from which on they are checked: the first tiny steps of a transient say nothing about later ones."""
-MOST_EVALUATIONS_A_SECOND = {True: 2e5, False: 5e6}
-"""That the clock leaves time for: for methods that choose their steps, a series each, and for fixed steps."""
 
 FLOORS = (
     "rounding of 32 units in the last place a step, in steps that short, comes to {:.2g} a second",
@@ -80,15 +73,11 @@ class Observables:
         return int(self.flight.evaluations_before + in_segment)
 
     @property
-    def _method(self) -> Method:
-        return self._arrays.integrator.methods[int(self.flight.method)]
-
-    @property
     def choice(self) -> str:
         """Which method advances the body now, and why."""
         flight = self.flight
         degree = int(flight.degree)
-        return self._method.choice.format(
+        return self._arrays.integrator.methods[int(flight.method)].choice.format(
             step_s=int(flight.step_ns) * 1e-9,
             degree=degree,
             degree_of_motion=degree_of_motion(degree),
@@ -126,38 +115,6 @@ class Observables:
         if swing > limit:
             return f"{setup.integrator.name}: string frequency times step = {swing:.3g}, good up to {limit:g}"
         return ""
-
-    @property
-    def too_slow(self) -> str:
-        """That the present segment takes more computing than the clock leaves time for; empty when it doesn't. By what
-        it took so far, and before that by the fastest that turns or swings.
-        """
-        flight = self.flight
-        elapsed = (self.time_ns - int(flight.start_ns)) * 1e-9
-        evaluations = fl.evaluations_of_segment(flight, self._arrays.methods)
-        if evaluations >= FEWEST_EVALUATIONS and elapsed > 0.0:
-            steps, evaluations = fl.steps_of_segment(flight) / elapsed, evaluations / elapsed
-        else:
-            steps, evaluations = self._expected_effort
-        if evaluations < MOST_EVALUATIONS_A_SECOND[self.setup.integrator.chooses]:
-            return ""
-        return f"{self.choice}: {steps:.2g} steps for a second of the motion, slower than real time"
-
-    @property
-    def _expected_effort(self) -> tuple[float, float]:
-        """Steps and evaluations that a second of the motion from now on takes, as far as that is known beforehand."""
-        method, flight = self._method, self.flight
-        if method.way == FIXED_STEPS:
-            steps = 1e9 / int(flight.step_ns)
-            return steps, steps * method.evaluations
-        if method.radians == 0.0:
-            return 0.0, 0.0
-        fastest = length(self.state.angular_velocity_body)
-        if method.on_string:
-            now = flight.trial if flight.now_ns > flight.committed_ns else flight.variables
-            if stretch(now, flight.problem)[0] > 0.0:
-                fastest = max(fastest, fastest_swing(flight.problem))
-        return fastest / method.radians, fastest / method.radians
 
     @property
     def string(self) -> StringState | None:

@@ -51,17 +51,6 @@ from .thrusters import ThrusterControl
 _UNTIL_REPLACED_NS = fl.NEVER >> 1
 
 
-def thrusts(loads: list[tuple[int, Load]], at_ns: int) -> list[Pending]:
-    """What thrusters, by number, push with from ``at_ns`` on, as commands of a flight."""
-    rows = []
-    for number, load in loads:
-        kind = HELD_WRENCH if load.is_zero else PULSE
-        row = Pending(at_ns, ClearWrench(), kind=kind, duration_ns=_UNTIL_REPLACED_NS, row=load.packed)
-        row.slot = -1 - number
-        rows.append(row)
-    return rows
-
-
 class Follower(Protocol):
     """Whoever takes the same commands at the same times, such as a ghost."""
 
@@ -255,7 +244,8 @@ class Simulation(Observables):
         observer, notifier, arrays = self.observer, self._notifier, self._arrays
         ignored = notifier.ignores_commands or not (notifier.wants_loads or observer.wants(Logged))
         if ignored and not arrays.integers[TIMEOUTS]:
-            self.events.note_all(due)
+            for pending in due:
+                self.events.note(pending.time_ns, pending.command)
             return
         first = arrays.first_due
         for number, (now_ns, what, load_id, row) in enumerate(arrays.last_events()):
@@ -347,8 +337,12 @@ class Simulation(Observables):
 
     def _thrust(self, loads: list[tuple[int, Load]]) -> None:
         """Let thrusters, by number, push like this until they are told otherwise."""
-        arrays = self._arrays
-        arrays.put(thrusts(loads, self.time_ns))
+        arrays, rows = self._arrays, []
+        for number, load in loads:
+            row = Pending(self.time_ns, ClearWrench(), duration_ns=_UNTIL_REPLACED_NS, row=load.packed)
+            row.kind, row.slot = HELD_WRENCH if load.is_zero else PULSE, -1 - number
+            rows.append(row)
+        arrays.put(rows)
         arrays.apply()
         if not self._notifier.wants_loads:
             return

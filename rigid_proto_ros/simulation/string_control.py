@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.errors import CommandRefused
 from ..base.rotation import transposed_times
-from ..base.vectors import Vector, vector
+from ..base.vectors import vector
 from ..motion.body import Body
 from ..motion.loads import MAX_ACCELERATION
 from ..motion.state import State
@@ -41,7 +41,8 @@ class StringControl:
 
     def tie_at(self, command: TieString, setup: Setup, state: State) -> None:
         """Take the knot to a point of the body; a string that is tied stays so, its k and c computed anew."""
-        attach = _attach(command, setup, state)
+        point = mesh_point(command, setup.body, state)
+        attach = vector(point if setup.surface is None else setup.surface.nearest_point(point))
         if self.tied is not None:
             check_rates(setup, attach)
             self.tied = _checked(
@@ -90,14 +91,6 @@ def mesh_point(command: TieString, body: Body, state: State) -> np.ndarray:
     if command.axes == "world":
         point = transposed_times(state.rotation, point - state.position)
     return point if command.axes == "mesh" else body.mesh_point(point)
-
-
-def _attach(command: TieString, setup: Setup, state: State) -> Vector:
-    """The knot in mesh coordinates, on the surface where there is one."""
-    point = mesh_point(command, setup.body, state)
-    if setup.surface is not None:
-        point = setup.surface.nearest_point(point)
-    return vector(point)
 
 
 def _checked(tied: StringState, body: Body, state: State) -> StringState:

@@ -8,10 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from ..base.errors import CommandRefused, InputError
+from ..base.errors import InputError
 from ..base.rotation import norm
 from ..base.vectors import Vector
-from ..motion.body import Body
 from ..motion.loads import Load
 from .flight import NEVER
 
@@ -50,18 +49,6 @@ def make_thruster(name: str, numbers: Sequence[float], bidirectional: bool, mini
     size = norm(dx, dy, dz)
     most = limit or math.inf
     return Thruster((x, y, z), (dx / size, dy / size, dz / size), -most if bidirectional else 0.0, most, minimum_on_ns)
-
-
-def check_forces(thrusters: Mapping[str, Thruster], forces: Sequence[float], body: Body) -> None:
-    """Raises CommandRefused unless there is a force [N] that the body can take for each thruster."""
-    if len(forces) != len(thrusters):
-        names = ", ".join(thrusters) or "none is declared by thrusters.<name>"
-        accepted = f"{len(thrusters)} numbers, one a thruster ({names})"
-        raise CommandRefused("thrusters", "thrusters", f"{len(forces)} numbers", accepted)
-    if not all(map(math.isfinite, forces)):
-        raise CommandRefused("nonfinite", "thrusters", list(forces), "finite numbers")
-    for thruster, force in zip(thrusters.values(), forces, strict=True):
-        thruster.load(thruster.within(force)).check_magnitude(body)
 
 
 class Push(NamedTuple):

@@ -116,7 +116,7 @@ def test_an_interrupted_write_leaves_the_old_file_and_no_half(tmp_path, monkeypa
         raise KeyboardInterrupt
 
     monkeypatch.setattr("rigid_proto_ros.base.progress.Progress.fraction", stop)
-    monkeypatch.setattr("rigid_proto_ros.scene.offline.run_with_progress", lambda run, end, _: run.advance(end) and 0.0)
+    monkeypatch.setattr("rigid_proto_ros.scene.offline.run_with_progress", lambda run, end: run.advance(end) and 0.0)
     assert main(["simulate", "book", "--duration", "0.1", "--csv", str(out)]) == 130
     assert capsys.readouterr().err == ""  # quietly
     assert out.read_text() == "before" and [path.name for path in tmp_path.iterdir()] == ["a.csv"]

@@ -130,26 +130,3 @@ def test_tying_and_changing_in_flight_are_refused_and_counted():
     fixed.submit(Change({}, lambda: replace(setup, integrator=integrator_named("auto"))), 2000)
     fixed.advance(10_000)
     assert fixed.refused == {"integrator": 1}
-
-
-def test_a_motion_that_takes_more_steps_than_the_clock_leaves_time_for_says_so():
-    tiny = flight(BODY, integrator="rk4", step_s=1e-7, initial=spinning((1, 2, 3)))
-    assert "1e+07 steps" in tiny.too_slow
-    tiny.advance(SECOND // 50)
-    assert "slower than real time" in tiny.too_slow
-    # Without the gyroscopic term the force turns along with a spin of 2e6 rad/s, which nothing slows down.
-    spun = flight(BODY, integrator="auto", initial=spinning((0, 0, 2e6)), gyroscopic=False)
-    assert spun.too_slow == ""
-    spun.submit(wrench("body@com", (1.0, 0.0, 0.0)))
-    spun.advance(1)
-    assert "1.3e+06 steps" in spun.too_slow
-
-
-def test_a_string_that_swings_too_fast_for_the_clock_says_so():
-    string = replace(tied(stiffness=0.0, frequency=1.6e5, damping_ratio=0.0), rest_length=0.0)
-    start = np.array([0.1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0.1])
-    simulation = flight(BODY, integrator="auto", initial=start, string=string)
-    # Before, by the swing; and after, by what it took.
-    assert "steps for a second of the motion, slower than real time" in simulation.too_slow
-    simulation.advance(SECOND // 10)
-    assert "slower than real time" in simulation.too_slow

@@ -15,9 +15,9 @@ from rigid_proto_ros.simulation.commands import Change
 TENSOR = np.array([[1.3, 0.2, -0.1], [0.2, 2.0, 0.3], [-0.1, 0.3, 2.9]])
 STEP_NS = 1_000_000
 POKED = ("rk4", "dop853", "free_body_strang", "lie_midpoint", "auto")
-PHASES = 12
+PHASES = 6
 STRESS_PHASES = 1500
-SCENES = 6
+SCENES = 3
 STRESS_SCENES = 400
 
 

@@ -54,11 +54,18 @@ def test_the_first_target_ties_and_is_taken_at_once():
     assert simulation.string.free_end(200 * MS).tolist() == [1.0, 2.0, 3.0]
 
 
-@pytest.mark.parametrize(("after_ms", "ramp_ms"), [(20, 20), (100, 100), (250, 100)])
+@pytest.mark.parametrize(("after_ms", "ramp_ms"), [(20, 20), (250, 100)])
 def test_the_free_end_goes_evenly_over_the_time_since_the_last_target_at_most_a_tenth_of_a_second(after_ms, ramp_ms):
     simulation, _ = simulated()
     simulation.submit(MoveString((0.0, 0.0, 1.0)), 0)
     simulation.submit(MoveString((0.3, -0.6, 1.0)), after_ms * MS)
+    # A target in mid-ramp starts from where the free end is.
+    half_ns = (after_ms + ramp_ms // 2) * MS
+    turned, _ = simulated()
+    for at_ns, target in ((0, (0.0, 0.0, 1.0)), (after_ms * MS, (0.3, -0.6, 1.0)), (half_ns, (0.0, 0.0, 2.0))):
+        turned.submit(MoveString(target), at_ns)
+    turned.advance(half_ns + 1)
+    assert turned.string.origin == pytest.approx([0.15, -0.3, 1.0], abs=1e-15)
     for fraction in (0.25, 0.5, 0.75, 1.0, 1.5):
         time_ns = round((after_ms + fraction * ramp_ms) * MS)
         simulation.advance(time_ns)
@@ -68,15 +75,6 @@ def test_the_free_end_goes_evenly_over_the_time_since_the_last_target_at_most_a_
         tied = simulation.string
         _, velocity = free_end_at(time_ns, tied.origin, tied.target, tied.begin_ns, tied.end_ns)
         assert velocity == pytest.approx([0.3 * speed, -0.6 * speed, 0.0], abs=1e-12)
-
-
-def test_a_target_in_mid_ramp_starts_from_where_the_free_end_is():
-    simulation, _ = simulated()
-    simulation.submit(MoveString((0.0, 0.0, 0.0)), 0)
-    simulation.submit(MoveString((1.0, 0.0, 0.0)), 200 * MS)
-    simulation.submit(MoveString((0.0, 1.0, 0.0)), 250 * MS)
-    simulation.advance(275 * MS)
-    assert simulation.string.free_end(275 * MS) == pytest.approx([0.25, 0.5, 0.0], abs=1e-15)
 
 
 def test_it_lets_go_the_timeout_after_the_last_target_and_not_before():
@@ -94,12 +92,13 @@ def test_it_lets_go_the_timeout_after_the_last_target_and_not_before():
     assert np.abs(simulation.angular_momentum - before).max() <= 1e-9 * np.abs(before).max()
 
 
-def test_timeout_zero_never_lets_go_and_an_attached_string_needs_no_target():
+def test_timeout_zero_never_lets_go_an_attached_string_needs_no_target_and_clear_wrench_leaves_it():
     simulation, _ = simulated(string__timeout=0.0)
     simulation.submit(MoveString((0.0, 0.0, 1.0)), 0)
     simulation.advance(10 * SECOND)
     assert simulation.string is not None
     simulation, _ = simulated(string__attached=True, string__target=[0.0, 0.0, 1.0])
+    simulation.submit(ClearWrench())
     simulation.advance(10 * SECOND)
     assert simulation.string is not None
 
@@ -126,14 +125,7 @@ def test_a_string_that_a_reset_ties_again_counts_for_the_integrator_though_it_wa
     simulation.check_change(scenario.with_changes({"integrator": "free_body", "string.attached": False}).setup)
 
 
-def test_clear_wrench_leaves_the_string_tied():
-    simulation, _ = simulated(string__attached=True)
-    simulation.submit(ClearWrench())
-    simulation.advance(SECOND)
-    assert simulation.string is not None
-
-
-@pytest.mark.parametrize("frame", ["world", "", "body", "rigid_body", "body/mesh", "rigid_body/mesh"])
+@pytest.mark.parametrize("frame", ["", "rigid_body", "body/mesh"])
 def test_the_knot_is_the_nearest_point_of_the_surface_as_it_is_then(frame):
     """In world, body (metres from the COM) and mesh coordinates, against trimesh's closest points: 1e-12."""
     simulation, scenario = simulated(string__timeout=0.0)
@@ -153,14 +145,6 @@ def test_the_knot_is_the_nearest_point_of_the_surface_as_it_is_then(frame):
     assert simulation.string.attach == pytest.approx(nearest, abs=1e-12)
     # And it lies elsewhere than it was asked for.
     assert np.linalg.norm(nearest - mesh_point) > 1e-3
-
-
-def test_without_a_mesh_the_knot_is_where_it_was_asked_for():
-    simulation, _ = simulated(mesh="", inertia_model="explicit", string__timeout=0.0)
-    simulation.submit(TieString("mesh", (1.0, 2.0, 3.0)))
-    simulation.submit(MoveString((0.0, 0.0, 0.0)))
-    simulation.advance(1)
-    assert simulation.string.attach == (1.0, 2.0, 3.0)
 
 
 def test_moving_the_knot_of_a_tied_string_keeps_it_tied_with_stiffness_and_damping_settled_anew():
@@ -185,26 +169,25 @@ def test_moving_the_knot_of_a_tied_string_keeps_it_tied_with_stiffness_and_dampi
 def test_stiffness_or_frequency_with_the_damping_ratio_give_k_and_c_from_the_effective_mass_and_hold_them(frequency):
     changes = {"string__frequency": frequency, "string__damping_ratio": 0.7, "string__attached": True}
     simulation, scenario = simulated(**changes, string__attach=[0.0, 0.05, 0.0], string__target=[0.3, 0.2, 1.0])
-    body, state = scenario.setup.body, simulation.state
-    arm = np.array([0.0, 0.05, 0.0]) * SCENE["scale"] - body.center_of_mass
-    away = state.position + state.rotation @ arm - [0.3, 0.2, 1.0]
-    mass = effective_mass(body, arm, state.rotation.T @ away / np.linalg.norm(away))
-    k = mass * frequency**2 if frequency else SCENE["string.stiffness"]
+
+    def expected(state: State) -> list[float]:
+        """k and c of the body as it is, in this state."""
+        body = simulation.setup.body
+        arm = np.array([0.0, 0.05, 0.0]) * SCENE["scale"] - body.center_of_mass
+        away = state.position + state.rotation @ arm - [0.3, 0.2, 1.0]
+        mass = effective_mass(body, arm, state.rotation.T @ away / np.linalg.norm(away))
+        k = mass * frequency**2 if frequency else SCENE["string.stiffness"]
+        return [k, 2 * 0.7 * math.sqrt(k * mass)]
+
+    first = expected(simulation.state)
     for time_ns in (0, SECOND):
         simulation.advance(time_ns)
-        assert simulation.string.stiffness == pytest.approx(k, rel=1e-12)
-        assert simulation.string.damping == pytest.approx(2 * 0.7 * math.sqrt(k * mass), rel=1e-12)
+        assert [simulation.string.stiffness, simulation.string.damping] == pytest.approx(first, rel=1e-12)
     # A change of the body takes them anew, for the body as it is then.
     simulation.submit(Change({}, lambda: scenario.with_changes({"mass": 5.0}).setup))
-    state = simulation.state
+    then = simulation.state
     simulation.advance(SECOND + 1)
-    heavy = simulation.setup.body
-    arm = np.array([0.0, 0.05, 0.0]) * SCENE["scale"] - heavy.center_of_mass
-    away = state.position + state.rotation @ arm - [0.3, 0.2, 1.0]
-    mass = effective_mass(heavy, arm, state.rotation.T @ away / np.linalg.norm(away))
-    k = mass * frequency**2 if frequency else SCENE["string.stiffness"]
-    assert simulation.string.stiffness == pytest.approx(k, rel=1e-12)
-    assert simulation.string.damping == pytest.approx(2 * 0.7 * math.sqrt(k * mass), rel=1e-12)
+    assert [simulation.string.stiffness, simulation.string.damping] == pytest.approx(expected(then), rel=1e-12)
 
 
 def test_with_a_frequency_a_nut_and_a_satellite_are_pulled_alike():
@@ -272,11 +255,8 @@ def test_reset_ties_the_string_as_its_parameters_say():
     ("read", "frame", "point", "reason"),
     [
         (string_target, "body", (0, 0, 0), "frame"),
-        (string_target, "world@com", (0, 0, 0), "frame"),
         (string_target, "world", (math.nan, 0, 0), "nonfinite"),
-        (string_target, "world", (0, math.inf, 0), "nonfinite"),
         (string_target, "world", (1e101, 0, 0), "magnitude"),
-        (string_attach, "nowhere", (0, 0, 0), "frame"),
         (string_attach, "body/mesh/", (0, 0, 0), "frame"),
         (string_attach, "body", (0, 0, -math.inf), "nonfinite"),
         (string_attach, "body/mesh", (0, 0, 1e300), "magnitude"),

@@ -45,9 +45,6 @@ FASTEST = 5e5
 µs.
 """
 
-RADIANS_A_STEP = 1.5
-"""That a step of a series covers: measured 1 to 3.5 from accuracy 1e-12 to 1e-3."""
-
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def steady_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
@@ -113,7 +110,6 @@ _SERIES_OF_MOTION = Method(
     motion_steps,
     "auto: taylor of degree {degree_of_motion}, loads that depend on the attitude",
     workspace=motion_workspace,
-    radians=RADIANS_A_STEP,
 )
 
 _BY_KIND = {
@@ -126,7 +122,6 @@ _BY_KIND = {
         spin_steps,
         "auto: taylor of degree {degree}, the loads turn with the body",
         workspace=spin_workspace,
-        radians=RADIANS_A_STEP,
     ),
     ANY_LOADS: _SERIES_OF_MOTION,
     SLACK_AT_REST: Method(

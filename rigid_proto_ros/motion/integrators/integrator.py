@@ -51,8 +51,7 @@ class Method:
     samples; control: CONTROL of integrators/series_steps.py. choice: what it is and why, in words, with places for
     {step_s}, for {degree} and {degree_of_motion} of series, and for {swing}, the string's fastest [rad/s]. evaluations:
     of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
-    sleeps: nothing moves. on_string: for segments with a string alone. radians: of the fastest turn or swing that a
-    step covers, about; 0 where steps don't follow it.
+    sleeps: nothing moves. on_string: for segments with a string alone.
     """
 
     way: int
@@ -62,7 +61,6 @@ class Method:
     workspace: Callable[[int], np.ndarray] | None = None
     sleeps: bool = False
     on_string: bool = False
-    radians: float = 0.0
 
 
 @dataclass(frozen=True)
