@@ -12,9 +12,17 @@ import numpy as np
 from ..base.compilation import njit
 from ..base.errors import MeshError
 from ..base.rotation import length, times
-from ..mesh.holes import fan, rims
-from ..mesh.nesting import component_nesting
-from ..mesh.topology import Topology, component_sums, joined_sets, mesh_topology, referenced_extent, surplus_copies
+from ..mesh.intersection import component_nesting
+from ..mesh.topology import (
+    Topology,
+    component_sums,
+    fan,
+    joined_sets,
+    mesh_topology,
+    referenced_extent,
+    rims,
+    surplus_copies,
+)
 from ..mesh.union import counted_once, united_surface
 from .verdict import MAX_NESTED_COMPONENTS, counted
 

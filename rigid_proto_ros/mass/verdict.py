@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import MeshError
-from ..mesh.crossing import self_crossings
-from ..mesh.holes import fan, rims
-from ..mesh.nesting import Nesting, component_nesting
+from ..mesh.intersection import Nesting, component_nesting, self_crossings
 from ..mesh.topology import (
     Components,
     Topology,
     component_sums,
+    fan,
     mesh_topology,
     referenced_extent,
+    rims,
     surplus_copies,
 )
 from ..mesh.union import can_unite, counted_once, united_volume

@@ -11,7 +11,7 @@ from judged_meshes import body, codes
 from mass_solids import box, sphere
 from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES
 
-from rigid_proto_ros.mesh.crossing import crossing_components, self_crossings, triangles_cross
+from rigid_proto_ros.mesh.intersection import crossing_components, self_crossings, triangles_cross
 from rigid_proto_ros.mesh.topology import mesh_topology
 
 

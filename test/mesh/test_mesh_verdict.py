@@ -16,7 +16,7 @@ from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.moments import solid_moments
 from rigid_proto_ros.mass.repair import RepairedSurface
 from rigid_proto_ros.mass.verdict import unit_suspicion
-from rigid_proto_ros.mesh import nesting as mesh_topology_nesting
+from rigid_proto_ros.mesh import intersection
 from rigid_proto_ros.mesh.hull import box_surface, convex_hull
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.mesh.topology import mesh_topology
@@ -100,7 +100,7 @@ def test_a_ball_with_many_bubbles_is_right_as_it_is():
 
 
 def test_what_is_left_undecided_accuses_no_component_and_turns_none(monkeypatch):
-    monkeypatch.setattr(mesh_topology_nesting, "WORK_LIMIT", 3000)
+    monkeypatch.setattr(intersection, "WORK_LIMIT", 3000)
     made = body(bubbles(4), repair=True)
     assert codes(made)["components_unchecked"] == "warning"
     assert "component_inward" not in codes(made) and "repaired" not in codes(made)
