@@ -29,7 +29,6 @@ ROBOTS = ["mujoco>=3.3"]
 SWEEP = ["pyarrow>=15"]
 # Motion for other tools: tables, glTF, USD.
 EXPORT = ["pyarrow>=15", "pygltflib>=1.16,<2", "usd-core>=25.5"]
-TERMINAL = ["argcomplete>=3"]
 # Mass and tensor from recorded motion: our sessions by mcap, with which zstandard comes, other bags by rosbags.
 IDENTIFY = ["scipy>=1.11", "rosbags>=0.11,<0.12", *MCAP]
 RERUN = ["rerun-sdk>=0.41,<0.42"]
@@ -84,7 +83,7 @@ setup(
     # What inspect, simulate, replay and the page need: `uvx --from WHEEL rigid_proto workbench` works.
     install_requires=["numpy>=1.26", "numba>=0.62", "PyYAML>=6.0", "trimesh>=4.4", *MCAP, *WORKBENCH],
     extras_require={
-        "all": [*RERUN, *MCAP, *MESHES, *ROBOTS, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT, *TERMINAL],
+        "all": [*RERUN, *MCAP, *MESHES, *ROBOTS, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT],
         "ros": ROS,
         "meshes": MESHES,
         "robots": ROBOTS,
@@ -94,7 +93,6 @@ setup(
         "sweep": SWEEP,
         "identify": IDENTIFY,
         "export": EXPORT,
-        "terminal": TERMINAL,
         "test": TEST,
     },
     zip_safe=False,

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rigid_proto_ros.base.child_processes import end_with_this_thread
+from rigid_proto_ros.base.interrupts import end_with_this_thread
 
 SOURCE = Path(__file__).resolve().parent.parent
 READY_S = 180.0

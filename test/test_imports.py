@@ -47,7 +47,6 @@ ALLOWED = {
     "numpy": ORDER,
     "numba": ("base", "mesh", "mass", "motion", "simulation", "sweep", "identify.trajectories"),
     "llvmlite": ("base.simd", "base.elementary", "base.provenance"),  # comes with numba
-    "argcomplete": ("base.command_line",),
     "yaml": ("scene", "session", "sweep", "ros", "cli"),
     "trimesh": ("mesh.assembly",),
     "collada": ("mesh.assembly",),

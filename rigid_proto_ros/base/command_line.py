@@ -6,7 +6,6 @@ name, examples in --help.
 from __future__ import annotations
 
 import argparse
-import os
 import re
 from collections.abc import Callable, Iterable
 from typing import Any, NoReturn
@@ -15,28 +14,6 @@ from .errors import did_you_mean, one_of
 
 NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\Z")
 """argparse knows no exponents and takes -2e-4 for an option."""
-
-
-def completing() -> bool:
-    """Whether the shell asks for completions and nothing is to be done."""
-    return "_ARGCOMPLETE" in os.environ
-
-
-def complete(parser: argparse.ArgumentParser) -> None:
-    """Answer the shell and end the process where it asks for completions and argcomplete is installed."""
-    if completing():
-        try:
-            import argcomplete
-        except ImportError:
-            return
-        argcomplete.autocomplete(parser)
-
-
-def completes(action: argparse.Action, names: Callable[[str], Iterable[str]]) -> None:
-    """Complete an argument from what ``names`` gives for the text typed so far; the shell completes files where none
-    fits.
-    """
-    action.completer = lambda prefix, **_: list(names(prefix))  # type: ignore[attr-defined]  # argcomplete's
 
 
 class Parser(argparse.ArgumentParser):

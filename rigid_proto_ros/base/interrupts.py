@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""SIGINT and SIGTERM end a command at any moment, quietly, with 128 + their number; a second one changes nothing.
+"""SIGINT and SIGTERM end a command at any moment, quietly, with 128 + their number; a second one changes nothing. And
+a process that this one starts ends when this one has ended.
 
 A signal that comes before Python has run our first line ends the interpreter as Python does: with a traceback.
 """
@@ -14,12 +15,16 @@ import time
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, NoReturn
 
 NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
 AGAIN_S = 0.5
 """How soon an interrupt is raised anew where a library's code has swallowed it [s]."""
+
+PR_SET_PDEATHSIG = 1
+"""From linux/prctl.h."""
 
 _received = 0
 _done = False
@@ -126,3 +131,29 @@ def leave(status: int) -> NoReturn:
         with suppress(OSError, ValueError, AttributeError):  # nobody reads any more; the stream was closed
             stream.flush()
     os._exit(status)
+
+
+# Processes that this one starts
+
+
+def with_this_package() -> dict[str, str]:
+    """This process's environment in which ``python -m rigid_proto_ros...`` finds this very package, from any folder."""
+    folder = str(Path(__file__).resolve().parents[2])
+    paths = [folder, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def end_with_this_thread() -> Callable[[], None] | None:
+    """``preexec_fn`` of a child that gets SIGTERM when the thread that starts it ends, and so also when this process is
+    killed; None where the system can't do that (Linux can).
+
+    The kernel takes the end of that thread for the parent's: call it in the main thread, or in one that waits for the
+    child. Asked for before the child's program is loaded, so that no end of the parent comes too early for it.
+    """
+    if not sys.platform.startswith("linux"):
+        return None
+    import ctypes
+
+    # Loaded before the fork: between fork and exec nothing may be imported.
+    prctl = ctypes.CDLL(None).prctl
+    return lambda: prctl(PR_SET_PDEATHSIG, signal.SIGTERM)

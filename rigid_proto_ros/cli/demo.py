@@ -12,8 +12,8 @@ import sys
 import time
 from pathlib import Path
 
-from ..base.child_processes import end_with_this_thread, with_this_package
 from ..base.errors import InputError
+from ..base.interrupts import end_with_this_thread, with_this_package
 from .options import add_mesh
 
 GRACE_S = 5.0

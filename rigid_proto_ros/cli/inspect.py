@@ -9,8 +9,6 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..base.bundled import body_names
-from ..base.command_line import completes
 from ..base.errors import InputError
 from ..base.progress import Progress
 from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
@@ -55,10 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Mass, centre of mass and inertia of a mesh under every model; a mesh that encloses no volume is refused."
     )
-    mesh = parser.add_argument(
+    parser.add_argument(
         "mesh", nargs="*", metavar="MESH", help="a path, package:// URI or bundled name; several are inspected in turn"
     )
-    completes(mesh, lambda _: body_names())
     parser.add_argument(
         "--density", type=number_or_link, action="append", metavar="D",
         help=f"kg/m³ (default {DENSITY:g}); with --compare LINK=D is one link's, and may be repeated",

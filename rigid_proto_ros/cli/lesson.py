@@ -7,8 +7,6 @@ import argparse
 import math
 import sys
 
-from ..base.bundled import scene_names
-from ..base.command_line import completes
 from ..base.errors import InputError, is_missing
 from ..base.files import output_file, whole_file
 from ..base.progress import Progress
@@ -21,8 +19,7 @@ EXAMPLES = (("rigid_proto lesson t_handle --html out/t_handle.html", "for a clas
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    name = parser.add_argument("name", metavar="NAME", help="a lesson: the name of a bundled scene")
-    completes(name, lambda _: scene_names())
+    parser.add_argument("name", metavar="NAME", help="a lesson: the name of a bundled scene")
     parser.add_argument("--html", metavar="FILE.html", required=True, help="the file to write")
     parser.add_argument(
         "--duration", type=float, metavar="S", help="simulated seconds (default 10, or 1 s past its script)"

@@ -16,7 +16,7 @@ from typing import Any
 
 from .. import __version__
 from ..base import interrupts
-from ..base.command_line import Parser, complete, completing
+from ..base.command_line import Parser
 from ..base.errors import tell
 
 COMMANDS = {
@@ -36,7 +36,6 @@ EXAMPLES = (
     ("rigid_proto inspect hammer", "mass, COM and inertia of a bundled mesh"),
     ("rigid_proto simulate t_handle --record out/flight.rrd", "simulate a bundled scene, recorded for Rerun"),
     ("rigid_proto replay out/flight.rrd --verify", "simulate it again, and compare every state bit for bit"),
-    ('eval "$(register-python-argcomplete rigid_proto)"', "completion in bash and zsh, where argcomplete is installed"),
 )
 
 
@@ -56,12 +55,11 @@ def main(argv: list[str] | None = None) -> int:
     for name, summary in COMMANDS.items():
         command = subparsers.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
         # Only the command that runs is imported, so that each starts as fast as it can.
-        if (argv and argv[0] == name) or completing():
+        if argv and argv[0] == name:
             module = importlib.import_module(f".{name}", __package__)
             module.add_arguments(command)
             command.show_examples(module.EXAMPLES)
             command.set_defaults(run=module.run)
-    complete(parser)
     args = parser.parse_args(argv)
     program = f"rigid_proto {args.command}"
     if own_process:

@@ -5,14 +5,10 @@ from __future__ import annotations
 
 import argparse
 
-from ..base.bundled import scene_names
-from ..base.command_line import completes
-
 
 def add_scene(parser: argparse.ArgumentParser, help: str, nargs: str | None = None, default: str | None = None) -> None:
-    """SCENE.yaml: a scene by path or bundled name, completed by the shell."""
-    scene = parser.add_argument("scene", nargs=nargs, default=default, metavar="SCENE.yaml", help=help)
-    completes(scene, lambda _: scene_names())
+    """SCENE.yaml: a scene by path or bundled name."""
+    parser.add_argument("scene", nargs=nargs, default=default, metavar="SCENE.yaml", help=help)
 
 
 def add_mesh(parser: argparse.ArgumentParser, help: str = "simulate this mesh") -> None:

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.command_line import Parser, completes
+from ..base.command_line import Parser
 from ..base.errors import InputError
 from ..base.files import output_file
 from .exports import add_exports, asked, check_exports, write_exports
@@ -50,10 +50,9 @@ def add_arguments(parser: Parser) -> None:
         metavar="S",
         help="simulated seconds (default 10, or 1 past the script's last command where that is later)",
     )
-    setting = parser.add_argument(
+    parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="change a parameter; may be repeated"
     )
-    completes(setting, _settings)
     parser.add_argument("--record", metavar="FILE.rrd", help="record the run for Rerun")
     parser.add_argument("--bag", metavar="FILE.mcap", help="record the run as a bag of the node's topics")
     add_json(parser)
@@ -67,21 +66,6 @@ def _instead_of(option: str) -> str:
 
     name = option.removeprefix("--").replace("-", "_")
     return f"a parameter is set by --set {name}=VALUE" if name in PARAMETERS else ""
-
-
-def _settings(begun: str) -> list[str]:
-    """What --set may be given, as far as ``begun`` says: names, then the values of the one that is named."""
-    from ..base.bundled import body_names
-    from ..scene.parameters import PARAMETERS
-
-    name, equals, _ = begun.partition("=")
-    parameter = PARAMETERS.get(name)
-    if not equals or parameter is None:
-        return [f"{name}=" for name in PARAMETERS]
-    values = ("false", "true") if parameter.type.startswith("bool") else ()
-    if name == "mesh":
-        values = tuple(body_names())
-    return [f"{name}={value}" for value in (*values, *filter(None, parameter.choices))]
 
 
 def run(args: argparse.Namespace) -> int:

@@ -9,8 +9,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.bundled import study_names
-from ..base.command_line import completes
 from ..base.errors import InputError
 from .options import add_json
 
@@ -25,8 +23,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    study = parser.add_argument("study", metavar="STUDY.yaml", help="a study file, or the name of a bundled study")
-    completes(study, lambda _: study_names())
+    parser.add_argument("study", metavar="STUDY.yaml", help="a study file, or the name of a bundled study")
     parser.add_argument("-o", "--output", metavar="FILE.parquet", help="the table (default: the study's name.parquet)")
     parser.add_argument("--row", type=int, metavar="N", help="simulate one row only")
     parser.add_argument(

@@ -12,8 +12,8 @@ from functools import cache, cached_property
 import numpy as np
 from numba import from_dtype, int64, types
 
-from ..base.borrowed_views import copy_numbers
 from ..base.compilation import njit
+from ..base.records import copy_numbers
 from ..base.rotation import quaternion_of_axes, rotate_inverse
 from ..mass.tensor import principal_axes_kernel
 from ..motion import body as of_body

@@ -13,8 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.child_processes import end_with_this_thread, with_this_package
 from ..base.errors import CommandRefused
+from ..base.interrupts import end_with_this_thread, with_this_package
 from ..motion.frames import parse_frame
 from ..motion.integrators import INTEGRATORS, auto
 from ..motion.integrators.stepping import method_table, provide_kernel

@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 from urllib.parse import quote
 
-from ..base.child_processes import end_with_this_thread
 from ..base.errors import is_missing
+from ..base.interrupts import end_with_this_thread
 from .ports import LOOPBACK, PortTakenError, listens
 
 STOP_TIMEOUT_S = 1.0

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from rclpy.utilities import remove_ros_args
 
-from ..base.command_line import Parser, complete
+from ..base.command_line import Parser
 from ..base.errors import InputError
 from ..scene.offline import scene_values
 from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
@@ -49,7 +49,6 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
         parser.epilog = f"{_parameter_help()}\n\n{parser.epilog}"
     if own and not any(word.startswith("-") for word in own):
         raise InputError(own[0], f"not an option; a scene is given by --ros-args --params-file {own[0]}")
-    complete(parser)
     return parser.parse_args(own)
 
 

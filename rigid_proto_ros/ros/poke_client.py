@@ -17,7 +17,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from ..base import interrupts
-from ..base.command_line import Parser, complete, completes
+from ..base.command_line import Parser
 from ..base.errors import InputError, tell
 
 if TYPE_CHECKING:
@@ -66,10 +66,9 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
         usage="poke_client (SCRIPT.yaml | poke ... | wrench ...) [--reset] [--lead S] [--node NAME]",
         examples=EXAMPLES,
     )
-    what = parser.add_argument(
+    parser.add_argument(
         "what", metavar="SCRIPT.yaml | poke | wrench", help="a script file, or one command given by the options below"
     )
-    completes(what, lambda _: _ONE_LINE_COMMANDS)
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
     parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")
     parser.add_argument("--lead", type=float, default=0.2, metavar="S", help="seconds added to every t (default 0.2)")
@@ -87,7 +86,6 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     line.add_argument("--axes", choices=("world", "body"), help="axes of force and torque (default world)")
     line.add_argument("--slot", metavar="NAME", help="replace what acts in this slot, and nothing else")
     line.add_argument("--for", dest="duration", type=float, metavar="S", help="duration in seconds")
-    complete(parser)
     args = parser.parse_args(argv)
     limits = (
         ("--lead", args.lead, 3600.0),

@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.borrowed_views import borrowed, copy_numbers
 from ..base.compilation import njit
 from ..base.exact_arithmetic import exact_quotient
-from ..base.records import record_type
+from ..base.records import copy_numbers, record_type
 from ..base.simd import aligned
 from ..base.vectors import Vector
 from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
@@ -329,10 +328,8 @@ def _fly_rows(
     room: tuple[Any, ...],
 ) -> None:
     """All rows of a batch, each beside that of the references if there are any."""
-    own, references = borrowed(own), borrowed(references)
-    sample_ns, watched, stops, measures = borrowed((sample_ns, watched, stops, measures))
-    status, end_ns, stop, measured, floors = borrowed(results)
-    context, flights, tables, states, others = borrowed(room)
+    status, end_ns, stop, measured, floors = results
+    context, flights, tables, states, others = room
     # One place that flies, whichever it is: a second one would be compiled a second time.
     sides, kept, ends = (references, own), (others, states), (stops[:0], stops)
     for i in range(status.shape[0]):

@@ -13,9 +13,8 @@ import math
 
 import numpy as np
 
-from ..base.borrowed_views import copy_numbers
 from ..base.compilation import njit
-from ..base.records import record_type
+from ..base.records import copy_numbers, record_type
 from ..base.rotation import norm
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment

@@ -80,7 +80,7 @@ def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, A
     with (
         whole_file("--output", file) as beside,
         pq.ParquetWriter(beside, schema, use_dictionary=text) as writer,
-        Progress("sweep", large=progress, unit="rows") as shown,
+        Progress("sweep", shown=progress) as shown,
     ):
         try:
             while True:

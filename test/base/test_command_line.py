@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the command lines have in common: examples that are read, completion, colour on a terminal and plain text elsewhere."""
+"""What the command lines have in common: examples that are read, colour on a terminal and plain text elsewhere."""
 
 import importlib
 import json
@@ -9,7 +9,6 @@ import subprocess
 import sys
 
 import pytest
-from ros_process import command as start_of
 from ros_process import from_source
 
 from rigid_proto_ros.base.command_line import Parser
@@ -40,54 +39,18 @@ def test_examples_of_the_node_and_the_client_are_read_by_them():
         poke_client._arguments(shlex.split(example)[1:])
 
 
-@pytest.mark.parametrize(
-    ("line", "offered"),
-    [
-        ("rigid_proto si", {"simulate"}),
-        ("rigid_proto simulate book --set string.freq", {"string.frequency="}),
-        ("rigid_proto simulate book --set inertia_model=b", {"inertia_model=bounding_box"}),
-        ("rigid_proto simulate book --set gyroscopic=", {"gyroscopic=true", "gyroscopic=false"}),
-        ("rigid_proto simulate --set mesh=spinning", {"mesh=spinning_top"}),
-        ("poke_client wr", {"wrench"}),
-        ("rigid_body_node --un", {"--until"}),
-    ],
-)
-def test_the_shell_completes_commands_options_and_names(line, offered, tmp_path):
-    pytest.importorskip("argcomplete")
-    answer = tmp_path / "completions"
-    asked = {
-        "_ARGCOMPLETE": "1",
-        "COMP_LINE": line,
-        "COMP_POINT": str(len(line)),
-        "_ARGCOMPLETE_SHELL": "bash",
-        "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
-        "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
-        "_ARGCOMPLETE_IFS": "\n",
-    }
-    subprocess.run(
-        start_of(line.split()[0]),
-        env={**from_source(dict(os.environ)), **asked},
-        cwd=tmp_path,
-        check=True,
-        timeout=180,
-    )
-    assert {word.strip() for word in answer.read_text().splitlines()} == offered
-
-
-WITHOUT = """
+ON_A_TERMINAL = """
 import sys
-for name in {names!r}:
-    sys.modules[name] = None
 sys.stdout.isatty = lambda: True
 from rigid_proto_ros.cli.main import main
 sys.exit(main({words!r}))
 """
 
 
-def said(words: list[str], *missing: str, **environment: str) -> str:
-    """What a command prints to something that says it is a terminal, in a Python without these packages."""
+def said(words: list[str], **environment: str) -> str:
+    """What a command prints to something that says it is a terminal."""
     done = subprocess.run(
-        [sys.executable, "-c", WITHOUT.format(names=missing, words=words)],
+        [sys.executable, "-c", ON_A_TERMINAL.format(words=words)],
         env={**from_source(dict(os.environ)), "TERM": "xterm", **environment},
         capture_output=True,
         text=True,
@@ -100,7 +63,7 @@ def said(words: list[str], *missing: str, **environment: str) -> str:
 
 def test_a_terminal_shows_colour_and_piped_or_where_none_is_wanted_the_same_text_is_plain(capsys):
     words = ["inspect", "hammer"]
-    coloured, plain = said(words), said(words, "argcomplete", _ARGCOMPLETE="1", NO_COLOR="1")
+    coloured, plain = said(words), said(words, NO_COLOR="1")
     assert command.main(words) == 0
     assert "\x1b[" in coloured and "\x1b[" not in plain
     assert capsys.readouterr().out == plain

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from ...base.borrowed_views import copy_numbers
 from ...base.compilation import njit
+from ...base.records import copy_numbers
 from ...base.rotation import matrix_elements, norm
 from ...base.vectors import Quaternion, Vector
 from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY

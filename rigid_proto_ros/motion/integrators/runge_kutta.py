@@ -13,8 +13,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...base.borrowed_views import copy_numbers
 from ...base.compilation import njit
+from ...base.records import copy_numbers
 from ...base.rotation import normalize
 from ...base.simd import Packed, filled, four, joined, load, number, store
 from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good

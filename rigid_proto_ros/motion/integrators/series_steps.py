@@ -22,10 +22,9 @@ import math
 
 import numpy as np
 
-from ...base.borrowed_views import copy_numbers
 from ...base.compilation import njit
 from ...base.elementary import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of, logarithm
-from ...base.records import record_type
+from ...base.records import copy_numbers, record_type
 from ...base.simd import Packed, aligned, filled, four, joined, largest, load
 from ..variables import ATTITUDE, HEAT, STORED, is_good
 from .error_measure import FLOOR, WEIGHINGS, Weights, heavier, jump_of_displacement, scales
