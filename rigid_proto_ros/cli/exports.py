@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError, one_of
+from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.progress import Progress
 
@@ -31,9 +31,7 @@ HELP = {
 }
 
 ANIMATIONS = ("gltf", "usd")
-"""Files that ``--fps`` and ``--with`` are of."""
-
-PARTS = ("ghost", "string", "trail")
+"""Files that ``--fps`` is of."""
 
 DEFAULT_FPS = 30.0
 
@@ -46,7 +44,6 @@ def add_exports(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--fps", type=float, metavar="N", help=f"with --gltf or --usd: frames a second (default {DEFAULT_FPS:g})"
     )
-    group.add_argument("--with", metavar="PART,..", help=f"with --gltf or --usd: draw {', '.join(PARTS)} too")
 
 
 def asked(args: argparse.Namespace) -> dict[str, str]:
@@ -61,37 +58,14 @@ def check_exports(args: argparse.Namespace) -> None:
         if not file.lower().endswith(ENDINGS[name]):
             raise InputError(f"--{name}", file, f"a file that ends in {' or '.join(ENDINGS[name])}")
         output_file(f"--{name}", file)
-    for option in ("fps", "with"):
-        if getattr(args, option) is not None and not set(ANIMATIONS) & set(files):
-            raise InputError(f"--{option}", "needs --gltf or --usd")
+    if args.fps is not None and not set(ANIMATIONS) & set(files):
+        raise InputError("--fps", "needs --gltf or --usd")
     if args.fps is not None and not (math.isfinite(args.fps) and 1e-3 <= args.fps <= 1e5):
         raise InputError("--fps", args.fps, "frames a second, from 1e-3 to 1e5")
-    for part in _parts(args):
-        if part not in PARTS:
-            raise InputError("--with", part, one_of(part, PARTS))
+    from ..export import check_library
+
     for name in files:
-        _check_library(name)
-
-
-def _check_library(name: str) -> None:
-    """Raise InputError where what writes such a file isn't installed."""
-    if name == "parquet":
-        from ..export.table import check_parquet
-
-        check_parquet()
-    elif name == "gltf":
-        from ..export.gltf import check_gltf
-
-        check_gltf()
-    elif name == "usd":
-        from ..export.usd import check_usd
-
-        check_usd()
-
-
-def _parts(args: argparse.Namespace) -> list[str]:
-    parts = getattr(args, "with")
-    return [part.strip() for part in parts.split(",")] if parts is not None else []
+        check_library(f"--{name}")
 
 
 def write_exports(
@@ -111,35 +85,24 @@ def write_exports(
                     else:
                         table.write_parquet(files[name], columns)
                 say(f"{files[name]}: {len(record.times_ns)} states")
-    if "gltf" in files or "usd" in files:
-        _write_animations(args, files, record, source, say)
-
-
-def _write_animations(
-    args: argparse.Namespace,
-    files: dict[str, str],
-    record: FlightRecord,
-    source: Source | None,
-    say: Callable[[str], None],
-) -> None:
+    if not set(ANIMATIONS) & set(files):
+        return
     from ..export.flight_record import frames
     from ..export.tracks import tracks_of
 
     fps = args.fps or DEFAULT_FPS
     made, report = frames(record, source, fps)
-    tracks = tracks_of(made, _parts(args))
-    for name in ANIMATIONS:
-        if name not in files:
-            continue
-        lines = [report]
-        with Progress(f"writing {files[name]}"):
-            if name == "gltf":
-                from ..export.gltf import write_gltf
+    tracks = tracks_of(made)
+    if "gltf" in files:
+        from ..export.gltf import write_gltf
 
-                write_gltf(files[name], made, tracks)
-            else:
-                from ..export.usd import write_usd
+        with Progress(f"writing {files['gltf']}"):
+            write_gltf(files["gltf"], made, tracks)
+        say(f"{files['gltf']}: {report}")
+    if "usd" in files:
+        from ..export.usd import write_usd
 
-                lines += write_usd(files[name], made, tracks, fps)
-        for line in lines:
-            say(f"{files[name]}: {line}")
+        with Progress(f"writing {files['usd']}"):
+            changed = write_usd(files["usd"], made, tracks, fps)
+        for line in (report, *changed):
+            say(f"{files['usd']}: {line}")

@@ -9,9 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import InputError
-from ..picture import style
-from ..picture.backend import Backend
-from ..picture.picture import Picture
 from ..scene.offline import OfflineRun
 from ..scene.scenario import Scenario, publication_ns
 from ..session.recorded_session import RecordedSession
@@ -96,29 +93,6 @@ class FlightRecord(Observer):
     def bodies(self, kind: type[BodyChanged | GhostChanged]) -> list[tuple[int, BodySnapshot]]:
         """(time_ns, body) of each change of the body or of the ghost."""
         return [(event.time_ns, event.body) for event in self.changes if isinstance(event, kind)]
-
-    def draw(self, backend: Backend, parts: frozenset[str]) -> None:
-        """Draw the flight's picture: the body, and these parts, by name. At the time of a change the state is the one
-        before it, and so is what is drawn.
-        """
-        picture = Picture(backend, parts.__contains__, rate=1_000_000_000)
-        start_ns, drawn_ns = int(self.times_ns[0]), -1.0
-        for event in self.changes:
-            time_ns = event.time_ns
-            if isinstance(event, GhostChanged) and style.GHOST not in parts:
-                continue
-            if isinstance(event, StringChanged) and time_ns > start_ns:
-                event = event._replace(time_ns=time_ns + 1)
-            if isinstance(event, MeshChanged | BodyChanged | GhostChanged) and time_ns > start_ns:
-                self._draw_states(picture, drawn_ns, time_ns)
-                drawn_ns = time_ns
-            picture.on(event)
-        self._draw_states(picture, drawn_ns, np.inf)
-
-    def _draw_states(self, picture: Picture, after_ns: float, until_ns: float) -> None:
-        picture.draw(*self.states.between(after_ns, until_ns))
-        if picture.ghost is not None:
-            picture.draw_ghost(*self.ghosts.between(after_ns, until_ns))
 
 
 def frames(record: FlightRecord, source: Source | None, fps: float) -> tuple[FlightRecord, str]:

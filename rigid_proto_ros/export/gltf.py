@@ -13,38 +13,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
-from ..base.errors import InputError, is_missing
 from ..base.files import whole_file
 from ..picture import style
 from ..picture.backend import DrawnMesh
-from ..picture.string import POINTS
 from ..picture.style import Colour
 from ..simulation.observer import BodyChanged, BodySnapshot, GhostChanged
+from . import check_library
 from .flight_record import FlightRecord
 from .gltf_model import add_model, model_of
-from .tracks import MeshSteps, Tracks
+from .tracks import BODIES, MeshSteps, Tracks
 
 if TYPE_CHECKING:
     import pygltflib
 
 FLOAT, UNSIGNED_INT = 5126, 5125
 VERTICES, INDICES = 34962, 34963
-LINE_STRIP, TRIANGLES = 3, 4
+LINES, TRIANGLES = 1, 4
 COMPONENTS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 Y_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
 """Attitude xyzw of the root: a quarter turn about x takes z up to y up."""
-
-STRING_WIDTH, STRING_SIDES = 0.012, 8
-"""Of the body's size; corners of its cross-section."""
-
-
-def check_gltf() -> None:
-    """Raise InputError where the library isn't installed."""
-    try:
-        import pygltflib  # noqa: F401 (whether it is installed)
-    except ImportError:
-        raise InputError("--gltf", is_missing("pygltflib", "export")) from None
 
 
 @dataclass
@@ -117,43 +105,27 @@ class Document:
         )
         return len(self.gltf.materials) - 1
 
-    def mesh(
-        self,
-        name: str,
-        attributes: dict[str, int],
-        indices: int | None,
-        mode: int,
-        material: int,
-        targets: dict[str, int] | None = None,
-    ) -> int:
-        """The number of a new mesh of one primitive. targets: accessors of what morph targets add to its points, by
-        name.
-        """
+    def mesh(self, name: str, attributes: dict[str, int], indices: int | None, mode: int, material: int) -> int:
+        """The number of a new mesh of one primitive."""
         import pygltflib
 
         primitive = pygltflib.Primitive(
             attributes=pygltflib.Attributes(**attributes), indices=indices, mode=mode, material=material
         )
-        mesh = pygltflib.Mesh(name=name, primitives=[primitive])
-        if targets:
-            primitive.targets = [pygltflib.Attributes(POSITION=number) for number in targets.values()]
-            mesh.weights, mesh.extras = [0.0] * len(targets), {"targetNames": list(targets)}
-        self.gltf.meshes.append(mesh)
+        self.gltf.meshes.append(pygltflib.Mesh(name=name, primitives=[primitive]))
         return len(self.gltf.meshes) - 1
 
     def animate(
         self, node: int, path: str, seconds: np.ndarray, values: np.ndarray, interpolation: str = "LINEAR"
     ) -> None:
-        """Play values (n, c) at seconds (n,) at a node's ``translation``, ``rotation``, ``scale`` or ``weights``."""
+        """Play values (n, c) at seconds (n,) at a node's ``translation``, ``rotation`` or ``scale``."""
         import pygltflib
 
         animation = self.gltf.animations[0]
-        if path == "rotation":
-            values = _unit(values)
         key = seconds.tobytes()
         if key not in self.inputs:
             self.inputs[key] = self.accessor(seconds, bounds=True)
-        output = self.accessor(values.ravel() if path == "weights" else values)
+        output = self.accessor(values)
         sampler = pygltflib.AnimationSampler(input=self.inputs[key], output=output, interpolation=interpolation)
         target = pygltflib.AnimationChannelTarget(node=node, path=path)
         animation.channels.append(pygltflib.AnimationChannel(sampler=len(animation.samplers), target=target))
@@ -168,8 +140,8 @@ class Document:
 
 
 def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
-    """Write the body, and ghost, string and path of the centre of mass where the tracks have them."""
-    check_gltf()
+    """Write the body, and ghost and string where there are any."""
+    check_library("--gltf")
     import pygltflib
 
     document = Document(
@@ -183,66 +155,46 @@ def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
     )
     root = document.node("flight", None, rotation=Y_UP)
     document.gltf.nodes[root].extras = {"first_time_s": record.times_ns[0] * 1e-9}
-    surfaces: dict[int, tuple[dict[str, int], int]] = {}
-    for name, part, mesh, kind in (
-        ("body", style.BODY, style.BODY_MESH, BodyChanged),
-        ("ghost", style.GHOST, style.GHOST_MESH, GhostChanged),
-    ):
+    for name, part, mesh in BODIES:
         times_ns, positions, attitudes = tracks.poses(part)
         if not len(times_ns):
             continue
         seconds = document.seconds(times_ns)
-        node = document.node(name, root, translation=positions[0].tolist(), rotation=_unit(attitudes[:1])[0].tolist())
+        node = document.node(name, root, translation=positions[0].tolist(), rotation=attitudes[0].tolist())
+        kind = BodyChanged if name == "body" else GhostChanged
         document.gltf.nodes[node].extras = _mass_properties(record.bodies(kind)[0][1])
         document.animate(node, "translation", seconds, positions)
         document.animate(node, "rotation", seconds, attitudes)
-        model = model_of(record) if kind is BodyChanged else None
-        _draw_meshes(document, node, name, tracks.meshes(mesh), style.STYLES[mesh], surfaces, model)
+        steps = tracks.mesh_steps(mesh)
+        if steps is not None:
+            _draw_mesh(document, node, name, steps, style.STYLES[mesh], model_of(record) if name == "body" else None)
         if times_ns[0] > record.times_ns[0]:
             # A ghost that comes in flight is of no size before.
             begins = np.array([0.0, seconds[0]], np.float32)
             document.animate_steps(node, begins, scale=np.array([np.zeros(3), np.ones(3)]))
-    _draw_string(document, root, tracks.string, STRING_WIDTH * tracks.size)
-    if len(tracks.trail) > 1:
-        points = document.accessor(tracks.trail, VERTICES, bounds=True)
-        material = document.material("trail", style.TRAIL_COLOUR)
-        document.node("trail", root, mesh=document.mesh("trail", {"POSITION": points}, None, LINE_STRIP, material))
+    _draw_string(document, root, tracks.string)
     _save(document, file)
 
 
-def _unit(attitudes: np.ndarray) -> np.ndarray:
-    return attitudes / np.linalg.norm(attitudes, axis=1, keepdims=True)
-
-
-def _draw_meshes(
+def _draw_mesh(
     document: Document,
     body: int,
     name: str,
-    meshes: list[MeshSteps],
+    steps: MeshSteps,
     look: style.Style,
-    surfaces: dict[int, tuple[dict[str, int], int]],
     model: tuple[bytes, np.ndarray] | None,
 ) -> None:
-    """A node for each mesh that the body is drawn as, below the body's; model: as ``model_of`` has it, in its place."""
-    if not meshes:
-        return
+    """A node below the body's that has its mesh, or the ``model`` as ``model_of`` has it."""
+    node = document.node(f"{name} mesh", body)
+    document.animate_steps(node, document.seconds(steps.times_ns), scale=steps.scales, translation=steps.positions)
     if model is not None:
         data, middle = model
-        (steps,) = meshes
-        frame = document.node(f"{name} mesh", body)
-        document.animate_steps(frame, document.seconds(steps.times_ns), scale=steps.scales, translation=steps.positions)
-        document.node("model", frame, translation=(-middle).tolist())
-        below = document.gltf.nodes[-1]
+        below = document.gltf.nodes[document.node("model", node, translation=(-middle).tolist())]
         below.children += add_model(document.gltf, document.data, type(document.gltf)().load_from_bytes(data))
         return
     material = document.material(name, look.colours[0], look.opacity)
-    for number, steps in enumerate(meshes, 1):
-        surface = steps.surface
-        if id(surface) not in surfaces:
-            surfaces[id(surface)] = _surface(document, surface)
-        mesh = document.mesh(f"{name} mesh", *surfaces[id(surface)], TRIANGLES, material)
-        node = document.node(f"{name} mesh" if number == 1 else f"{name} mesh {number}", body, mesh=mesh)
-        document.animate_steps(node, document.seconds(steps.times_ns), scale=steps.scales, translation=steps.positions)
+    attributes, corners = _surface(document, steps.surface)
+    document.gltf.nodes[node].mesh = document.mesh(f"{name} mesh", attributes, corners, TRIANGLES, material)
 
 
 def _surface(document: Document, surface: DrawnMesh) -> tuple[dict[str, int], int]:
@@ -263,64 +215,26 @@ def _mass_properties(body: BodySnapshot) -> dict[str, Any]:
     }
 
 
-def _draw_string(document: Document, root: int, string: dict[int, np.ndarray | None], width: float) -> None:
-    """A node at the free end, whose mesh is bent and stretched by morph targets of weights from 0 to 1: from the least
-    to the most of span and sag along each axis.
+def _draw_string(document: Document, root: int, string: dict[int, np.ndarray | None]) -> None:
+    """A straight line from the free end: a unit one along x, turned and stretched to the knot; of no size while no
+    string is tied.
     """
-    strips = [own for own in string.values() if own is not None]
-    if not strips:
+    ends = np.array([own if own is not None else np.zeros((2, 3)) for own in string.values()])
+    if not ends.any():
         return
-    # Per tied frame: the free end, its way to the knot, and how far the middle hangs below the span's.
-    free, knots = np.array([own[0] for own in strips]), np.array([own[-1] for own in strips])
-    sags = [own[len(own) // 2] - 0.5 * (own[0] + own[-1]) if len(own) > 2 else np.zeros(3) for own in strips]
-    forms = np.hstack([knots - free, sags])
-    # Without a string it stays as it was, unseen.
-    tied = np.array([own is not None for own in string.values()])
-    known = np.clip(np.cumsum(tied) - 1, 0, None)
-    free, forms = free[known], forms[known]
-    low, high = forms.min(axis=0), forms.max(axis=0)
-    along = np.linspace(0.0, 1.0, POINTS if forms[:, 3:].any() else 2)
-    shares = np.column_stack([along] * 3 + [4.0 * along * (1.0 - along)] * 3)
-    around = _cross_sections()
-    ways = np.vstack([np.eye(3), np.eye(3)])
-    centres = (shares * low) @ ways
-    points = (centres[:, np.newaxis] + 0.5 * width * around).reshape(-1, 3)
-    moved = np.flatnonzero(high > low)
-    targets = {
-        f"{'span' if k < 3 else 'sag'} {'xyz'[k % 3]}": document.accessor(
-            np.repeat(shares[:, k] * (high - low)[k], len(around))[:, np.newaxis] * ways[k], VERTICES, bounds=True
-        )
-        for k in moved.tolist()
-    }
-    attributes = {
-        "POSITION": document.accessor(points, VERTICES, bounds=True),
-        "NORMAL": document.accessor(np.tile(around, (len(along), 1)), VERTICES),
-    }
-    corners = document.accessor(_sides(len(along)).ravel(), INDICES)
+    spans = ends[:, 1] - ends[:, 0]
+    lengths = np.linalg.norm(spans, axis=1)
+    directions = spans / np.where(lengths > 0.0, lengths, 1.0)[:, np.newaxis]
+    # The shortest turn from x; opposite to x half a turn about z, and none of what has no direction.
+    turns = np.column_stack([np.zeros(len(spans)), -directions[:, 2], directions[:, 1], 1.0 + directions[:, 0]])
+    turns[np.linalg.norm(turns, axis=1) < 1e-9] = [0.0, 0.0, 1.0, 0.0]
+    points = document.accessor(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), VERTICES, bounds=True)
     material = document.material("string", style.STRING_COLOUR)
-    mesh = document.mesh("string", attributes, corners, TRIANGLES, material, targets)
-    node = document.node("string", root, mesh=mesh)
+    node = document.node("string", root, mesh=document.mesh("string", {"POSITION": points}, None, LINES, material))
     seconds = document.seconds(np.array(list(string), np.int64))
-    document.animate(node, "translation", seconds, free)
-    document.animate_steps(node, seconds, scale=np.repeat(tied[:, np.newaxis], 3, axis=1).astype(float))
-    if targets:
-        document.animate(node, "weights", seconds, (forms[:, moved] - low[moved]) / (high - low)[moved])
-
-
-def _cross_sections() -> np.ndarray:
-    """Unit circles (3 STRING_SIDES, 3) about x, y and z: along whichever way it is swept, one of them is seen broad."""
-    angles = np.linspace(0.0, 2.0 * np.pi, STRING_SIDES, endpoint=False)
-    circle = np.column_stack([np.zeros(STRING_SIDES), np.cos(angles), np.sin(angles)])
-    return np.vstack([np.roll(circle, axis, axis=1) for axis in range(3)])
-
-
-def _sides(count: int) -> np.ndarray:
-    """Triangles (n, 3) between neighbours of ``count`` cross-sections."""
-    low = np.arange(3 * STRING_SIDES)
-    following = low - low % STRING_SIDES + (low + 1) % STRING_SIDES
-    high, far = low + 3 * STRING_SIDES, following + 3 * STRING_SIDES
-    piece = np.vstack([np.column_stack([low, following, far]), np.column_stack([low, far, high])])
-    return np.vstack([piece + 3 * STRING_SIDES * k for k in range(count - 1)])
+    document.animate(node, "translation", seconds, ends[:, 0])
+    document.animate(node, "rotation", seconds, turns / np.linalg.norm(turns, axis=1, keepdims=True))
+    document.animate(node, "scale", seconds, np.repeat(lengths[:, np.newaxis], 3, axis=1))
 
 
 def _save(document: Document, file: str) -> None:

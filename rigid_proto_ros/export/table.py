@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..base.errors import InputError, is_missing
 from ..base.files import whole_file
 from ..base.provenance import cpu, versions
 from ..simulation.quantities import QUANTITIES
+from . import check_library
 from .flight_record import FlightRecord
 
 STATE_COLUMNS = dict(list(QUANTITIES.items())[:13])
@@ -44,17 +44,9 @@ def write_csv(
             progress(begin + len(part), len(table))
 
 
-def check_parquet() -> None:
-    """Raise InputError where pyarrow isn't installed."""
-    try:
-        import pyarrow.parquet  # noqa: F401 (whether it is installed)
-    except ImportError:
-        raise InputError("--parquet", is_missing("pyarrow", "export")) from None
-
-
 def write_parquet(file: str, columns: dict[str, np.ndarray]) -> None:
     """Write a .parquet; its metadata hold the units, the processor and the versions."""
-    check_parquet()
+    check_library("--parquet")
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The picture as tracks: what a file for other tools holds of it, by part and time."""
+"""The picture as tracks: what a file for other tools holds of body, ghost and string, by time."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..base.errors import InputError
 from ..picture import style
 from ..picture.backend import Backend, DrawnMesh
+from ..picture.picture import Picture
 from ..picture.style import Colour
+from ..simulation.observer import BodyChanged, GhostChanged, MeshChanged, StringChanged
 from .flight_record import FlightRecord
 
-PARTS = {
-    "ghost": (style.GHOST, style.GHOST_MESH),
-    "string": (style.STRING,),
-    "trail": (style.COM_TRAIL,),
-}
-"""What may be drawn beside the body, and the picture's parts that it is."""
+BODIES = (("body", style.BODY, style.BODY_MESH), ("ghost", style.GHOST, style.GHOST_MESH))
+"""Names of what moves, the part of the picture that it is, and that of its mesh."""
+
+WANTED = frozenset({style.GHOST, style.GHOST_MESH, style.STRING})
 
 
 @dataclass
-class Track:
+class _Track:
     """A part's frame at times_ns (n,): positions (n, 3) [m], attitudes (n, 4) xyzw, and scales (n, 3) of those that are
     given one.
     """
@@ -35,9 +36,7 @@ class Track:
 
 @dataclass(frozen=True)
 class MeshSteps:
-    """One mesh of a part: from each of times_ns (n,) on it has the scales and positions (n, 3), scale 0 while another
-    one is drawn.
-    """
+    """The mesh of a part: from each of times_ns (n,) on it has the scales and positions (n, 3)."""
 
     surface: DrawnMesh
     times_ns: np.ndarray
@@ -46,15 +45,15 @@ class MeshSteps:
 
 
 class Tracks(Backend):
-    """Keeps what is drawn. string: per time the points (p, 3) of the string, or None; trail: points (m, 3)."""
+    """Keeps what is drawn. size: the least of the body's sizes [m]. string: per time its free end and its knot (2, 3),
+    or None.
+    """
 
     def __init__(self) -> None:
         self.size = 0.0
-        """The least of the body's sizes [m]."""
         self.string: dict[int, np.ndarray | None] = {}
-        self._places: dict[str, Track] = {}
-        self._meshes: dict[str, list[tuple[int, DrawnMesh | None]]] = {}
-        self._trail: list[np.ndarray] = []
+        self._places: dict[str, _Track] = {}
+        self._meshes: dict[str, DrawnMesh] = {}
         self._times = np.zeros(0, np.int64)
 
     def begin(self, times_ns: np.ndarray) -> None:
@@ -66,8 +65,12 @@ class Tracks(Backend):
         self.size = min(size, self.size or size)
 
     def mesh(self, name: str, surface: DrawnMesh | None) -> None:
-        """Another mesh from now on."""
-        self._meshes.setdefault(name, []).append((int(self._times[0]), surface))
+        """Keep the mesh; raises InputError for another one in flight."""
+        if surface is None:
+            return
+        if self._meshes.setdefault(name, surface) is not surface:
+            reason = f"the mesh changes at {self._times[0] / 1e9:.9g} s"
+            raise InputError("session", reason, "a flight of one mesh, for --gltf and --usd")
 
     def place(
         self,
@@ -77,7 +80,7 @@ class Tracks(Backend):
         scale: np.ndarray | None = None,
     ) -> None:
         """Keep the part's frame."""
-        track = self._places.setdefault(name, Track())
+        track = self._places.setdefault(name, _Track())
         track.times_ns.append(self._times)
         if positions is not None:
             track.positions.append(positions)
@@ -93,51 +96,51 @@ class Tracks(Backend):
         strips: Sequence[np.ndarray],
         colours: Sequence[Colour] | None = None,  # noqa: ARG002 (a backend gets it)
     ) -> None:
-        """Keep the string."""
+        """Keep the ends of the string."""
         if name == style.STRING:
             rest = iter(strips)
             for time_ns, count in zip(self._times.tolist(), counts.tolist(), strict=True):
-                self.string[time_ns] = next(rest) if count else None
-
-    def points(self, name: str, counts: np.ndarray, positions: np.ndarray) -> None:  # noqa: ARG002 (a backend gets it)
-        """Keep the path of the centre of mass."""
-        if name == style.COM_TRAIL:
-            self._trail.append(positions)
-
-    @property
-    def trail(self) -> np.ndarray:
-        """Its points (m, 3) [m]."""
-        return np.concatenate(self._trail) if self._trail else np.zeros((0, 3))
+                self.string[time_ns] = next(rest)[[0, -1]] if count else None
 
     def poses(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Times (n,) [ns], positions (n, 3) and attitudes (n, 4) of a body; of none there are none."""
-        track = self._places.get(name, Track())
-        if not track.times_ns:
-            return np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 4))
-        return np.concatenate(track.times_ns), np.concatenate(track.positions), np.concatenate(track.attitudes)
-
-    def meshes(self, name: str) -> list[MeshSteps]:
-        """The meshes of a part, in the order in which they are drawn."""
-        drawn = self._meshes.get(name, [])
+        """Times (n,) [ns], positions (n, 3) and unit quaternions (n, 4) of a body; of none there are none."""
         track = self._places.get(name)
         if track is None:
-            return []
-        times_ns, positions, scales = (np.concatenate(part) for part in (track.times_ns, track.positions, track.scales))
+            return np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 4))
+        times_ns, positions, attitudes = map(np.concatenate, (track.times_ns, track.positions, track.attitudes))
+        return times_ns, positions, attitudes / np.linalg.norm(attitudes, axis=1, keepdims=True)
+
+    def mesh_steps(self, name: str) -> MeshSteps | None:
+        """The mesh of a part; None of a body without one."""
+        if name not in self._meshes:
+            return None
+        track = self._places[name]
+        times_ns, positions, scales = map(np.concatenate, (track.times_ns, track.positions, track.scales))
         # Of several at one time the last counts.
         last = np.append(times_ns[1:] > times_ns[:-1], True)
-        times_ns, positions, scales = times_ns[last], positions[last], scales[last]
-        found = []
-        for k, (begin_ns, surface) in enumerate(drawn):
-            end_ns = drawn[k + 1][0] if k + 1 < len(drawn) else np.inf
-            shown = (times_ns >= begin_ns) & (times_ns < end_ns)
-            if surface is not None and shown.any():
-                steps = np.where(shown[:, np.newaxis], scales, 0.0)
-                found.append(MeshSteps(surface, times_ns, steps, positions))
-        return found
+        return MeshSteps(self._meshes[name], times_ns[last], scales[last], positions[last])
 
 
-def tracks_of(record: FlightRecord, parts: Sequence[str]) -> Tracks:
-    """The flight with these of PARTS."""
+def tracks_of(record: FlightRecord) -> Tracks:
+    """The flight's picture: body, ghost and string. At the time of a change the state is the one before it, and so is
+    what is drawn.
+    """
     tracks = Tracks()
-    record.draw(tracks, frozenset(name for part in parts for name in PARTS[part]))
+    picture = Picture(tracks, WANTED.__contains__, rate=1_000_000_000)
+    start_ns, drawn_ns = int(record.times_ns[0]), -1.0
+
+    def draw(until_ns: float) -> None:
+        picture.draw(*record.states.between(drawn_ns, until_ns))
+        if picture.ghost is not None:
+            picture.draw_ghost(*record.ghosts.between(drawn_ns, until_ns))
+
+    for event in record.changes:
+        if event.time_ns > start_ns:
+            if isinstance(event, StringChanged):
+                event = event._replace(time_ns=event.time_ns + 1)
+            elif isinstance(event, MeshChanged | BodyChanged | GhostChanged):
+                draw(event.time_ns)
+                drawn_ns = event.time_ns
+        picture.on(event)
+    draw(np.inf)
     return tracks

@@ -145,5 +145,5 @@ class SessionTab:
         made, report = frames(record, source, rate)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "take.glb"
-            write_gltf(str(file), made, tracks_of(made, ("ghost", "string")))
+            write_gltf(str(file), made, tracks_of(made))
             return file.read_bytes(), report

@@ -74,18 +74,10 @@ class Player:
             node = self._parents.get(node)
         return points
 
-    def mesh_points(self, name: str, seconds: float | None = None) -> np.ndarray:
-        """The mesh's own points; at a time with what its morph targets add then."""
+    def mesh_points(self, name: str) -> np.ndarray:
+        """The mesh's own points."""
         mesh = self.document["meshes"][self.document["nodes"][self.nodes[name]]["mesh"]]
-        primitive = mesh["primitives"][0]
-        points = self.read(primitive["attributes"]["POSITION"])
-        if seconds is not None and "targets" in primitive:
-            weights = self.value(self.nodes[name], "weights", seconds)
-            points = points + sum(
-                weight * self.read(target["POSITION"])
-                for weight, target in zip(weights, primitive["targets"], strict=True)
-            )
-        return points
+        return self.read(mesh["primitives"][0]["attributes"]["POSITION"])
 
 
 def z_up(points: np.ndarray) -> np.ndarray:

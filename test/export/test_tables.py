@@ -78,7 +78,6 @@ def test_one_json_object_is_all_that_json_prints_beside_an_export(tmp_path, caps
         (["--gltf", "a.gltf"], ("--gltf", ".glb")),
         (["--gltf", "{tmp}/a.glb", "--fps", "-1"], ("--fps", "-1.0")),
         (["--gltf", "{tmp}/a.glb", "--fps", "nan"], ("--fps", "nan")),
-        (["--gltf", "{tmp}/a.glb", "--with", "goat"], ("--with", "did you mean ghost?")),
         (["--fps", "10"], ("--fps", "needs --gltf")),
         (["--usd", "a.usdz"], ("--usd", ".usda or .usdc")),
     ],
