@@ -17,6 +17,7 @@ import numpy as np
 import viser
 
 from ..scene.parameters import parameter_named
+from ..scene.yaml_text import scalar
 
 Handle = viser.GuiInputHandle[Any]
 Values = Mapping[str, Any]
@@ -28,6 +29,9 @@ TYPING_S = 0.6
 
 TOUCHED_S = 1.0
 """[s] An input isn't written to this soon after its user touched it: it would jump back under the finger."""
+
+NEW_WEIGHT = "ballast.weight"
+"""A point mass that can be added, beside those of the scene."""
 
 
 @dataclass
@@ -80,16 +84,10 @@ class Controls:
         handle = self._gui.add_checkbox(label, False, hint=_hint(name))
         return self.bind(handle, lambda values: bool(values[name]), lambda value: {name: value})
 
-    def choice(self, name: str, label: str, options: tuple[str, ...] | None = None) -> Handle:
-        """One of the parameter's choices; an empty one is shown as a dash."""
-        options = tuple(option or "–" for option in options or parameter_named(name).choices)
-        handle = self._gui.add_dropdown(label, options, hint=_hint(name))
-
-        def shown(values: Values) -> object:
-            value = values[name] or "–"
-            return value if value in options else handle.value
-
-        return self.bind(handle, shown, lambda value: {name: "" if value == "–" else value})
+    def choice(self, name: str, label: str) -> Handle:
+        """One of the parameter's choices."""
+        handle = self._gui.add_dropdown(label, parameter_named(name).choices, hint=_hint(name))
+        return self.bind(handle, lambda values: values[name], lambda value: {name: value})
 
     def numbers(self, name: str, label: str, length: int = 1) -> Handle:
         """Numbers of any size, as text with blanks between them."""
@@ -110,6 +108,34 @@ class Controls:
             return " ".join(f"{x:.9g}" for x in np.broadcast_to(value, length))
 
         return self.bind(handle, shown, changes, TYPING_S, parameter_named(name).accepted)
+
+    def any_parameter(self) -> None:
+        """One that is chosen by name, as text."""
+        chosen: Any = self._gui.add_dropdown("Parameter", ("mass",), hint="Those that can be changed live")
+        text: Any = self._gui.add_text("Value", "", hint="Numbers with blanks between them; true or false; a name")
+
+        def shown(values: Values) -> object:
+            options = tuple(name for name in (*values, NEW_WEIGHT) if parameter_named(name).changes != "read-only")
+            if chosen.options != options:
+                weights = [name for name in options if name.startswith("ballast.")]
+                name = weights[0] if len(weights) > 1 or chosen.value not in options else chosen.value
+                chosen.options, chosen.value = options, name
+            value = values.get(chosen.value, (0.0, 0.0, 0.0, 0.0))
+            if isinstance(value, (str, bool)):
+                return str(value).lower() if isinstance(value, bool) else value
+            return " ".join(f"{x:.9g}" for x in np.ravel(value))
+
+        def changes(typed: str) -> Changes:
+            words = typed.replace(",", " ").strip(" []").split()
+            array = parameter_named(chosen.value).type == "doubles"
+            return {chosen.value: [scalar(word) for word in words] if array else scalar(typed.strip())}
+
+        @chosen.on_update
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                text.value = str(shown(self._values))
+
+        self.bind(text, shown, changes, TYPING_S)
 
     def factor(
         self,

@@ -276,15 +276,6 @@ class Flight:
         k = int(np.searchsorted(self._past.times, round(time_s * 1e9), side="right")) - 1
         self.moment_ns = int(self._past.times[max(k, 0)])
 
-    def look_back(self, seconds: float) -> None:
-        """Look at a time before the one that is shown; after it with a negative number."""
-        shown_ns = self.live.state.time_ns if self.moment_ns is None else self.moment_ns
-        time_s = shown_ns * 1e-9 - seconds
-        if self._past is not None and time_s > self.reach_s[1]:
-            self.look_at_present()
-        elif seconds > 0.0 or self._past is not None:
-            self.look_at(max(time_s, 0.0))
-
     def look_at_present(self) -> None:
         """Show the present again, which goes on if it did."""
         if self._leave_past():

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..picture import style
+from .panel import CENTRE_OF_MASS, PATHS, SEE_INTO
 from .readouts import COM_PLACE, DRIFT, ENERGY, GHOST_ANGLE, MOMENTUM, ROTATIONAL, SPEED, SPIN, SPINS, TRANSLATIONAL
 
 TURN = "set initial.angular_velocity"
@@ -21,7 +22,7 @@ class Course:
     ``drag`` and ``reset``, ``set NAME`` of a parameter, ``show NAME`` of a switch, in any order and as often as it is
     listed, then ``watch SECONDS`` of simulated time.
 
-    numbers: the readouts that the lesson speaks of. shows: parts of the picture and switches that are off otherwise.
+    numbers: the readouts that the lesson speaks of. shows: switches that are off otherwise, and style.STRING_LINE.
     labels: the parts and contacts that are named in the picture, at most three. speed: simulated seconds per second.
     """
 
@@ -42,37 +43,35 @@ COURSES = {
         labels=(style.MOMENTUM, "tip"),
     ),
     "book": Course(THREE_THROWS, (SPIN, SPINS, ENERGY, MOMENTUM, DRIFT)),
-    "com_or_rim": Course(
-        (("poke com",), ("reset", "poke away"), (ALONE,)), PUSHED, ("Centre of mass",), labels=("rim",)
-    ),
+    "com_or_rim": Course((("poke com",), ("reset", "poke away"), (ALONE,)), PUSHED, (CENTRE_OF_MASS,), labels=("rim",)),
     "dropped_term": Course(
         (("watch 2",), ("set gyroscopic", "watch 2"), ("set gyroscopic", "watch 2")),
         (DRIFT, ENERGY, MOMENTUM, SPIN, SPINS),
-        (style.OMEGA,),
+        ("Angular velocity ω",),
         (style.MOMENTUM, style.OMEGA),
     ),
     "hammer": Course(
         ((ALONE,), ("set inertia_model", ALONE), ("set inertia_model", "poke", "poke")),
         (SPEED, SPIN, COM_PLACE, ENERGY, MOMENTUM),
-        ("Centre of mass", "See into the body"),
+        (CENTRE_OF_MASS, SEE_INTO),
         (style.MOMENTUM, "head", "grip"),
     ),
     "hollow_box": Course(
         (("poke",), ("set inertia_model", "reset", "poke"), (ALONE,)),
         (SPIN, SPEED, ROTATIONAL, MOMENTUM, ENERGY),
-        ("See into the body",),
+        (SEE_INTO,),
         (style.MOMENTUM, "corner"),
     ),
     "l_bracket": Course(
         (("watch 0.9",), ("show Principal axes",), ("set gyroscopic", "watch 2")),
         (SPIN, SPINS, DRIFT, MOMENTUM, ENERGY),
-        (style.OMEGA,),
+        ("Angular velocity ω",),
         (style.MOMENTUM, style.OMEGA),
     ),
     "plumb_line": Course(
         (("watch 20",), ("set string.attach", "watch 20"), ("poke",)),
         (SPEED, SPIN, ENERGY, COM_PLACE),
-        ("Centre of mass", "See into the body", style.STRING_LINE),
+        (CENTRE_OF_MASS, SEE_INTO, style.STRING_LINE),
         (),
     ),
     "spinning_top": Course(
@@ -85,12 +84,12 @@ COURSES = {
         (SPIN, SPINS, ENERGY, MOMENTUM, DRIFT),
         labels=(style.MOMENTUM, "tip"),
     ),
-    "teapot": Course((("poke",), ("reset", "poke", "poke"), ("poke com",)), PUSHED, ("Centre of mass",), ()),
+    "teapot": Course((("poke",), ("reset", "poke", "poke"), ("poke com",)), PUSHED, (CENTRE_OF_MASS,), ()),
     "tennis_racket": Course(THREE_THROWS, (SPIN, SPINS, ENERGY, MOMENTUM, DRIFT)),
     "thrown_hammer": Course(
         (("watch 0.5",), (TURN, "reset", "watch 0.5"), ("set gravity", "watch 0.2")),
         (COM_PLACE, SPEED, SPIN, ENERGY, MOMENTUM),
-        (style.COM_TRAIL, style.TRAIL),
+        (PATHS,),
         (),
         0.1,
     ),

@@ -29,7 +29,9 @@ SPACE = f'<div class="{ANSWERS}"></div>'
 
 
 class LessonPanel:
-    """on_lesson(course) is called when one begins, or none."""
+    """on_lesson(course) is called when one begins, or none. for_class(on): class mode, with nothing but picture, lesson
+    and three buttons, begins or ends.
+    """
 
     def __init__(
         self,
@@ -38,6 +40,7 @@ class LessonPanel:
         flight: Flight,
         readings: Readings,
         on_lesson: Callable[[Course], None],
+        for_class: Callable[[bool], None],
     ) -> None:
         self._flight = flight
         self._readings = readings
@@ -46,19 +49,20 @@ class LessonPanel:
         self._progress = LessonProgress()
         self._guess: int | None = None
         self._asked = False
-        self._speed_before = 1.0
         self._due_s = 0.0
         with tabs.add_tab("Lesson"):
             choice: Any = gui.add_dropdown("Lesson", (FREE, *self._lessons), initial_value=FREE)
-            compare = gui.add_button(
-                "True tensor against its box's",
-                hint="An L-bracket and its ghost, started alike: one with its own tensor, one with its bounding box's",
-            )
             self._text = gui.add_markdown("")
             self._choices: list[Any] = [gui.add_button(letter, visible=False) for letter in "ABC"]
             self._numbers = gui.add_html("")
             self._script = gui.add_button("Do it with exact forces", visible=False, hint="Runs the lesson's script")
             self._again = gui.add_button("Begin again", visible=False, hint="The lesson from its start")
+            self._compare = gui.add_button(
+                "True tensor against its box's",
+                hint="An L-bracket and its ghost, started alike: one with its own tensor, one with its bounding box's",
+            )
+            # Here, for class mode hides the other tabs.
+            self._class: Any = gui.add_checkbox("Class mode", False, hint="In large letters; F11 fills the screen")
             gui.add_html(SPACE)
         self._choice = choice
 
@@ -67,7 +71,7 @@ class LessonPanel:
             if event.client is not None:
                 await self.begin()
 
-        @compare.on_click
+        @self._compare.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
             if self.name(COMPARED) and self.lesson is not None:
                 await self._fly(self.lesson, "", False)
@@ -77,6 +81,11 @@ class LessonPanel:
             lesson = self.lesson
             if lesson is not None and lesson.script:
                 await self._fly(lesson, example_path(lesson.script).read_text("utf-8"), False)
+
+        @self._class.on_update
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            for_class(self._class.value)
+            self._show_buttons()
 
         @self._again.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
@@ -116,11 +125,16 @@ class LessonPanel:
         """Show the chosen lesson, whose scene flies already, from its question on."""
         lesson = self.lesson
         self._guess, self._asked = None, lesson is not None
-        self._script.visible = lesson is not None and bool(lesson.script)
-        self._again.visible = lesson is not None
+        self._show_buttons()
         self._progress.begin("" if lesson is None else lesson.name)
         self._on_lesson(self.course)
         self._show_text()
+
+    def _show_buttons(self) -> None:
+        lesson, alone = self.lesson, bool(self._class.value)
+        self._choice.visible = self._compare.visible = not alone
+        self._script.visible = lesson is not None and bool(lesson.script) and not alone
+        self._again.visible = lesson is not None and not alone
 
     async def begin(self) -> None:
         """Begin the chosen lesson, or leave the body alone."""

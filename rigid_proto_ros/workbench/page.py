@@ -49,14 +49,12 @@ from .flight import Flight
 from .lesson_course import Course
 from .lesson_panel import LessonPanel
 from .page_style import ClassMode
-from .physics_tab import PhysicsTab
+from .panel import ALWAYS, AT_FIRST, CENTRE_OF_MASS, PARTS, ForcesTab, ShowTab
 from .pointer import DrawnPose, DrawnPoses, Pointer, Tools, suggested_force
 from .readouts import Readings, ReadoutTab
 from .room import Room
 from .session_tab import SessionTab
-from .show_tab import AT_FIRST, CENTRE_OF_MASS, PARTS, ShowTab
-from .status import Announcements, motion_words
-from .time_bar import TimeBar, add_keys
+from .time_bar import Announcements, TimeBar, motion_words
 
 FRAME_S = 0.02
 """[s] Between two looks at what the simulation has told."""
@@ -136,7 +134,7 @@ class Page:
         self._listening = False
         # The picture, and the hand in it.
         self.room = Room(server)
-        shown = {part for name in AT_FIRST for part in PARTS[name]} | {style.BODY_MESH, CONTACTS}
+        shown = {part for name in AT_FIRST for part in PARTS[name]} | {style.BODY_MESH, CONTACTS, *ALWAYS}
         self.backend = ViserBackend(server.scene, shown, lambda node: self.pointer.attach(node))
         self.picture = Picture(self.backend, lambda name: name in DESCRIBED or self.backend.wanted(name))
         self._com = server.scene.add_icosphere(
@@ -160,7 +158,6 @@ class Page:
         self.readings = Readings()
         self._make_panel()
         self._open = asyncio.Event()
-        self._slow_due_s = 0.0
         if lesson:
             self.lessons.name(lesson)
         server.on_client_connect(self._on_connect)
@@ -170,10 +167,11 @@ class Page:
         gui, flight, say = self.server.gui, self.flight, self.announcements.say
         self.controls = Controls(gui, flight.set, say)
         self.bar = TimeBar(gui, self.controls, flight)
+        self._class_mode = ClassMode(self.server)
         tabs = gui.add_tab_group()
-        self.lessons = LessonPanel(gui, tabs, flight, self.readings, self._on_lesson)
-        self.body_tab = BodyTab(gui, tabs, self.controls, flight, say, self._fly)
-        self.physics_tab = PhysicsTab(gui, tabs, self.controls, self.tools, flight, say)
+        self.lessons = LessonPanel(gui, tabs, flight, self.readings, self._on_lesson, self._for_class)
+        self.body_tab = BodyTab(gui, tabs, self.controls, flight, self._fly)
+        self.forces_tab = ForcesTab(gui, tabs, self.controls, self.tools, flight)
         self.readout_tab = ReadoutTab(gui, tabs, self.readings)
         self.session_tab = SessionTab(gui, tabs, flight, say)
         self.show_tab = ShowTab(
@@ -182,11 +180,8 @@ class Page:
             self._switch,
             self.backend.see_into,
             self.room.paint,
-            ClassMode(self.server).switch,
-            self._centre,
             lambda name: self.lessons.did(f"show {name}"),
         )
-        add_keys(gui, self.bar, flight, self._centre)
 
     def deliver(self, function: Callable[..., object], *arguments: object) -> None:
         """Run a function on the page's thread soon; from any thread."""
@@ -210,7 +205,8 @@ class Page:
 
     # Browsers come and go
 
-    async def _on_connect(self, _: viser.ClientHandle) -> None:
+    async def _on_connect(self, client: viser.ClientHandle) -> None:
+        self.room.look(client)
         if not self._listening:
             self._listening = True
             self._new_scene = True
@@ -259,14 +255,10 @@ class Page:
         )
         self.pointer.hold()
         self.lessons.draw(now_s)
-        self.readout_tab.draw(now_s, self._scales())
-        words = self.announcements.text or ("the past" if looking else self._words())
-        self.bar.show(self.state.time_ns * 1e-9, words)
-        if now_s >= self._slow_due_s:
-            self._slow_due_s = now_s + 1.0
-            self.announcements.lost(self.live.loop.timekeeping.real_time_lost_s)
-            if self.live.loop.simulation.failure:
-                self.announcements.trouble(self.live.loop.simulation.failure)
+        self.readout_tab.draw(now_s)
+        failure = self.live.loop.simulation.failure
+        words = "the past" if looking else f"⚠ {failure}" if failure else self._words()
+        self.bar.show(self.state.time_ns * 1e-9, self.announcements.waited_for or words)
         self.session_tab.draw()
 
     def _words(self) -> str:
@@ -336,7 +328,7 @@ class Page:
             self._furnish(scenario)
             size = self.picture.shape.size if self.picture.shape else 1.0
             self.tools.usual_force = self.tools.force = suggested_force(scenario, size)
-            self.physics_tab.show_force()
+            self.forces_tab.show_force()
         elif unit != self._unit:
             self._furnish(scenario)
         self._unit = self.backend.unit
@@ -479,16 +471,11 @@ class Page:
         unit = self.backend.unit
         self.room.furnish(unit, (low - start) / unit, (high - start) / unit, falls and not held)
 
-    def _scales(self) -> dict[str, str]:
-        cell = self.room.cell * self.backend.unit
-        rows = {"a square of the floor": f"{cell:.3g} m"}
-        for symbol, unit in (("L", style.MOMENTUM_UNIT), ("ω", style.OMEGA_UNIT)):
-            value = self.picture.scales.per_metre(symbol) * cell
-            if value > 0.0:
-                rows[f"arrow of {symbol} as long"] = f"{value:.3g} {unit}"
-        return rows
-
     # What the panel asks for
+
+    def _for_class(self, on: bool) -> None:
+        self._class_mode.switch(on)
+        self.bar.speed.visible = not on
 
     def _switch(self, part: str, shown: bool) -> None:
         if part == CENTRE_OF_MASS:

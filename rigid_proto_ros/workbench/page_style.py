@@ -62,7 +62,7 @@ color-body); margin-top: 0.4em; }} .{ANSWERS} {{ display: none; }}
 }}
 @media {MEDIUM} {{
   {_DOCKED_ROW} {{ width: 100% !important; }}
-  .mantine-Tabs-tab {{ padding: 0.6em 0.55em; }}
+  .mantine-Tabs-tab {{ padding: 0.5em 0.4em; font-size: 0.85em; }}
 }}
 @media {MEDIUM} and (orientation: landscape) {{
   {_DOCK} {{ width: {100 - BESIDE_SHARE}% !important; }}
@@ -85,8 +85,7 @@ color-body); margin-top: 0.4em; }} .{ANSWERS} {{ display: none; }}
 
 CLASS_STYLE = f"""<style>
 :root {{ --mantine-scale: 1.25; }}
-.mantine-Tabs-list, [role="tablist"], .mantine-Paper-root:has(> .mantine-Collapse-root .{MARK}) .mantine-Select-root
-  {{ display: none !important; }}
+.mantine-Tabs-list, [role="tablist"] {{ display: none !important; }}
 .{MARK} b {{ font-size: 1.7em; }}
 </style>"""
 

@@ -44,22 +44,15 @@ POKE_TRAVEL = 0.3
 MODIFIERS: tuple[Any, ...] = (None, "shift")
 """With which keys a click is heard, as viser names them."""
 
-POKE, PUSH = "Poke along the view", "Push inward"
-
 
 @dataclass
 class Tools:
-    """What the panel says about the pointer. force [N], usual_force: one that suits the body; click: POKE or PUSH, for
-    pages without a shift key.
-
-    at_com: the string pulls at the centre of mass and not at the grabbed point. frequency [rad/s]: how hard, scaled by
-    the effective mass; 0 leaves the stiffness as it is.
+    """What the panel says about the pointer. force [N], usual_force: one that suits the body. frequency [rad/s]: of the
+    string, on the effective mass.
     """
 
     force: float = 1.0
     usual_force: float = 1.0
-    click: str = POKE
-    at_com: bool = False
     frequency: float = 8.0
 
 
@@ -147,7 +140,6 @@ class Pointer:
         self._poses = poses
         self._tools = tools
         self._drag: _Drag | None = None
-        self._knot_by_hand = False
 
     @property
     def dragging(self) -> bool:
@@ -176,8 +168,7 @@ class Pointer:
     async def _on_click(self, event: viser.SceneNodePointerEvent[Any]) -> None:
         seen = self._poses.usual(time.monotonic())
         if seen is not None and event.ray_origin is not None and event.ray_direction is not None:
-            push = (event.modifier == "shift") != (self._tools.click == PUSH)
-            self.click(event.ray_origin, event.ray_direction, seen, push)
+            self.click(event.ray_origin, event.ray_direction, seen, event.modifier == "shift")
 
     def click(self, ray_origin: Iterable[float], ray_direction: Iterable[float], seen: DrawnPose, push: bool) -> bool:
         """Poke where the ray of the picture meets the body as it was ``seen``; whether it meets it."""
@@ -218,23 +209,12 @@ class Pointer:
         if seen is None:
             return
         entries: list[Entry] = []
-        if tools.frequency > 0.0 and scenario.parameters.string.frequency != tools.frequency:
+        if scenario.parameters.string.frequency != tools.frequency:
             entries.append({"set": {"string.frequency": tools.frequency}})
-        if tools.at_com or surface is None:
-            aside = 1e-6 * surface.extent if surface is not None else np.zeros(3)
-            entries += self._tie_inside(body.mesh_point((0.0, 0.0, 0.0)), aside)
-        else:
-            entries.append({"string": {"attach": numbers(body.mesh_point(numbers(seen.body_point(start))))}})
-            self._knot_by_hand = True
+        point = (0.0, 0.0, 0.0) if surface is None else numbers(seen.body_point(start))
+        entries.append({"string": {"attach": numbers(body.mesh_point(point))}})
         self._drag = _Drag(client_id, seen.world_point(end), seen, now)
         self._flight.do(*entries, _target(self._drag))
-
-    def _tie_inside(self, point: np.ndarray, aside: np.ndarray) -> list[Entry]:
-        """The knot at a point that isn't on the surface: only the parameter can say so."""
-        # A parameter that keeps its value changes nothing, so after a knot by hand it takes a step aside first.
-        places = [point + aside, point] if self._knot_by_hand else [point]
-        self._knot_by_hand = False
-        return [{"set": {"string.attach": numbers(place)}} for place in places]
 
     def pull(self, end: Iterable[float]) -> None:
         """Move the string's free end."""

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
 
@@ -102,11 +102,6 @@ class LivePlot:
                 self._handle.title = title
         self._handle.data = (ages_s, *(values / 10.0**suited.exponent).T)
 
-    def switch(self, shown: bool) -> None:
-        """Show or hide it."""
-        if self._handle.visible != shown:
-            self._handle.visible = shown
-
 
 class Readings:
     """What can be read off a flight. ``restart`` at every reset; values: as text, by name."""
@@ -123,7 +118,7 @@ class Readings:
 
     @property
     def samples(self) -> np.ndarray:
-        """(n, 11): time [s], five energies [J], ω in principal axes (3), angle of L and of the ghost [°]."""
+        """(n, 10): time [s], five energies [J], ω in principal axes (3), angle of L [°]."""
         return np.array(self._samples)
 
     def is_due(self, time_ns: int) -> bool:
@@ -144,15 +139,12 @@ class Readings:
         rotational = kinetic - translational
         gravity = -body.mass * float(scenario.setup.gravity @ state.position)
         total = kinetic + gravity + string_energy
-        apart = 0.0
-        if ghost is not None:
-            apart = float(np.degrees(attitude_angle(np.array(state.orientation_xyzw), ghost[3:7])))
         time_s = state.time_ns * 1e-9
         if self._samples and time_s < self._samples[-1][0]:
             self._samples.clear()
         if self.is_due(state.time_ns):
             energies = (translational, rotational, gravity, string_energy, total)
-            self._samples.append((time_s, *energies, *w.tolist(), angle, apart))
+            self._samples.append((time_s, *energies, *w.tolist(), angle))
         while self._samples[0][0] < time_s - PLOTTED_S:
             self._samples.popleft()
         spin = float(np.linalg.norm(state.angular_velocity_body))
@@ -169,6 +161,7 @@ class Readings:
             COM_PLACE: " ".join(f"{_seen(x):.4g}" for x in state.position) + " m",
         }
         if ghost is not None:
+            apart = float(np.degrees(attitude_angle(np.array(state.orientation_xyzw), ghost[3:7])))
             self.values[GHOST_ANGLE] = f"{apart:.0f}{style.ANGLE_UNIT}"
 
 
@@ -194,29 +187,21 @@ class ReadoutTab:
                 LivePlot(
                     gui, style.MOMENTUM_ANGLE_TITLE, style.ANGLE_UNIT, style.MOMENTUM_ANGLE_SERIES, least=FLAT_ANGLE
                 ),
-                LivePlot(
-                    gui,
-                    style.GHOST_ANGLE_TITLE,
-                    style.ANGLE_UNIT,
-                    (("angle", style.GHOST_COLOUR),),
-                    least=FLAT_ANGLE,
-                ),
             )
         self._numbers_due_s = self._plots_due_s = 0.0
 
-    def draw(self, now_s: float, more: Mapping[str, str]) -> None:
-        """Draw what is due; more: rows below the numbers."""
+    def draw(self, now_s: float) -> None:
+        """Draw what is due."""
         readings = self._readings
         if now_s >= self._numbers_due_s:
             self._numbers_due_s = now_s + NUMBERS_S
-            content = html_table((*readings.values.items(), *more.items()))
+            content = html_table(readings.values.items())
             if self._numbers.content != content:
                 self._numbers.content = content
         samples = readings.samples
         if now_s >= self._plots_due_s and len(samples) > 1:
             self._plots_due_s = now_s + PLOTS_S
             ages = samples[:, 0] - samples[-1, 0]
-            self._plots[-1].switch(GHOST_ANGLE in readings.values)
             first = 1
             for plot in self._plots:
                 plot.show(ages, samples[:, first : first + plot.columns])

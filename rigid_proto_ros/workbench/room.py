@@ -103,17 +103,25 @@ class Room:
         self._middle = 0.5 * (low + high)
         self._reach = np.maximum(half_sides - 0.5, LEASH)
         self._floor_height = float(low[2]) - LEASH
-        self.cell = nice_step(size_m / CELLS) / size_m
-        distance = max(0.5 / BODY_FILLS / SLOPE, distance_to_see(half_sides))
+        nearest = 0.5 / BODY_FILLS / SLOPE
+        distance = max(nearest, distance_to_see(half_sides))
+        # From further off, thin lines would flicker where they lie close together.
+        self.cell = nice_step(size_m * distance / nearest / CELLS) / size_m
         for grid in (self._floor, self._wall):
             grid.cell_size, grid.section_size, grid.fade_distance = self.cell, 5.0 * self.cell, 3.0 * distance
         self._wall.visible = falls
-        position = self._middle + distance * VIEW
+        self._distance = distance
         camera = self._server.initial_camera
-        camera.position, camera.look_at, camera.fov = position, self._middle, FIELD_OF_VIEW
+        camera.position, camera.look_at, camera.fov = self._middle + distance * VIEW, self._middle, FIELD_OF_VIEW
         for client in self._server.get_clients().values():
-            with client.atomic():
-                client.camera.position, client.camera.look_at = position, self._middle
+            self.look(client)
+
+    def look(self, client: viser.ClientHandle) -> None:
+        """Let this page see all that is expected; in a picture that is higher than wide, from further off."""
+        camera = client.camera
+        narrow = max(1.0, camera.image_height / max(camera.image_width, 1))
+        with client.atomic():
+            camera.position, camera.look_at = self._middle + narrow * self._distance * VIEW, self._middle
 
     def follow(self, position: np.ndarray, origin: np.ndarray, unit: float) -> np.ndarray:
         """The world point (3,) [m] at the picture's middle, for a body there, so that it stays in sight."""

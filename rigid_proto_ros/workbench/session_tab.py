@@ -52,7 +52,6 @@ class SessionTab:
                 "Seconds back", 0.0, 10.0, STEP_S, 0.0, hint="Time stands while the past is shown"
             )
             self._go_on = gui.add_button("Go on from here", disabled=True, hint="With another future")
-            self._forget = gui.add_button("Forget the previous motion", visible=False)
 
         @self._back.on_update
         async def _(event: viser.GuiEvent[Any]) -> None:
@@ -66,10 +65,6 @@ class SessionTab:
         @self._go_on.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
             await flight.go_on_from_here()
-
-        @self._forget.on_click
-        async def _(_: viser.GuiEvent[Any]) -> None:
-            flight.left = None
 
     def draw(self) -> None:
         """How far back one can go grows while the body flies."""
@@ -85,7 +80,6 @@ class SessionTab:
         if abs(self._back.value - back_s) > 0.5 * STEP_S:
             self._back.value = min(back_s, self._back.max)
         self._go_on.disabled = not looking
-        self._forget.visible = flight.left is not None
 
     def _save_folder(self) -> None:
         gui = self._gui

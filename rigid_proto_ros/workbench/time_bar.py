@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""The bar that stays in sight: time, what the body is doing, play, step, reset and speed; and the keys."""
+"""The bar that stays in sight: time, what the body is doing, play, step, reset and speed; and what is said to all."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+import time
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 import viser
 
+from ..scene.scenario import Scenario
 from .controls import Controls
 from .flight import Flight
 from .page_style import MARK
@@ -17,8 +19,8 @@ SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1"
 
 PAUSE, PLAY, STEP, RESET = "Pause", "Play", "Step", "Reset"
 
-BACK_S = 1.0
-"""[s] That backspace goes back, each time it is pressed."""
+SOON_S = 0.3
+"""[s] What takes no longer isn't said to be waited for."""
 
 
 class TimeBar:
@@ -29,7 +31,7 @@ class TimeBar:
         with gui.add_folder("Time"):
             self._line = gui.add_html("")
             play = gui.add_button_group("Simulation", (PAUSE, STEP, RESET))
-            speed = gui.add_dropdown(
+            self.speed = gui.add_dropdown(
                 "Speed", tuple(SPEEDS), initial_value="1", hint="Simulated seconds per second (real_time_factor)"
             )
         self._play: Any = play
@@ -39,9 +41,20 @@ class TimeBar:
             await {STEP: self.step, RESET: self.reset}.get(play.value, self.play_or_pause)()
 
         def shown(values: Any) -> str:
-            return next((name for name, f in SPEEDS.items() if f == values["real_time_factor"]), speed.value)
+            return next((name for name, f in SPEEDS.items() if f == values["real_time_factor"]), self.speed.value)
 
-        controls.bind(speed, shown, lambda name: {"real_time_factor": SPEEDS[name]})
+        controls.bind(self.speed, shown, lambda name: {"real_time_factor": SPEEDS[name]})
+        # Browsers send no key that is typed into an input. Letters W A S D Q E move viser's camera.
+        keys: tuple[tuple[Any, str, Callable[[], Awaitable[None]]], ...] = (
+            ("space", "Pause or resume; after rewinding, continue from there", self.play_or_pause),
+            ("arrowright", "One step; pauses first", self.step),
+            ("R", "Reset", self.reset),
+        )
+        for hotkey, does, act in keys:
+
+            @gui.add_command(does, hotkey=hotkey).on_trigger
+            async def _(_: Any, act: Callable[[], Awaitable[None]] = act) -> None:
+                await act()
 
     async def play_or_pause(self) -> None:
         """Pause or go on; from the past that is looked at, go on from there."""
@@ -52,25 +65,15 @@ class TimeBar:
 
     async def step(self) -> None:
         """One publication period on; pauses first."""
-        flight = self._flight
-        if flight.moment_ns is not None:
-            flight.look_back(-self._period_s)
-        elif flight.paused:
-            flight.step()
+        self._flight.look_at_present()
+        if self._flight.paused:
+            self._flight.step()
         else:
-            flight.pause(True)
-
-    async def step_back(self) -> None:
-        """One publication period back."""
-        self._flight.look_back(self._period_s)
+            self._flight.pause(True)
 
     async def reset(self) -> None:
         """Time 0."""
         self._flight.reset()
-
-    @property
-    def _period_s(self) -> float:
-        return max(0.005, 1.0 / float(self._flight.scenario.parameters.publish_rate))
 
     def show(self, time_s: float, what: str) -> None:
         """The time that is shown, and what the body is doing."""
@@ -83,31 +86,47 @@ class TimeBar:
             self._line.content = content
 
 
-def add_keys(gui: viser.GuiApi, bar: TimeBar, flight: Flight, centre: Callable[[], None]) -> None:
-    """Give all pages the keys, as viser's commands: Ctrl-K lists them. Browsers send no key that is typed into an
-    input. Letters W A S D Q E move viser's camera and are left to it.
-    """
+def motion_words(scenario: Scenario, tracks: Mapping[str, str], loads: int) -> str:
+    """What the body does: tracks: the last status of each, as observers hear them; loads: how many act."""
+    setup = scenario.setup
+    motion, string = tracks.get("motion", ""), tracks.get("string", "")
+    if motion == "paused":
+        return "paused"
+    if loads:
+        words = "a force acts" if loads == 1 else f"{loads} forces act"
+    elif string in ("taut", "slack"):
+        words = "string attached"
+    elif motion == "sleeping":
+        words = "at rest"
+    elif setup.gravity.any():
+        words = "free fall"
+    else:
+        words = "free rotation"
+        if setup.integrator.name in ("auto", "free_body") and not (setup.linear_damping or setup.angular_damping):
+            words += ", exact"
+    return words if setup.gyroscopic else f"{words}, without ω × Iω"
 
-    async def back() -> None:
-        flight.look_back(BACK_S)
 
-    async def now() -> None:
-        flight.look_at_present()
+class Announcements:
+    """What is said to all browsers."""
 
-    async def centred() -> None:
-        centre()
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._busy = ""
+        self._since_s = 0.0
 
-    keys: tuple[tuple[Any, str, Callable[[], Awaitable[None]]], ...] = (
-        ("space", "Pause or resume; after rewinding, continue from there", bar.play_or_pause),
-        ("arrowright", "One step forward; pauses first", bar.step),
-        ("arrowleft", "One step back", bar.step_back),
-        ("backspace", f"Rewind {BACK_S:g} s", back),
-        ("N", "Return to now after rewinding", now),
-        ("R", "Reset", bar.reset),
-        ("C", "Centre on the body", centred),
-    )
-    for hotkey, does, act in keys:
+    def say(self, text: str) -> None:
+        """A line in the corner of all browsers."""
+        for client in self._server.get_clients().values():
+            client.add_notification("Workbench", text, auto_close_seconds=10.0)
 
-        @gui.add_command(does, hotkey=hotkey).on_trigger
-        async def _(_: Any, act: Callable[[], Awaitable[None]] = act) -> None:
-            await act()
+    def busy(self, doing: str) -> None:
+        """The page is busy with this, or, where it is empty, no longer."""
+        if doing != self._busy:
+            self._busy, self._since_s = doing, time.monotonic()
+
+    @property
+    def waited_for(self) -> str:
+        """What takes time, and for how long it has; empty for nothing."""
+        since_s = time.monotonic() - self._since_s
+        return f"{self._busy} … {since_s:.0f} s" if self._busy and since_s > SOON_S else ""

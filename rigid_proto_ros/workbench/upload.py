@@ -224,8 +224,7 @@ class UploadFolder:
             )
             self._size = gui.add_markdown("", visible=False)
             self._as_it_is = gui.add_button("Simulate it", visible=False)
-            self._repaired = gui.add_button("Simulate it repaired", visible=False)
-            self._hull = gui.add_button("Simulate its hull", visible=False)
+            self._stand_in: Any = gui.add_button_group("Simulate", ("it repaired", "its hull"), visible=False)
 
         @button.on_upload
         async def _(_: viser.GuiEvent[Any]) -> None:
@@ -235,16 +234,14 @@ class UploadFolder:
         async def _(_: viser.GuiEvent[Any]) -> None:
             self._show_size()
 
-        ways: tuple[tuple[viser.GuiButtonHandle, dict[str, object]], ...] = (
-            (self._as_it_is, {}),
-            (self._repaired, {"mesh_repair": True}),
-            (self._hull, {"mesh_fallback": "hull"}),
-        )
-        for way, stand_in in ways:
+        @self._as_it_is.on_click
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            await self._fly({})
 
-            @way.on_click
-            async def _(_: viser.GuiEvent[Any], stand_in: dict[str, object] = stand_in) -> None:
-                await self._fly(stand_in)
+        @self._stand_in.on_click
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            repaired = self._stand_in.value == "it repaired"
+            await self._fly({"mesh_repair": True} if repaired else {"mesh_fallback": "hull"})
 
     async def take(self, name: str, content: bytes) -> None:
         """Judge a file, and say what is found of it."""
@@ -267,7 +264,7 @@ class UploadFolder:
         for handle in (self._unit, self._up, self._size):
             handle.visible = upload is not None
         self._as_it_is.visible = upload is not None and not upload.refusal
-        self._repaired.visible = self._hull.visible = upload is not None and bool(upload.refusal)
+        self._stand_in.visible = upload is not None and bool(upload.refusal)
 
     def _show_size(self) -> None:
         if self.present is not None:

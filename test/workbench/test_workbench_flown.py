@@ -30,9 +30,9 @@ from rigid_proto_ros.workbench import page as page_module
 from rigid_proto_ros.workbench.flight import COMPILING
 from rigid_proto_ros.workbench.lesson_course import COURSES
 from rigid_proto_ros.workbench.lesson_panel import FREE
+from rigid_proto_ros.workbench.panel import SEE_INTO
 from rigid_proto_ros.workbench.readouts import ENERGY, PLOTTED_S, SPEED
-from rigid_proto_ros.workbench.show_tab import SEE_INTO
-from rigid_proto_ros.workbench.status import motion_words
+from rigid_proto_ros.workbench.time_bar import motion_words
 
 
 @pytest.fixture(scope="module")
@@ -231,7 +231,7 @@ def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -
         ({}, {"motion": "paused"}, "paused"),
         ({}, {"motion": "sleeping"}, "at rest"),
         ({"gravity": [0.0, 0.0, -9.81]}, {"motion": "flying"}, "free fall"),
-        ({"gyroscopic": False, "integrator": "rk4"}, {"motion": "flying"}, "free rotation, rk4, without ω × Iω"),
+        ({"gyroscopic": False, "integrator": "rk4"}, {"motion": "flying"}, "free rotation, without ω × Iω"),
     ],
 )
 def test_the_status_line_says_in_plain_words_what_the_body_does(values, tracks, words) -> None:

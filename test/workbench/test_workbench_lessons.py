@@ -23,10 +23,11 @@ from rigid_proto_ros.scene.lessons import SENTENCES, lesson
 from rigid_proto_ros.workbench import controls, lesson_panel, readouts
 from rigid_proto_ros.workbench import page as page_module
 from rigid_proto_ros.workbench.lesson_course import COURSES
+from rigid_proto_ros.workbench.panel import PATHS
 
 Z = np.array([0.0, 0.0, 1.0])
 GYROSCOPIC = "Gyroscopic term ω × Iω"
-SPIN, MODEL, WEIGHT = "Initial spin [rad/s]", "Model", "Its mass [kg]"
+SPIN, MODEL, WEIGHT = "Initial spin [rad/s]", "Model", "Value"
 
 
 class User(FlownPage):
@@ -109,9 +110,8 @@ def ballast_flips(user: User) -> None:
 
 
 def ballast_on(user: User) -> None:
-    assert user.widget("Weight").value == "tip" and user.widget("At x y z").value == "0 0 0.07"
-    user.set(WEIGHT, "0.03")
-    user.press("Put it there")
+    assert user.widget("Parameter").value == "ballast.tip" and user.widget(WEIGHT).value == "0 0 0 0.07"
+    user.set(WEIGHT, "0.03 0 0 0.07")
     user.fly(12.0)
     x, y, z = user.body.inertia.diagonal()
     assert z < y < x
@@ -119,8 +119,7 @@ def ballast_on(user: User) -> None:
 
 
 def ballast_off(user: User) -> None:
-    user.set(WEIGHT, "0")
-    user.press("Put it there")
+    user.set(WEIGHT, "0 0 0 0.07")
     since = user.time[-1]
     user.fly(10.0)
     assert np.count_nonzero(user.flips(2) > since) >= 3
@@ -428,7 +427,7 @@ def parabola_miss(path: np.ndarray) -> float:
 
 
 def hammer_paths(user: User) -> None:
-    assert all(user.widget(name).value for name in ("Path of the COM", "Path of a point"))
+    assert user.widget(PATHS).value
     user.fly(1.0)
     com, grip = (path_of(user, name) for name in (style.COM_TRAIL, style.TRAIL))
     assert min(len(com), len(grip)) > 50

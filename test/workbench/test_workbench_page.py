@@ -214,7 +214,7 @@ def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_button
     page.until(lambda: not page.page.get_by_role("tab", name="Body").is_visible(), "page without tabs")
     buttons = [b.inner_text() for b in page.page.locator(".mantine-Button-root").all() if b.is_visible()]
     assert {"Pause", "Step", "Reset"} <= set(buttons)
-    page.flown.page.show_tab._class.value = False
+    page.page.get_by_label("Class mode", exact=True).first.click(force=True)
     page.until(lambda: page.page.get_by_role("tab", name="Body").is_visible(), "tabs again")
 
 

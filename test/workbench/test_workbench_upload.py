@@ -207,7 +207,12 @@ def test_the_end_of_the_process_removes_its_uploads(place: Path) -> None:
         "import sys; from rigid_proto_ros.workbench.upload import Uploads; u = Uploads()\n"
         f"print(u.take('x.obj', open({str(resolve_mesh('book'))!r}, 'rb').read()).path)\n1/0\n"
     )
-    environment = {**os.environ, "TMPDIR": str(place), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    environment = {
+        **os.environ,
+        "NUMBA_DISABLE_JIT": "1",
+        "TMPDIR": str(place),
+        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+    }
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
     assert Path(done.stdout.strip()).parent.parent.parent == place
     assert not list(place.iterdir())
