@@ -10,7 +10,6 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.command_codec import string_attach, string_target
 from rigid_proto_ros.scene.scenario import check_inertia, make_scenario, mesh_sha256_of
-from rigid_proto_ros.session.messages import PROJECTIONS
 from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, ReleaseString, WrenchCommand
 from rigid_proto_ros.simulation.observer import Reset
@@ -28,36 +27,27 @@ class _LinesSinceReset(EventLines):
 
 
 class HandSession:
-    """A body under hands. ``heard`` gets (what, *content) as a client of the node would: scene, event, state."""
+    """A body under hands."""
 
-    def __init__(self, values: dict, heard=lambda what, *content: None) -> None:
+    def __init__(self, values: dict) -> None:
         self.scenario = make_scenario(values)
         self.first = self.scenario
-        self.heard = heard
         self.log = _LinesSinceReset()
         self.simulation = Simulation(self.scenario.setup, self.log)
         self.now_ns = 0
-        self._told = 0
-        heard("scene", self.scenario.text)
 
     def wait(self, time_ns: int, every_ns: int = 10_000_000) -> None:
         """Let time pass, states published as it does."""
         until_ns = self.now_ns + time_ns
         while self.now_ns < until_ns:
             self.now_ns = min(until_ns, (self.now_ns // every_ns + 1) * every_ns)
-            row = self.simulation.advance(self.now_ns).row.tolist()
+            self.simulation.advance(self.now_ns)
             assert not self.simulation.failure
-            for _, line in self.log.timed[self._told :]:
-                self.heard("event", line)
-            self._told = len(self.log.timed)
-            if self.now_ns % every_ns == 0:
-                self.heard("state", self.now_ns, PROJECTIONS["pose"](row), PROJECTIONS["twist"](row))
 
     def reset(self) -> None:
         """As the service does."""
         self.simulation.reset(self.scenario.setup)
-        self.first, self.now_ns, self._told = self.scenario, 0, 1
-        self.heard("event", self.log.lines[0])
+        self.first, self.now_ns = self.scenario, 0
 
     def load(self, held: bool, frame_id: str, force, torque=(0.0, 0.0, 0.0), stamp_ns: int = 0) -> None:
         """A message of the wrench or the poke topic."""
@@ -90,7 +80,6 @@ class HandSession:
         except InputError:
             return
         self.scenario = scenario
-        self.heard("scene", scenario.text)
         self._submit(Change(named, lambda: scenario.setup))
 
     def inertia(self, mass: float, com, tensor) -> None:
@@ -99,7 +88,6 @@ class HandSession:
 
         def apply():
             self.scenario = check_inertia(self.scenario, content)
-            self.heard("scene", self.scenario.text)
             return self.scenario.setup
 
         self._submit(Change(content, apply, "inertia"))
@@ -132,10 +120,10 @@ SCENE = {
 }
 
 
-def random_hand_session(seed: int, seconds: float, heard=lambda what, *content: None) -> HandSession:
+def random_hand_session(seed: int, seconds: float) -> HandSession:
     """Drags, clicks, sliders and pauses as hands make them, the same for a seed."""
     rng = np.random.default_rng(seed)
-    hand = HandSession(SCENE, heard)
+    hand = HandSession(SCENE)
     end_ns = round(seconds * 1e9)
     while hand.now_ns < end_ns:
         _act(hand, rng)
@@ -210,22 +198,15 @@ def _click(hand: HandSession, rng: np.random.Generator, deed: str) -> None:
 
 
 def _slide(hand: HandSession, rng: np.random.Generator) -> None:
-    slider = rng.integers(9)
-    if slider == 0:
-        hand.set(mass=float(rng.uniform(0.1, 0.3)))
-    elif slider == 1:
-        hand.set(density=float(rng.uniform(4000.0, 9000.0)))
-    elif slider == 2:
-        hand.set(scale=rng.uniform(0.8, 1.2, 3).tolist())
-    elif slider == 3:
-        hand.set(ballast__tip=[float(rng.uniform(0.0, 0.03)), 0.0, 0.0, 0.07])
-    elif slider == 4:
-        hand.set(inertia_model=str(rng.choice(["solid", "shell", "bounding_box", "points"])))
-    elif slider == 5:
-        hand.set(gravity=[0.0, 0.0, float(rng.uniform(-0.3, 0.0))], linear_damping=float(rng.uniform(0.0, 0.1)))
-    elif slider == 6:
-        hand.set(string__attached=bool(rng.random() < 0.5), string__target=(0.1 * rng.normal(size=3)).tolist())
-    elif slider == 7:
-        hand.set(string__stiffness=float(rng.uniform(0.5, 2.0)), poke_duration=float(rng.uniform(0.01, 0.1)))
-    else:
-        hand.set(gyroscopic=bool(rng.random() < 0.7))
+    changes = (
+        {"mass": float(rng.uniform(0.1, 0.3))},
+        {"density": float(rng.uniform(4000.0, 9000.0))},
+        {"scale": rng.uniform(0.8, 1.2, 3).tolist()},
+        {"ballast.tip": [float(rng.uniform(0.0, 0.03)), 0.0, 0.0, 0.07]},
+        {"inertia_model": str(rng.choice(["solid", "shell", "bounding_box", "points"]))},
+        {"gravity": [0.0, 0.0, float(rng.uniform(-0.3, 0.0))], "linear_damping": float(rng.uniform(0.0, 0.1))},
+        {"string.attached": bool(rng.random() < 0.5), "string.target": (0.1 * rng.normal(size=3)).tolist()},
+        {"string.stiffness": float(rng.uniform(0.5, 2.0)), "poke_duration": float(rng.uniform(0.01, 0.1))},
+        {"gyroscopic": bool(rng.random() < 0.7)},
+    )
+    hand.set(**changes[rng.integers(len(changes))])

@@ -127,9 +127,6 @@ class Flight:
         self.scenes_begun = 0
         self._past: RecordedSession | None = None
         self.moment_ns: int | None = None
-        self.left: RecordedSession | None = None
-        self._left_ns = 0
-        self._start: dict[str, object] = {}
         self._ran_before = False
 
     @property
@@ -216,8 +213,6 @@ class Flight:
             if speed is not None:
                 values["real_time_factor"] = speed
             self._begin(make_scenario(values), script, (self.paused and not goes_on) if paused is None else paused)
-            self._start = {}
-            self.left = None
             return True
 
         return await self._ask("preparing the scene", begin) or False
@@ -238,18 +233,9 @@ class Flight:
             self.live.pause(paused)
 
     def reset(self) -> None:
-        """Time 0 of the scene; of the one before a branch, too."""
+        """Time 0 of the scene, or of the branch."""
         self.look_at_present()
-        self.left = None
-        start, self._start = self._start, {}
-
-        def begin() -> None:
-            if start:
-                self._begin(self.scenario.with_changes(start), "", self.paused)
-            else:
-                self.live.reset()
-
-        self._soon(self._ask("", begin))
+        self._soon(self._ask("", self.live.reset))
 
     # The past
 
@@ -295,31 +281,18 @@ class Flight:
         first, last = np.searchsorted(past.times, [moment_ns - lasting_ns, moment_ns])
         return past.times[first : last + 1], past.rows[first : last + 1]
 
-    def left_row(self, time_ns: int) -> np.ndarray | None:
-        """Where the body was in the future that the last branch left, at a time of this run; None for nowhere."""
-        left = self.left
-        if left is None:
-            return None
-        k = int(np.searchsorted(left.times, self._left_ns + time_ns, side="right")) - 1
-        return left.rows[k] if 0 <= k < len(left.times) - 1 else None
-
     async def go_on_from_here(self) -> None:
         """Let simulated time go on from the moment that is looked at, with another future."""
         past, moment_ns = self._past, self.moment_ns
         if past is None or moment_ns is None:
             return
-        before = self.scenario.parameters.named()
 
         def branch() -> bool:
             values: dict[str, object] = {}
             branch = branch_at(past, moment_ns)
             values.update(read_scene_text(branch.scene).values)
             values.update(self._kept)
-            start: dict[str, object] = {name: before[name] for name in before if name.startswith("initial.")}
-            start |= {name: before[name] for name in ("string.attached", "string.attach", "string.target")}
             self._begin(make_scenario(values), json.dumps(branch.entries) if branch.entries else "", False)
-            self._start = self._start or start
-            self.left, self._left_ns = past, moment_ns
             return True
 
         if await self._ask("going back", branch):

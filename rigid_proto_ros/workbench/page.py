@@ -389,15 +389,9 @@ class Page:
         picture = self.picture
         held = self._string_energies(np.array(times), np.array(rows))
         picture.draw(np.array(times), np.array(rows))
-        ghost = self.flight.left_row(times[-1])
-        if ghost is None:
-            ghost = self._ghost_row if self.live.scenario.ghost is not None else None
-        elif picture.ghost is None and picture.body is not None:
-            picture.set_ghost(times[-1], picture.body)
+        ghost = self._ghost_row if self.live.scenario.ghost is not None else None
         if ghost is not None and picture.ghost is not None:
             picture.draw_ghost(np.array(times[-1:]), ghost[np.newaxis])
-        elif picture.ghost is not None and self.live.scenario.ghost is None:
-            picture.set_ghost(times[-1], None)
         for time_ns, row, energy in zip(times[:-1], rows[:-1], held[:-1], strict=True):
             if self.readings.is_due(time_ns):
                 self.readings.take(self._scenario, State(time_ns, row), energy, None)

@@ -24,7 +24,7 @@ import viser
 
 from ..base.errors import InputError, MeshError
 from ..mass.from_mesh import mesh_body
-from ..mass.inspection import Inspection, as_json, inspect_mesh
+from ..mass.inspection import Inspection, inspect_mesh
 from ..mesh.cache import PASSING
 from ..mesh.reading import OWN_FORMATS, load_mesh
 from .flight import Flight
@@ -61,14 +61,13 @@ SENSIBLE_DENSITY = 1000.0
 @dataclass(frozen=True)
 class Upload:
     """name: as shown. path: for the parameter ``mesh``. up: which of its axes points up most likely. inspection: what
-    is known of it; report: as ``inspect --json``.
+    is known of it.
     """
 
     name: str
     path: str
     up: str
     inspection: Inspection
-    report: dict
 
     @property
     def sides(self) -> np.ndarray:
@@ -85,7 +84,7 @@ class Upload:
         """Its size and mass in one line, its numbers being in this unit and its density SENSIBLE_DENSITY."""
         metres = UNITS[unit]
         sides = " × ".join(f"{side * metres:.3g}" for side in self.sides)
-        volume = self.report["volume"]
+        volume = self.inspection.volume
         if volume is None:
             return f"{sides} m"
         return f"{sides} m, {SENSIBLE_DENSITY * volume * metres**3:.3g} kg at {SENSIBLE_DENSITY:g} kg/m³"
@@ -148,7 +147,7 @@ class Uploads:
             raise
         said = UP_COMMENT.search(data[:4096]) if suffix == "obj" else None
         up = said[1].decode().lower() if said else "y" if suffix in Y_UP else "z"
-        return Upload(name, str(path), up, inspection, as_json(inspection))
+        return Upload(name, str(path), up, inspection)
 
     def keep(self, paths: Sequence[str]) -> None:
         """Remove all but these files."""
