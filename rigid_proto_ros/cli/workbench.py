@@ -33,17 +33,22 @@ def run(args: argparse.Namespace) -> int:
     from ..base.interrupts import leave
     from ..live.shutdown import Shutdown
     from ..rerun_view.ports import LOOPBACK
-    from ..scene.offline import read_scene
+    from ..scene.offline import scene_values
     from ..scene.parameters import Parameters
+    from ..scene.scenario import make_scenario
+    from ..scene.scene_file import scene_file
     from ..workbench.main import serve
 
     scene = args.scene or "t_handle"
-    scenario = read_scene(scene, {"mesh": args.mesh} if args.mesh else {})
+    values = {**scene_values(scene_file(scene)), **({"mesh": args.mesh} if args.mesh else {})}
     port = args.port
-    if port is None and scenario.parameters.workbench_port != Parameters().workbench_port:
-        port = scenario.parameters.workbench_port
+    asked = Parameters().replaced(values).workbench_port
+    if port is None and asked != Parameters().workbench_port:
+        port = asked
     name = "" if args.mesh else scene
     with Shutdown() as shutdown:
-        number = serve(scenario, name, port, args.host or LOOPBACK, not args.no_browser, shutdown.wait)
+        number = serve(
+            lambda: make_scenario(values), name, port, args.host or LOOPBACK, not args.no_browser, shutdown.wait
+        )
         # The interpreter would wait for a kernel that is being compiled.
         leave(128 + number)

@@ -9,13 +9,17 @@ import time
 import webbrowser
 from collections.abc import Callable
 
+import viser
+
 from ..base.bundled import scene_names
+from ..base.compilation import notify_when_compiling
 from ..live.live_simulation import LiveSimulation
 from ..live.warm_up import warm_up
 from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
 from ..scene.parameters import Parameters
 from ..scene.scenario import Scenario
+from .flight import COMPILING
 from .page import Page
 from .server import make_server, stop_server
 
@@ -32,7 +36,7 @@ ENDED = "the program has ended; this is the last state"
 
 class Workbench:
     """Serves the page of one body until ``close``. port: the one asked for, None for the first free one from the
-    default on. lesson, anew: as Page has them.
+    default on. lesson, anew: as Page has them. server: one that serves already.
 
     Raises InputError naming ``--host`` or ``--port`` where nothing can listen there.
     """
@@ -44,12 +48,13 @@ class Workbench:
         host: str = LOOPBACK,
         lesson: str = "",
         anew: bool = False,
+        server: viser.ViserServer | None = None,
     ) -> None:
         # The physics thread shares the interpreter with the page: it waits this long for its turn at most.
         sys.setswitchinterval(TURN_S)
         title = TITLE if live.name == "rigid_body" else f"{TITLE} {live.name}"
-        self._server = make_server(title, host, port, Parameters().workbench_port)
-        self.address = f"http://{host}:{self._server.get_port()}"
+        self._server = server or make_server(title, host, port, Parameters().workbench_port)
+        self.address = address_of(self._server)
         self.page = Page(self._server, live, lesson, anew)
         self._running = asyncio.run_coroutine_threadsafe(self.page.run(), self._server.get_event_loop())
 
@@ -63,26 +68,47 @@ class Workbench:
         self.page.close()
 
 
+def address_of(server: viser.ViserServer) -> str:
+    """Where a browser finds it."""
+    return f"http://{server.get_host()}:{server.get_port()}"
+
+
 def serve(
-    scenario: Scenario,
+    read: Callable[[], Scenario],
     scene: str,
     port: int | None,
     host: str,
     opens: bool,
     wait: Callable[[], int],
 ) -> int:
-    """Fly a scenario with its page until ``wait`` returns, and return what it did. scene: its name; one of a lesson
-    begins with its question.
+    """Fly a scenario with its page until ``wait`` returns, and return what it did. read(): the scenario, whose mesh may
+    need kernels that are to be compiled: the page says so meanwhile. scene: its name; one of a lesson begins with its
+    question.
 
-    Raises InputError as Workbench does.
+    Raises InputError as Workbench does, and as ``read`` does.
     """
-    live = LiveSimulation(scenario)
-    lesson = scene if scene in scene_names() else ""
-    workbench = Workbench(live, port, host, lesson, True)
+    server = make_server(TITLE, host, port, Parameters().workbench_port)
+    told: list[str] = []
+
+    def tell() -> None:
+        if not told:
+            told.append(address_of(server))
+            print(f"The workbench is at {told[0]}   (Ctrl-C ends it)", flush=True)
+            if opens and has_display():
+                webbrowser.open(told[0])
+
+    waiting = server.gui.add_markdown(f"**{COMPILING} …**")
     try:
-        print(f"The workbench is at {workbench.address}   (Ctrl-C ends it)", flush=True)
-        if opens and has_display():
-            webbrowser.open(workbench.address)
+        with notify_when_compiling(tell):
+            scenario = read()
+        live = LiveSimulation(scenario)
+    except BaseException:
+        stop_server(server)
+        raise
+    waiting.remove()
+    workbench = Workbench(live, lesson=scene if scene in scene_names() else "", anew=True, server=server)
+    try:
+        tell()
         live.announce()
         workbench.page.flight.prepare(lambda: warm_up(scenario.setup), live.start)
         return wait()

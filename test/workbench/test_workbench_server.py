@@ -6,9 +6,11 @@ from __future__ import annotations
 import gzip
 import http.client
 import importlib.util
+import re
 import socket
 from collections.abc import Iterator
 
+import numba
 import pytest
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
@@ -17,7 +19,7 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
 from rigid_proto_ros.workbench.controls import Controls
-from rigid_proto_ros.workbench.main import TITLE
+from rigid_proto_ros.workbench.main import TITLE, serve
 from rigid_proto_ros.workbench.server import make_server, refusal, stop_server
 
 
@@ -58,6 +60,21 @@ def test_who_loses_the_race_for_a_port_serves_on_the_next_one(monkeypatch: pytes
         stop_server(server)
         with pytest.raises(InputError, match=f"--port: got {taken}"):
             make_server(TITLE, LOOPBACK, taken, taken)
+
+
+def test_the_address_is_told_while_kernels_that_the_mesh_needs_are_compiled(capsys) -> None:
+    def read():
+        assert capsys.readouterr().out == ""
+        numba.njit(lambda: 1.0)()
+        address = re.search(r"The workbench is at http://127.0.0.1:(\d+)", capsys.readouterr().out)
+        connection = http.client.HTTPConnection(LOOPBACK, int(address[1]), timeout=20)
+        connection.request("GET", "/")
+        assert connection.getresponse().status == 200
+        connection.close()
+        raise InputError("mesh", "this one", "another one")
+
+    with pytest.raises(InputError, match="another one"):
+        serve(read, "t_handle", None, LOOPBACK, opens=False, wait=lambda: 0)
 
 
 @pytest.mark.parametrize("encoding", ["gzip", "identity"])
