@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..simulation.observer import ShownLoad
-from .style import LOAD_COLOURS
 
 FIRST = 0.6
 """Body sizes of the first arrow of its kind: it reaches out of most bodies, and one four times as long can be seen."""
@@ -23,8 +22,6 @@ LEAST, LONGEST = 0.005, 3.0
 
 IMPULSE_SHOWN_NS = 150_000_000
 """[ns of simulated time] An impulse acts at an instant; its arrow stays this long so that it can be seen."""
-
-PARTS = ("force", "torque")
 
 
 class ArrowScales:
@@ -104,12 +101,6 @@ class Loads:
         if acting is not None:
             acting.end_ns = time_ns
             self._ended.append(acting)
-
-    @property
-    def kinds(self) -> list[str]:
-        """Kinds of the loads that act now, each once."""
-        kinds = {acting.load.kind for acting in self._acting.values()}
-        return [kind for kind in LOAD_COLOURS if kind in kinds]
 
     def rows(
         self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray, scales: ArrowScales, size: float, weight: float

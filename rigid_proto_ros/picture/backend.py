@@ -55,7 +55,7 @@ class Backend:
         """m strips (p, 3) of p points each; colours of each, or the style's."""
 
     def points(self, name: str, counts: np.ndarray, positions: np.ndarray) -> None:
-        """Positions (m, 3)."""
+        """Positions (m, 3); those of a trail are one of each state, and the path goes through them."""
 
     def labels(self, name: str, counts: np.ndarray, positions: np.ndarray, texts: Sequence[str]) -> None:
         """m texts at positions (m, 3)."""

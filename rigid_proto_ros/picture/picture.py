@@ -43,25 +43,8 @@ AXIS_LENGTH, PRINCIPAL_LENGTH = 0.25, 0.88
 LABEL_BEYOND = 1.06
 """Of an arrow's length: where its label stands."""
 
-TRAIL_SPACING = 1.5
-"""Of a trail's points, in their radii."""
-
-POINTS_PER_PIECE_MAX = 16
-"""Points of a trail between two states."""
-
 LINE_SIZES = 1.1
 """Body sizes that the line of a string that pulls is drawn on beyond its knot."""
-
-SKEWED = 0.1
-"""Least product of inertia of a skewed body, against the largest difference of two moments: axes some 6° off."""
-
-
-def skewed(inertia: np.ndarray) -> bool:
-    """Whether the principal axes of a tensor (3, 3) are clearly others than its own axes, so that products of inertia
-    tell.
-    """
-    products = np.abs(inertia - np.diag(np.diag(inertia))).max()
-    return bool(products > SKEWED * max(np.ptp(principal_axes(inertia)[0]), 1e-300))
 
 
 class Ticks:
@@ -77,44 +60,6 @@ class Ticks:
         before = int(ticks[0]) - 1 if self._last is None else self._last
         self._last = int(ticks[-1])
         return np.flatnonzero(np.diff(ticks, prepend=before) > 0)
-
-
-class Trail:
-    """The path of one point of the body, as points so close that they look like a line."""
-
-    def __init__(self) -> None:
-        self._last: tuple[int, np.ndarray, np.ndarray] | None = None
-
-    def between(
-        self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray, point: np.ndarray, spacing: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Counts (n,) and points (m, 3) [world] on the path from the state before to each of rows (n, 13) with
-        attitudes R (n, 3, 3).
-
-        The body point (3,) moves between two states on the cubic that has its position and velocity at both.
-        """
-        at = rows[:, 0:3] + R @ point
-        velocity = rows[:, 7:10] + np.einsum("nij,nj->ni", R, np.cross(rows[:, 10:13], point))
-        if self._last is None:
-            self._last = (int(times_ns[0]), at[0], velocity[0])
-        first_ns, first_at, first_velocity = self._last
-        h = 1e-9 * np.diff(times_ns, prepend=first_ns)[:, np.newaxis]
-        start = np.vstack([first_at, at[:-1]])
-        start_slope, end_slope = np.vstack([first_velocity, velocity[:-1]]) * h, velocity * h
-        self._last = (int(times_ns[-1]), at[-1].copy(), velocity[-1].copy())
-
-        length = np.linalg.norm(at - start, axis=1)
-        counts = np.clip(np.ceil(length / spacing), 1, POINTS_PER_PIECE_MAX).astype(int)
-        piece = np.repeat(np.arange(len(at)), counts)
-        within = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts) + 1
-        u = (within / counts[piece])[:, np.newaxis]
-        points = (
-            (1.0 + 2.0 * u) * (1.0 - u) ** 2 * start[piece]
-            + u * (1.0 - u) ** 2 * start_slope[piece]
-            + u * u * (3.0 - 2.0 * u) * at[piece]
-            - u * u * (1.0 - u) * end_slope[piece]
-        )
-        return counts, points
 
 
 class Shape:
@@ -157,7 +102,6 @@ class Picture:
     def restart(self) -> None:
         """A new run: simulated time starts again at 0; mesh, body and scales stay."""
         self.redraw()
-        self._trail, self._com_trail = Trail(), Trail()
         self._momentum_at_start: np.ndarray | None = None
         self._poinsot = PoinsotPicture()
         self.loads = Loads()
@@ -310,7 +254,11 @@ class Picture:
         if self._wanted(style.POINSOT):
             self._poinsot.draw(backend, times_ns, rows, spin, L, redrawn)
         self._draw_motion(spin, L)
-        self._draw_trails(times_ns, rows, R)
+        each = np.ones(len(rows), dtype=int)
+        if self.shape.tip is not None and self._wanted(style.TRAIL):
+            backend.points(style.TRAIL, each, rows[:, 0:3] + R @ self.shape.tip)
+        if rows[:, 7:10].any() and self._wanted(style.COM_TRAIL):
+            backend.points(style.COM_TRAIL, each, rows[:, 0:3])
         string = self.string.rows(times_ns, rows, R) if self.string.was_tied else None
         self._draw_loads(times_ns, rows, R)
         if string is not None:
@@ -356,14 +304,6 @@ class Picture:
             counts = seen.astype(int)
             self.backend.arrows(name, counts, drawn)
             self.backend.labels(name, counts, LABEL_BEYOND * drawn, [symbol] * len(drawn))
-
-    def _draw_trails(self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray) -> None:
-        assert self.shape is not None
-        spacing = TRAIL_SPACING * style.STYLES[style.TRAIL].width * self.shape.size
-        if self.shape.tip is not None and self._wanted(style.TRAIL):
-            self.backend.points(style.TRAIL, *self._trail.between(times_ns, rows, R, self.shape.tip, spacing))
-        if rows[:, 7:10].any() and self._wanted(style.COM_TRAIL):
-            self.backend.points(style.COM_TRAIL, *self._com_trail.between(times_ns, rows, R, np.zeros(3), spacing))
 
     def _draw_loads(self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray) -> None:
         assert self.body is not None and self.shape is not None

@@ -113,7 +113,6 @@ ANGULAR_MOMENTUM = "plots/angular_momentum"
 ANGULAR_MOMENTUM_ANGLE = "plots/angular_momentum_angle"
 ANGULAR_VELOCITY_PRINCIPAL = "plots/angular_velocity_principal"
 POSITION = "plots/position"
-EFFORT = "plots/effort"
 GHOST_ANGLE = "plots/ghost_angle"
 STRING_LINE_DISTANCE = "plots/string_line_distance"
 STRING_TENSION = "plots/string_tension"
@@ -130,7 +129,6 @@ SERIES = {
     ANGULAR_MOMENTUM_ANGLE: MOMENTUM_ANGLE_SERIES,
     ANGULAR_VELOCITY_PRINCIPAL: OMEGA_SERIES,
     POSITION: (("x", RED), ("y", GREEN), ("z", BLUE)),
-    EFFORT: (("steps", BLUE), ("force evaluations", ORANGE)),
     GHOST_ANGLE: (("ghost to body", GHOST_COLOUR),),
     STRING_TENSION: (("string", ORANGE),),
     STRING_LINE_DISTANCE: (("COM to the string's line", YELLOW),),

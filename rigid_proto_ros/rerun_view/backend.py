@@ -50,12 +50,13 @@ def mesh_entity(name: str, number: int) -> str:
 class RerunBackend(Backend):
     """Draws on ``streams``. ``clock`` says at which wall clock times the states were taken.
 
-    plotted: the least and the largest value of each plot, by name.
+    plotted: the least and the largest value of each plot, by name. paths: where each trail ends.
     """
 
     def __init__(self) -> None:
         self.streams: Sequence[Stream] = ()
         self.plotted: dict[str, tuple[float, float]] = {}
+        self.paths: dict[str, np.ndarray] = {}
         self._size = 1.0
         self._clock = np.zeros(1, np.int64), np.zeros(1, np.int64)
         self._times: list[Any] = []
@@ -132,7 +133,12 @@ class RerunBackend(Backend):
         self.send(name, rr.LineStrips3D.columns(strips=strips, colors=colours).partition(counts))
 
     def points(self, name: str, counts: np.ndarray, positions: np.ndarray) -> None:
-        """Log points."""
+        """Log points; of a trail the straight way from each to the next one."""
+        if name in (style.TRAIL, style.COM_TRAIL):
+            before = self.paths.get(name, positions[0])
+            self.paths[name] = positions[-1].copy()
+            self.lines(name, counts, list(np.stack([np.vstack([before, positions[:-1]]), positions], axis=1)))
+            return
         self._style(name, rr.Points3D)
         self.send(name, rr.Points3D.columns(positions=positions).partition(counts))
 

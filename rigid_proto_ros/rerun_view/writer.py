@@ -72,7 +72,7 @@ class SceneWriter:
         self.moved = False
         self._last_time_ns = 0
         self._picture.restart()
-        self._backend.plotted = {}
+        self._backend.plotted, self._backend.paths = {}, {}
         self._lines: dict[str, list[Line]] = {}
         self._commanded = False
 

@@ -94,7 +94,7 @@ def test_a_finished_recording_says_how_far_its_plots_reach(tmp_path) -> None:
     ]
     # The height of the COM goes from 1.5 m to 2.77 m and back.
     assert any(low <= -0.05 and 2.9 <= high <= 5.0 for ((low, high),) in ends), ends
-    com = np.array([points[-1] for points in cells(path, style.COM_TRAIL, "Points3D:positions")[1]])
+    com = np.array([strips[0][-1] for strips in cells(path, style.COM_TRAIL, "LineStrips3D:strips")[1]])
     assert com[:, 2].max() == pytest.approx(2.77, abs=0.02) and abs(com[:, 1]).max() < 1e-6
 
 
