@@ -116,62 +116,9 @@ HUNG = {
         "string.damping_ratio": {"uniform": [0.0, 0.3]},
         "string.target.x": {"uniform": [-0.2, 0.2]},
         "initial.angular_velocity": {"direction": 4.0},
+        "angular_damping": {"log_uniform": [1e-8, 1e-5]},
+        "linear_damping": {"log_uniform": [1e-4, 1.0]},
     },
     "measure": {"final": ["position", "orientation", "energy"], "max": ["potential_energy"], "min": ["energy"]},
 }
-"""A string from the start, slack and taut."""
-
-TIED = {
-    "scene": "t_handle",
-    "script": [
-        {"t": 0.1, "string": {"target": [0.1, 0.0, 0.5]}},
-        {"t": 0.07, "string": {"attach": [0.0, 0.0, 0.06]}},
-        {"t": 0.1, "at": "tip", "impulse": [0.0, 0.0, 0.01]},
-        {"t": 0.13, "string": {"target": [0.1, 0.1, 0.5]}},
-        {"t": 0.2, "thrusters": [0.05, 0.01, 0.02, 0.01]},
-        {"t": 0.22, "thrusters": [0.0, 0.0, 0.0, 0.0]},
-        {"t": 0.23, "thrusters": [0.0, 0.01, 0.02, 0.0]},
-        {"t": 0.53, "string": {"attach": [0.0, 0.0, 0.0], "target": [0.0, 0.1, 0.4]}},
-        {"t": 0.53, "wrench": {"force": [0.01, 0.0, 0.0]}},
-        {"t": 0.6, "string": "release"},
-        {"t": 0.7, "service": "clear_wrench"},
-        {"t": 0.72, "set": {"mass": 0.25, "gravity": [0.0, 0.1, -9.0]}},
-        {"t": 0.75, "thrusters": [0.01, 0.0, 0.02, 0.0]},
-        {"t": 0.8, "string": {"target": [0.0, 0.1, 0.4]}},
-        {"t": 0.83, "string": {"target": [0.1, 0.1, 0.4]}},
-        {"t": 0.9, "wrench": {"at": "tip", "force": [0.01, 0.0, 0.0]}},
-        {"t": 1.0, "set": {"density": 3000.0, "angular_damping": 1e-5}},
-        {"t": 1.0, "set": {"explicit_inertia.mass": 0.3, "scale": [1.1]}},
-    ],
-    "duration": 1.5,
-    "samples": 6,
-    "watch": 20,
-    "set": {
-        "gravity": [0, 0, -9.81],
-        "ballast.tip": [0.01, 0, 0, 0.07],
-        "wrench_timeout": 0.2,
-        "thruster": {"minimum_on_time": 0.05},
-        "string": {"attach": [0.0, 0.0, 0.07], "timeout": 0.4, "frequency": 20.0, "rest_length": 0.1},
-    },
-    "vary": {
-        "mass": {"uniform": [0.1, 0.3]},
-        "string.frequency": {"uniform": [5.0, 60.0]},
-        "script.1.string.target": {"direction": 0.5},
-        "script.3.impulse.x": {"uniform": [0.0, 0.02]},
-        "script.14.string.target.x": {"uniform": [-0.3, 0.3]},
-        "initial.angular_velocity": {"direction": 4.0},
-    },
-    "measure": {"final": ["position", "orientation", "energy"], "max": ["potential_energy"], "min": ["energy"]},
-}
-"""What scripts do beside pokes and wrenches, which the simulation flies: strings, thrusters, changes."""
-
-HONEY = {
-    **POKES,
-    "samples": 6,
-    "vary": {
-        "angular_damping": {"log_uniform": [1e-3, 30.0]},
-        "linear_damping": {"log_uniform": [1.0, 3e4]},
-        "script.4.duration": {"uniform": [0.05, 0.3]},
-    },
-}
-"""Damping from soft to as fast as it can be."""
+"""A string from the start, slack and taut, and damping."""

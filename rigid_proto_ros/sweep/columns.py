@@ -23,7 +23,7 @@ from ..simulation import flight as fl
 from ..simulation.checks import check_command, check_start
 from ..simulation.commands import ClearWrench, Pending, WrenchCommand
 from ..simulation.setup import Setup
-from .sampling import Points
+from .sampling import VERTEX, Draw
 from .study import Study, Vary
 from .targets import Target
 from .variation import apply, body_mesh_of
@@ -73,8 +73,10 @@ class Columns:
 
     def __init__(self, study: Study, reference: dict[str, Value] | None) -> None:
         self._study, self._reference = study, with_mass_of_density(reference or {})
-        if any(v.target.parameter and _field_of(v.target.parameter) not in batch.NUMBERS for v in study.vary):
-            raise NotBatchable
+        for vary in study.vary:
+            is_vertex = isinstance(vary.form, Draw) and vary.form.shape == VERTEX
+            if is_vertex or (vary.target.parameter and _field_of(vary.target.parameter) not in batch.NUMBERS):
+                raise NotBatchable
         typical = apply(study, [vary.form.probes[-1] for vary in study.vary])
         parameters = study.parameters.replaced({"mass": 0.0} if study.density_decides else {})
         parameters = parameters.replaced(self._reference)
@@ -140,10 +142,10 @@ Place = tuple[int, str, slice | int]
 def _place_of(vary: Vary, script: list[Any], entries: list[int]) -> Place:
     """Where the numbers of what varies in the script stand in its table of commands."""
     target: Target = vary.target
-    name, *component = target.path[1:] if target.path[0] == "wrench" else target.path
-    is_number = not isinstance(vary.form, Points) or vary.form.taken(np.zeros(1, np.int64)).dtype == np.float64
+    is_number = isinstance(vary.form, Draw) or vary.form.taken(np.zeros(1, np.int64)).dtype == np.float64
     if entries.count(target.entry) != 1 or "jitter" in script[target.entry - 1] or not is_number:
         raise NotBatchable
+    name, *component = target.path[1:] if target.path[0] == "wrench" else target.path
     row = entries.index(target.entry)
     if name in ("t", "duration"):
         return row, "at_ns" if name == "t" else "duration_ns", 0

@@ -30,6 +30,10 @@ class FailedFlight(Exception):
     """Why a row has no result."""
 
 
+_NO_ROW = (InputError, TypeError, AttributeError, KeyError, IndexError)
+"""Raised where values don't fit the scene or its script together."""
+
+
 @dataclass
 class Chunk:
     """Columns of a table by name: float64, int64, or objects (text or None). simulated: how many rows the
@@ -51,7 +55,7 @@ def _sides(study: Study) -> list[Columns]:
     try:
         references = [] if study.reference is None else [Columns(study, dict(study.reference))]
         return [Columns(study, None), *references]
-    except (NotBatchable, InputError):
+    except (NotBatchable, *_NO_ROW):
         return []
 
 
@@ -71,7 +75,7 @@ def run_chunk(study: Study, first: int, last: int) -> Chunk:
         results.measured[i], results.stop[i] = np.nan, -1
         try:
             simulate_row(study, apply(study, [column[i] for column in columns]), i, results)
-        except (FailedFlight, InputError, TypeError, AttributeError, KeyError, IndexError) as error:
+        except (FailedFlight, *_NO_ROW) as error:
             failures[i] = " ".join(str(error).split())
     return Chunk(_table(study, rows, columns, results, failures), len(left))
 

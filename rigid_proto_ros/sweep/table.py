@@ -18,6 +18,7 @@ from ..base.errors import InputError, is_missing
 from ..base.files import whole_file
 from ..base.progress import Progress
 from ..base.provenance import cpu, versions
+from ..scene.script import expand_script
 from .rows import Chunk, run_chunk
 from .study import Study
 
@@ -28,8 +29,8 @@ KEY = b"rigid_proto_ros"
 """Of the file's metadata: a JSON object."""
 CHUNK_ROWS = 4096
 """At most: then a chunk's own cost doesn't count."""
-CHUNK_ENTRIES = 500_000
-"""Entries of scripts that a chunk keeps in memory: with a long script it has fewer rows."""
+CHUNK_COMMANDS = 500_000
+"""Commands of scripts that a chunk keeps in memory: with a long script it has fewer rows."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -71,8 +72,9 @@ def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, A
     """
     pa, pq = arrow()
     threads = cores()
-    step = min(CHUNK_ROWS, CHUNK_ENTRIES // max(1, len(study.script)), -(-study.rows // (2 * threads)))
-    starts = iter(range(0, study.rows, max(1, step)))
+    commands = len(expand_script(study.script, "script"))
+    step = max(1, min(CHUNK_ROWS, CHUNK_COMMANDS // max(1, commands), -(-study.rows // (2 * threads))))
+    starts = iter(range(0, study.rows, step))
     done = simulated = failed = 0
     schema = as_arrow(run_chunk(study, 0, 0)).schema
     text = [name for name, kind in zip(schema.names, schema.types, strict=True) if kind == pa.string()]
@@ -85,7 +87,7 @@ def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, A
         try:
             while True:
                 while len(pending) < 2 * threads and (first := next(starts, None)) is not None:
-                    pending.append(pool.submit(run_chunk, study, first, min(first + max(1, step), study.rows)))
+                    pending.append(pool.submit(run_chunk, study, first, min(first + step, study.rows)))
                 if not pending:
                     break
                 chunk = pending.popleft().result()

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from sweep_studies import HONEY, HUNG, POKES, STRUCTURE, TIED, study
+from sweep_studies import HUNG, POKES, PULLED, STRUCTURE, study
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.integrators import INTEGRATORS
@@ -40,8 +40,8 @@ def differing_rows(own, chunk: Chunk) -> list[str]:
 
 @pytest.mark.parametrize(
     ("spec", "is_simulated"),
-    [(POKES, False), (HUNG, False), (HONEY, False), (STRUCTURE, True), (TIED, True)],
-    ids=["pokes", "hung", "damped", "structure", "tied"],
+    [(POKES, False), (HUNG, False), (STRUCTURE, True), (PULLED, True)],
+    ids=["pokes", "hung", "structure", "pulled"],
 )
 def test_rows_have_the_bits_of_the_simulation_whatever_chunk_they_are_in(spec, is_simulated: bool) -> None:
     own = study(spec)
