@@ -19,7 +19,6 @@ from ..mesh.topology import (
     fan,
     joined_sets,
     mesh_topology,
-    referenced_extent,
     rims,
     surplus_copies,
 )
@@ -172,8 +171,7 @@ def unite_components(
     nothing = vertices, triangles, polygon_starts, ""
     if topology.unbalanced or not 1 < topology.components <= MAX_NESTED_COMPONENTS:
         return nothing
-    extent = referenced_extent(vertices, triangles)
-    sums = component_sums(vertices, triangles, topology, 0.5 * extent.lower + 0.5 * extent.upper)
+    sums = component_sums(vertices, triangles, topology)
     nesting = component_nesting(vertices, triangles, topology.component, sums.lower, sums.upper)
     if not nesting.complete:
         raise MeshError("mesh_repair", "union: too many faces to say how the components lie to each other")
@@ -249,8 +247,7 @@ def _turn_outward(surface: RepairedSurface) -> list[str]:
     topology = surface.topology()
     if topology.unbalanced or not 0 < topology.components <= MAX_NESTED_COMPONENTS:
         return []
-    extent = referenced_extent(surface.vertices, surface.triangles)
-    sums = component_sums(surface.vertices, surface.triangles, topology, 0.5 * extent.lower + 0.5 * extent.upper)
+    sums = component_sums(surface.vertices, surface.triangles, topology)
     wrong = sums.volume < 0.0
     if topology.components > 1:
         nesting = component_nesting(surface.vertices, surface.triangles, topology.component, sums.lower, sums.upper)

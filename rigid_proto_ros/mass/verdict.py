@@ -91,8 +91,6 @@ def unit_suspicion(longest_side: float) -> Finding | None:
     """A remark when a body of ``longest_side`` [m] looks as if its file weren't in metres."""
     if longest_side > LARGE_M:
         units = f"{longest_side:.4g} mm if the file is in millimetres (--scale 0.001)"
-        if longest_side < 100.0 * LARGE_M:
-            units += f", {longest_side:.4g} cm if in centimetres (--scale 0.01)"
         message = f"the body is {longest_side:.4g} m across; it would be {units} (scale)"
         return Finding("unit_suspicion", WARNING, message)
     if longest_side < SMALL_M:
@@ -106,11 +104,8 @@ def stated_unit(unit: float) -> Finding | None:
     """A remark when a mesh's file says that its unit is ``unit`` metres."""
     if unit == 1.0:
         return None
-    names = {1e-6: "a micrometre", 1e-3: "a millimetre", 1e-2: "a centimetre", 0.0254: "an inch", 0.3048: "a foot"}
-    said = f"{unit:g} m" + (f" ({names[unit]})" if unit in names else "")
-    return Finding(
-        "stated_unit", INFO, f"the file says that its unit is {said}: coordinates have been converted to metres"
-    )
+    message = f"the file says that its unit is {unit:g} m: coordinates have been converted to metres"
+    return Finding("stated_unit", INFO, message)
 
 
 def counted(number: int, noun: str) -> str:
@@ -231,9 +226,6 @@ def _check_components(
         verdict.inward = bool(np.sum(volume) < 0.0)
         message = f"{count} components are too many to check whether some overlap or lie inside others"
         verdict.add("components_unchecked", WARNING, message)
-        inward = int(np.count_nonzero(volume < 0.0))
-        if 0 < inward < count:
-            verdict.add("component_inward", WARNING, f"{inward} of {count} components subtract from the volume")
     else:
         nesting = component_nesting(vertices, triangles, topology.component, sums.lower, sums.upper)
         _check_nesting(verdict, nesting, volume)
@@ -320,22 +312,17 @@ def check_surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[Verdict,
         return verdict, None
     topology = mesh_topology(vertices, triangles)
     verdict.components = topology.components
-    lower, upper = extent.lower, extent.upper
-    half = 0.5 * upper - 0.5 * lower
-    middle = 0.5 * lower + 0.5 * upper
+    half = 0.5 * extent.upper - 0.5 * extent.lower
     if extent.unused:
-        spare = "1 vertex belongs" if extent.unused == 1 else f"{extent.unused} vertices belong"
-        message = f"{spare} to no face; that carries no mass"
-        lost = int(np.count_nonzero(~np.isfinite(vertices).all(axis=1)))
-        if lost:
-            message += "; it is" if extent.unused == 1 else f"; {lost} of them {'is' if lost == 1 else 'are'}"
-            message += " not finite and taken to lie at the first face's first corner"
+        message = f"vertices that belong to no face carry no mass: {extent.unused}"
+        if not np.isfinite(vertices).all():
+            message += "; what is not finite is taken to lie at the first face's first corner"
         verdict.add(UNREFERENCED, INFO, message)
     _check_size(verdict, 2.0 * float(half.max()))
     if not verdict.usable:
         return verdict, topology
     diagonal = 2.0 * float(np.linalg.norm(half))
-    sums = component_sums(vertices, triangles, topology, middle)
+    sums = component_sums(vertices, triangles, topology)
     _check_edges(verdict, topology, sums, vertices, half)
     if topology.unbalanced == 0:
         volume = float(np.sum(sums.volume))

@@ -61,22 +61,21 @@ def code_tag() -> str:
     return digest.hexdigest()[:16]
 
 
-def _path(key: str, kind: str) -> Path | None:
+def _store(name: str, save: Callable[[IO[bytes]], object]) -> None:
+    """Write to a file beside the entry and move it there, so that a reader never sees half an entry."""
     base = folder()
-    return base / f"{key}-{code_tag()}.{kind}" if base else None
-
-
-def _write(path: Path, save: Callable[[IO[bytes]], object]) -> None:
-    """Write to a file beside ``path`` and move it there, so that a reader never sees half an entry."""
+    if base is None:
+        return
+    path = base / name
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".new-")
+        base.mkdir(parents=True, exist_ok=True)
+        handle, new = tempfile.mkstemp(dir=path.parent, prefix=".new-")
         try:
             with os.fdopen(handle, "wb") as stream:
                 save(stream)
-            os.replace(name, path)
+            os.replace(new, path)
         except BaseException:
-            os.unlink(name)
+            os.unlink(new)
             raise
         _prune(path.parent)
     except OSError:
@@ -94,39 +93,34 @@ def _prune(base: Path) -> None:
 
 def load_arrays(key: str) -> dict[str, np.ndarray] | None:
     """The arrays kept under ``key``, or None."""
-    path = _path(key, "npz")
-    if path is None:
-        return None
+    base = folder()
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        os.utime(path)
-        return arrays
+        if base is not None:
+            path = base / f"{key}-{code_tag()}.npz"
+            with np.load(path, allow_pickle=False) as archive:
+                arrays = {name: archive[name] for name in archive.files}
+            os.utime(path)
+            return arrays
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
-        return None
+        pass
+    return None
 
 
 def store_arrays(key: str, **arrays: np.ndarray) -> None:
     """Keep arrays under ``key``."""
-    path = _path(key, "npz")
-    if path:
-        _write(path, lambda stream: np.savez(stream, allow_pickle=False, **arrays))
+    _store(f"{key}-{code_tag()}.npz", lambda stream: np.savez(stream, allow_pickle=False, **arrays))
 
 
 def load_json(key: str) -> dict | None:
     """The JSON object kept under ``key``, or None."""
-    path = _path(key, "json")
-    if path is None:
-        return None
+    base = folder()
     try:
-        value = json.loads(path.read_bytes())
-        return value if isinstance(value, dict) else None
+        value = json.loads((base / f"{key}-{code_tag()}.json").read_bytes()) if base else None
     except (OSError, ValueError):
         return None
+    return value if isinstance(value, dict) else None
 
 
 def store_json(key: str, value: dict) -> None:
     """Keep a JSON object under ``key``; floats keep all their digits."""
-    path = _path(key, "json")
-    if path:
-        _write(path, lambda stream: stream.write(json.dumps(value).encode()))
+    _store(f"{key}-{code_tag()}.json", lambda stream: stream.write(json.dumps(value).encode()))

@@ -181,13 +181,6 @@ def _read_scene(data: bytes, suffix: str, path: Path, max_triangles: int) -> _Co
     return _Content(unit * vertices, triangles, None, unit, tuple(sorted(files.items())))
 
 
-def _with_files(sha256: str, files: tuple[tuple[str, str], ...]) -> str:
-    """The hash of a file that took others, named with their hashes; its own when it took none."""
-    if not files:
-        return sha256
-    return hashlib.sha256(repr((sha256, files)).encode()).hexdigest()
-
-
 def _from_cache(key: str) -> _Content | None:
     """What is kept under a file's hash."""
     kept = mesh_cache.load_arrays(key)
@@ -223,12 +216,7 @@ def load_mesh(name: str, *, max_triangles: int = MAX_TRIANGLES, search: Search =
             _to_cache(key, content)
     if len(content.triangles) == 0:
         raise MeshError(path.name, "the file has no faces")
-    return Mesh(
-        path.stem,
-        str(path),
-        content.vertices,
-        content.triangles,
-        content.polygon_starts,
-        _with_files(sha256, content.files),
-        content.unit,
-    )
+    if content.files:
+        sha256 = hashlib.sha256(repr((sha256, content.files)).encode()).hexdigest()
+    surface = content.vertices, content.triangles, content.polygon_starts
+    return Mesh(path.stem, str(path), *surface, sha256, content.unit)

@@ -347,8 +347,10 @@ class Components:
     upper: np.ndarray
 
 
-def component_sums(vertices: np.ndarray, triangles: np.ndarray, topology: Topology, middle: np.ndarray) -> Components:
-    """The components' volumes and boxes; ``middle`` (3,) is a point near the mesh's centre."""
+def component_sums(vertices: np.ndarray, triangles: np.ndarray, topology: Topology) -> Components:
+    """The components' volumes and boxes, from the middle of their triangles' first corners."""
+    corners = vertices[triangles[:, 0]]
+    middle = 0.5 * corners.min(axis=0) + 0.5 * corners.max(axis=0)
     return Components(middle, *_component_sums(vertices, triangles, topology.component, topology.components, middle))
 
 

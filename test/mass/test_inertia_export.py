@@ -9,7 +9,7 @@ import pytest
 from mass_solids import moved, prism, sphere
 
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.mass.export import mjcf_inertial, quaternion_wxyz, sdf_inertial, urdf_inertial
+from rigid_proto_ros.mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
 from rigid_proto_ros.mass.properties import MassProperties, MeshMoments
 from rigid_proto_ros.robots.reading import read_robot
 
@@ -80,16 +80,6 @@ def test_sdf_and_urdf_and_mjcf_are_read_back_by_our_own_reader(properties, tmp_p
         assert link.mass == properties.mass
         assert link.center_of_mass.tolist() == properties.center_of_mass.tolist()
         assert off(link.inertia, properties) <= 1e-14, name
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_quaternions_of_half_turns_and_others_give_the_rotation_back(seed):
-    from mass_solids import rotation
-
-    from rigid_proto_ros.robots.model import rotation_from_wxyz
-
-    for R in (rotation(seed), np.diag([1.0, -1, -1]), np.diag([-1.0, 1, -1]), np.diag([-1.0, -1, 1]), np.eye(3)):
-        assert rotation_from_wxyz(quaternion_wxyz(R)) == pytest.approx(R, abs=1e-15)
 
 
 def test_the_command_prints_what_the_json_says(capsys):

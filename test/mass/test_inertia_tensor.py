@@ -16,8 +16,6 @@ from rigid_proto_ros.mass.tensor import (
     degenerate_pairs,
     equimomental_shapes,
     principal_axes,
-    six_from_tensor,
-    tensor_from_six,
 )
 
 
@@ -46,7 +44,7 @@ def test_equal_components_let_the_first_decide_the_sign():
 
 
 @given(st.integers(0, 2**31), st.floats(-12, 0), st.floats(0, 1))
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=60)
 def test_axes_are_a_proper_rotation_that_diagonalises(seed, exponent, between):
     small = 10.0**exponent
     moments = np.array([small, 1.0 - between * small, 1.0])
@@ -100,11 +98,6 @@ def test_the_equimomental_box_of_a_box_is_that_box():
     sides, semi_axes = equimomental_shapes(7.0, moments)
     assert sides == pytest.approx([c, b, a], rel=1e-14)
     assert 7.0 / 5 * (semi_axes[1] ** 2 + semi_axes[2] ** 2) == pytest.approx(moments[0], rel=1e-14)
-
-
-def test_six_entries_and_the_matrix_are_the_same():
-    six = (1.0, 0.1, 0.2, 2.0, 0.3, 2.5)
-    assert six_from_tensor(tensor_from_six(six)) == six
 
 
 def test_good_tensors_pass_without_a_word():

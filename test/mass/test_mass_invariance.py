@@ -12,7 +12,7 @@ from rigid_proto_ros.mass.tensor import principal_axes
 MODELS = st.sampled_from(["solid", "shell", "points"])
 SEEDS = st.integers(0, 2**31)
 lengths = st.floats(-3, 3).map(lambda e: 10.0**e)
-settings.register_profile("mass", deadline=None, max_examples=40)
+settings.register_profile("mass", deadline=None, max_examples=20)
 PROFILE = settings.get_profile("mass")
 
 

@@ -28,17 +28,13 @@ def lopsided():
     return moved(prism(circle(5) * [1.0, 0.6], 1.5, twist=0.8, layers=6), (0.4, -0.7, 0.2), 21)
 
 
-@pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("model", COMPUTED)
-def test_any_scale_is_that_of_scaled_vertices(lopsided, model, scale):
+def test_any_scale_is_that_of_scaled_vertices(lopsided, model):
     vertices, triangles = lopsided
-    scaled = vertices * np.array(scale)
-    turned = triangles[:, ::-1].copy() if np.prod(scale) < 0.0 else triangles
-    closed_form = MeshMoments(vertices, triangles).mass_properties(model, scale=scale, density=700.0)
-    anew = MeshMoments(scaled, turned).mass_properties(model, density=700.0)
-    if model == "bounding_box":  # turned boxes aren't the question here: scaling acts along the axes
-        anew = MeshMoments(scaled, turned).mass_properties(model, density=700.0)
-    close(closed_form, anew, 1e-12)
+    for scale in SCALES:
+        turned = triangles[:, ::-1].copy() if np.prod(scale) < 0.0 else triangles
+        closed_form = MeshMoments(vertices, triangles).mass_properties(model, scale=scale, density=700.0)
+        close(closed_form, MeshMoments(vertices * np.array(scale), turned).mass_properties(model, density=700.0), 1e-12)
 
 
 @pytest.mark.parametrize("model", COMPUTED)
@@ -70,13 +66,6 @@ def test_bounding_box_is_the_cuboid_about_the_boxs_centre(lopsided):
     assert np.diag(properties.inertia) == pytest.approx(
         3.0 / 12 * np.array([b * b + c * c, a * a + c * c, a * a + b * b])
     )
-
-
-def test_shell_of_a_fine_sphere_approaches_two_thirds_m_r_squared():
-    moments = shell_moments(*sphere(200))
-    assert moments.measure == pytest.approx(4 * np.pi, rel=2e-4)
-    properties = MeshMoments(*sphere(200)).mass_properties("shell", mass=1.0)
-    assert np.diag(properties.inertia) == pytest.approx([2 / 3] * 3, rel=2e-4)
 
 
 def test_shell_of_a_box_is_the_sum_of_its_six_plates():

@@ -69,13 +69,6 @@ def winding_number(point: np.ndarray, corners: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_body_is_of_a_size_one_holds(name: str) -> None:
-    made = load_mesh(name)
-    assert 250 <= len(made.triangles) <= 7000
-    assert 0.05 <= np.ptp(made.vertices, axis=0).max() <= 0.7
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_body_has_the_size_that_its_description_states(name: str) -> None:
     pytest.importorskip("manifold3d")
     from bundled_bodies.catalogue import BODIES
@@ -124,12 +117,6 @@ def test_l_bracket_has_all_three_products_of_inertia() -> None:
     off_diagonal = np.abs(inertia[np.triu_indices(3, 1)]) / inertia.max()
     # Measured 0.0087, 0.235 and 0.0019 of the largest entry.
     assert off_diagonal.min() > 1e-3
-
-
-def test_spinning_top_is_symmetric_about_its_axis() -> None:
-    inertia = tensor("spinning_top")
-    # Coordinates are rounded to 10 nm on a radius of 36 mm.
-    assert abs(inertia[0, 0] - inertia[1, 1]) < 1e-6 * inertia[2, 2]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -13,7 +13,6 @@ from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.inspection import verify_moments
 from rigid_proto_ros.mesh import union
-from rigid_proto_ros.mesh.union import counted_once
 
 
 def message(made, code: str) -> str:
@@ -69,12 +68,6 @@ def test_the_union_keeps_a_cavity_and_what_lies_in_it():
     crossing = together(shells, moved(box(), (2.0, 1.0, 1.0)))
     pytest.importorskip("manifold3d")
     assert volume(body(crossing, repair="union")) == pytest.approx(64.0 - 8.0 + 1.0 + 0.5, rel=1e-12)
-
-
-def test_what_several_enclose_counts_once():
-    inside = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]], dtype=bool)  # three in a row, the innermost last
-    assert counted_once(np.array([3.0, 2.0, 1.0]), inside).tolist() == [1.0, 0.0, 0.0]
-    assert counted_once(np.array([3.0, -2.0, 1.0]), inside).tolist() == [1.0, -1.0, 1.0]
 
 
 def test_without_manifold3d_the_overlap_is_told_and_the_union_says_what_is_missing(monkeypatch):

@@ -7,7 +7,7 @@ import struct
 import numpy as np
 import pytest
 from judged_meshes import body, codes, load, volume
-from mass_solids import box, sphere
+from mass_solids import sphere
 from mesh_files import (
     CUBE_QUADS,
     CUBE_TRIANGLES,
@@ -87,10 +87,10 @@ def test_a_unit_that_the_file_states_is_taken_and_said(tmp_path, name, data, uni
 
 
 @pytest.mark.parametrize(
-    ("side", "words"), [(20.0, "20 mm if the file is in millimetres (--scale 0.001)"), (3000.0, "3000 mm"), (5e-5, "0.05 m")]
+    ("side", "words"), [(20.0, "20 mm if the file is in millimetres (--scale 0.001)"), (3000.0, "3000 mm"), (5e-5, "0.05 m"), (1.8, None)]
 )  # fmt: skip
 def test_a_size_that_no_metre_file_has_names_the_unit_that_makes_sense(side, words):
-    assert words in unit_suspicion(side).message
+    assert (unit_suspicion(side) is None) if words is None else (words in unit_suspicion(side).message)
 
 
 @pytest.mark.parametrize("name", ["a.stl.gz", "a.obj.bz2", "a.zae"])
@@ -139,18 +139,6 @@ def test_an_open_tube_says_what_it_is_with_caps():
     reason = body((vertices, tube)).verdict.reason
     assert "flat caps over the holes give 3.14" in reason  # 64 sides: 3.137
     assert "2.09 to 2.09" not in reason and "volume unknown" in reason
-
-
-def test_a_refusal_never_prints_a_range_of_equal_ends():
-    rng = np.random.default_rng(3)
-    vertices, triangles = box((1.0, 2.0, 3.0), 6)
-    for count in range(1, 30):
-        hole = rng.choice(len(triangles), count, replace=False)
-        reason = body((vertices, np.delete(triangles, hole, axis=0))).verdict.reason
-        if "ambiguous" in reason:
-            low, high = reason.partition("ambiguous: ")[2].split(",")[0].split(" to ")
-            assert low != high
-        assert "flat caps over the holes give" in reason
 
 
 def test_nan_in_a_vertex_that_no_face_uses_is_no_harm(tmp_path, capsys):

@@ -15,9 +15,8 @@ from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.moments import solid_moments
 from rigid_proto_ros.mass.repair import RepairedSurface
-from rigid_proto_ros.mass.verdict import unit_suspicion
 from rigid_proto_ros.mesh import intersection
-from rigid_proto_ros.mesh.hull import box_surface, convex_hull
+from rigid_proto_ros.mesh.hull import convex_hull
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.mesh.topology import mesh_topology
 
@@ -54,27 +53,22 @@ def test_a_part_inside_another_wound_outward_counts_twice_and_is_told():
     assert volume(repaired) == pytest.approx(volume(body(HOLLOW)), rel=1e-14)
 
 
-@pytest.mark.parametrize("shift", [(0.5, 0.5, 0.5), (0.31, 0.17, 0.05), (0.9, 0.0, 0.0)])
-def test_overlapping_parts_are_told(shift):
-    made = body(together(box(cells=3), moved(box(cells=3), shift, 2)))
-    assert codes(made)["overlapping_components"] == "warning"
-
-
-def test_crossing_bars_without_a_corner_inside_each_other_are_told():
-    made = body(together(box((4.0, 1.0, 1.0)), moved(box((1.0, 4.0, 0.5)), (0.1, 0.2, 0.05))))
-    assert codes(made) == {"overlapping_components": "warning"}
+@pytest.mark.parametrize(
+    "parts",
+    [
+        *((box(cells=3), moved(box(cells=3), shift, 2)) for shift in ((0.5, 0.5, 0.5), (0.31, 0.17, 0.05))),
+        (box((4.0, 1.0, 1.0)), moved(box((1.0, 4.0, 0.5)), (0.1, 0.2, 0.05))),  # bars without a corner in the other
+        (box(), moved(box(), (0.5, 0, 0))),  # every edge that meets the other box lies in one of its faces
+    ],
+)
+def test_overlapping_parts_are_told(parts):
+    assert codes(body(together(*parts)))["overlapping_components"] == "warning"
 
 
 def test_parts_apart_or_touching_are_not_called_overlapping():
     assert codes(body(together(box(), moved(box(), (3.0, 0, 0))))) == {}
     assert "overlapping_components" not in codes(body(together(box(), moved(box(), (1.0, 0, 0)))))
     assert "overlapping_components" not in codes(body(together(box(), moved(box(), (1.0, 0.5, 0)))))
-
-
-def test_boxes_that_share_part_of_their_faces_and_of_their_inside_are_told():
-    # Every edge that meets the other box lies in one of its faces: no edge passes properly through a triangle.
-    made = body(together(box(), moved(box(), (0.5, 0, 0))))
-    assert codes(made) == {"overlapping_components": "warning"}
 
 
 def test_a_grid_of_touching_boxes_overlaps_nowhere():
@@ -130,14 +124,6 @@ def test_repair_turns_faces_to_agree(fraction):
     repaired = body((vertices, broken), repair=True)
     assert volume(repaired) == pytest.approx(volume(body(BALL)), rel=1e-14)
     assert codes(repaired) == {"repaired": "warning"}
-
-
-def test_repair_keeps_a_cavity_whatever_the_faces_said():
-    vertices, triangles = HOLLOW
-    flip = np.random.default_rng(2).random(len(triangles)) < 0.3
-    broken = triangles.copy()
-    broken[flip] = broken[flip, ::-1]
-    assert volume(body((vertices, broken), repair=True)) == pytest.approx(volume(body(HOLLOW)), rel=1e-14)
 
 
 def test_repair_of_bodies_wound_apart(meshes):
@@ -208,7 +194,7 @@ def test_copies_that_close_the_surface_stay_and_those_that_spoil_it_go():
 
 
 @given(st.integers(0, 10**6), st.sampled_from([1, 2, 5]))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_whatever_closes_small_holes_changes_no_more_than_is_said(seed, holes):
     rng = np.random.default_rng(seed)
     vertices, triangles = sphere(16)
@@ -274,7 +260,7 @@ def test_the_fallbacks_are_named_and_stand_in():
 
 
 @given(st.integers(0, 2**31), st.integers(4, 60), st.sampled_from(["normal", "sphere", "grid"]), st.floats(-8, 0))
-@settings(deadline=None, max_examples=80)
+@settings(deadline=None, max_examples=40)
 def test_the_hull_is_closed_convex_and_holds_every_point(seed, count, kind, exponent):
     random = np.random.default_rng(seed)
     points = random.normal(size=(count, 3))
@@ -299,17 +285,6 @@ def test_the_hull_is_closed_convex_and_holds_every_point(seed, count, kind, expo
     heights = np.einsum("fk,fpk->fp", normals, points[None] - a[:, None])
     volume_scale = spread[0] ** 2 * spread[2]
     assert heights.max() <= 1e-9 * volume_scale + 1e-14
-
-
-def test_the_box_surface_is_outward():
-    vertices, triangles = box_surface(np.zeros(3), np.array([1.0, 2.0, 3.0]))
-    assert solid_moments(vertices, triangles).measure == 6.0
-    assert mesh_topology(vertices, triangles).unbalanced == 0
-
-
-@pytest.mark.parametrize(("side", "suspect"), [(400.0, True), (1.8, False), (0.02, False), (1e-4, True)])
-def test_sizes_that_no_metre_file_has_are_suspected(side, suspect):
-    assert (unit_suspicion(side) is not None) == suspect
 
 
 def test_thin_bodies_are_called_so():
