@@ -23,8 +23,7 @@ SEE_INTO, CENTRE_OF_MASS, PATHS = "See into the body", "Centre of mass", "Paths 
 PARTS: dict[str, tuple[str, ...]] = {
     CENTRE_OF_MASS: (CENTRE_OF_MASS,),
     "Principal axes": (style.PRINCIPAL_AXES,),
-    "Inertia ellipsoid": (style.INERTIA_ELLIPSOID,),
-    "Box of equal inertia": (style.INERTIA_BOX,),
+    "Inertia ellipsoid and box": (style.INERTIA_ELLIPSOID, style.INERTIA_BOX),
     "Angular momentum L": (style.MOMENTUM,),
     "Angular velocity ω": (style.OMEGA,),
     PATHS: (style.COM_TRAIL, style.TRAIL),
@@ -55,7 +54,6 @@ class ForcesTab:
                 controls.numbers("initial.angular_velocity", "Initial spin [rad/s]", 3)
                 controls.checkbox("gyroscopic", "Gyroscopic term ω × Iω")
                 gravity = gui.add_button_group("Gravity is", tuple(GRAVITIES))
-                controls.numbers("string.attach", "Tied at x y z", 3)
             with gui.add_folder("Any parameter"):
                 controls.any_parameter()
         self._slider = force

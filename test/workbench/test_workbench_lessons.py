@@ -78,7 +78,8 @@ class User(FlownPage):
         self.reset()
 
     def tie(self, place: str) -> None:
-        self.set("Tied at x y z", place)
+        self.set("Parameter", "string.attach")
+        self.set("Value", place)
 
     def gravity_off(self) -> None:
         self.press("off", of="Gravity is")
