@@ -63,8 +63,8 @@ def test_axes_that_are_arbitrary_are_no_difference(moments, others, turn, angle)
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("scale", [[1.0, 1.0, 1.0], [0.5, -2.0, 3.0]])
-@pytest.mark.parametrize("weights", [{}, {"ballast.a": [0.3, 0.1, 0.02, -0.05]}])
+@pytest.mark.parametrize("scale", [[0.5, -2.0, 3.0]])
+@pytest.mark.parametrize("weights", [{"ballast.a": [0.3, 0.1, 0.02, -0.05]}])
 def test_a_model_at_the_solids_com_has_its_own_tensor_there(model: str, scale, weights) -> None:
     def body(**values):
         return read_scene("hammer", {"scale": scale, "inertia_model": model, **values}).setup.body
