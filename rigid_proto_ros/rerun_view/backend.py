@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import rerun as rr
 
 from ..picture import style
@@ -130,7 +131,7 @@ class RerunBackend(Backend):
     ) -> None:
         """Log line strips."""
         self._style(name, rr.LineStrips3D)
-        self.send(name, rr.LineStrips3D.columns(strips=strips, colors=colours).partition(counts))
+        self.send(name, rr.LineStrips3D.columns(strips=_arrow_strips(strips), colors=colours).partition(counts))
 
     def points(self, name: str, counts: np.ndarray, positions: np.ndarray) -> None:
         """Log points; of a trail the straight way from each to the next one."""
@@ -166,6 +167,14 @@ class RerunBackend(Backend):
                 names, colours = zip(*style.SERIES[name][: values.shape[1]], strict=True)
                 stream.log_static(name, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
         self.send(name, scalar_columns(values))
+
+
+def _arrow_strips(strips: Sequence[np.ndarray]) -> Any:
+    """Strips (p, 3) as the library has them; made by itself, a strip costs it .1 ms."""
+    points = np.concatenate([np.zeros((0, 3)), *strips]).astype(np.float32)
+    ends = np.cumsum([0, *map(len, strips)], dtype=np.int32)
+    kind = rr.components.LineStrip3DBatch([]).as_arrow_array().type
+    return pa.ListArray.from_arrays(ends, pa.FixedSizeListArray.from_arrays(points.ravel(), type=kind.value_type), kind)
 
 
 def _nowhere() -> Any:
