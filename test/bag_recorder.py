@@ -2,7 +2,7 @@
 """What ``ros2 bag record -s mcap`` leaves, from messages that a plain subscriber took off a real node.
 
 rosbag2 itself isn't to be had from PyPI. The layout is that of its Jazzy release: profile ros2, a schema and a channel per
-topic with its quality of service, messages logged at the time they were received, metadata.yaml of version 9.
+topic with its quality of service, messages logged at the time they were received.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-import zstandard
 from mcap.writer import CompressionType, Writer
 
 from rigid_proto_ros.session.messages import DEFINITIONS, TOPICS
@@ -114,7 +112,6 @@ def write_bag_file(
     compression: CompressionType = CompressionType.NONE,
     chunked: bool = True,
     chunk_size: int = 768 * 1024,
-    compress_messages: bool = False,
     finish: bool = True,
 ) -> None:
     """One .mcap file as rosbag2_storage_mcap writes it; its default is chunks without compression."""
@@ -133,8 +130,7 @@ def write_bag_file(
                 channels[message.topic] = writer.register_channel(
                     message.topic, "cdr", schemas[message.type], {**qos, "topic_type_hash": "RIHS01_0"}
                 )
-            data = zstandard.compress(message.data) if compress_messages else message.data
-            writer.add_message(channels[message.topic], message.log_time, data, message.log_time)
+            writer.add_message(channels[message.topic], message.log_time, message.data, message.log_time)
         if finish:
             writer.add_metadata("rosbag2", {"serialized_metadata": "version: 9\n"})
             writer.finish()
@@ -142,63 +138,11 @@ def write_bag_file(
             writer.flush()
 
 
-def write_bag(folder: Path, messages: list[Logged], *, files: int = 1, compression_mode: str = "", **options) -> Path:
-    """A bag's folder with metadata.yaml; ``files`` as after splitting, compression_mode FILE or MESSAGE (zstd)."""
+def write_bag(folder: Path, messages: list[Logged], *, files: int = 1, **options) -> Path:
+    """A bag's folder; ``files`` as after splitting."""
     folder.mkdir()
-    names = []
     size = -(-len(messages) // files)
     for k in range(files):
-        path = folder / f"{folder.name}_{k}.mcap"
-        write_bag_file(
-            path, messages[k * size : (k + 1) * size], compress_messages=compression_mode == "MESSAGE", **options
-        )
-        if compression_mode == "FILE":
-            compressed = path.with_name(path.name + ".zstd")
-            compressed.write_bytes(zstandard.compress(path.read_bytes()))
-            path.unlink()
-            path = compressed
-        names.append(path.name)
-    write_metadata(folder, names, messages, compression_mode)
+        write_bag_file(folder / f"{folder.name}_{k}.mcap", messages[k * size : (k + 1) * size], **options)
+    (folder / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 9\n")
     return folder
-
-
-def write_metadata(folder: Path, names: list[str], messages: list[Logged], compression_mode: str = "") -> None:
-    """metadata.yaml beside a bag's files."""
-    begin = min((m.log_time for m in messages), default=0)
-    length = max((m.log_time for m in messages), default=0) - begin
-    topics = sorted({(m.topic, m.type) for m in messages})
-    information = {
-        "version": 9,
-        "storage_identifier": "mcap",
-        "duration": {"nanoseconds": length},
-        "starting_time": {"nanoseconds_since_epoch": begin},
-        "message_count": len(messages),
-        "topics_with_message_count": [
-            {
-                "topic_metadata": {
-                    "name": topic,
-                    "type": message_type,
-                    "serialization_format": "cdr",
-                    "offered_qos_profiles": [],
-                    "type_description_hash": "RIHS01_0",
-                },
-                "message_count": sum(m.topic == topic for m in messages),
-            }
-            for topic, message_type in topics
-        ],
-        "compression_format": "zstd" if compression_mode else "",
-        "compression_mode": compression_mode,
-        "relative_file_paths": names,
-        "files": [
-            {
-                "path": name,
-                "starting_time": {"nanoseconds_since_epoch": begin},
-                "duration": {"nanoseconds": length},
-                "message_count": len(messages),
-            }
-            for name in names
-        ],
-        "custom_data": None,
-        "ros_distro": "jazzy",
-    }
-    (folder / "metadata.yaml").write_text(yaml.safe_dump({"rosbag2_bagfile_information": information}))

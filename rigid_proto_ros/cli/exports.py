@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.progress import Progress
+from .options import number_from
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord, Source
@@ -42,7 +42,10 @@ def add_exports(parser: argparse.ArgumentParser) -> None:
     for name, endings in ENDINGS.items():
         group.add_argument(f"--{name}", metavar=f"FILE{endings[0]}", help=HELP[name])
     group.add_argument(
-        "--fps", type=float, metavar="N", help=f"with --gltf or --usd: frames a second (default {DEFAULT_FPS:g})"
+        "--fps",
+        type=number_from(1e-3, 1e5),
+        metavar="N",
+        help=f"with --gltf or --usd: frames a second (default {DEFAULT_FPS:g})",
     )
 
 
@@ -60,8 +63,6 @@ def check_exports(args: argparse.Namespace) -> None:
         output_file(f"--{name}", file)
     if args.fps is not None and not set(ANIMATIONS) & set(files):
         raise InputError("--fps", "needs --gltf or --usd")
-    if args.fps is not None and not (math.isfinite(args.fps) and 1e-3 <= args.fps <= 1e5):
-        raise InputError("--fps", args.fps, "frames a second, from 1e-3 to 1e5")
     from ..export import check_library
 
     for name in files:

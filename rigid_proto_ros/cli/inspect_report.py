@@ -5,25 +5,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..mass.inspection import Inspection
 from ..mass.tensor import principal_axes, six_from_tensor
-from .terminal import SEVERITY_STYLES, Text, line, table
 
 if TYPE_CHECKING:
     from ..robots.composite_inertia import Lump
     from ..robots.diagnosis import LinkDiagnosis
     from ..robots.fix import FixedLink
 
-_STATUS_STYLES = {
-    "uniform": "green",
-    "not uniform": "green",
-    **dict.fromkeys(("impossible", "impossible for its shape", "explained"), "bold red"),
-}
 SHOWN_ZERO = 5e-7
 """Of a quantity's largest entry: what is smaller is beyond the six digits shown, and stands as 0. JSON has it."""
 
@@ -31,6 +25,14 @@ SHOWN_ZERO = 5e-7
 def shown_zero(values: Iterable[float], largest: float) -> list[float]:
     """The values, those that don't show beside ``largest`` as 0."""
     return [0.0 if abs(value) < SHOWN_ZERO * largest else float(value) for value in values]
+
+
+def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> None:
+    """Print columns aligned to their widest cell."""
+    lines = [list(row) for row in ([head] if head else []) + list(rows)]
+    widths = [max(len(row[k]) for row in lines if k < len(row)) for k in range(max(map(len, lines)))]
+    for row in lines:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip())
 
 
 def print_report(inspection: Inspection, report: dict) -> None:
@@ -43,14 +45,13 @@ def print_report(inspection: Inspection, report: dict) -> None:
         *([] if report["winding_consistent"] else ["inconsistently wound"]),
         f"{count} component{'s' if count != 1 else ''}",
     ]
-    line((str(body.mesh.path), "bold"), f": {', '.join(state)}")
+    print(f"{body.mesh.path}: {', '.join(state)}")
     for finding in inspection.findings:
-        style = SEVERITY_STYLES.get(finding.severity, "")
-        line("  ", (finding.severity, style), f": {finding.message} [{finding.code}]")
+        print(f"  {finding.severity}: {finding.message} [{finding.code}]")
     if not inspection.findings:
-        line("  ", ("no problems found", "green"))
+        print("  no problems found")
     size = inspection.upper - inspection.lower
-    rows: list[tuple[Text, ...]] = [("size", _row(size), "m")]
+    rows: list[tuple[str, ...]] = [("size", _row(size), "m")]
     if report["volume"] is not None:
         rows.append(("volume", f"{report['volume']: .9g}", "m³"))
     if report["area"] is not None:
@@ -73,19 +74,19 @@ def print_report(inspection: Inspection, report: dict) -> None:
         pairs = [
             pair for pair, same in zip(("1 and 2", "2 and 3"), report["principal_degenerate"], strict=True) if same
         ]
-        line(f"principal moments {' and '.join(pairs)} are equal: every axis in the span of theirs is principal")
-    line("")
+        print(f"principal moments {' and '.join(pairs)} are equal: every axis in the span of theirs is principal")
+    print()
     _print_models(inspection)
     if "verification" in report:
         errors = (
             f"{name.removesuffix('_error').replace('_', ' ').replace('center', 'centre')} {value:.1e}"
             for name, value in report["verification"].items()
         )
-        line(f"errors against exact rational arithmetic: {', '.join(errors)}")
+        print(f"errors against exact rational arithmetic: {', '.join(errors)}")
 
 
 def _print_models(inspection: Inspection) -> None:
-    rows: list[tuple[Text, ...]] = []
+    rows: list[tuple[str, ...]] = []
     for name, properties in inspection.models.items():
         marked = f"{'* ' if name == inspection.model else '  '}{name}"
         cells = [marked, f"{properties.mass:.6g}"]
@@ -111,20 +112,20 @@ def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
         name = f" ({d.mesh})" if d.mesh else ""
         by = f" by its {d.judged_by} shapes" if d.inertia_error is not None else ""
         note = f"; {d.note}" if d.note else ""
-        line((d.link, "bold"), f"{name}: ", (d.status, _STATUS_STYLES.get(d.status, "yellow")), f"{by}{note}")
+        print(f"{d.link}{name}: {d.status}{by}{note}")
         if d.inertia_error is not None:
             off = "" if d.mass_error is None else f", mass {d.mass_error:.2g}"
             center = f"centre of mass {d.center_of_mass_error:.2g} of the size"
-            line(f"  differs from the uniform solid: inertia {d.inertia_error:.2g} ({_ratio(d)}), {center}{off}")
+            print(f"  differs from the uniform solid: inertia {d.inertia_error:.2g} ({_ratio(d)}), {center}{off}")
         for cause in d.causes:
-            line(f"  cause: {cause}")
+            print(f"  cause: {cause}")
         for doubt in d.doubts:
-            line(f"  doubt: {doubt}")
+            print(f"  doubt: {doubt}")
         if d.status not in ("uniform", "not uniform"):
             _print_expected(d)
     if len(diagnoses) > 1:
         counts = Counter(d.status for d in diagnoses)
-        line(f"{len(diagnoses)} links: {', '.join(f'{count} {status}' for status, count in counts.items())}")
+        print(f"{len(diagnoses)} links: {', '.join(f'{count} {status}' for status, count in counts.items())}")
 
 
 def _ratio(d: LinkDiagnosis) -> str:
@@ -148,12 +149,12 @@ def print_diagnosis_lines(diagnoses: list[LinkDiagnosis]) -> None:
             parts.append(f"mass {_percent(d.mass_error)}")
         reasons = "; ".join(d.causes or ((d.note,) if d.inertia_error is None else ()))
         text = ", ".join(parts) + ("; " if parts and reasons else "") + reasons
-        line((d.link, "bold"), ": ", (d.status, _STATUS_STYLES.get(d.status, "yellow")), f": {text}" if text else "")
+        print(f"{d.link}: {d.status}{f': {text}' if text else ''}")
 
 
 def print_fixed_links(links: list[FixedLink], out: str) -> None:
     """What ``--fix`` prints: each link before and after, and those that were left, with the reason."""
-    rows: list[tuple[Text, ...]] = []
+    rows: list[tuple[str, ...]] = []
     for link in links:
         before, after = link.before, link.after
         errors = [
@@ -167,35 +168,35 @@ def print_fixed_links(links: list[FixedLink], out: str) -> None:
         mass = f"{old} -> {new}" if link.written and old != new else old
         done = f"from its {before.judged_by} shapes" if link.written else f"left: {link.left}" if link.left else ""
         status = f"{before.status} -> {after.status}" if link.written else before.status
-        rows.append((before.link, (status, _STATUS_STYLES.get(after.status, "yellow")), mass, *errors, done))
+        rows.append((before.link, status, mass, *errors, done))
     table(rows, ("link", "", "mass [kg]", "error of the inertia", "of the centre of mass", ""))
     for link in links:
         for doubt in link.after.doubts if link.written else ():
-            line((link.before.link, "bold"), ": written, but ", doubt)
+            print(f"{link.before.link}: written, but {doubt}")
     written, left = (sum(map(bool, column)) for column in zip(*((x.written, x.left) for x in links), strict=True))
-    line(f"{out}: {written} of {len(links)} inertials rewritten, {left} left as they are")
+    print(f"{out}: {written} of {len(links)} inertials rewritten, {left} left as they are")
 
 
 def print_lump(whole: Lump, written: tuple[str, ...]) -> None:
     """What ``--lump`` prints."""
     properties = whole.properties
     moments, axes = principal_axes(properties.inertia)
-    rows: list[tuple[Text, ...]] = [("links", f" {len(whole.links)}", ""), ("mass", f"{properties.mass: .9g}", "kg")]
+    rows: list[tuple[str, ...]] = [("links", f" {len(whole.links)}", ""), ("mass", f"{properties.mass: .9g}", "kg")]
     rows.append(("centre of mass", _row(properties.center_of_mass), "m"))
     rows += _tensor_rows(properties.inertia)
     rows.append(("principal moments", _row(moments), "kg m²"))
     rows += [(f"principal axis {k + 1}", _row(shown_zero(axes[:, k], 1.0)), "") for k in range(3)]
     table(rows)
     if whole.massless:
-        line(f"without an inertial, and so without mass: {', '.join(whole.massless)}")
+        print(f"without an inertial, and so without mass: {', '.join(whole.massless)}")
     for kind, texts in (("not in the mesh", whole.absent), ("doubt", whole.doubts)):
         for text in texts:
-            line((kind, "yellow"), f": {text}")
+            print(f"{kind}: {text}")
     for name in written:
-        line(f"wrote {name}")
+        print(f"wrote {name}")
 
 
-def _tensor_rows(inertia: np.ndarray) -> list[tuple[Text, ...]]:
+def _tensor_rows(inertia: np.ndarray) -> list[tuple[str, ...]]:
     labels = [("inertia", "kg m², about the centre of mass"), ("", ""), ("", "")]
     largest = float(np.abs(inertia).max())
     return [(label, _row(shown_zero(row, largest)), unit) for (label, unit), row in zip(labels, inertia, strict=True)]
@@ -205,8 +206,8 @@ def _print_expected(d: LinkDiagnosis) -> None:
     if d.expected is None:
         return
     center, six = d.expected.center_of_mass, six_from_tensor(d.expected.inertia)
-    line(f"  expected: mass {d.expected.mass:.9g}  com {center[0]:.9g} {center[1]:.9g} {center[2]:.9g}")
-    line(
+    print(f"  expected: mass {d.expected.mass:.9g}  com {center[0]:.9g} {center[1]:.9g} {center[2]:.9g}")
+    print(
         "  expected: ixx ixy ixz iyy iyz izz "
         + " ".join(f"{value:.9g}" for value in shown_zero(six, max(map(abs, six))))
     )

@@ -19,7 +19,6 @@ from ..base.errors import InputError
 from ..base.files import whole_file
 from ..mass.tensor import principal_axes, six_from_tensor
 from .inspect_report import print_diagnoses, print_diagnosis_lines, print_fixed_links, print_lump
-from .terminal import line
 
 if TYPE_CHECKING:
     from ..robots.composite_inertia import Lump
@@ -147,7 +146,7 @@ def _are_robots(names: list[str]) -> bool:
 def _judge_one_of_several(args: argparse.Namespace, robot: str, options: Options) -> tuple[int, dict]:
     """Exit status and JSON object of one robot, 2 where it is refused; the others are judged none the less."""
     if not args.json:
-        line((robot, "bold"), ":")
+        print(f"{robot}:")
     try:
         return _judge(args, robot, options, None, None)
     except InputError as error:

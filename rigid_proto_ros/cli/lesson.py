@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 
 from ..base.errors import InputError, is_missing
 from ..base.files import output_file, whole_file
 from ..base.progress import Progress
-from .terminal import line
+from .options import number_from
 
 FPS = 30.0
 
@@ -22,7 +21,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", help="a lesson: the name of a bundled scene")
     parser.add_argument("--html", metavar="FILE.html", required=True, help="the file to write")
     parser.add_argument(
-        "--duration", type=float, metavar="S", help="simulated seconds (default 10, or 1 s past its script)"
+        "--duration",
+        type=number_from(0.1, 600.0),
+        metavar="S",
+        help="simulated seconds (default 10, or 1 s past its script)",
     )
 
 
@@ -41,8 +43,6 @@ def run(args: argparse.Namespace) -> int:
 
     if not args.html.lower().endswith((".html", ".htm")):
         raise InputError("--html", args.html, "a file that ends in .html")
-    if args.duration is not None and not (math.isfinite(args.duration) and 0.1 <= args.duration <= 600.0):
-        raise InputError("--duration", args.duration, "seconds from 0.1 to 600")
     shown = lesson(args.name)
     output_file("--html", args.html)
     script = read_script(example_path(shown.script)) if shown.script else []
@@ -58,5 +58,5 @@ def run(args: argparse.Namespace) -> int:
     ghosts = dict(zip(made.ghosts.times_ns, made.ghosts.rows, strict=True))
     with Progress(f"writing {args.html}"), whole_file("--html", args.html) as path:
         path.write_text(lesson_html(shown, made.changes, made.times_ns, made.rows, ghosts), encoding="utf-8")
-    line(f"{args.html}: {duration_ns / 1e9:g} s of {args.name}; open it in a browser")
+    print(f"{args.html}: {duration_ns / 1e9:g} s of {args.name}; open it in a browser")
     return 0

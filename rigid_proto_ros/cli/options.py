@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 
 
 def add_scene(parser: argparse.ArgumentParser, help: str, nargs: str | None = None, default: str | None = None) -> None:
@@ -28,3 +29,14 @@ def add_session(parser: argparse.ArgumentParser, node: str) -> None:
 def add_json(parser: argparse.ArgumentParser) -> None:
     """--json: for other programs."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def number_from(lower: float, upper: float) -> Callable[[str], float]:
+    """The type of an option that takes a number within these bounds."""
+
+    def number(text: str) -> float:
+        if not lower <= (value := float(text)) <= upper:
+            raise argparse.ArgumentTypeError(f"got {text}; accepted: a number from {lower:g} to {upper:g}")
+        return value
+
+    return number

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import shlex
 import sys
 from pathlib import Path
@@ -14,15 +13,12 @@ from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.progress import Progress
 from .exports import add_exports, asked, check_exports, write_exports
-from .options import add_session
+from .options import add_session, number_from
 
 if TYPE_CHECKING:
     from ..scene.scenario import Scenario
     from ..session.check import Difference
     from ..session.recorded_session import RecordedSession
-
-REFUSALS_SHOWN = 10
-"""Of a run: a flood of commands can have been refused."""
 
 EXAMPLES = (
     ("rigid_proto replay out/flight.rrd --verify", "simulate it again, and compare every state bit for bit"),
@@ -45,14 +41,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--repair", metavar="FILE", help="write a readable file with all that is complete in a damaged session"
     )
-    parser.add_argument("--at", type=float, metavar="T", help="simulated time [s], for --as-scene")
+    parser.add_argument("--at", type=number_from(0.0, 1e9), metavar="T", help="simulated time [s], for --as-scene")
     parser.add_argument(
         "--as-scene",
         metavar="FILE.yaml",
         help="write the scene that begins at --at, and a script of what still acts then as FILE_script.yaml",
     )
     parser.add_argument("--publish", choices=("states", "commands"), help="publish it over ROS")
-    parser.add_argument("--speed", type=float, metavar="X", help="speed factor of --publish states (default 1)")
+    parser.add_argument(
+        "--speed", type=number_from(1e-6, 1e6), metavar="X", help="speed factor of --publish states (default 1)"
+    )
     add_exports(parser)
 
 
@@ -60,15 +58,19 @@ def run(args: argparse.Namespace) -> int:
     """Say what the session holds, and do what is asked for with it."""
     from ..rerun_view.session_files import read_runs, repair
 
-    _check(args)
+    if (args.at is None) != (args.as_scene is None):
+        raise InputError("--at", "needs --as-scene FILE.yaml, and --as-scene needs --at T")
+    if args.speed is not None and args.publish != "states":
+        raise InputError("--speed", "needs --publish states; a running node has real_time_factor")
+    if args.record and Path(args.record).exists() and Path(args.record).samefile(args.session):
+        raise InputError("--record", args.record, "another file than the session")
+    check_exports(args)
     if args.repair:
         repair(args.session, args.repair)
     runs = read_runs(args.session, "" if args.publish == "commands" else args.node)
     given = given_scene(args.scene, runs[-1])
     for number, session in enumerate(runs, 1):
         _print_session(args.session if len(runs) == 1 else f"{args.session}, run {number} of {len(runs)}", session)
-    if args.repair:
-        print(f"  repaired: {args.repair}")
     if args.record:
         from ..rerun_view.session_files import record
 
@@ -76,27 +78,12 @@ def run(args: argparse.Namespace) -> int:
             record(runs, args.record, given, progress.fraction)
     if asked(args):
         _export(runs, args, given)
-    _print_how_to_view(args)
     if args.as_scene:
-        _branch(runs[-1], args, given)
+        _branch(runs[-1], args)
     status = _verify(runs, args) if args.verify else 0
     if status == 0 and args.publish:
         status = _publish(runs[-1], args)
     return status
-
-
-def _check(args: argparse.Namespace) -> None:
-    if (args.at is None) != (args.as_scene is None):
-        raise InputError("--at", "needs --as-scene FILE.yaml, and --as-scene needs --at T")
-    if args.at is not None and not (math.isfinite(args.at) and 0.0 <= args.at <= 1e9):
-        raise InputError("--at", args.at, "seconds from 0 to 1e9")
-    if args.speed is not None and not (math.isfinite(args.speed) and 1e-6 <= args.speed <= 1e6):
-        raise InputError("--speed", args.speed, "a factor from 1e-6 to 1e6")
-    if args.speed is not None and args.publish != "states":
-        raise InputError("--speed", "needs --publish states; a running node has real_time_factor")
-    if args.record and Path(args.record).exists() and Path(args.record).samefile(args.session):
-        raise InputError("--record", args.record, "another file than the session")
-    check_exports(args)
 
 
 def _print_session(name: str, session: RecordedSession) -> None:
@@ -104,25 +91,14 @@ def _print_session(name: str, session: RecordedSession) -> None:
     span = f"{times.min() / 1e9:.9g} s to {times.max() / 1e9:.9g} s" if len(times) else "no time"
     print(f"{name}: {len(times)} states, {span}; {len(session.events)} commands and services")
     if not session.complete:
-        print(f"  truncated: {session.readable_bytes} of {session.file_bytes} bytes are complete")
+        print("  truncated: read up to where it was cut")
     if session.missing:
         print(f"  without {', '.join(session.missing)}")
     if session.accuracy_floor:
         print(f"  the accuracy asked for is not held throughout: {session.accuracy_floor}")
-    for time_ns, line in session.refusals[:REFUSALS_SHOWN]:
-        print(f"  refused at {time_ns / 1e9:.9g} s: {line}")
-    if (more := len(session.refusals) - REFUSALS_SHOWN) > 0:
-        print(f"  {more} more were refused, the last at {session.refusals[-1][0] / 1e9:.9g} s")
-
-
-def _print_how_to_view(args: argparse.Namespace) -> None:
-    newest = args.record or args.repair or args.session
-    if newest.endswith(".rrd"):
-        print(f"  show it with: rerun {newest}")
-    elif args.record:
-        print(f"  recorded: {args.record}")
-    else:
-        print(f"  to show it, convert it for Rerun: rigid_proto replay {newest} --record FILE.rrd")
+    if session.refusals:
+        time_ns, line = session.refusals[-1]
+        print(f"  {len(session.refusals)} commands refused, the last at {time_ns / 1e9:.9g} s: {line}")
 
 
 def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
@@ -164,7 +140,6 @@ def _export(runs: list[RecordedSession], args: argparse.Namespace, given: Scenar
 
 def _print_difference(difference: Difference, session: RecordedSession) -> None:
     """What led to a difference, as far as the recording says."""
-    from ..base.provenance import versions
     from ..session.check import made_with_table
 
     if difference.command:
@@ -172,15 +147,9 @@ def _print_difference(difference: Difference, session: RecordedSession) -> None:
     table = made_with_table(session)
     if not table:
         print("  the recording doesn't say what it was made with", file=sys.stderr)
-        return
-    motion = {name: (was, here) for name, was, here in table}.get("motion", ("before 2026-11-22", ""))
-    if motion[0] != motion[1]:
-        here = versions()["motion"]
-        print(f"  it needs a version whose motion is of {motion[0]}; this one's is of {here}", file=sys.stderr)
-    wide = [max(len(row[k]) for row in table) for k in (0, 1)]
-    for name, was, now in table:
-        mark = "" if was == now else "   <- differs"
-        print(f"  {name:{wide[0]}}  recorded {was:{wide[1]}}  here {now}{mark}", file=sys.stderr)
+    for name, was, here in table:
+        if was != here:
+            print(f"  {name} differs: {was} recorded, {here} here", file=sys.stderr)
 
 
 def given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
@@ -196,24 +165,19 @@ def given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
     return read_scene(path, None, lambda text: print(f"rigid_proto: {text}", file=sys.stderr))
 
 
-def _branch(session: RecordedSession, args: argparse.Namespace, given: Scenario | None) -> None:
-    from ..scene.scenario import nanoseconds
-    from ..session.branch import branch_at, recorded_branch
+def _branch(session: RecordedSession, args: argparse.Namespace) -> None:
+    from ..session.branch import branch_at
+    from ..simulation.commands import nanoseconds
 
-    time_ns = nanoseconds(args.at)
-    if given is None and session.missing:
-        raise InputError(
-            "--as-scene", f"the recording has no {', '.join(session.missing)}; give its scene with --scene FILE"
-        )
-    branch = branch_at(session, time_ns) if given is None else recorded_branch(session, given, time_ns)
+    if session.missing:
+        raise InputError("--as-scene", f"a recording without {', '.join(session.missing)}", "one that has them")
+    branch = branch_at(session, nanoseconds(args.at))
     scene = output_file("--as-scene", args.as_scene)
     scene.write_text(branch.scene, encoding="utf-8")
     script = scene.with_name(f"{scene.stem}_script.yaml")
     script.write_text(branch.script, encoding="utf-8")
     words = ["rigid_proto", "simulate", str(scene), "--script", str(script)]
     print(f"  scene at {args.at:g} s: {shlex.join(words)}")
-    for note in branch.notes:
-        print(f"  {note}")
 
 
 def _publish(session: RecordedSession, args: argparse.Namespace) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,8 +13,7 @@ from ..base.command_line import Parser
 from ..base.errors import InputError
 from ..base.files import output_file
 from .exports import add_exports, asked, check_exports, write_exports
-from .options import add_json, add_scene
-from .terminal import line, table
+from .options import add_json, add_scene, number_from
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
@@ -46,7 +44,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument("--script", metavar="POKES.yaml", help="poke script; its times are simulated time")
     parser.add_argument(
         "--duration",
-        type=float,
+        type=number_from(0.0, 1e9),
         metavar="S",
         help="simulated seconds (default 10, or 1 past the script's last command where that is later)",
     )
@@ -71,13 +69,11 @@ def _instead_of(option: str) -> str:
 def run(args: argparse.Namespace) -> int:
     """Run the scene and print its end."""
     from ..scene.offline import OfflineRun, parse_setting, read_scene, run_with_progress, summary
-    from ..scene.scenario import nanoseconds
     from ..scene.scenario_run import Refusals
     from ..scene.script import read_script
+    from ..simulation.commands import nanoseconds
     from ..simulation.observer import Observers
 
-    if args.duration is not None and not (math.isfinite(args.duration) and 0.0 <= args.duration <= 1e9):
-        raise InputError("--duration", args.duration, "seconds from 0 to 1e9")
     scenario = read_scene(args.scene, dict(parse_setting(s) for s in args.set), _warn)
     for warning in scenario.warnings:
         _warn(warning)
@@ -92,7 +88,11 @@ def run(args: argparse.Namespace) -> int:
         OfflineRun(scenario, script)
         _check_places(files, args.bag)
     check_exports(args)
-    record = _flight_record() if asked(args) else None
+    record: FlightRecord | None = None
+    if asked(args):
+        from ..export.flight_record import FlightRecord
+
+        record = FlightRecord()
     recorders = _recorders(files, scenario.parameters)
     watching = [*recorders.values(), *filter(None, [record])]
     try:
@@ -113,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
     if record is not None:
         from ..export.flight_record import source_of_scene
 
-        write_exports(args, record, source_of_scene(scenario, script), _warn if args.json else line)
+        write_exports(args, record, source_of_scene(scenario, script), _warn if args.json else print)
     if floor := flight.simulation.accuracy_floor:
         _warn(f"accuracy {flight.simulation.setup.accuracy:g} is not held throughout: {floor}")
     if flight.simulation.failure:
@@ -132,12 +132,6 @@ def _check_places(files: list[str], bag: str | None) -> None:
         output_file("record", file)
     if len({Path(file).resolve() for file in files}) < len(files):
         raise InputError("--bag", files[-1], "another file than that of --record")
-
-
-def _flight_record() -> FlightRecord:
-    from ..export.flight_record import FlightRecord
-
-    return FlightRecord()
 
 
 def _recorders(files: list[str], parameters: Parameters) -> dict[str, Recorder]:
@@ -170,23 +164,24 @@ def _warn(message: str) -> None:
 
 
 def _print_summary(result: dict, recordings: list[str]) -> None:
-    def vector(name: str) -> str:
-        return " ".join(f"{x:< 16.9g}" for x in result[name]).rstrip()
+    def vector(name: str, unit: str = "") -> str:
+        return f"{' '.join(f'{x: .9g}'.ljust(16) for x in result[name])} {unit}".rstrip()
 
-    rows: list[tuple[str, ...]] = [
-        ("simulated", f" {result['time_ns'] / 1e9:.9g} s in {result['wall_time']:.3g} s of wall time"),
-        ("position", vector("position"), "m"),
-        ("attitude xyzw", vector("orientation_xyzw")),
-        ("velocity", vector("linear_velocity"), "m/s"),
-        ("ω (world)", vector("angular_velocity"), "rad/s"),
-        ("kinetic energy", f" {result['kinetic_energy']:.9g}", "J"),
-        ("potential energy", f" {result['potential_energy']:.9g}", "J"),
-        ("L (world)", vector("angular_momentum"), "kg m²/s"),
-        ("integrator", f" {result['integrator']}, {result['steps']} steps"),
-        ("state hash", f" {result['state_hash']}"),
-    ]
-    table(rows)
+    rows = {
+        "simulated": f" {result['time_ns'] / 1e9:.9g} s in {result['wall_time']:.3g} s of wall time",
+        "position": vector("position", "m"),
+        "attitude xyzw": vector("orientation_xyzw"),
+        "velocity": vector("linear_velocity", "m/s"),
+        "ω (world)": vector("angular_velocity", "rad/s"),
+        "kinetic energy": f" {result['kinetic_energy']:.9g} J",
+        "potential energy": f" {result['potential_energy']:.9g} J",
+        "L (world)": vector("angular_momentum", "kg m²/s"),
+        "integrator": f" {result['integrator']}, {result['steps']} steps",
+        "state hash": f" {result['state_hash']}",
+    }
+    for name, value in rows.items():
+        print(f"{name:16s} {value}")
     for file in recordings:
         bag = Path(file).suffix == ".mcap"
         show = f"rigid_proto replay {file} --record {Path(file).with_suffix('.rrd')}" if bag else f"rerun {file}"
-        line(("recorded", "bold"), f" {file}; {'for Rerun' if bag else 'show it with'}: {show}")
+        print(f"recorded {file}; show it with: {show}")

@@ -30,16 +30,15 @@ def read_session(path: str | Path) -> RecordedSession:
     """
     path = Path(path)
     try:
-        size = path.stat().st_size
-        kept, complete = whole_bytes(path)
+        _, complete = whole_bytes(path)
     except OSError as error:
         raise InputError("session", str(path), f"a recording that can be read ({error.strerror})") from error
-    session = RecordedSession(complete=complete, readable_bytes=size if complete else kept, file_bytes=size)
+    session = RecordedSession(complete=complete)
     try:
         _read(path, session)
     except RuntimeError:
         # Also a file whose index was cut: all frames are whole, but the reader wants none of it.
-        session = RecordedSession(complete=False, readable_bytes=kept, file_bytes=size)
+        session = RecordedSession(complete=False)
         with whole_part(path) as whole:
             try:
                 _read(whole, session)

@@ -104,11 +104,9 @@ def repair(path: str | Path, repaired: str | Path) -> None:
         _rerun_reader().read_session(path)
         copy_whole(path, repaired)
         return
-    bags = _bag_reader()
-    files = bags.bag_files(path)
-    if len(files) > 1:
-        raise InputError("--repair", f"the bag has {len(files)} files; name one of them")
-    bags.repair_mcap(bags.bag_bytes(files[0]), repaired, str(files[0]))
+    if path.is_dir():
+        raise InputError("--repair", str(path), "one .mcap file of the folder")
+    _bag_reader().repair_mcap(path, repaired)
 
 
 def is_bag(path: Path) -> bool:

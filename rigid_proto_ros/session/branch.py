@@ -8,7 +8,7 @@ within ``accuracy``, and not to the very bits.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,22 +17,20 @@ from ..scene.scenario import Scenario, make_scenario
 from ..scene.yaml_text import flow
 from ..simulation.commands import HELD_WRENCH, UNNAMED_SLOT, slot_name
 from ..simulation.flight import NEVER
-from ..simulation.flight_arrays import ActingLoad
 from ..simulation.simulation import Simulation
 from .messages import PROJECTIONS
 from .recorded_session import RecordedSession
-from .replay import Resimulation, mesh_finder, session_scenario
+from .replay import Resimulation, resimulation
 
 Entry = dict[str, object]
 
 
 @dataclass(frozen=True)
 class Branch:
-    """scene: parameter-file text; entries: of a poke script; notes: what differs."""
+    """scene: parameter-file text; entries: of a poke script."""
 
     scene: str
-    entries: list[Entry] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    entries: list[Entry]
 
     @property
     def script(self) -> str:
@@ -49,32 +47,18 @@ def branch_at(session: RecordedSession, time_ns: int) -> Branch:
     last_ns = max([session.end_ns, *(event_ns for event_ns, _ in session.events)])
     if not 0 <= time_ns <= last_ns:
         raise InputError("--at", time_ns / 1e9, f"a time of the session, 0 to {last_ns / 1e9:.9g} s")
-    again = Resimulation(session_scenario(session), session.lines, None, mesh_finder(session), session.node_name)
+    again = resimulation(session)
     row = again.advance(time_ns)
     simulation = again.simulation
     if simulation.failure:
         raise InputError("--at", time_ns / 1e9, f"a time before the motion failed: {simulation.failure}")
-    scene = _scene(again.scenario, row, _string_parameters(simulation))
     entries = [*_load_entries(simulation), *_thruster_entries(simulation), *_string_entries(simulation)]
-    return Branch(scene.text, entries)
+    return Branch(_scene(again, row).text, entries)
 
 
-def recorded_branch(session: RecordedSession, scenario: Scenario, time_ns: int) -> Branch:
-    """The same from recorded states alone: the one at ``time_ns``, or the last before it, in a scene given with it."""
-    before = np.flatnonzero(session.times <= time_ns)
-    if not len(before):
-        raise InputError("--at", time_ns / 1e9, f"a time from the first state, {_first(session)}, on")
-    k = before[np.argmax(session.times[before])]
-    notes = [f"the state is the one recorded at {session.times[k] / 1e9:.9g} s; what acted then isn't recorded"]
-    return Branch(_scene(scenario, session.rows[k], {}).text, notes=notes)
-
-
-def _first(session: RecordedSession) -> str:
-    return f"at {session.times.min() / 1e9:.9g} s" if len(session.times) else "of which there is none"
-
-
-def _scene(scenario: Scenario, row: np.ndarray, string: dict[str, object]) -> Scenario:
-    numbers = row.tolist()
+def _scene(again: Resimulation, row: np.ndarray) -> Scenario:
+    """The scene that begins with this state, and with the string as it is."""
+    numbers, scenario, tied = row.tolist(), again.scenario, again.simulation.string
     velocities = PROJECTIONS["twist"](numbers)
     values = {
         **scenario.parameters.named(),
@@ -83,21 +67,13 @@ def _scene(scenario: Scenario, row: np.ndarray, string: dict[str, object]) -> Sc
         "initial.linear_velocity": velocities[:3],
         "initial.angular_velocity": velocities[3:],
         "record": "",
-        **string,
+        "string.attached": tied is not None,
+        "string.attach": list(again.simulation.attach if tied is None else tied.attach),
     }
+    if tied is not None:
+        values["string.target"] = tied.free_end(again.simulation.time_ns).tolist()
+        values["initial.string_mass"] = tied.effective_mass
     return make_scenario(values, scenario.body_mesh.mesh if scenario.body_mesh else None)
-
-
-def _string_parameters(simulation: Simulation) -> dict[str, object]:
-    tied = simulation.string
-    if tied is None:
-        return {"string.attached": False, "string.attach": list(simulation.attach)}
-    return {
-        "string.attached": True,
-        "string.attach": list(tied.attach),
-        "string.target": tied.free_end(simulation.time_ns).tolist(),
-        "initial.string_mass": tied.effective_mass,
-    }
 
 
 def _string_entries(simulation: Simulation) -> Iterator[Entry]:
@@ -114,30 +90,21 @@ def _string_entries(simulation: Simulation) -> Iterator[Entry]:
 def _load_entries(simulation: Simulation) -> Iterator[Entry]:
     timeout_ns, now_ns = simulation.setup.wrench_timeout_ns, simulation.time_ns
     for acting in simulation.acting:
-        if acting.thruster >= 0:
-            continue
-        entry: Entry = _load_entry(acting)
         endless = acting.kind == HELD_WRENCH and not timeout_ns
+        if acting.thruster >= 0 or not (endless or acting.end_ns > now_ns):
+            continue
+        load = acting.load
+        entry: Entry = {"at": "com" if load.mesh_point is None else {"point": list(load.mesh_point)}}
+        if load.axes == "normal":
+            entry["push"] = load.force[0]
+        else:
+            entry |= {"force": list(load.force), "torque": list(load.torque), "axes": load.axes}
+        if acting.slot > UNNAMED_SLOT:
+            entry["slot"] = slot_name(acting.slot)
         if not endless:
             entry["duration"] = (acting.end_ns - now_ns) / 1e9
-        if endless or acting.end_ns > now_ns:
-            yield {"t": 0.0, "wrench": entry} if _is_wrench(acting) else {"t": 0.0, **entry}
-
-
-def _is_wrench(acting: ActingLoad) -> bool:
-    return acting.kind == HELD_WRENCH or acting.slot == UNNAMED_SLOT
-
-
-def _load_entry(acting: ActingLoad) -> Entry:
-    load = acting.load
-    entry: Entry = {"at": "com" if load.mesh_point is None else {"point": list(load.mesh_point)}}
-    if load.axes == "normal":
-        entry["push"] = load.force[0]
-    else:
-        entry |= {"force": list(load.force), "torque": list(load.torque), "axes": load.axes}
-    if acting.slot > UNNAMED_SLOT:
-        entry["slot"] = slot_name(acting.slot)
-    return entry
+        held = acting.kind == HELD_WRENCH or acting.slot == UNNAMED_SLOT
+        yield {"t": 0.0, "wrench": entry} if held else {"t": 0.0, **entry}
 
 
 def _thruster_entries(simulation: Simulation) -> Iterator[Entry]:

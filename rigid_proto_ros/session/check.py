@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 import json
-import struct
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from ..simulation.event_log import EventLog
 from ..simulation.observer import Event, Logged, Observer
 from .messages import FIELDS, PROJECTIONS
 from .recorded_session import RecordedSession
-from .replay import Resimulation, as_published, mesh_finder, resimulation, session_scenario
+from .replay import Resimulation, as_published, resimulation
 from .runs import decode_event
 
 
@@ -57,56 +56,47 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
     Returns the first difference, or None. Raises InputError for a session that can't be decoded, or lacks what a check
     needs: the topics named, or its beginning.
     """
-    _check_verifiable(session)
-    recorded = session.lines
-    events = [decode_event(line, number) for number, line in enumerate(recorded, 1)]
-    broken = broken_link(recorded)
-    if broken is not None:
-        if broken == 1 and not _begins_at_its_start(session, events):
-            raise _began_later(session)
-        line = recorded[broken - 1]
-        return Difference(events[broken - 1][0], f"command {broken} isn't what its hash says: {line}", tampered=True)
-    lines = _Lines()
-    again = resimulation(session, lines)
-    states = list(_states_in_order(session))
+    states = _states_in_order(session)
     if not states:
-        raise NotVerifiableError(
-            "--verify", "a recording without states", "one with states: there is nothing to verify"
-        )
-    compared = 0
-    for count, (time_ns, name, row) in enumerate(states):
-        try:
-            computed = again.advance(time_ns)
-        except CommandRefused as refusal:
-            return _not_taken(again, lines, recorded, refusal)
-        difference = _line_difference(recorded, lines.lines, compared)
-        if difference is not None:
-            return difference
-        compared = len(lines.lines)
-        if again.simulation.failure and again.simulation.time_ns != time_ns:
-            return Difference(time_ns, again.simulation.failure)
-        difference = _row_difference(
-            time_ns, count + 1, name, row, as_published(session, again.scenario.parameters, name, time_ns, computed)
-        )
-        if difference is not None:
-            if count == 0 and not recorded and time_ns > 0:
-                # Nothing in it says that it is complete.
-                raise _began_later(session)
-            return replace(difference, command=_command_before(events, recorded, time_ns))
-        if count % 1000 == 0:
-            progress(count / len(states))
-    return _what_follows(again, lines, recorded, events)
-
-
-def _check_verifiable(session: RecordedSession) -> None:
-    """Raises InputError where there is nothing to compare, or nothing to compute it from."""
-    if next(_states_in_order(session), None) is None:
         lacks = ", ".join(session.missing) or "states"
         accepted = "states from a start or reset on; without them there is nothing to verify"
         raise NotVerifiableError("--verify", f"a recording without {lacks}", accepted)
     if session.missing:
         accepted = "a recording that holds them from a start or reset on"
         raise InputError("--verify", f"a recording without {', '.join(session.missing)}", accepted)
+    first_ns, recorded = states[0][0], session.lines
+    began_later = NotVerifiableError(
+        "--verify", f"a recording that begins at {first_ns / 1e9:.9g} s", "one that begins at a start or a reset"
+    )
+    times_ns = [decode_event(line, number)[0] for number, line in enumerate(recorded, 1)]
+    if (broken := broken_link(recorded)) is not None:
+        if broken == 1 and first_ns > 0:
+            raise began_later
+        what = f"command {broken} isn't what its hash says: {recorded[broken - 1]}"
+        return Difference(times_ns[broken - 1], what, tampered=True)
+    computed = _Lines()
+    again = resimulation(session, computed)
+    compared = 0
+    for count, (time_ns, name, row) in enumerate(states):
+        difference, state = _advance(again, time_ns, computed.lines, recorded, compared)
+        if difference is not None:
+            return difference
+        compared = len(computed.lines)
+        expected = as_published(session, again.scenario.parameters, name, time_ns, state)
+        if what := _row_difference(count + 1, name, row, expected):
+            if count == 0 and not recorded and first_ns > 0:
+                raise began_later
+            # At its own time a command acts after the state.
+            before = sum(acted_ns < time_ns for acted_ns in times_ns)
+            return Difference(time_ns, what, f"command {before}: {recorded[before - 1]}" if before else "")
+        if count % 1000 == 0:
+            progress(count / len(states))
+    end_ns = max([again.simulation.time_ns, *(acted_ns + 1 for acted_ns in times_ns)])
+    difference, _ = _advance(again, end_ns, computed.lines, recorded, compared)
+    missing = len(computed.lines)
+    if difference is None and missing < len(recorded):
+        return Difference(times_ns[missing], f"command {missing + 1} did not act: {recorded[missing]}")
+    return difference
 
 
 def made_with_table(session: RecordedSession) -> list[tuple[str, str, str]]:
@@ -127,21 +117,32 @@ def broken_link(lines: Sequence[str]) -> int | None:
     return None
 
 
-def _what_follows(again: Resimulation, lines: _Lines, recorded: list[str], events: list) -> Difference | None:
-    """Events behind the last state."""
+def _advance(
+    again: Resimulation, time_ns: int, computed: Sequence[str], recorded: Sequence[str], compared: int
+) -> tuple[Difference | None, np.ndarray]:
+    """The state computed at ``time_ns``, or the first difference in the commands up to there, of which ``compared``
+    were alike.
+    """
+    refused = None
     try:
-        if events:
-            again.advance(max(again.simulation.time_ns, max(time_ns for time_ns, _, _ in events) + 1))
+        row = again.advance(time_ns)
     except CommandRefused as refusal:
-        return _not_taken(again, lines, recorded, refusal)
-    difference = _line_difference(recorded, lines.lines)
-    if difference is None and len(lines.lines) < len(recorded):
-        missing = len(lines.lines)
-        difference = Difference(events[missing][0], f"command {missing + 1} did not act: {recorded[missing]}")
-    return difference
+        row, refused = np.empty(0), refusal
+    for number, line in enumerate(computed[compared:], compared + 1):
+        if number > len(recorded):
+            return Difference(json.loads(line)["time_ns"], f"a command that wasn't recorded: {line}"), row
+        if line != recorded[number - 1]:
+            what = f"command {number} differs: {recorded[number - 1]} recorded, {line} computed"
+            return Difference(json.loads(recorded[number - 1])["time_ns"], what), row
+    if refused is not None:
+        what = f"command {len(computed) + 1} was applied in the recording, but is refused here: {refused}"
+        return Difference(again.simulation.time_ns, what), row
+    if again.simulation.failure and again.simulation.time_ns != time_ns:
+        return Difference(time_ns, again.simulation.failure), row
+    return None, row
 
 
-def _states_in_order(session: RecordedSession) -> Iterator[tuple[int, str, np.ndarray]]:
+def _states_in_order(session: RecordedSession) -> list[tuple[int, str, np.ndarray]]:
     """Time, topic ("" for the state itself) and row of everything to compare, in the order of time."""
     streams = {"": (session.times, session.rows)}
     if session.published:
@@ -149,73 +150,16 @@ def _states_in_order(session: RecordedSession) -> Iterator[tuple[int, str, np.nd
     merged = [
         (int(t), name, row) for name, (times, rows) in streams.items() for t, row in zip(times, rows, strict=True)
     ]
-    yield from sorted(merged, key=lambda state: state[0])
+    return sorted(merged, key=lambda state: state[0])
 
 
-def _row_difference(
-    time_ns: int, number: int, name: str, recorded: np.ndarray, computed: np.ndarray
-) -> Difference | None:
-    """How the ``number``-th state differs, by the variable that differs most."""
+def _row_difference(number: int, name: str, recorded: np.ndarray, computed: np.ndarray) -> str:
+    """How the ``number``-th state differs, by the variable that differs most; empty where it doesn't."""
     if name:
         computed = np.array(PROJECTIONS[name](computed.tolist()))
     if computed.tobytes() == recorded.tobytes():
-        return None
-    pairs = list(zip(recorded.tolist(), computed.tolist(), strict=True))
-    worst = max(range(len(pairs)), key=lambda k: (abs(pairs[k][1] - pairs[k][0]), _ulps(*pairs[k])))
-    was, now = pairs[worst]
-    where = f"state {number}, {name + ' ' if name else ''}{FIELDS[name][worst]}"
-    return Difference(time_ns, f"{where} differs by {_ulps(was, now)} ulp: {was!r} recorded, {now!r} computed")
-
-
-def _ulps(a: float, b: float) -> int:
-    """How many doubles b lies from a."""
-    first, second = (struct.unpack("<q", struct.pack("<d", x))[0] for x in (a, b))
-    first, second = (bits if bits >= 0 else -(bits & (2**63 - 1)) for bits in (first, second))
-    return abs(first - second)
-
-
-def _command_before(events: list, recorded: Sequence[str], time_ns: int) -> str:
-    """The last command that acted before a state: at its own time, commands act after it."""
-    before = [number for number, event in enumerate(events, 1) if event[0] < time_ns]
-    if not before:
         return ""
-    last = max(before, key=lambda number: (events[number - 1][0], number))
-    return f"command {last}: {recorded[last - 1]}"
-
-
-def _line_difference(recorded: Sequence[str], computed: Sequence[str], begin: int = 0) -> Difference | None:
-    pairs = zip(computed[begin:], recorded[begin:], strict=False)
-    for number, (ours, theirs) in enumerate(pairs, begin + 1):
-        if ours != theirs:
-            time_ns, _, _ = decode_event(theirs, number)
-            return Difference(time_ns, f"command {number} differs: {theirs} recorded, {ours} computed")
-    if len(computed) > len(recorded):
-        line = computed[len(recorded)]
-        return Difference(json.loads(line)["time_ns"], f"a command that wasn't recorded: {line}")
-    return None
-
-
-def _not_taken(again: Resimulation, lines: _Lines, recorded: list[str], refusal: CommandRefused) -> Difference:
-    earlier = _line_difference(recorded, lines.lines)
-    number = len(lines.lines) + 1
-    return earlier or Difference(
-        again.simulation.time_ns, f"command {number} was applied in the recording, but is refused here: {refusal}"
-    )
-
-
-def _begins_at_its_start(session: RecordedSession, events: list) -> bool:
-    """Whether the first state is that of the scene before anything happened to it."""
-    first = next(_states_in_order(session), None)
-    if first is None or first[0] > events[0][0]:
-        return False
-    time_ns, name, row = first
-    again = Resimulation(session_scenario(session), [], None, mesh_finder(session), session.node_name)
-    told = as_published(session, again.scenario.parameters, name, time_ns, again.advance(time_ns))
-    return _row_difference(time_ns, 1, name, row, told) is None
-
-
-def _began_later(session: RecordedSession) -> NotVerifiableError:
-    first = min((state[0] for state in _states_in_order(session)), default=0)
-    return NotVerifiableError(
-        "--verify", f"a recording that begins at {first / 1e9:.9g} s", "one that begins at a start or a reset"
-    )
+    different = np.flatnonzero(computed.view(np.uint64) != np.ascontiguousarray(recorded).view(np.uint64))
+    worst = different[np.argmax(np.abs(computed - recorded)[different])]
+    where = f"state {number}, {name + ' ' if name else ''}{FIELDS[name][worst]}"
+    return f"{where} differs: {float(recorded[worst])!r} recorded, {float(computed[worst])!r} computed"

@@ -37,7 +37,7 @@ class RecordedSession:
     refusals: (time_ns, text). times (n,) int64 [ns, simulated] and rows (n, 13) float64, exactly the published states
     in ``simulation/observer.py``'s ``STATE_FIELDS`` order. vertices (p, 3) float64 and triangles (m, 3) int64 as
     loaded, None without a mesh; mesh_sha256 of the mesh file; mesh_chunks counts how often the drawn mesh was logged.
-    complete: the file was finished properly. readable_bytes of file_bytes hold whole pieces.
+    complete: the file was finished properly.
 
     A bag holds no state rows but what the node published of them: ``published``, by topic; ``rows`` are then found from
     those, for the eye. scenes: every text of the scene topic, in order. node_name: what stands before the topics'
@@ -56,8 +56,6 @@ class RecordedSession:
     mesh_sha256: str = ""
     mesh_chunks: int = 0
     complete: bool = True
-    readable_bytes: int = 0
-    file_bytes: int = 0
     published: dict[str, StampedRows] = field(default_factory=dict)
     scenes: list[str] = field(default_factory=list)
     node_name: str = "rigid_body"
@@ -76,13 +74,6 @@ class RecordedSession:
     def end_ns(self) -> int:
         """Simulated time [ns] of the last state; 0 without states."""
         return int(self.times[-1]) if len(self.times) else 0
-
-    def summary(self) -> str:
-        """What there is, in one line."""
-        text = f"{len(self.times)} states to {1e-9 * self.end_ns:g} s, {len(self.events)} events"
-        if not self.complete:
-            text += f"; not finished properly, {self.readable_bytes} of {self.file_bytes} bytes are complete"
-        return text
 
 
 def find_mesh(

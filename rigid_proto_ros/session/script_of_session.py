@@ -15,12 +15,7 @@ from ..base.vectors import vector
 from ..motion.body import Body
 from ..motion.frames import Frame
 from ..motion.loads import Load
-from ..scene.command_codec import (
-    MARKS,
-    entry_of,
-    frame_names,
-    of_event,
-)
+from ..scene.command_codec import MARKS, entry_of, frame_names, of_event
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, nanoseconds, scene_text
 from ..scene.yaml_text import flow
@@ -28,7 +23,7 @@ from ..simulation.commands import TieString, WrenchCommand
 from ..simulation.observer import Applied, Event, Logged, Observer
 from ..simulation.string_control import mesh_point
 from .recorded_session import RecordedSession
-from .replay import Resimulation, mesh_finder, session_scenario
+from .replay import Resimulation, resimulation
 from .runs import decode_event
 
 NOT_OF_THE_MOTION = frozenset({"record", "viewer", "rerun_port", "web_port", "workbench_port", "start_paused"})
@@ -53,12 +48,11 @@ def script_of_session(session: RecordedSession) -> SavedScript:
 
     Raises InputError for events that can't be decoded or taken, which is what an incomplete record of the run gives.
     """
-    scenario = session_scenario(session)
-    writer = _Writer(scenario)
-    again = Resimulation(scenario, session.lines, writer, mesh_finder(session), session.node_name)
-    writer.follow(again)
+    writer = _Writer()
+    again = writer.again = resimulation(session, writer)
+    scenario = writer.last = again.scenario
     if session.events:
-        again.advance(max(decode_event(line, number)[0] for number, line in enumerate(session.lines, 1)) + 1)
+        again.advance(max(time_ns for time_ns, _ in session.events) + 1)
     if writer.lines != session.lines:
         raise InputError("events", f"{len(session.lines)} lines", "all lines of the log since the start or a reset")
     entries, notes = writer.entries, []
@@ -86,21 +80,19 @@ def kept_scene(scenario: Scenario) -> str:
 class _Writer(Observer):
     """Turns what acts on a body computed anew into script entries.
 
-    lines: the log's lines as they come out again. entries: of a script, in the order of acting.
+    lines: the log's lines as they come out again. entries: of a script, in the order of acting. again: the simulation;
+    last: its scenario before the latest change.
     """
 
     takes = frozenset({Applied, Logged})
 
-    def __init__(self, scenario: Scenario) -> None:
+    again: Resimulation
+    last: Scenario
+    _applied: tuple[WrenchCommand, Load, Body]
+
+    def __init__(self) -> None:
         self.lines: list[str] = []
         self.entries: list[dict] = []
-        self._last = scenario
-        self._again: Resimulation
-        self._applied: tuple[WrenchCommand, Load, Body]
-
-    def follow(self, again: Resimulation) -> None:
-        """The simulation that this writes of: to be called before anything acts in it."""
-        self._again = again
 
     def on(self, event: Event) -> None:
         """A wrench or poke takes effect, and its line follows; or anything else has acted."""
@@ -117,28 +109,22 @@ class _Writer(Observer):
         if kind in ("set", "inertia"):
             self._change(time_ns, content if kind == "set" else {})
             return
-        again = self._again
+        again = self.again
         frames = frame_names(again.scenario.parameters, again.node_name)
         command = of_event(kind, content, frames)
         assert command is not None
         if isinstance(command, WrenchCommand):
             command = _forward(command, self._applied)
         elif isinstance(command, TieString):
-            command = replace(command, axes="mesh", point=self._attach(command))
-        self._add(time_ns, entry_of(command))
-
-    def _add(self, time_ns: int, entry: dict) -> None:
-        self.entries.append({"t": time_ns / 1e9, **entry})
-
-    def _attach(self, command: TieString) -> tuple[float, float, float]:
-        """The point in mesh coordinates, not yet taken onto the surface: that happens again."""
-        simulation = self._again.simulation
-        x, y, z = mesh_point(command, simulation.setup.body, simulation.state).tolist()
-        return x, y, z
+            # In mesh coordinates, not yet taken onto the surface: that happens again.
+            simulation = again.simulation
+            point = mesh_point(command, simulation.setup.body, simulation.state)
+            command = replace(command, axes="mesh", point=vector(point))
+        self.entries.append({"t": time_ns / 1e9, **entry_of(command)})
 
     def _change(self, time_ns: int, content: dict) -> None:
-        before, after = self._last, self._again.scenario
-        self._last = after
+        before, after = self.last, self.again.scenario
+        self.last = after
         changes = {name: value for name, value in content.items() if name not in NOT_OF_THE_MOTION}
         if not content:
             earlier = before.parameters.named()
@@ -146,7 +132,7 @@ class _Writer(Observer):
         if not changes:
             # It cut the motion's steps all the same.
             changes = {"poke_duration": after.parameters.poke_duration}
-        self._add(time_ns, {"set": changes})
+        self.entries.append({"t": time_ns / 1e9, "set": changes})
 
 
 def _forward(command: WrenchCommand, applied: tuple[WrenchCommand, Load, Body]) -> WrenchCommand:

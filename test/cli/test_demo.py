@@ -18,10 +18,10 @@ pytest.importorskip("rerun")
 def fly(ros_environment, folder, *arguments):
     from rigid_proto_ros.rerun_view.reader import read_session, record_batches
 
-    done = run("rigid_proto", "demo", "--out", folder, *arguments, environment=ros_environment, timeout=180)
+    done = run("rigid_proto", "demo", *arguments, environment=ros_environment, cwd=folder, timeout=180)
     assert done.returncode == 0, done.stderr
-    session = folder / "session.rrd"
-    assert str(session) in done.stdout
+    session = folder / "out" / "session.rrd"
+    assert "out/session.rrd" in done.stdout
     return session, read_session(session), list(record_batches(session))
 
 
@@ -52,7 +52,7 @@ def check(session, recorded, batches, pokes):
 
 
 def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies(ros_environment, tmp_path):
-    session, recorded, batches = fly(ros_environment, tmp_path / "out", "--duration", "10")
+    session, recorded, batches = fly(ros_environment, tmp_path, "--duration", "10")
     check(session, recorded, batches, pokes=3)
     assert recorded.times.max() == recorded.end_ns == 10_000_000_000
     verified = run("rigid_proto", "replay", session, "--verify", environment=ros_environment)
@@ -62,9 +62,7 @@ def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies(ros_
 
 @pytest.mark.stress
 def test_a_real_mesh_flies_too_and_hangs_where_the_state_says(ros_environment, tmp_path, meshes):
-    session, recorded, batches = fly(
-        ros_environment, tmp_path / "out", "--duration", "7", "--mesh", meshes / "spot.obj"
-    )
+    session, recorded, batches = fly(ros_environment, tmp_path, "--duration", "7", "--mesh", meshes / "spot.obj")
     check(session, recorded, batches, pokes=3)
     assert len(recorded.vertices) == 11533
     verified = run("rigid_proto", "replay", session, "--verify", environment=ros_environment)
@@ -72,9 +70,8 @@ def test_a_real_mesh_flies_too_and_hangs_where_the_state_says(ros_environment, t
 
 
 def test_an_open_mesh_is_refused_in_one_line_that_names_what_helps(ros_environment, tmp_path, meshes):
-    done = run(
-        "rigid_proto", "demo", "--out", tmp_path, "--mesh", meshes / "teapot_open.obj", environment=ros_environment
-    )
+    mesh = meshes / "teapot_open.obj"
+    done = run("rigid_proto", "demo", "--mesh", mesh, environment=ros_environment, cwd=tmp_path)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert "mesh_repair" in line
@@ -87,6 +84,6 @@ def test_what_the_set_up_compiles_is_all_that_the_first_flight_needs(ros_environ
         command = [sys.executable, str(SOURCE / "requirements" / "compile_kernels.py"), part]
         subprocess.run(command, env=from_source(environment), check=True)
     compiled = sorted((tmp_path / "kernels").rglob("*.nbc"))
-    done = run("rigid_proto", "demo", "--out", tmp_path / "out", environment=environment)
+    done = run("rigid_proto", "demo", environment=environment, cwd=tmp_path)
     assert done.returncode == 0 and "compiling" not in done.stderr, done.stderr
     assert compiled and sorted((tmp_path / "kernels").rglob("*.nbc")) == compiled

@@ -9,7 +9,6 @@ import re
 import shutil
 import struct
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -81,37 +80,28 @@ def mesh_beside(tmp_path) -> None:
 
 LAYOUTS = {
     "bare": lambda to, m: write_bag_file(to.with_suffix(".mcap"), m),
-    "folder": lambda to, m: write_bag(to, m),
-    "split": lambda to, m: write_bag(to, m, files=3, chunk_size=20_000),
-    "zstd chunks": lambda to, m: write_bag(to, m, compression=CompressionType.ZSTD),
-    "lz4 chunks": lambda to, m: write_bag(to, m, compression=CompressionType.LZ4),
-    "no chunks": lambda to, m: write_bag(to, m, chunked=False),
-    "compressed messages": lambda to, m: write_bag(to, m, compression_mode="MESSAGE"),
-    "bare, compressed messages": lambda to, m: write_bag_file(to.with_suffix(".mcap"), m, compress_messages=True),
-    "compressed files": lambda to, m: write_bag(to, m, compression_mode="FILE", files=2),
+    "split": lambda to, m: write_bag(to, m, files=12, chunk_size=20_000, compression=CompressionType.ZSTD),
 }
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_a_bag_in_every_layout_is_verified_to_the_bit(flown, mesh_beside, tmp_path, layout):
+def test_a_bag_alone_or_split_is_verified_to_the_bit(flown, mesh_beside, tmp_path, layout):
     LAYOUTS[layout](tmp_path / "bag", flown)
     path = tmp_path / "bag" if (tmp_path / "bag").is_dir() else tmp_path / "bag.mcap"
-    runs = read_runs(path)
-    assert len(runs) == 2
+    first, second = runs = read_runs(path)
     for run in runs:
         assert len(run.events) >= 9
         assert len(run.published["pose"]) > 150 and len(run.published["odom"]) > 150
-        assert verify(run) is None
-    assert main(["replay", str(path), "--verify"]) == 0
-
-
-def test_states_of_the_two_runs_are_told_apart_by_their_stamps(flown, tmp_path):
-    LAYOUTS["bare"](tmp_path / "bag", flown)
-    for run in read_runs(tmp_path / "bag.mcap"):
+        # The two runs are told apart by their stamps.
         for rows in run.published.values():
             assert (np.diff(rows.times) >= 0).all()
             assert rows.times[-1] >= SECOND * 7 // 4
             assert rows.times[0] < SECOND // 4
+        assert verify(run) is None
+    # What the first run left is what the second begins with.
+    assert "gravity: [0.0, 0.0, 0.0]" in first.scene
+    assert "string.target: [0.0, 0.0, 0.2]" in second.scene
+    assert "string.target: [0.0, 0.0, 0.2]" not in first.scene
 
 
 def test_states_stamped_by_a_clock_are_read_in_simulated_time(flown, tmp_path):
@@ -143,15 +133,6 @@ def stamp_of(data: bytes) -> int:
     return sec * SECOND + nanosec
 
 
-def test_the_second_run_begins_with_the_scene_in_force_at_its_reset(flown, tmp_path):
-    LAYOUTS["bare"](tmp_path / "bag", flown)
-    first, second = read_runs(tmp_path / "bag.mcap")
-    assert "gravity: [0.0, 0.0, 0.0]" in first.scene
-    # What the first run left: density set, mass 0, string loose with a new target.
-    assert "string.target: [0.0, 0.0, 0.2]" in second.scene
-    assert "string.target: [0.0, 0.0, 0.2]" not in first.scene
-
-
 def test_a_mesh_that_is_nowhere_is_named_with_its_hash(flown, tmp_path, monkeypatch):
     monkeypatch.setattr("rigid_proto_ros.session.recorded_session.body_names", tuple)
     LAYOUTS["bare"](tmp_path / "bag", flown)
@@ -175,23 +156,13 @@ def _command(capsys, *arguments) -> tuple[int, str, str]:
     return status, said.out, said.err
 
 
-def test_a_bag_that_begins_later_is_shown_and_not_verified(flown, mesh_beside, tmp_path, capsys):
-    events = [m for m in flown if m.topic.endswith("events")]
-    first_run = events[: next(k for k, m in enumerate(events) if "reset" in read_string(m.data, ""))]
-    begin, end = first_run[3].log_time, first_run[-1].log_time
-    late = [m for m in flown if begin < m.log_time < end or (m.topic.endswith("scene") and m.log_time < begin)]
-    LAYOUTS["bare"](tmp_path / "bag", late)
-    bag = tmp_path / "bag.mcap"
-    status, out, err = _command(capsys, bag)
-    assert status == 0 and "states" in out
-    status, _, err = _command(capsys, bag, "--verify")
-    assert status == 2
-    assert len(err.splitlines()) == 1 and "begins at" in err
-
-
-def test_from_a_reset_on_a_bag_that_began_later_is_verified(flown, mesh_beside, tmp_path, capsys):
+def test_a_bag_that_began_later_is_verified_from_a_reset_on_alone(flown, mesh_beside, tmp_path, capsys):
     begin = [m for m in flown if m.topic.endswith("events")][4].log_time
     late = [m for m in flown if m.log_time > begin or m.topic.endswith("scene")]
+    reset = next(m.log_time for m in late if '"kind": "reset"' in m.data.decode(errors="ignore"))
+    LAYOUTS["bare"](tmp_path / "first", [m for m in late if m.log_time < reset])
+    status, _, err = _command(capsys, tmp_path / "first.mcap", "--verify")
+    assert status == 2 and len(err.splitlines()) == 1 and "begins at" in err
     LAYOUTS["bare"](tmp_path / "bag", late)
     status, out, _ = _command(capsys, tmp_path / "bag.mcap", "--verify")
     assert status == 0
@@ -202,7 +173,7 @@ def test_from_a_reset_on_a_bag_that_began_later_is_verified(flown, mesh_beside, 
 def test_a_bag_that_lacks_a_topic_is_shown_with_a_scene_and_verify_names_the_topic(
     flown, mesh_beside, tmp_path, capsys, missing
 ):
-    LAYOUTS["folder"](tmp_path / "bag", _without(flown, *missing))
+    write_bag(tmp_path / "bag", _without(flown, *missing))
     bag, scene = tmp_path / "bag", tmp_path / "scene.yaml"
     status, _, err = _command(capsys, bag, "--verify")
     assert status == 2
@@ -210,6 +181,9 @@ def test_a_bag_that_lacks_a_topic_is_shown_with_a_scene_and_verify_names_the_top
     assert all(f"/rigid_body/{name}" in err for name in missing[:1])
     if "pose" in missing:
         return
+    if "scene" in missing:
+        status, _, err = _command(capsys, bag, "--record", tmp_path / "x.mcap")
+        assert status == 2 and "--scene FILE" in err and len(err.splitlines()) == 1
     scene.write_text(f"rigid_body:\n  ros__parameters:\n    mesh: {tmp_path / 'bracket.obj'}\n")
     shown = tmp_path / "shown.mcap"
     assert _command(capsys, bag, "--scene", scene, "--record", shown)[0] == 0
@@ -219,18 +193,11 @@ def test_a_bag_that_lacks_a_topic_is_shown_with_a_scene_and_verify_names_the_top
     assert np.array_equal(again[0].published["pose"].rows[-1], recorded[0].published["pose"].rows[-1])
 
 
-def test_without_a_scene_drawing_asks_for_one(flown, tmp_path, capsys):
-    LAYOUTS["bare"](tmp_path / "bag", _without(flown, "scene"))
-    status, _, err = _command(capsys, tmp_path / "bag.mcap", "--record", tmp_path / "x.mcap")
-    assert status == 2 and "--scene FILE" in err and len(err.splitlines()) == 1
-
-
-def test_a_bag_whose_recorder_was_killed_has_no_metadata_and_no_end(flown, mesh_beside, tmp_path):
+def test_a_bag_whose_recorder_was_killed_is_read_up_to_its_last_chunk(flown, mesh_beside, tmp_path):
     folder = tmp_path / "bag"
     folder.mkdir()
-    write_bag_file(folder / "bag_0.mcap", flown, finish=False)
+    write_bag_file(folder / "bag_0.mcap", flown, chunk_size=20_000, finish=False)
     data = (folder / "bag_0.mcap").read_bytes()
-    # rosbag2's chunks are large and not compressed: what lies before a cut inside one counts too.
     (folder / "bag_0.mcap").write_bytes(data[: len(data) * 3 // 4])
     runs = read_runs(folder)
     assert not runs[-1].complete
@@ -239,7 +206,7 @@ def test_a_bag_whose_recorder_was_killed_has_no_metadata_and_no_end(flown, mesh_
         assert verify(run) is None
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_changed_event_in_a_bag_is_named(flown, mesh_beside, tmp_path, seed, capsys):
     rng = random.Random(seed)
     at = [k for k, m in enumerate(flown) if m.topic.endswith("events")]
@@ -263,21 +230,25 @@ def test_a_changed_state_is_named(flown, mesh_beside, tmp_path, capsys):
     changed = [*flown[:at], replace(flown[at], data=bytes(data)), *flown[at + 1 :]]
     LAYOUTS["bare"](tmp_path / "bag", changed)
     status, _, err = _command(capsys, tmp_path / "bag.mcap", "--verify")
-    assert status == 1 and re.search(r"at .* s: state \d+, twist .* differs by 1 ulp: ", err)
+    assert status == 1 and re.search(r"at .* s: state \d+, twist .* differs: ", err)
 
 
 def test_what_is_no_bag_is_refused_in_one_line(flown, tmp_path, capsys):
     empty = tmp_path / "empty"
     empty.mkdir()
-    unknown = LAYOUTS["folder"](tmp_path / "unknown", flown)
-    metadata = Path(unknown) / "metadata.yaml"
-    metadata.write_text(metadata.read_text().replace("storage_identifier: mcap", "storage_identifier: tape"))
     other = tmp_path / "other.mcap"
     write_bag_file(other, [Logged("/chatter", "std_msgs/msg/String", 1, cdr.string("hello"))])
     garbled = tmp_path / "garbled.mcap"
     bad = [replace(m, data=b"\x00\x01") if m.topic.endswith("pose") else m for m in flown]
     write_bag_file(garbled, bad)
-    for path, word in ((empty, "ros2 bag record"), (unknown, "tape"), (other, "/chatter"), (garbled, "pose")):
+    database = tmp_path / "bag.db3"
+    database.write_bytes(b"SQLite format 3\0")
+    for path, word in (
+        (empty, "ros2 bag convert"),
+        (other, "/chatter"),
+        (garbled, "pose"),
+        (database, "ros2 bag convert"),
+    ):
         status, _, err = _command(capsys, path)
         assert status == 2 and word in err and len(err.splitlines()) == 1, err
 

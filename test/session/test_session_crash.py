@@ -63,8 +63,8 @@ def last_state_before(data: bytes, offset: int) -> int:
 
 def offsets(data: bytes) -> list[int]:
     """At random, and at, just before and just behind every border, within heads, and in the index and footer."""
-    found = random.Random(3).sample(range(MAGIC_BYTES, len(data)), 60)
-    found += [at + d for at, _ in records(data) for d in (-1, 0, 1, RECORD_HEAD.size, RECORD_HEAD.size + 3)]
+    found = random.Random(3).sample(range(MAGIC_BYTES, len(data)), 30)
+    found += [at + d for at, _ in records(data)[::3] for d in (-1, 0, 1, RECORD_HEAD.size, RECORD_HEAD.size + 3)]
     return sorted({offset for offset in found if offset <= len(data)} | {len(data) - d for d in (1, 7, 8, 9, 20, 37)})
 
 
@@ -103,7 +103,7 @@ def test_what_a_cut_left_is_verified(recording, tmp_path):
 def test_repair_makes_a_file_that_the_stock_reader_opens(recording, tmp_path, capsys):
     data = recording.read_bytes()
     cut, repaired = tmp_path / "cut.mcap", tmp_path / "repaired.mcap"
-    for offset in random.Random(5).sample(range(len(data) // 4, len(data)), 8):
+    for offset in random.Random(5).sample(range(len(data) // 4, len(data)), 3):
         cut.write_bytes(data[:offset])
         assert main(["replay", str(cut), "--repair", str(repaired)]) == 0
         assert "truncated" in capsys.readouterr().out
@@ -140,7 +140,7 @@ def test_damage_inside_is_refused_in_one_line(recording, tmp_path, capsys):
 def test_random_bytes_never_end_in_a_traceback(recording, tmp_path, capsys):
     data, rng = recording.read_bytes(), random.Random(6)
     path = tmp_path / "fuzzed.mcap"
-    for _ in range(40):
+    for _ in range(20):
         fuzzed = bytearray(data[: rng.randrange(len(data))])
         for _ in range(rng.randrange(1, 4)):
             fuzzed[rng.randrange(len(fuzzed))] = rng.randrange(256)
