@@ -1,15 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""What the command lines have in common: examples that are read, colour on a terminal and plain text elsewhere."""
+"""What the command lines have in common: examples that are read, and text for people."""
 
 import importlib
 import json
-import os
 import shlex
-import subprocess
-import sys
 
 import pytest
-from ros_process import from_source
 
 from rigid_proto_ros.base.command_line import Parser
 from rigid_proto_ros.cli import main as command
@@ -37,38 +33,6 @@ def test_examples_of_the_node_and_the_client_are_read_by_them():
         arguments.own_arguments(shlex.split(example))
     for example, _ in poke_client.EXAMPLES:
         poke_client._arguments(shlex.split(example)[1:])
-
-
-ON_A_TERMINAL = """
-import sys
-sys.stdout.isatty = lambda: True
-from rigid_proto_ros.cli.main import main
-sys.exit(main({words!r}))
-"""
-
-
-def said(words: list[str], **environment: str) -> str:
-    """What a command prints to something that says it is a terminal."""
-    done = subprocess.run(
-        [sys.executable, "-c", ON_A_TERMINAL.format(words=words)],
-        env={**from_source(dict(os.environ)), "TERM": "xterm", **environment},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=180,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def test_a_terminal_shows_colour_and_piped_or_where_none_is_wanted_the_same_text_is_plain(capsys):
-    words = ["inspect", "hammer"]
-    coloured, plain = said(words), said(words, NO_COLOR="1")
-    assert command.main(words) == 0
-    assert "\x1b[" in coloured and "\x1b[" not in plain
-    assert capsys.readouterr().out == plain
-    bare = "".join(part.split("m", 1)[1] if k else part for k, part in enumerate(coloured.split("\x1b[")))
-    assert [line.rstrip() for line in bare.splitlines()] == plain.splitlines()
 
 
 def test_what_does_not_show_beside_the_rest_is_0_in_text_and_itself_in_json(capsys):
