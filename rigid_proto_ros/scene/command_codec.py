@@ -12,7 +12,7 @@ entry can say (``entry_of``).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any
@@ -139,24 +139,11 @@ def whole_stamp(seconds: int, nanoseconds: int) -> int:
     return seconds * 1_000_000_000 + nanoseconds
 
 
-_OF_EVENT: Mapping[str, Callable[[Any, Names, int], Command]] = {
-    "wrench": lambda c, names, ns: load_command(
-        True, _text(c), _three(c, "force"), _three(c, "torque"), names, stamp_ns=ns
-    ),
-    "poke": lambda c, names, ns: load_command(
-        False, _text(c), _three(c, "force"), _three(c, "torque"), names, stamp_ns=ns
-    ),
-    "string_target": lambda c, names, ns: string_target(_text(c), _three(c, "point"), names, stamp_ns=ns),
-    "string_attach": lambda c, names, ns: string_attach(_text(c), _three(c, "point"), names, stamp_ns=ns),
-    "inertia": lambda c, names, ns: inertia(
-        _text(c), (float(c["mass"]), *_three(c, "com"), *_numbers(c["tensor"], 6)), names, stamp_ns=ns
-    ),
-    "thrusters": lambda c, *_: ThrusterCommand(tuple(map(float, c["forces"]))),
-    "state": lambda c, *_: SetState({name: tuple(map(float, numbers)) for name, numbers in c.items()}),
-    "set": lambda c, *_: Change(dict(c)),
-    "clear_wrench": lambda *_: ClearWrench(),
-    "string_release": lambda *_: ReleaseString(),
-}
+EVENT_KINDS = (
+    *("wrench", "poke", "string_target", "string_attach", "inertia", "thrusters", "state"),
+    *("set", "clear_wrench", "string_release"),
+)
+"""Events that a command is behind."""
 
 
 def of_event(kind: str, content: Mapping, names: Names = WORDS) -> Command | None:
@@ -167,34 +154,48 @@ def of_event(kind: str, content: Mapping, names: Names = WORDS) -> Command | Non
     """
     if kind in MARKS:
         return None
-    if kind not in _OF_EVENT:
-        raise InputError("kind", kind, ", ".join([*_OF_EVENT, *MARKS]))
+    if kind not in EVENT_KINDS:
+        raise InputError("kind", kind, ", ".join([*EVENT_KINDS, *MARKS]))
     stamp_ns = content.get("stamp_ns", 0)
     if type(stamp_ns) is not int:
         raise InputError("stamp_ns", stamp_ns, "nanoseconds")
     try:
-        return _OF_EVENT[kind](content, names, stamp_ns)
+        return _of_event(kind, content, names, stamp_ns)
     except CommandRefused:
         raise
     except (KeyError, TypeError, ValueError, AttributeError):
         raise InputError(kind, str(content)[:80], "the content of a recorded event") from None
 
 
-def _text(content: Mapping) -> str:
-    if not isinstance(content["frame_id"], str):
+def _of_event(kind: str, content: Mapping, names: Names, stamp_ns: int) -> Command:
+    def numbers(key: str, count: int = 3) -> tuple[float, ...]:
+        found = tuple(map(float, content[key]))
+        if len(found) != count:
+            raise ValueError
+        return found
+
+    match kind:
+        case "set":
+            return Change(dict(content))
+        case "clear_wrench":
+            return ClearWrench()
+        case "string_release":
+            return ReleaseString()
+        case "thrusters":
+            return ThrusterCommand(tuple(map(float, content["forces"])))
+        case "state":
+            return SetState({name: tuple(map(float, values)) for name, values in content.items()})
+    frame_id = content["frame_id"]
+    if not isinstance(frame_id, str):
         raise TypeError
-    return content["frame_id"]
-
-
-def _numbers(values: Sequence, count: int) -> tuple[float, ...]:
-    numbers = tuple(map(float, values))
-    if len(numbers) != count:
-        raise ValueError
-    return numbers
-
-
-def _three(content: Mapping, key: str) -> Vector:
-    return vector(_numbers(content[key], 3))
+    if kind == "inertia":
+        values = (float(content["mass"]), *numbers("com"), *numbers("tensor", 6))
+        return inertia(frame_id, values, names, stamp_ns=stamp_ns)
+    if kind in ("wrench", "poke"):
+        force, torque = vector(numbers("force")), vector(numbers("torque"))
+        return load_command(kind == "wrench", frame_id, force, torque, names, stamp_ns=stamp_ns)
+    read = string_target if kind == "string_target" else string_attach
+    return read(frame_id, vector(numbers("point")), names, stamp_ns=stamp_ns)
 
 
 # Written

@@ -26,7 +26,7 @@ from rigid_proto_ros.scene.command_codec import (
     topic_of,
 )
 from rigid_proto_ros.scene.script import expand_schedule, expand_script, read_schedule
-from rigid_proto_ros.scene.yaml_text import flow, load_json, load_plain_yaml
+from rigid_proto_ros.scene.yaml_text import flow
 from rigid_proto_ros.session.messages import read_string
 from rigid_proto_ros.simulation.commands import (
     Change,
@@ -177,27 +177,3 @@ def test_what_moves_nothing_has_no_command_and_what_is_damaged_is_named() -> Non
     ):
         with pytest.raises(InputError):
             of_event(kind, content, NODE)
-
-
-POKES = """# three ways of a line
-- {t: 0.5, at: com, force: [1, 0, 0], duration: 1e-3}
-- {t: 0.75, at: {point: [0.1, -2.0, 3]}, impulse: [0, 1.5e-2, 0]}
-- {t: 1, set: {string.damping_ratio: 0.001, integrator: rk4}}
-"""
-
-
-def test_a_list_in_flow_style_is_read_like_any_other_yaml() -> None:
-    assert load_json(POKES) is not None
-    assert expand_script(load_json(POKES)) == expand_script(yaml.safe_load(POKES))
-    for other in (
-        "- {a: on}",
-        "- {a: No}",
-        "- {a: 'x'}",
-        "- {a: 010}",
-        "- {a: 0x10}",
-        "- {a: .5}",
-        "- {a: 12:30}",
-        "- {a: ~}",
-    ):
-        assert load_json(other) is None
-        assert load_plain_yaml(other, "text") == yaml.safe_load(other)
