@@ -246,11 +246,13 @@ def test_what_is_refused_overwrites_no_recording(option, ending, tmp_path, capfd
         assert kept.read_bytes() == b"an earlier flight"
 
 
-def test_a_demo_that_is_refused_keeps_the_session_before_it(tmp_path, capfd):
-    session, mesh = tmp_path / "session.rrd", tmp_path / "open.obj"
+def test_a_demo_that_is_refused_keeps_the_session_before_it(tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    session, mesh = tmp_path / "out" / "session.rrd", tmp_path / "open.obj"
+    session.parent.mkdir()
     session.write_bytes(b"an earlier flight")
     mesh.write_text(MESHES["open.obj"][0])
-    assert "mesh_repair" in one_line(capfd, rigid_proto, ["demo", "--out", str(tmp_path), "--mesh", str(mesh)])
+    assert "mesh_repair" in one_line(capfd, rigid_proto, ["demo", "--mesh", str(mesh)])
     assert session.read_bytes() == b"an earlier flight"
 
 

@@ -93,12 +93,6 @@ def test_a_random_change_of_an_event_is_found_and_named(session, rng):
     assert f"command {number + 1} " in str(difference), (path, difference)
 
 
-def test_a_change_without_effect_on_the_motion_is_found(session):
-    number = next(k for k, line in enumerate(session.lines) if "publish_clock" in line)
-    line = session.lines[number].replace("true", "false")
-    assert f"command {number + 1} " in str(verify(with_line(session, number, line)))
-
-
 def rechained(session: RecordedSession, change) -> RecordedSession:
     """The session with its event contents changed, and every hash made to fit again."""
     log, events = EventLog(), []
@@ -175,50 +169,36 @@ def test_an_event_that_cannot_be_decoded_is_refused(session, line):
 
 
 @pytest.mark.parametrize(
-    "content",
-    [{}, {"stamp_ns": 0}, {"stamp_ns": 0, "frame_id": 7, "force": [0, 0, 0], "torque": [0, 0, 0]}],
+    "changes",
+    [
+        {"content": {"stamp_ns": 0}},
+        {"content": {"stamp_ns": 0, "frame_id": 7, "force": [0, 0, 0], "torque": [0, 0, 0]}},
+        {"kind": "push"},
+    ],
 )
-def test_a_content_that_is_none_is_refused_when_its_hash_fits(session, content):
-    def emptied(number, event):
+def test_an_event_that_is_none_is_refused_when_its_hash_fits(session, changes):
+    def other(number, event):
         if number == 1:
-            event["content"] = content
+            event.update(changes)
 
     with pytest.raises(InputError, match="event 2"):
-        verify(rechained(session, emptied))
-
-
-def test_a_kind_that_is_none_is_refused_when_its_hash_fits(session):
-    def renamed(number, event):
-        if number == 1:
-            event["kind"] = "push"
-
-    with pytest.raises(InputError, match="event 2, kind.*push"):
-        verify(rechained(session, renamed))
-
-
-def scripts_that_fit(scene: str) -> dict[str, list]:
-    """The bundled scripts whose points this scene's body has; the messages to paste among the examples are none."""
-    fitting = {"untouched": []}
-    for name in example_names():
-        try:
-            script = read_script(example_path(name))
-            OfflineRun(read_scene(scene, warn=lambda text: None), script)
-        except InputError:
-            continue
-        fitting[name] = script
-    return fitting
+        verify(rechained(session, other))
 
 
 @pytest.mark.parametrize("scene", scene_names())
-def test_every_bundled_scene_is_verified_with_every_script_that_fits(scene, tmp_path):
-    scripts = scripts_that_fit(scene)
-    assert len(scripts) > 1
-    for name, script in scripts.items():
-        recorder = McapObserver(tmp_path / f"{name}.mcap", simulated_log=True)
-        run = OfflineRun(read_scene(scene, warn=lambda text: None), script, recorder)
-        last_ns = script[-1].stamp_ns if script else SECOND
-        assert run.advance(min(last_ns, 9 * SECOND) + SECOND)
-        recorder.close()
-        (session,) = read_runs(tmp_path / f"{name}.mcap")
-        assert session.events or not script
-        assert verify(session) is None, name
+def test_every_bundled_scene_is_verified_with_a_script_that_fits(scene, tmp_path):
+    for name in example_names():
+        # Others have points that this scene's body lacks; the messages to paste among the examples are no scripts.
+        try:
+            script = read_script(example_path(name))
+            OfflineRun(read_scene(scene, warn=lambda text: None), script)
+            break
+        except InputError:
+            continue
+    recorder = McapObserver(tmp_path / "s.mcap", simulated_log=True)
+    run = OfflineRun(read_scene(scene, warn=lambda text: None), script, recorder)
+    assert run.advance(min(script[-1].stamp_ns, 4 * SECOND) + SECOND)
+    recorder.close()
+    (session,) = read_runs(tmp_path / "s.mcap")
+    assert session.events
+    assert verify(session) is None, name
