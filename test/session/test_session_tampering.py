@@ -197,7 +197,7 @@ def test_every_bundled_scene_is_verified_with_a_script_that_fits(scene, tmp_path
             continue
     recorder = McapObserver(tmp_path / "s.mcap", simulated_log=True)
     run = OfflineRun(read_scene(scene, warn=lambda text: None), script, recorder)
-    assert run.advance(min(script[-1].stamp_ns, 4 * SECOND) + SECOND)
+    assert run.advance(min(script[-1].stamp_ns, 9 * SECOND) + SECOND)
     recorder.close()
     (session,) = read_runs(tmp_path / "s.mcap")
     assert session.events
