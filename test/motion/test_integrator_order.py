@@ -9,7 +9,7 @@ from one_segment import new_variables
 
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import NO_GYROSCOPIC_TERM, STRING
-from rigid_proto_ros.motion.integrators.taylor import taylor_steps_of_degree
+from rigid_proto_ros.motion.integrators.series import taylor_steps_of_degree
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.motion.variables import to_row

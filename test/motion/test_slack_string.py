@@ -13,7 +13,7 @@ from local_error import reference_problem
 from reference_taylor import reference_motion
 
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.integrators.first_root import NONE, first_rise
+from rigid_proto_ros.motion.integrators.string_law import NONE, first_rise
 from rigid_proto_ros.motion.string import StringSettings
 
 BALL = make_body(2.0, np.zeros(3), 0.02 * np.eye(3))

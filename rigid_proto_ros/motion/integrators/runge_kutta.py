@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Explicit Runge-Kutta methods by their tableau, rk4 among them, and the loop over steps of one length that all
-methods with fixed steps share.
+"""Steps of one length: the loop that all methods with fixed steps share, explicit Runge-Kutta methods by their tableau
+(rk4, dop853), and semi_implicit_euler.
 
 Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.1. The quaternion is
 normalized after the step; the right-hand side takes its direction only, so stages may leave the unit sphere. Euler's
 equations with the gyroscopic term: Goldstein, Classical Mechanics (2002), section 5.5.
+
+semi_implicit_euler steps as game engines do: Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), section
+I.1 (symplectic Euler). Symplectic only where velocities do not act on velocities: the gyroscopic term is taken
+explicitly, so a spinning body gains energy.
 """
 
 from __future__ import annotations
@@ -15,10 +19,10 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.records import copy_numbers
-from ...base.rotation import normalize
+from ...base.rotation import exponential, multiply, normalize
 from ...base.simd import Packed, filled, four, joined, load, number, store
 from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good
-from .equations import accelerations, stretch, tension_margin
+from .equations import accelerations, parts_of, stretch, tension_margin
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator, Kernel
 from .string_law import excursion, is_one_sided, shortening_heat
 
@@ -187,4 +191,116 @@ RK4 = Integrator(
             ]
         )
     ),
+)
+
+
+# Of the code dop853.f (Prince and Dormand 1981; Hairer, section II.10): row i weighs the earlier stages for stage i
+# (0 to 11), and all of them for the step (12).
+DOP853_TABLEAU = np.zeros((13, 12))
+DOP853_TABLEAU[1, [0]] = [0.05260015195876773]
+DOP853_TABLEAU[2, [0, 1]] = [0.0197250569845379, 0.0591751709536137]
+DOP853_TABLEAU[3, [0, 2]] = [0.02958758547680685, 0.08876275643042054]
+DOP853_TABLEAU[4, [0, 2, 3]] = [0.2413651341592667, -0.8845494793282861, 0.924834003261792]
+DOP853_TABLEAU[5, [0, 3, 4]] = [0.037037037037037035, 0.17082860872947386, 0.12546768756682242]
+DOP853_TABLEAU[6, [0, 3, 4, 5]] = [0.037109375, 0.17025221101954405, 0.06021653898045596, -0.017578125]
+DOP853_TABLEAU[7, [0, 3, 4, 5, 6]] = [
+    0.03709200011850479,
+    0.17038392571223998,
+    0.10726203044637328,
+    -0.015319437748624402,
+    0.008273789163814023,
+]
+DOP853_TABLEAU[8, [0, 3, 4, 5, 6, 7]] = [
+    0.6241109587160757,
+    -3.3608926294469414,
+    -0.868219346841726,
+    27.59209969944671,
+    20.154067550477894,
+    -43.48988418106996,
+]
+DOP853_TABLEAU[9, [0, 3, 4, 5, 6, 7, 8]] = [
+    0.47766253643826434,
+    -2.4881146199716677,
+    -0.590290826836843,
+    21.230051448181193,
+    15.279233632882423,
+    -33.28821096898486,
+    -0.020331201708508627,
+]
+DOP853_TABLEAU[10, [0, 3, 4, 5, 6, 7, 8, 9]] = [
+    -0.9371424300859873,
+    5.186372428844064,
+    1.0914373489967295,
+    -8.149787010746927,
+    -18.52006565999696,
+    22.739487099350505,
+    2.4936055526796523,
+    -3.0467644718982196,
+]
+DOP853_TABLEAU[11, [0, 3, 4, 5, 6, 7, 8, 9, 10]] = [
+    2.273310147516538,
+    -10.53449546673725,
+    -2.0008720582248625,
+    -17.9589318631188,
+    27.94888452941996,
+    -2.8589982771350235,
+    -8.87285693353063,
+    12.360567175794303,
+    0.6433927460157636,
+]
+DOP853_TABLEAU[12, [0, 5, 6, 7, 8, 9, 10, 11]] = [
+    0.054293734116568765,
+    4.450312892752409,
+    1.8915178993145003,
+    -5.801203960010585,
+    0.3111643669578199,
+    -0.1521609496625161,
+    0.20136540080403034,
+    0.04471061572777259,
+]
+
+DOP853 = Integrator(
+    name="dop853",
+    order=8,
+    evaluations=12,
+    source="Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.10",
+    limits="Explicit: accurate up to |ω|h of about 1, diverges beyond about 4.",
+    stability_limit=2.0,
+    supports=LOADS | {ANGULAR_DAMPING, STRING},
+    kernel=explicit(DOP853_TABLEAU),
+)
+
+
+@njit(cache=True, error_model="numpy")
+def _semi_implicit_step(
+    y: np.ndarray, p: np.record, h: float, pulls: bool, _tableau: np.ndarray, _k: np.ndarray, out: np.ndarray
+) -> None:
+    """A ``Step``: velocities first, then positions with the new velocities, the attitude by the exponential map."""
+    q, w, d, u = parts_of(y)
+    turning, moving, work, heat = accelerations(q, w, d, u, p, pulls)
+    for j in range(3):
+        out[SPIN + j] = w[j] + h * turning[j]
+        out[VELOCITY + j] = u[j] + h * moving[j]
+        out[DISPLACEMENT + j] = d[j] + h * out[VELOCITY + j]
+    turn = exponential(h * out[SPIN], h * out[SPIN + 1], h * out[SPIN + 2])
+    out[0], out[1], out[2], out[3] = normalize(*multiply(*q, *turn))
+    out[HAND_WORK], out[HEAT] = y[HAND_WORK] + h * work, y[HEAT] + h * heat
+
+
+@njit(cache=True, error_model="numpy")
+def semi_implicit_euler_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+    """Up to n steps of h seconds in place; returns the number of good ones."""
+    return repeated(_semi_implicit_step, ONE_STAGE, y, p, h, n)
+
+
+SEMI_IMPLICIT_EULER = Integrator(
+    name="semi_implicit_euler",
+    order=1,
+    evaluations=1,
+    source="Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), section I.1",
+    limits="First order; a string stays bounded up to ω_s h of about 2, "
+    "a spinning body gains energy beyond |ω|h of 0.1.",
+    stability_limit=0.1,
+    supports=LOADS | {ANGULAR_DAMPING, STRING},
+    kernel=semi_implicit_euler_steps,
 )

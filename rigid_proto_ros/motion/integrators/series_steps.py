@@ -28,7 +28,6 @@ from ...base.records import copy_numbers, record_type
 from ...base.simd import Packed, aligned, filled, four, joined, largest, load
 from ..variables import ATTITUDE, HEAT, STORED, is_good
 from .error_measure import FLOOR, WEIGHINGS, Weights, heavier, jump_of_displacement, scales
-from .first_root import NONE
 from .series import (
     A_KNOT,
     MOTION_COLUMNS,
@@ -45,6 +44,7 @@ from .series import (
     variables_of,
 )
 from .string_law import (
+    NONE,
     PASSES,
     PULLS,
     SHORTENS,
