@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from ..mass.verdict import ERROR, Finding
 from ..mesh.locate import resolve_mesh
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
 from .inspect_report import print_report
-from .inspect_robot import add_robot_arguments, check_robot_options, compare, given, lump, number_or_link
+from .inspect_robot import add_robot_arguments, check_robot_options, compare, lump
 
 DENSITY = 1000.0
 """kg/m³, water's, when neither density nor mass is given."""
@@ -38,8 +39,8 @@ EXAMPLES = (
     ("rigid_proto inspect hammer --verify", "the errors against exact rational arithmetic"),
     ("rigid_proto inspect --compare robot.urdf", "the errors of a robot's inertials"),
     (
-        "rigid_proto inspect --compare robot.urdf --fix fixed.urdf --total-mass 12",
-        "the same file with right inertials, for a robot of 12 kg",
+        "rigid_proto inspect --compare robot.urdf --fix fixed.urdf",
+        "the same file with right inertials",
     ),
     (
         "rigid_proto inspect --lump robot.urdf --joint elbow=0.5 --as-scene robot.yaml",
@@ -56,14 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "mesh", nargs="*", metavar="MESH", help="a path, package:// URI or bundled name; several are inspected in turn"
     )
-    parser.add_argument(
-        "--density", type=number_or_link, action="append", metavar="D",
-        help=f"kg/m³ (default {DENSITY:g}); with --compare LINK=D is one link's, and may be repeated",
-    )  # fmt: skip
-    parser.add_argument(
-        "--mass", type=number_or_link, action="append", metavar="M",
-        help="kg, instead of a density; with --compare LINK=M is one link's, and may be repeated",
-    )  # fmt: skip
+    parser.add_argument("--density", type=float, metavar="D", help=f"kg/m³ (default {DENSITY:g})")
+    parser.add_argument("--mass", type=float, metavar="M", help="kg, instead of a density")
     parser.add_argument("--scale", nargs="+", default=["1"], metavar="S", help="one or three numbers (0.001: mm to m)")
     parser.add_argument("--model", choices=MODELS, default="solid", help="inertia model (default solid)")
     parser.add_argument(
@@ -131,21 +126,14 @@ def run(args: argparse.Namespace) -> int:
     scale, meshes = _scale_and_meshes(args)
     args.repair, meshes = _repair_and_meshes(args, meshes)
     args.mesh = meshes
-    given_mass, given_density = given("mass", args.mass), given("density", args.density)
-    if given_mass.everywhere and given_density.everywhere:
-        raise InputError("--density", given_density.everywhere, "--mass or --density, not both")
+    _check_numbers(args)
     scale_vector(scale)
-    if args.max_triangles < 1:
-        raise InputError("max-triangles", args.max_triangles, "an integer >= 1")
     check_robot_options(args, meshes)
     if args.lump is not None:
         return lump(args)
     if args.compare is not None:
-        return compare(args, meshes, scale, given_mass, given_density)
-    if given_mass.by_link or given_density.by_link:
-        named = next(iter({**given_mass.by_link, **given_density.by_link}))
-        raise InputError("--mass" if given_mass.by_link else "--density", f"{named}= needs --compare ROBOT")
-    mass, density = given_mass.everywhere or 0.0, given_density.everywhere or DENSITY
+        return compare(args, meshes, scale)
+    mass, density = args.mass or 0.0, args.density or DENSITY
     if not meshes:
         raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
     found = [_inspect(args, name, scale, mass, density) for name in meshes]
@@ -159,6 +147,17 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"meshes": [{"name": one.name, **(one.report or _unread(one))} for one in found]}))
     return max(one.status for one in found)
+
+
+def _check_numbers(args: argparse.Namespace) -> None:
+    """Refuse numbers that no mesh can have."""
+    for name, value in (("mass", args.mass), ("density", args.density)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise InputError(name, value, "a finite number > 0")
+    if args.mass and args.density:
+        raise InputError("--density", args.density, "--mass or --density, not both")
+    if args.max_triangles < 1:
+        raise InputError("max-triangles", args.max_triangles, "an integer >= 1")
 
 
 @dataclass(frozen=True)

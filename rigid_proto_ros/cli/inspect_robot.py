@@ -9,7 +9,6 @@ import argparse
 import json
 import math
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,41 +24,17 @@ if TYPE_CHECKING:
     from ..robots.diagnosis import LinkDiagnosis, Options
     from ..robots.fix import FixedLink
 
-_COMPARES = ("link", "fix", "all", "total_mass", "tolerance")
+_COMPARES = ("link", "fix", "all", "tolerance")
 _LUMPS = ("joint", "as_scene")
-ROBOT_SUFFIXES = (".urdf", ".sdf", ".xacro", ".xml", ".mjcf")
-
-
-@dataclass(frozen=True)
-class Given:
-    """What ``--mass`` or ``--density`` gave: for all that no link is named for (None when nothing), and by link."""
-
-    everywhere: float | None
-    by_link: dict[str, float]
-
-
-def number_or_link(text: str) -> tuple[str, float]:
-    """``7850`` or ``arm=7850`` as the link's name, or "", and the number; raises ValueError for others."""
-    link, _, number = text.rpartition("=")
-    return link, float(number)
+ROBOT_SUFFIXES = (".urdf", ".sdf", ".xml", ".mjcf")
 
 
 def joint_value(text: str) -> tuple[str, float]:
     """``elbow=0.5`` as name and number; raises ValueError for others."""
-    name, number = number_or_link(text)
-    if not name or not math.isfinite(number):
+    name, _, number = text.rpartition("=")
+    if not name or not math.isfinite(float(number)):
         raise ValueError(f"{text!r} instead of NAME=VALUE")
-    return name, number
-
-
-def given(option: str, values: list[tuple[str, float]] | None) -> Given:
-    """The values of an option that may be repeated; raises InputError for what no mass or density is."""
-    found = dict(values or [])
-    for link, value in found.items():
-        if not 0.0 < value < float("inf"):
-            raise InputError(option, f"{link}={value:g}" if link else value, "a finite number > 0")
-    everywhere = found.pop("", None)
-    return Given(everywhere, found)
+    return name, float(number)
 
 
 def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,19 +48,11 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --compare or --lump: a folder that holds packages or models that the file names; may be repeated",
     )  # fmt: skip
     parser.add_argument(
-        "--xacro", action="append", default=[], metavar="NAME:=VALUE",
-        help="with --compare or --lump: an argument of a xacro file; may be repeated",
-    )  # fmt: skip
-    parser.add_argument(
         "--tolerance", type=float, metavar="T",
         help="with --compare: one line per link; exit 1 also when one differs from a uniform solid by more than T",
     )  # fmt: skip
     parser.add_argument("--fix", metavar="OUT", help="with --compare: write the file to OUT, wrong inertials rewritten")
     parser.add_argument("--all", action="store_true", help="with --fix: rewrite those that aren't uniform, too")
-    parser.add_argument(
-        "--total-mass", type=float, metavar="M",
-        help="with --compare: the robot weighs M kg, and links without --mass or --density share one density",
-    )  # fmt: skip
     parser.add_argument("--lump", metavar="ROBOT", help="a URDF, SDF or MJCF with its joints held, as one rigid body")
     parser.add_argument(
         "--joint", type=joint_value, action="append", metavar="NAME=VALUE",
@@ -102,12 +69,8 @@ def check_robot_options(args: argparse.Namespace, meshes: list[str]) -> None:
         for name in names:
             if getattr(args, use) is None and getattr(args, name) not in (None, False, []):
                 raise InputError(f"--{name.replace('_', '-')}", f"needs --{use} ROBOT")
-    for flag, words in (("--package-path", args.package_path), ("--xacro", args.xacro)):
-        if words and args.compare is None and args.lump is None:
-            raise InputError(flag, "needs --compare ROBOT or --lump ROBOT")
-    for word in args.xacro:
-        if ":=" not in word:
-            raise InputError("--xacro", word, "NAME:=VALUE, as xacro takes it")
+    if args.package_path and args.compare is None and args.lump is None:
+        raise InputError("--package-path", "needs --compare ROBOT or --lump ROBOT")
     if args.compare is not None and len(meshes) > 1 and not _are_robots(meshes):
         raise InputError("--compare", " ".join(meshes), "one MESH, or none for all links, or further robots")
     if args.compare is not None and _are_robots(meshes) and args.fix is not None:
@@ -116,7 +79,7 @@ def check_robot_options(args: argparse.Namespace, meshes: list[str]) -> None:
         raise InputError("--lump", "can't be combined with MESH or --compare")
 
 
-def compare(args: argparse.Namespace, meshes: list[str], scale: list[float], mass: Given, density: Given) -> int:
+def compare(args: argparse.Namespace, meshes: list[str], scale: list[float]) -> int:
     """``inspect [MESH] --compare ROBOT``, or with several robots: 1 when a link's inertial is wrong, otherwise 0; with
     a mesh or a tolerance also 1 for one that differs from the uniform solid, and when nothing could be compared.
     """
@@ -124,7 +87,7 @@ def compare(args: argparse.Namespace, meshes: list[str], scale: list[float], mas
     mesh = meshes[0] if meshes and len(robots) == 1 else None
     _check(args, mesh, scale)
     chosen = None if scale == [1.0] else np.array(scale * 3 if len(scale) == 1 else scale)
-    options = _options(args, mass, density)
+    options = _options(args)
     if args.fix is not None:
         return _fix(args, options)
     if len(robots) == 1:
@@ -184,7 +147,7 @@ def lump(args: argparse.Namespace) -> int:
         value = getattr(args, flag.replace("-", "_"))
         if value and value != unused.get(flag):
             raise InputError(f"--{flag}", "can't be used with --lump, which takes the robot's own inertials")
-    whole = lump_robot(Path(args.lump), dict(args.joint or []), tuple(args.package_path), tuple(args.xacro))
+    whole = lump_robot(Path(args.lump), dict(args.joint or []), tuple(args.package_path))
     written = _write_scene(whole, args.as_scene) if args.as_scene else ()
     exports = {"urdf": urdf_inertial, "sdf": sdf_inertial, "mjcf": mjcf_inertial}
     export = next((export for name, export in exports.items() if getattr(args, name)), None)
@@ -248,38 +211,26 @@ def _check(args: argparse.Namespace, mesh: str | None, scale: list[float]) -> No
         raise InputError(f"--{flag}", "can't be used with --compare, which compares solids")
     if mesh is None and scale != [1.0]:
         raise InputError("--scale", "needs the MESH of one link; the robot's file gives the scales of its own meshes")
-    for name in ("tolerance", "total_mass"):
-        value = getattr(args, name)
-        if value is not None and not 0.0 < value < float("inf"):
-            raise InputError(f"--{name.replace('_', '-')}", value, "a finite number > 0")
+    if args.tolerance is not None and not 0.0 < args.tolerance < math.inf:
+        raise InputError("--tolerance", args.tolerance, "a finite number > 0")
     if args.all and args.fix is None:
         raise InputError("--all", "needs --fix OUT")
-    if mesh is not None and (args.fix is not None or args.total_mass is not None):
-        flag = "--fix" if args.fix is not None else "--total-mass"
-        raise InputError(flag, "needs the whole robot: --compare ROBOT without a MESH")
+    if mesh is not None and args.fix is not None:
+        raise InputError("--fix", "needs the whole robot: --compare ROBOT without a MESH")
 
 
-def _options(args: argparse.Namespace, mass: Given, density: Given) -> Options:
+def _options(args: argparse.Namespace) -> Options:
     from ..robots.diagnosis import LIMIT, Options
 
-    both = mass.by_link.keys() & density.by_link.keys()
-    if both:
-        raise InputError("--mass", f"link {min(both)} has a mass and a density; give one of them")
-    if args.total_mass is not None and (mass.everywhere or density.everywhere):
-        raise InputError("--total-mass", "can be combined with --mass and --density of single links (LINK=) only")
     return Options(
-        mass.everywhere or 0.0,
-        density.everywhere or 0.0,
+        args.mass or 0.0,
+        args.density or 0.0,
         args.repair,
         args.fallback,
         args.accept_open,
         args.max_triangles,
         tuple(args.package_path),
-        mass.by_link,
-        density.by_link,
-        args.total_mass or 0.0,
         args.tolerance or LIMIT,
-        tuple(args.xacro),
     )
 
 

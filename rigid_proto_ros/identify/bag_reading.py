@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Anybody's bags as measured flights, read by rosbags: which topics count, their messages as series, a wrench's as
-loads.
+loads: commands that hold until the next one, or samples of what changed in between.
 """
 
 from __future__ import annotations
@@ -13,21 +13,34 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError, is_missing
+from ..base.vectors import vector
 from ..motion.frames import parse_frame
+from ..motion.loads import Load
 from . import measurements as ms
-from .wrench_messages import WRENCH_TIMEOUT_NS, wrench_history
 
 EARTH = (0.0, 0.0, -9.81)
 
 TRANSFORMS = ("geometry_msgs/msg/TransformStamped", "tf2_msgs/msg/TFMessage")
 KINDS = {
-    "pose": ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped", *TRANSFORMS),
-    "twist": ("geometry_msgs/msg/TwistStamped",),
-    "odom": ("nav_msgs/msg/Odometry",),
+    "pose": (
+        "geometry_msgs/msg/PoseStamped",
+        "geometry_msgs/msg/PoseWithCovarianceStamped",
+        "nav_msgs/msg/Odometry",
+        *TRANSFORMS,
+    ),
     "imu": ("sensor_msgs/msg/Imu",),
     "wrench": ("geometry_msgs/msg/WrenchStamped",),
 }
 """Options, and the types of message that each takes."""
+
+WRENCH_TIMEOUT_NS = 1_500_000_000
+"""A wrench holds until the next message, and at most as long as the node's own default."""
+STEADY = 0.5
+"""Gaps between messages that differ from the usual one by less than this part of it are of one rate."""
+FEWEST_SAMPLED = 20
+"""Messages of a wrench that is called sampled."""
+LEAST_JUMP, MOST_CHANGES = 0.03, 16
+"""A sampled load's jump counts where it is more than this part of the largest force or torque, and so many do."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +58,8 @@ class Choice:
 
 @dataclass(frozen=True)
 class _Message:
-    """stamp_ns as its header says. numbers: the type's own, in its order; of an Imu its rate and its acceleration, NaN
-    where they aren't given.
+    """stamp_ns as its header says. numbers: position and attitude, rate and acceleration, or force and torque; NaN
+    where an IMU doesn't measure them.
     """
 
     stamp_ns: int
@@ -67,8 +80,9 @@ class _Topic:
     def times_ns(self) -> np.ndarray:
         return np.array([message.stamp_ns for message in self.messages], np.int64)
 
-    def numbers(self, first: int, last: int) -> np.ndarray:
-        return np.array([message.numbers[first:last] for message in self.messages], float).reshape(-1, last - first)
+    @property
+    def numbers(self) -> np.ndarray:
+        return np.array([message.numbers for message in self.messages], float)
 
 
 def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
@@ -77,14 +91,14 @@ def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     _check_clocks(chosen, choice)
     begin = min(int(topic.times_ns[0]) for topic in chosen.values())
     window = (begin + round(choice.first_s * 1e9), begin + round(min(choice.last_s, 1e9) * 1e9))
-    series = [one for kind, topic in chosen.items() if kind != "wrench" for one in _series(kind, topic, chosen)]
+    series = [one for kind in ("pose", "imu") if kind in chosen for one in _series(kind, chosen[kind])]
     series = [part for part in (one.within(*window) for one in series) if len(part.times_ns)]
     if not series:
         raise InputError("--from", choice.first_s, f"a window with samples of {path} in it")
     loads = ms.no_loads()
     if "wrench" in chosen:
         wrench = chosen["wrench"]
-        loads = wrench_history(wrench.name, wrench.times_ns, wrench.numbers(0, 6), *_wrench_frame(wrench, chosen))
+        loads = wrench_history(wrench.name, wrench.times_ns, wrench.numbers, *_wrench_frame(wrench, chosen["pose"]))
     where = "assumed, as no --gravity was given" if choice.gravity is None else "from --gravity"
     return ms.MeasuredFlight(str(path), tuple(series), loads, choice.gravity or EARTH, gravity_from=where)
 
@@ -132,7 +146,7 @@ def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str
             raise InputError("session", f"{several}; say which with --{kind}")
         if topics:
             found[kind] = (topics[0], "")
-    if not {"pose", "odom"} & set(found):
+    if "pose" not in found:
         known = ", ".join(f"{t} ({k})" for t, k in sorted(types.items())[:6]) or "nothing"
         raise InputError("session", f"{path} has no poses, transforms or odometry; it has {known}")
     return found
@@ -170,9 +184,8 @@ _NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
     "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
     "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
     "geometry_msgs/msg/TransformStamped": lambda m: _pair(m.transform.translation, m.transform.rotation),
-    "geometry_msgs/msg/TwistStamped": lambda m: _pair(m.twist.linear, m.twist.angular),
     "geometry_msgs/msg/WrenchStamped": lambda m: _pair(m.wrench.force, m.wrench.torque),
-    "nav_msgs/msg/Odometry": lambda m: (*_pose(m.pose.pose), *_pair(m.twist.twist.linear, m.twist.twist.angular)),
+    "nav_msgs/msg/Odometry": lambda m: _pose(m.pose.pose),
     "sensor_msgs/msg/Imu": _imu,
 }
 
@@ -180,7 +193,7 @@ _NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
 def _topic(messages: list[_Message], name: str, message_type: str, frame: str) -> _Topic:
     if message_type in TRANSFORMS:
         messages, frame = _one_transform(messages, name, frame), ""
-    elif frame and message_type not in KINDS["twist"] + KINDS["wrench"]:
+    elif frame and message_type not in KINDS["wrench"]:
         raise InputError(name, f"{name}@{frame}", f"{name} alone, as a {message_type} has no choice of frames")
     messages = sorted(messages, key=lambda message: message.stamp_ns)
     # Of messages with one stamp the first counts: a repeated one says nothing new.
@@ -205,49 +218,23 @@ def _one_transform(messages: list[_Message], topic: str, child: str) -> list[_Me
     return found
 
 
-def _frames(chosen: dict[str, _Topic]) -> tuple[set[str], set[str]]:
-    """Names of the world's frame and of the tracked one, as far as the topics say."""
-    worlds, bodies = {"world"}, {"body"}
-    for kind in ("pose", "odom"):
-        if kind in chosen:
-            message = chosen[kind].messages[0]
-            worlds.add(message.frame_id)
-            bodies.add(message.child_frame_id)
-    return worlds - {""}, bodies - {""}
-
-
-def _series(kind: str, topic: _Topic, chosen: dict[str, _Topic]) -> list[ms.Series]:
-    def series(quantity: str, first: int, last: int, in_body: bool = False) -> ms.Series:
-        return ms.Series(topic.name, quantity, topic.times_ns, topic.numbers(first, last), in_body, kind == "imu")
-
-    if kind == "imu":
-        found = [series(ms.RATE, 0, 3, in_body=True), series(ms.ACCELERATION, 3, 6, in_body=True)]
-        given = [one for one in found if not np.isnan(one.values).all()]
-        for one in given:
-            if not np.isfinite(one.values).all():
-                raise InputError(topic.name, f"an {one.kind} that isn't finite")
-        return given
-    if kind == "twist":
-        in_body = _is_in_body(topic, chosen)
-        return [series(ms.VELOCITY, 0, 3, in_body), series(ms.RATE, 3, 6, in_body)]
-    attitude = series(ms.ATTITUDE, 3, 7)
-    found = [series(ms.POSITION, 0, 3), replace(attitude, values=_units(attitude.values, topic))]
-    if kind == "odom":
-        found += [series(ms.VELOCITY, 7, 10, in_body=True), series(ms.RATE, 10, 13, in_body=True)]
-    return found
-
-
-def _is_in_body(topic: _Topic, chosen: dict[str, _Topic]) -> bool:
-    worlds, bodies = _frames(chosen)
-    frame = topic.frame or topic.messages[0].frame_id
-    if frame in worlds:
-        return False
-    if frame in bodies:
-        return True
-    known = ", ".join(sorted(worlds | bodies))
-    raise InputError(
-        "--twist", f"{topic.name} in frame {frame!r}", f"{topic.name}@world or {topic.name}@body, or one of {known}"
-    )
+def _series(kind: str, topic: _Topic) -> list[ms.Series]:
+    times, numbers = topic.times_ns, topic.numbers
+    if kind == "pose":
+        attitudes = _units(numbers[:, 3:7], topic)
+        return [
+            ms.Series(topic.name, *one)
+            for one in ((ms.POSITION, times, numbers[:, :3]), (ms.ATTITUDE, times, attitudes))
+        ]
+    found = [
+        ms.Series(topic.name, ms.RATE, times, numbers[:, :3]),
+        ms.Series(topic.name, ms.ACCELERATION, times, numbers[:, 3:]),
+    ]
+    given = [one for one in found if not np.isnan(one.values).all()]
+    for one in given:
+        if not np.isfinite(one.values).all():
+            raise InputError(topic.name, f"an {one.kind} that isn't finite")
+    return given
 
 
 def _units(q: np.ndarray, topic: _Topic) -> np.ndarray:
@@ -272,9 +259,10 @@ def _check_clocks(chosen: dict[str, _Topic], choice: Choice) -> None:
             )
 
 
-def _wrench_frame(topic: _Topic, chosen: dict[str, _Topic]) -> tuple[str, tuple[float, float, float] | None]:
+def _wrench_frame(topic: _Topic, pose: _Topic) -> tuple[str, tuple[float, float, float] | None]:
     """Axes of a wrench, and where it acts in the tracked frame, None for the centre of mass."""
-    worlds, bodies = _frames(chosen)
+    worlds = {"world", pose.messages[0].frame_id} - {""}
+    bodies = {"body", pose.messages[0].child_frame_id} - {""}
     text = topic.frame or topic.messages[0].frame_id
     axes, at, point = text.partition("@")
     axes = "world" if axes in worlds else "body" if axes in bodies else axes
@@ -303,3 +291,59 @@ def given_offsets(words: Sequence[str]) -> dict[str, float]:
         if not equals or not topic or not abs(found[topic]) < 1e9:
             raise InputError("--offset", word, "TOPIC=S with a number of seconds, added to the topic's stamps")
     return found
+
+
+def wrench_history(
+    topic: str, times: np.ndarray, numbers: np.ndarray, axes: str, where: tuple[float, float, float] | None
+) -> ms.LoadHistory:
+    """Of messages at times (m,) [ns], ascending, with forces and torques (m, 6) along the axes of ``Load``, at a point
+    of the tracked frame or, for None, at the centre of mass.
+    """
+    acts: np.ndarray = np.any(numbers != 0.0, axis=1)
+    same = np.append(False, np.all(numbers[1:] == numbers[:-1], axis=1))
+    begins, sds_s = _begins(times, acts)
+    ends = np.minimum(np.append(begins[1:], times[-1] + WRENCH_TIMEOUT_NS), times + WRENCH_TIMEOUT_NS)
+    rows: list[tuple[int, int, np.ndarray]] = []
+    before, which = np.full(len(times), -1), np.full(len(times), -1)
+    for k in range(len(times)):
+        before[k] = which[k - 1] if k and ends[k - 1] == begins[k] else -1
+        if not acts[k]:
+            continue
+        if same[k] and before[k] >= 0:
+            rows[-1] = (rows[-1][0], int(ends[k]), rows[-1][2])
+        else:
+            load = Load(axes, where, vector(numbers[k, :3]), vector(numbers[k, 3:]))
+            rows.append((int(begins[k]), int(ends[k]), load.row))
+        which[k] = len(rows) - 1
+    sds_s *= _sharpness(numbers)
+    counted = np.sort(np.argsort(-sds_s)[:MOST_CHANGES])
+    counted = counted[sds_s[counted] > 0.0]
+    changes = ms.SampledChanges(before[counted], which[counted], sds_s[counted])
+    return replace(ms.load_history(rows), topic=topic, changes=changes)
+
+
+def _sharpness(numbers: np.ndarray) -> np.ndarray:
+    """Which part of each change to the loads (m, 6) is a jump (m,): what changes steadily is known in between."""
+    forces, torques = numbers[:, :3], numbers[:, 3:]
+    parts = [part / max(float(np.linalg.norm(part, axis=1).max()), 1e-300) for part in (forces, torques)]
+    steps = np.diff(np.hstack(parts), axis=0, prepend=np.hstack(parts)[:1])
+    around = 0.5 * (np.vstack([steps[1:], steps[-1:]]) + np.vstack([steps[:1], steps[:-1]]))
+    sizes, sharp = np.linalg.norm(steps, axis=1), np.linalg.norm(steps - around, axis=1)
+    return np.where((sizes > 0.0) & (sharp > LEAST_JUMP), np.minimum(sharp / np.maximum(sizes, 1e-300), 1.0), 0.0)
+
+
+def _begins(times_ns: np.ndarray, acts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """When the loads of messages at times_ns (m,) begin (m,), and how well that is known (m,) [s].
+
+    A command acts from its stamp on. A wrench at a steady rate that is also sent while nothing acts was sampled: it
+    changed at any time since the message before, on average in the middle.
+    """
+    gaps = np.diff(times_ns)
+    if len(times_ns) < FEWEST_SAMPLED or not np.any(~acts[:-1] & acts[1:]):
+        return times_ns, np.zeros(len(times_ns))
+    usual = float(np.median(gaps))
+    steady = np.append(False, np.abs(gaps - usual) < STEADY * usual)
+    if steady.mean() < 0.5:
+        return times_ns, np.zeros(len(times_ns))
+    waited = np.where(steady, np.append(0, gaps), 0)
+    return times_ns - waited // 2, 1e-9 * waited / np.sqrt(12.0)

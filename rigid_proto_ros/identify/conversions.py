@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from .fitting import CannotFlyError, fit_flights, short_misfit
-from .measurements import ACCELERATION, ATTITUDE, POSITION, RATE, VELOCITY, MeasuredFlight, Series
+from .measurements import ACCELERATION, ATTITUDE, POSITION, RATE, MeasuredFlight, Series
 from .residual_checks import check_residuals
 from .unknowns import Unknowns, Values
 
@@ -19,8 +19,8 @@ USUAL = (
     " (--gravity), quaternions that begin with w, a wrench along other axes (--wrench TOPIC@FRAME), clocks (--offset)"
 )
 _SCALES = (
-    ((POSITION, VELOCITY), 1e-3, "positions are in mm"),
-    ((POSITION, VELOCITY), 1e-2, "positions are in cm"),
+    ((POSITION,), 1e-3, "positions are in mm"),
+    ((POSITION,), 1e-2, "positions are in cm"),
     ((RATE,), np.pi / 180.0, "rates are in degrees a second"),
     ((ACCELERATION,), 9.80665, "accelerations are in g"),
 )

@@ -22,17 +22,13 @@ from .unknowns import Unknowns, Values, possible_tensor
 
 LEAST_NOISE = 1e-4
 """Part of what a series shows that is taken for noise at first: a simulated flight leaves nothing at the end."""
-HUBER = 1.5
-"""Robust fits: residuals beyond so many standard deviations count by their size alone (95 % efficient at
-1.345, Huber 1981).
-"""
 WIDER = 8.0
 """Of steps of difference quotients: of what is rounding alone so much less is left."""
-OFFSET_MARGIN_S = 0.05
-"""The largest difference of two clocks that is looked for."""
 MOST_RIM_STEPS = 6
 ROUGH = 1e-3
 """Tolerance of a stage that only leads on to the next one."""
+OFFSET_MARGIN_S = 0.05
+"""The largest difference of two clocks that is looked for."""
 FIRST_ANGLES = (6.0, 3.0)
 """Turn of the first segments [rad], of which the initial estimate's errors of some hundredths aren't much: the next one
 where the one before leaves more than noise.
@@ -93,39 +89,27 @@ def fit_flights(
     flights: Sequence[MeasuredFlight],
     unknowns: Unknowns,
     values: Values,
-    robust: bool = False,
-    known: Estimate | None = None,
 ) -> Estimate:
-    """The most likely values, from these on; raises InputError where they can't be flown.
-
-    known: an estimate of the same flights whose noise counts and whose starts are near.
-    """
+    """The most likely values, from these on; raises InputError where they can't be flown."""
     fit = _Fit(flights, unknowns, values)
-    if known is not None:
-        fit.sigmas = dict(known.sigmas)
-        segments = fit.cut(math.inf)
-        return _estimate(fit, segments, fit.improve(segments, known.starts, 30, 1e-7))
     starts = _approached(fit)
     fit.sigmas = fit.noise_left(fit.cut(math.inf), starts)
-    for turn in range(4):
+    for _ in range(4):
         segments, before = fit.cut(math.inf), fit.sigmas
         starts = fit.improve(segments, starts, 60, 1e-7)
-        if robust:
-            fit.weights = _huber_weights(fit, segments, starts)
         fit.sigmas = fit.noise_left(segments, starts)
-        if all(abs(fit.sigmas[key] - before[key]) < 0.01 * before[key] for key in before) and (turn or not robust):
+        if all(abs(fit.sigmas[key] - before[key]) < 0.01 * before[key] for key in before):
             break
     return _estimate(fit, fit.cut(math.inf), starts)
 
 
 class _Fit:
-    """Values as far as they have come, the noise (by series' name) and the weights of samples (by series' ``id``)."""
+    """Values as far as they have come, and the noise by series' name."""
 
     def __init__(self, flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> None:
         self.flights, self.unknowns, self.values = flights, unknowns, values
         self.series = [one for flight in flights for one in flight.series]
         self.sigmas = {one.name: max(noise_by_differences(one), LEAST_NOISE * spread(one)) for one in self.series}
-        self.weights = {id(one): np.ones(len(one.times_ns)) for one in self.series}
         self.near = {one.name: NEAR * spread(one) for one in self.series}
         every = {}
         for flight in flights:
@@ -140,7 +124,7 @@ class _Fit:
         return sh.cut(
             self.flights,
             length_s,
-            lambda series: np.sqrt(self.weights[id(series)]) / self.sigmas[series.name],
+            self.sigmas,
             margin,
             lambda series: self._every[id(series)] if is_thin else 1,
         )
@@ -156,7 +140,7 @@ class _Fit:
         numbers, starts = found
         self.values = problem.values(numbers)
         is_inside = is_possible(self.values.inertia)
-        self.values = possible(self.values)
+        self.values = replace(self.values, inertia=possible_tensor(self.values.inertia))
         return starts if is_inside or tolerance > ROUGH else self._along_the_rim(segments, starts)
 
     def _along_the_rim(self, segments: Sequence[sh.Segment], starts: list[np.ndarray]) -> list[np.ndarray]:
@@ -168,7 +152,8 @@ class _Fit:
             if here is None:
                 raise CannotFlyError
             step = possible_step(here.jacobian, here.residuals, slice(first, first + 6), self.values.inertia)
-            self.values, starts = possible(problem.values(step)), here.starts_for(step)
+            values, starts = problem.values(step), here.starts_for(step)
+            self.values = replace(values, inertia=possible_tensor(values.inertia))
             if np.linalg.norm(here.jacobian @ step) < SMALL_STEP:
                 break
         return starts
@@ -181,20 +166,14 @@ class _Fit:
         counts = dict(sums)
         for segment, start in zip(segments, starts, strict=True):
             for piece, residual in zip(segment.pieces, residuals_of(segment, start, self.values), strict=True):
-                name, weights = piece.series.name, self.weights[id(piece.series)][piece.rows]
-                sums[name] += float((weights[:, None] * residual**2).sum())
-                counts[name] += 3.0 * float(weights.sum())
+                sums[piece.series.name] += float((residual**2).sum())
+                counts[piece.series.name] += residual.size
         samples = 3 * sum(segment.samples for segment in segments)
         left = max(1.0 - (sh.START * len(segments) + len(self.unknowns)) / samples, 0.1)
         found = {}
         for one in self.series:
             found[one.name] = max(math.sqrt(sums[one.name] / (left * counts[one.name])), least_noise(one))
         return found
-
-
-def possible(values: Values) -> Values:
-    """The same, with the nearest tensor on the rim of what can exist where it is outside."""
-    return replace(values, inertia=possible_tensor(values.inertia))
 
 
 def residuals_of(segment: sh.Segment, start: np.ndarray, values: Values) -> list[np.ndarray]:
@@ -277,17 +256,6 @@ def _first_length(flights: Sequence[MeasuredFlight], angle: float) -> float:
     samples = sum(len(flight.pose[0].times_ns) for flight in flights if flight.pose is not None)
     rate = max(high_rate(flight) for flight in flights)
     return max(angle / max(rate, 1e-9), total / MOST_SEGMENTS, FEWEST_SAMPLES * total / samples)
-
-
-def _huber_weights(fit: _Fit, segments: Sequence[sh.Segment], starts: Sequence[np.ndarray]) -> dict[int, np.ndarray]:
-    """1, or less for samples that lie too far off; too far is relative to the median size of the residuals."""
-    weights = {}
-    for key, part in residuals_by_series(segments, starts, fit.values).items():
-        size = np.linalg.norm(part, axis=1)
-        # The median length of three normal numbers is 1.538.
-        scale = max(float(np.median(size)) / 1.538, 1e-300)
-        weights[key] = np.minimum(1.0, HUBER * np.sqrt(3.0) * scale / np.maximum(size, 1e-300))
-    return weights
 
 
 def _estimate(fit: _Fit, segments: list[sh.Segment], starts: list[np.ndarray]) -> Estimate:

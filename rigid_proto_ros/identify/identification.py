@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import InputError
-from .comparison import Candidate, compare
+from ..mass.properties import MassProperties
 from .conversions import likely_cause
 from .fitting import CannotFlyError, fit_flights
 from .measurements import ACCELERATION, MeasuredFlight, topics_of
@@ -31,7 +31,7 @@ class Known:
     """
 
     mass: float | None = None
-    body: Candidate | None = None
+    body: MassProperties | None = None
     length: float = GUESSED_RADIUS
     offsets: Mapping[str, float] = field(default_factory=dict)
 
@@ -40,8 +40,6 @@ def identify(
     flights: Sequence[MeasuredFlight],
     fit: Sequence[str] = DEFAULT_FIT,
     known: Known | None = None,
-    candidates: Mapping[str, Candidate] | None = None,
-    robust: bool = False,
 ) -> Identification:
     """Mass properties of the body that flew in all of these flights; raises InputError."""
     known = known or Known()
@@ -50,21 +48,17 @@ def identify(
     unknowns = make_unknowns(fit, topics_of(flights))
     first = _first_values(flights[0], known)
     try:
-        estimate = fit_flights(flights, unknowns, first, robust)
+        estimate = fit_flights(flights, unknowns, first)
     except CannotFlyError:
         cause = likely_cause(flights, unknowns, first)
         raise CannotFlyError(cause) if cause else CannotFlyError() from None
     identifiability = Identifiability(estimate, known.length)
-    compared = []
-    if candidates:
-        body = unknowns.count("mass", "inertia", "com")
-        compared = compare(flights, estimate, candidates, fit, identifiability.count_identified(body))
     given = {"mass": known.mass is not None or known.body is not None}
     guessed = frozenset(name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.body is not None))
     checks = check_residuals(flights, estimate)
     cause = "" if all(check.is_noise for check in checks) else likely_cause(flights, unknowns, first)
     assumed = _assumed(flights, known, fit)
-    return Identification(flights, estimate, identifiability, checks, compared, assumed, guessed, cause)
+    return Identification(flights, estimate, identifiability, checks, assumed, guessed, cause)
 
 
 def _check(flights: Sequence[MeasuredFlight]) -> None:

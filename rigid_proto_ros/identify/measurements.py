@@ -12,8 +12,8 @@ from ..motion.loads import LOAD
 from ..simulation.flight import IMPULSE, PULSE
 from .trajectories import Wrenches
 
-POSITION, ATTITUDE, VELOCITY, RATE, ACCELERATION = "position", "attitude", "velocity", "rate", "acceleration"
-UNITS = {POSITION: "m", ATTITUDE: "rad", VELOCITY: "m/s", RATE: "rad/s", ACCELERATION: "m/s²"}
+POSITION, ATTITUDE, RATE, ACCELERATION = "position", "attitude", "rate", "acceleration"
+UNITS = {POSITION: "m", ATTITUDE: "rad", RATE: "rad/s", ACCELERATION: "m/s²"}
 
 
 @dataclass(frozen=True)
@@ -21,16 +21,14 @@ class Series:
     """Samples of one quantity of one topic. kind: POSITION and the others. times_ns (n,) ascending; values (n, 3), or
     (n, 4) xyzw.
 
-    in_body: velocities and rates are in axes of the tracked frame, else in the world's. All are of the tracked frame's
-    origin but ACCELERATION and an IMU's RATE, which are of the place and in the axes of that sensor (``is_imu``).
+    POSITION and ATTITUDE are of the tracked frame in the world; RATE and ACCELERATION are an IMU's, in the axes of the
+    tracked frame, the latter at the place of the IMU.
     """
 
     topic: str
     kind: str
     times_ns: np.ndarray
     values: np.ndarray
-    in_body: bool = False
-    is_imu: bool = False
 
     @property
     def name(self) -> str:

@@ -12,7 +12,6 @@ from ..base.errors import InputError
 from ..mass.export import urdf_inertial
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
-from .comparison import ModelComparison
 from .fitting import Estimate
 from .measurements import MeasuredFlight
 from .residual_checks import ResidualCheck, remarks
@@ -33,7 +32,6 @@ class Identification:
     estimate: Estimate
     identifiability: Identifiability
     checks: Sequence[ResidualCheck]
-    compared: Sequence[ModelComparison]
     assumed: Sequence[str]
     guessed: frozenset[str] = frozenset()
     """Of ``mass``, ``com`` and ``inertia`` what was neither asked for nor given: it has no number."""
@@ -161,17 +159,6 @@ def as_json(found: Identification) -> dict:
             for one in found.checks
         ],
         "remarks": found.remarks,
-        "compared": [
-            {
-                "name": one.name,
-                "log_likelihood": one.log_likelihood if np.isfinite(one.log_likelihood) else None,
-                "freedoms": one.freedoms,
-                "probability": one.probability,
-                "contradicted": one.is_contradicted,
-                "problem": one.problem,
-            }
-            for one in found.compared
-        ],
         "flights": [{"name": flight.name, "duration": flight.duration_s} for flight in found.flights],
     }
 
@@ -206,13 +193,6 @@ def as_text(found: Identification) -> list[str]:
         white = "white" if check.is_white else "not white"
         lines.append(f"noise of {check.series}: {check.noise:.3g} {check.unit}, {white}, {check.samples} samples")
     lines += found.remarks
-    for one in found.compared:
-        if one.problem:
-            text = one.problem
-        else:
-            text = "contradicted by the motion" if one.is_contradicted else "agrees with the motion"
-            text += f" (log likelihood {one.log_likelihood:.4g} relative to the free fit, p = {one.probability:.2g})"
-        lines.append(f"{one.name:<18} {text}")
     return lines
 
 

@@ -120,7 +120,7 @@ def remarks(checks: Sequence[ResidualCheck]) -> list[str]:
         where = f"{check.series} of {check.flight}"
         if check.outliers:
             many = f"{check.outliers} of {check.samples} samples lie" if check.outliers > 1 else "one sample lies"
-            found.append(f"{where}: {many} more than {FAR:g} standard deviations off; --robust gives them less weight")
+            found.append(f"{where}: {many} more than {FAR:g} standard deviations off")
         if check.is_noise:
             continue
         if check.worst_s is not None:

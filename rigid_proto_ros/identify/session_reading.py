@@ -15,7 +15,7 @@ from ..session.replay import session_scenario
 from ..session.runs import decode_event
 from ..simulation.commands import ClearWrench, WrenchCommand
 from ..simulation.setup import Setup
-from .measurements import ATTITUDE, POSITION, RATE, VELOCITY, LoadHistory, MeasuredFlight, Series, load_history
+from .measurements import ATTITUDE, POSITION, LoadHistory, MeasuredFlight, Series, load_history
 
 
 def session_flight(
@@ -49,23 +49,16 @@ def session_flight(
 
 
 def _series(session: RecordedSession) -> list[Series]:
-    if not session.published:
-        rows, times = session.rows, session.times
-        parts = (POSITION, rows[:, :3]), (ATTITUDE, rows[:, 3:7]), (VELOCITY, rows[:, 7:10])
-        return [Series("states", kind, times, values) for kind, values in parts] + [
-            Series("states", RATE, times, rows[:, 10:13], in_body=True)
-        ]
-    found = []
-    for topic, stamped in session.published.items():
-        times, rows = stamped.times, stamped.rows
-        own = topic == "odom"
-        if topic in ("pose", "odom"):
-            found += [Series(topic, POSITION, times, rows[:, :3]), Series(topic, ATTITUDE, times, rows[:, 3:7])]
-        if topic in ("twist", "odom"):
-            first = 7 if own else 0
-            found.append(Series(topic, VELOCITY, times, rows[:, first : first + 3], in_body=own))
-            found.append(Series(topic, RATE, times, rows[:, first + 3 : first + 6], in_body=own))
-    return found
+    """The poses: of the recorded states, or as a bag's topics have them."""
+    poses = {"states": (session.times, session.rows)}
+    if session.published:
+        found = {topic: (one.times, one.rows) for topic, one in session.published.items() if topic in ("pose", "odom")}
+        poses = dict(list(found.items())[:1])
+    return [
+        Series(topic, kind, times, rows[:, columns])
+        for topic, (times, rows) in poses.items()
+        for kind, columns in ((POSITION, slice(0, 3)), (ATTITUDE, slice(3, 7)))
+    ]
 
 
 def _load_history(

@@ -9,7 +9,7 @@ unknowns.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,6 @@ from . import measurements as ms
 from . import rotations as rot
 from . import trajectories as tr
 from .incremental_qr import upper_triangle
-from .sensors import difference, sensor_numbers, shown
 from .unknowns import STEP, Unknowns, Values
 
 STATE = 13
@@ -39,11 +38,11 @@ CLOCK_STEP_S = 1e-5
 
 @dataclass(frozen=True)
 class Piece:
-    """Samples of a series within a segment: its rows, and standard deviations for each unit (n,), weighted."""
+    """Samples of a series within a segment: its rows, and the standard deviation of their noise."""
 
     series: ms.Series
     rows: slice
-    scale: np.ndarray
+    sigma: float
 
     @property
     def times_ns(self) -> np.ndarray:
@@ -96,13 +95,13 @@ class Segment:
 def cut(
     flights: Sequence[ms.MeasuredFlight],
     length_s: float,
-    scale: Callable[[ms.Series], np.ndarray],
+    sigmas: Mapping[str, float],
     margin_s: float = 0.0,
     every: Callable[[ms.Series], int] = lambda _: 1,
 ) -> list[Segment]:
     """Segments of about this length, of a flight a power of two, so that longer ones begin where shorter ones do.
 
-    scale: standard deviations for each unit (n,) of the samples of a series. margin_s: how much earlier segments start
+    sigmas: standard deviation of the noise by name of the series. margin_s: how much earlier segments start
     than their samples. every: each so-many-th sample of a series is used.
     """
     margin = round(margin_s * 1e9)
@@ -117,7 +116,7 @@ def cut(
                 begun, ended = np.searchsorted(series.times_ns, (first, last))
                 rows = slice(int(begun), int(ended), every(series))
                 if ended > begun:
-                    pieces.append(Piece(series, rows, scale(series)[rows]))
+                    pieces.append(Piece(series, rows, sigmas[series.name]))
             if pieces:
                 segments.append(Segment(flight, first - margin, last + margin, tuple(pieces), count == 1))
     return segments
@@ -149,6 +148,41 @@ def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
     rows[:, tr.START : tr.START + 3] += rot.turned(q, com)
     rows[:, tr.START + 7 : tr.START + 10] += rot.turned(q, rot.cross(w, com))
     return rows
+
+
+COM, PLACE, GYRO_BIAS, ACCEL_BIAS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
+"""Of a row of ``sensor_numbers``."""
+
+
+def sensor_numbers(values: Values) -> np.ndarray:
+    """What samples depend on beside the flight (12,): centre of mass and place of the IMU in the tracked frame [m], and
+    what the IMU adds to rates [rad/s] and accelerations [m/s²].
+    """
+    return np.concatenate([values.center_of_mass, values.imu_place, values.gyro_bias, values.accel_bias])
+
+
+def shown(series: ms.Series, s: np.ndarray, sensor: np.ndarray) -> np.ndarray:
+    """What a series shows (..., 3), or (..., 4) xyzw, of samples s (..., SAMPLE) of the centre of mass. sensor: its
+    ``sensor_numbers`` (..., 12).
+    """
+    q, w, com = s[..., 3:7], s[..., 10:13], sensor[..., COM]
+    if series.kind == ms.ATTITUDE:
+        return q
+    if series.kind == ms.POSITION:
+        return s[..., :3] - rot.turned(q, com)
+    if series.kind == ms.RATE:
+        return w + sensor[..., GYRO_BIAS]
+    # v' at the IMU less gravity: a + ω' × r + ω × (ω × r), all along body axes.
+    arm = sensor[..., PLACE] - com
+    felt, angular = s[..., tr.SPECIFIC_FORCE : tr.SPECIFIC_FORCE + 3], s[..., tr.ANGULAR_ACCELERATION : tr.SAMPLE]
+    return felt + rot.cross(angular, arm) + rot.cross(w, rot.cross(w, arm)) + sensor[..., ACCEL_BIAS]
+
+
+def difference(series: ms.Series, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """``other`` less ``one`` (..., 3); of attitudes the rotation vector from one to the other in body axes [rad]."""
+    if series.kind == ms.ATTITUDE:
+        return rot.logarithm(rot.product(rot.inverse(one), other))
+    return other - one
 
 
 def _times(segment: Segment, values: Values) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -243,7 +277,7 @@ class Variations:
 
 def linearized(segment: Segment, start: np.ndarray, variations: Variations) -> np.ndarray | None:
     """How the residuals of all pieces change with the start and the unknowns, and as the last row the residuals
-    themselves: (12 + e + unknowns + 1, 3 m of all pieces), in units of the standard deviations, weighted.
+    themselves: (12 + e + unknowns + 1, 3 m of all pieces), in standard deviations.
 
     None where a flight failed.
     """
@@ -258,11 +292,10 @@ def linearized(segment: Segment, start: np.ndarray, variations: Variations) -> n
     places = np.where(variations.columns < START, variations.columns, variations.columns + extra)
     for piece, own, part in zip(segment.pieces, where, _parts(segment), strict=True):
         seen = shown(piece.series, samples[:, own][which], variations.sensors[:, None])
-        weight = piece.scale[:, None]
-        columns[-1, part] = (weight * difference(piece.series, seen[0], piece.values)).ravel()
+        columns[-1, part] = difference(piece.series, seen[0], piece.values).ravel() / piece.sigma
         changed = difference(piece.series, seen[variations.minus], seen[variations.plus])
         # What a flight shows moves by that, what is measured less what it shows by minus that.
-        columns[places, part] = -(weight * changed / variations.widths[:, None, None]).reshape(len(places), -1)
+        columns[places, part] = -(changed / (piece.sigma * variations.widths[:, None, None])).reshape(len(places), -1)
     for k in range(extra):
         step = np.zeros(len(start))
         step[STATE + k] = CLOCK_STEP_S
@@ -292,7 +325,7 @@ def _by_clock(segment: Segment, one: tuple[np.ndarray, Values], other: tuple[np.
         return column
     edges = segment.wrenches(*one).edges_ns
     for piece, a, b, part in zip(segment.pieces, earlier, later, _parts(segment), strict=True):
-        slope = -piece.scale[:, None] * difference(piece.series, a, b) / (2.0 * CLOCK_STEP_S)
+        slope = -difference(piece.series, a, b) / (2.0 * CLOCK_STEP_S * piece.sigma)
         if piece.series.kind == ms.ACCELERATION and len(edges):
             # Where a load begins or ends an accelerometer's curve jumps, and says nothing about its slope.
             times = piece.times_ns - segment.begin_ns + round(one[1].offset(piece.series.topic) * 1e9)

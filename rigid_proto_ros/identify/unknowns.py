@@ -67,10 +67,6 @@ class Unknowns:
     def __contains__(self, group: str) -> bool:
         return any(name == group for name, _ in self.slots)
 
-    def count(self, *groups: str) -> int:
-        """How many unknowns belong to these groups."""
-        return sum(name in groups for name, _ in self.slots)
-
     def scales(self, values: Values) -> np.ndarray:
         """What counts as a large change of each unknown."""
         mass, size = values.mass, values.size

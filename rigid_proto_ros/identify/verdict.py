@@ -142,10 +142,6 @@ class Identifiability:
             return TUMBLE
         return "a longer recording, or a given value"
 
-    def count_identified(self, count: int) -> int:
-        """How many of the directions among the first ``count`` coordinates are identified."""
-        return count - int(np.linalg.matrix_rank(self._directions[:count, self._unidentified], tol=0.5))
-
     def quantity(self, of: Callable[[Values], float]) -> Quantity:
         """A function of the estimate with its standard deviation, or nothing where a direction that isn't
         identified changes it.

@@ -36,15 +36,13 @@ class Lump:
 
 
 @np.errstate(all="ignore")  # of numbers near the largest, which are refused
-def lump_robot(
-    path: Path, joints: Mapping[str, float], folders: tuple[Path, ...] = (), xacro: tuple[str, ...] = ()
-) -> Lump:
+def lump_robot(path: Path, joints: Mapping[str, float], folders: tuple[Path, ...] = ()) -> Lump:
     """The robot at joint values [rad or m] by name, the others at 0, in the frame of its root link (URDF), of the model
     (SDF) or of the world (MJCF).
 
     Raises InputError for a file without inertials, for joints that it doesn't have, and for links that make no tree.
     """
-    robot = read_robot(path, folders, xacro)
+    robot = read_robot(path)
     search = Search(path.parent, folders)
     links = robot.simulated() if robot.simulated else [_computed(link, Meshes(search)) for link in robot.links]
     with valid_numbers(path.name):  # of the joints, which are read now

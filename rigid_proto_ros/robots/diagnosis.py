@@ -16,8 +16,7 @@ the better of both is named; a mass distribution may lie in either.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -92,11 +91,8 @@ class LinkDiagnosis:
 
 @dataclass(frozen=True)
 class Options:
-    """How shapes are taken, where their files are looked for, and what xacro is told (``name:=value``).
-
-    ``mass`` or ``density`` > 0 are the true ones of every link, ``masses`` and ``densities`` those of the links that
-    they name; with ``total_mass`` > 0 the links that no mass or density is given for are of one density, at which the
-    robot weighs that. ``tolerance``: relative differences up to this are taken for rounding.
+    """How shapes are taken, and where their files are looked for. ``mass`` or ``density`` > 0 is the true one of every
+    link. ``tolerance``: relative differences up to this are taken for rounding.
     """
 
     mass: float = 0.0
@@ -106,18 +102,10 @@ class Options:
     accept_open: float = 0.0
     max_triangles: int = MAX_TRIANGLES
     folders: tuple[Path, ...] = ()
-    masses: Mapping[str, float] = field(default_factory=dict)
-    densities: Mapping[str, float] = field(default_factory=dict)
-    total_mass: float = 0.0
     tolerance: float = LIMIT
-    xacro: tuple[str, ...] = ()
 
-    def mass_of(self, link: str, volume: float) -> float:
+    def mass_of(self, volume: float) -> float:
         """The true mass of a link of ``volume`` [m³], 0 where none is given."""
-        if link in self.masses:
-            return self.masses[link]
-        if link in self.densities:
-            return self.densities[link] * volume
         return self.mass or self.density * volume
 
 
@@ -139,7 +127,7 @@ def diagnose(link: Link, parts: LinkShapes, options: Options, judged_by: str = "
     try:
         volume = parts.volume()
         plain = replace(plain, volume=volume, doubts=parts.doubts)
-        wanted = options.mass_of(link.name, volume)
+        wanted = options.mass_of(volume)
         if link.problem:
             return replace(plain, note=link.problem, expected=parts.properties(wanted or WATER * volume))
         finite = np.all(np.isfinite(link.inertia)) and np.all(np.isfinite(link.center_of_mass))
@@ -182,10 +170,7 @@ def diagnose(link: Link, parts: LinkShapes, options: Options, judged_by: str = "
 
 
 class Doctor:
-    """Judges the links of a robot file.
-
-    Raises InputError for a total mass that the links' given masses leave nothing of, and for names of no link.
-    """
+    """Judges the links of a robot file."""
 
     def __init__(self, path: Path, links: list[Link], options: Options, meshes: Meshes | None = None) -> None:
         self.options = options
@@ -198,10 +183,6 @@ class Doctor:
             accept_open=options.accept_open,
         )
         self.links = links
-        for name in (*options.masses, *options.densities):
-            self.require(name)
-        if options.total_mass:
-            self.options = replace(options, masses=self._shared_out(options.total_mass))
 
     def require(self, name: str) -> None:
         """Raise InputError when not one link has this name."""
@@ -211,25 +192,6 @@ class Doctor:
         if name not in names:
             hint = did_you_mean(name, names) or f"the links are {', '.join(names)}"
             raise InputError("link", f"there is no link {name!r} with an inertial or a shape; {hint}")
-
-    def _shared_out(self, total: float) -> dict[str, float]:
-        """Masses by link of which the whole is ``total``: the links without a given one are of one density."""
-        given = dict(self.options.masses)
-        volumes: dict[str, float] = {}
-        rest = total
-        for link in self.links:
-            volume = self.diagnose(link).volume
-            known = self.options.mass_of(link.name, volume)
-            if known or not (volume or link.problem):
-                rest -= known or link.mass
-            elif not link.problem:
-                self.require(link.name)
-                volumes[link.name] = volume
-        if not volumes or not rest > 0.0:
-            left = f"{rest:.6g} kg for {len(volumes)} links that enclose a volume"
-            raise InputError("--total-mass", total, f"more than the mass of the other links; it leaves {left}")
-        density = rest / sum(volumes.values())
-        return {**given, **{name: density * volume for name, volume in volumes.items()}}
 
     def diagnoses(self, only: str | None = None) -> list[tuple[Link, LinkDiagnosis]]:
         """The links (or that one) with their diagnoses, in the file's order."""
@@ -324,7 +286,7 @@ def compare_robot(
 
     Raises InputError when the file, or nothing in it, can be diagnosed.
     """
-    doctor = Doctor(path, read_robot(path, options.folders, options.xacro).links, options)
+    doctor = Doctor(path, read_robot(path).links, options)
     if link is not None:
         doctor.require(link)
     if mesh is not None:

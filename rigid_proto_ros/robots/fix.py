@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
@@ -22,9 +22,8 @@ from ..mass.export import is_flat, quaternion_wxyz
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
 from .diagnosis import NOT_UNIFORM, UNIFORM, UNKNOWN, Doctor, LinkDiagnosis, Options
-from .model import Link
+from .model import MAX_BYTES, Link, parse_xml
 from .reading import robot_of
-from .robot_xml import MAX_BYTES, is_xacro, parse_xml
 
 _SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _ATTRIBUTE = re.compile(rb"""\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")
@@ -225,11 +224,11 @@ def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, options: Options, pla
     """Why a link that isn't uniform can't, or shan't, be written; "" when it can."""
     if diagnosis.status == NOT_UNIFORM and not everything:
         return "a body of its shapes can have it; --all makes it uniform"
-    if link.problem and not options.mass_of(link.name, diagnosis.volume):
-        return f"{diagnosis.note}; --mass LINK=M or --density LINK=D writes one"
+    if link.problem and not options.mass_of(diagnosis.volume):
+        return f"{diagnosis.note}; --mass M or --density D writes one"
     if diagnosis.expected is None:
         if diagnosis.volume:
-            return "its mass isn't a positive number; --mass LINK=M or --density LINK=D says what it is"
+            return "its mass isn't a positive number; --mass M or --density D says what it is"
         return diagnosis.note
     if link.element is None or id(link.element) not in places:
         return "it stands in another file, or its body has no name"
@@ -251,11 +250,6 @@ def fix_robot(
     """
     data = read_bounded(path, MAX_BYTES, "fix", "a URDF, SDF or MJCF file")
     root = parse_xml(data, path)
-    if is_xacro(root, path):
-        plain = path.name.removesuffix(".xacro").removesuffix(".urdf") + ".urdf"
-        if plain == path.name:  # the shell would empty the file before xacro reads it
-            plain = f"{path.stem}.expanded.urdf"
-        raise InputError("fix", path.name, f"plain URDF: xacro {path} > {plain}, and then --compare {plain} --fix OUT")
     if b"\0" in data:
         raise InputError("fix", path.name, "a file in UTF-8 or another ASCII-compatible encoding")
     spans = [span for span in _spans(data) if span.tag in ("inertial", "link")]
@@ -279,7 +273,6 @@ def fix_robot(
             written[id(known.element)] = span, text
     for span, text in sorted(written.values(), key=lambda item: -item[0].start):
         data = data[: span.start] + text + data[span.end :]
-    options = replace(doctor.options, total_mass=0.0)
     again = Doctor(path, robot_of(parse_xml(data, path), path).links, options, doctor.meshes)
     after = again.diagnoses(link)
     links = []

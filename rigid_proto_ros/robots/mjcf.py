@@ -20,6 +20,7 @@ from ..base.errors import InputError, is_missing
 from ..base.files import read_bounded
 from .model import (
     COLLISION,
+    MAX_BYTES,
     OTHER,
     SLIDES,
     TURNS,
@@ -31,10 +32,10 @@ from .model import (
     Robot,
     Shape,
     bare_link,
+    parse_xml,
     printed_link,
     rotation_from_wxyz,
 )
-from .robot_xml import MAX_BYTES, parse_xml
 
 MAX_INCLUDES = 200
 

@@ -7,7 +7,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +23,8 @@ VISUAL, COLLISION = "visual", "collision"
 TURNS, SLIDES, FIXED, OTHER = "turns", "slides", "fixed", "other"
 WATER = 1000.0
 """kg/m³ of a shape of which nothing else is said."""
+MAX_BYTES = 50_000_000
+"""Of a robot's file."""
 
 
 @dataclass(frozen=True)
@@ -178,6 +183,24 @@ def _values(connections: list[Connection], given: Mapping[str, float]) -> Callab
         return factor * value(joints[followed], depth + 1) + offset
 
     return value
+
+
+def parse_xml(data: bytes, path: Path) -> Element:
+    """The root of a file's XML, names as they are written: SDFs use prefixes (gz:) that they don't declare.
+
+    Raises InputError for what is no XML, or has entities.
+    """
+    if b"<!ENTITY" in data:
+        raise InputError("robot file", path.name, "a file without XML entities")
+    tree = ElementTree.TreeBuilder()
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
+    parser.CharacterDataHandler = tree.data
+    try:
+        parser.Parse(data, True)
+        return tree.close()
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise InputError("robot file", path.name, f"well-formed XML ({error})") from None
 
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:

@@ -8,20 +8,26 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from ..base.errors import InputError
+from ..base.files import read_bounded
 from .mjcf import read_mjcf
-from .model import Robot, valid_numbers
-from .robot_xml import robot_root
+from .model import MAX_BYTES, Robot, parse_xml, valid_numbers
 from .sdf import read_sdf
 from .urdf import read_urdf
 
 
-def read_robot(path: Path, folders: tuple[Path, ...] = (), xacro: tuple[str, ...] = ()) -> Robot:
-    """The robot that a file describes; arguments and errors of robot_root."""
-    return robot_of(robot_root(path, folders, xacro), path)
+def read_robot(path: Path) -> Robot:
+    """The robot that a file describes; raises InputError when it can't be read."""
+    data = read_bounded(path, MAX_BYTES, "robot file", "a URDF, SDF or MJCF file")
+    return robot_of(parse_xml(data, path), path)
 
 
 def robot_of(root: Element, path: Path) -> Robot:
     """The robot below the root of a file; raises InputError for what is none, or holds what are no numbers."""
+    if path.suffix == ".xacro" or any("xacro" in str(element.tag) for element in root.iter()):
+        plain = path.name.removesuffix(".xacro").removesuffix(".urdf") + ".urdf"
+        if plain == path.name:  # the shell would empty the file before xacro reads it
+            plain = f"{path.stem}.expanded.urdf"
+        raise InputError("robot file", path.name, f"plain URDF: xacro {path} > {plain} expands it")
     with valid_numbers(path.name):
         if root.tag == "robot":
             return read_urdf(root)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto identify`` on our own sessions: the verdict, numbers as JSON and URDF, given tensors judged, one line for bad input."""
+"""``rigid_proto identify`` on our own sessions: the verdict, numbers as JSON and URDF, one line for bad input."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from rerun.chunk import RrdReader
 
 from rigid_proto_ros.cli.main import main
 
@@ -63,25 +62,10 @@ def test_before_the_poke_its_mass_is_no_number(flight: tuple, capsys: pytest.Cap
     assert "not identified: mass" in found["verdict"]
 
 
-def test_the_solid_agrees_and_the_box_is_contradicted(flight: tuple, capsys: pytest.CaptureFixture) -> None:
-    found = _json(capsys, str(flight[0]), "--mesh", "t_handle")
-    judged = {one["name"].rpartition(" ")[2]: one for one in found["compared"]}
-    assert found["compared"][0]["name"].endswith("as solid")
-    assert judged["bounding_box"]["contradicted"]
-    assert judged["shell"]["contradicted"]
-
-
-def test_its_urdf_is_judged_as_true_by_its_own_motion(flight: tuple, capsys: pytest.CaptureFixture) -> None:
-    bag, known = flight
+def test_its_urdf_is_an_inertial(flight: tuple, capsys: pytest.CaptureFixture) -> None:
     capsys.readouterr()
-    assert main(["identify", str(bag), "--urdf"]) == 0
-    text = capsys.readouterr().out
-    assert ElementTree.fromstring(text).find("mass") is not None
-    robot = known["folder"] / "robot.urdf"
-    robot.write_text(f'<robot name="r"><link name="handle">{text}</link></robot>')
-    [judged] = _json(capsys, str(bag), "--against", str(robot))["compared"]
-    assert judged["name"] == "robot.urdf, handle"
-    assert judged["log_likelihood"] > -20.0
+    assert main(["identify", str(flight[0]), "--urdf"]) == 0
+    assert float(ElementTree.fromstring(capsys.readouterr().out).find("mass").get("value")) == pytest.approx(0.1570796)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +76,6 @@ def test_its_urdf_is_judged_as_true_by_its_own_motion(flight: tuple, capsys: pyt
         (["FLIGHT", "--from", "9"], "--from"),
         (["FLIGHT", "--mass", "-1"], "--mass"),
         (["FLIGHT", "--fit", "mass,colour"], "--fit"),
-        (["FLIGHT", "--density", "1000"], "--density"),
         (["FLIGHT", "--to", "0.5", "--urdf"], "--urdf"),
         (["FLIGHT", "--pose", "/elsewhere"], "--pose"),
         (["FLIGHT", "--offset", "pose"], "--offset"),
@@ -106,33 +89,6 @@ def test_bad_input_is_one_line_and_exit_2(
     assert len(said) == 1
     assert said[0].startswith("rigid_proto identify: ")
     assert message in said[0]
-
-
-def test_a_recording_shows_measured_and_fitted_flight_what_is_left_and_both_tensors(
-    flight: tuple, capsys: pytest.CaptureFixture
-) -> None:
-    bag, known = flight
-    file = known["folder"] / "shown.rrd"
-    assert main(["identify", str(bag), "--record", str(file)]) == 0
-    assert "mass" in capsys.readouterr().out
-    rows: dict[str, int] = {}
-    for chunk in RrdReader(str(file)).stream():
-        rows[chunk.entity_path] = max(rows.get(chunk.entity_path, 0), chunk.num_rows)
-    assert {
-        "/world/measured_1/mesh",
-        "/world/fitted_1/mesh",
-        "/ellipsoids/1",
-        "/ellipsoids/0",
-        "/report",
-    } <= set(rows)
-    shown = [rows[entity] for entity in ("/world/measured_1", "/world/fitted_1", "/residuals/1_1", "/residuals/1_2")]
-    assert shown == [151] * 4  # 1.5 s at 100 Hz
-
-
-def test_a_recording_that_cannot_be_written_is_one_line(flight: tuple, capsys: pytest.CaptureFixture) -> None:
-    capsys.readouterr()
-    assert main(["identify", str(flight[0]), "--to", "0.3", "--record", "shown.txt"]) == 2
-    assert "ends in .rrd" in capsys.readouterr().err
 
 
 def test_without_scipy_one_line_names_the_extra() -> None:

@@ -17,7 +17,6 @@ import numpy as np
 
 from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.identify import shooting as sh
-from rigid_proto_ros.identify.comparison import Candidate
 from rigid_proto_ros.identify.fitting import Estimate
 from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.measurements import ACCELERATION, ATTITUDE, POSITION, RATE, MeasuredFlight, topics_of
@@ -25,6 +24,7 @@ from rigid_proto_ros.identify.report import Identification
 from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, Values, make_unknowns
 from rigid_proto_ros.identify.verdict import Identifiability, Quantity
 from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mass.properties import MassProperties
 from rigid_proto_ros.mass.tensor import principal_axes, six_from_tensor
 
 EARTH = (0.0, 0.0, -9.81)
@@ -73,7 +73,7 @@ class MeasuredThrow:
     def bound(self) -> Estimate:
         """What nobody has: the truth, with its Fisher information."""
         unknowns = make_unknowns(self.fit, topics_of([self.flight]))
-        [segment] = sh.cut([self.flight], np.inf, lambda s: np.full(len(s.times_ns), 1.0 / SIGMAS[s.kind]))
+        [segment] = sh.cut([self.flight], np.inf, {one.name: SIGMAS[one.kind] for one in self.flight.series})
         columns = sh.linearized(segment, self.start, sh.Variations(unknowns, self.truth))
         assert columns is not None
         root = sh.compressed(columns, segment, self.start, is_held=False)[sh.START : -1, sh.START : -1]
@@ -127,7 +127,7 @@ def throw(number: int, poked: bool, first: str = "ball", phone: bool = False) ->
 
 def _against_bound(found: Identification, made: MeasuredThrow) -> dict[str, float]:
     ideal = made.bound()
-    bound = Identification([made.flight], ideal, Identifiability(ideal, made.size), [], [], [])
+    bound = Identification([made.flight], ideal, Identifiability(ideal, made.size), [], [])
     names, told, true = _numbers(found, made.truth)
     sds = _numbers(bound, made.truth)[1]
     return {
@@ -160,11 +160,11 @@ def _direction(rng: np.random.Generator) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-def _first(first: str, truth: Values, rng: np.random.Generator) -> Candidate | None:
+def _first(first: str, truth: Values, rng: np.random.Generator) -> MassProperties | None:
     if first == "ball":
         return None
     turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
-    return Candidate(100.0 * truth.mass, 100.0 * turn @ truth.inertia @ turn.T)
+    return MassProperties(100.0 * truth.mass, truth.center_of_mass, 100.0 * turn @ truth.inertia @ turn.T)
 
 
 def has_phone(number: int) -> bool:

@@ -44,16 +44,12 @@ def wrench(time_ns: int, force: Any, torque: Any, frame: str) -> dict:
     return {"header": header(time_ns, frame), "wrench": {"force": xyz(force), "torque": xyz(torque)}}
 
 
-def twist(time_ns: int, v: Any, w: Any, frame: str) -> dict:
-    return {"header": header(time_ns, frame), "twist": {"linear": xyz(v), "angular": xyz(w)}}
-
-
-def odometry(time_ns: int, p: Any, q: Any, v: Any, w: Any) -> dict:
+def odometry(time_ns: int, p: Any, q: Any) -> dict:
     return {
         "header": header(time_ns, "odom"),
         "child_frame_id": "base_link",
         "pose": {"pose": {"position": xyz(p), "orientation": xyzw(q)}, "covariance": [0.0] * 36},
-        "twist": {"twist": {"linear": xyz(v), "angular": xyz(w)}, "covariance": [0.0] * 36},
+        "twist": {"twist": {"linear": xyz((0, 0, 0)), "angular": xyz((0, 0, 0))}, "covariance": [0.0] * 36},
     }
 
 

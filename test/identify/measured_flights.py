@@ -83,7 +83,7 @@ def with_imu(
     felt = felt + bias[1] + PHONE[1] * rng.standard_normal(felt.shape)
     stamps = times - round(offset_s * 1e9)
     imu = (
-        ms.Series("/imu", ms.RATE, stamps, rate, in_body=True, is_imu=True),
-        ms.Series("/imu", ms.ACCELERATION, stamps, felt, in_body=True, is_imu=True),
+        ms.Series("/imu", ms.RATE, stamps, rate),
+        ms.Series("/imu", ms.ACCELERATION, stamps, felt),
     )
     return ms.MeasuredFlight("flight", (*flight.series, *imu), flight.load_history, flight.gravity)

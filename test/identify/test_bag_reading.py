@@ -52,12 +52,10 @@ def test_odometry_with_gaps_and_jitter_beside_a_thruster_gives_the_body(tmp_path
     messages, load = _thruster(rng, "base_link")
     times = np.sort(np.arange(0.0, 3.0, 0.01) + 0.003 * rng.random(300))[fb.keep(300, rng)]
     times_ns, samples = mf.flown(_truth(), mf.tumbling(), times, load)
-    q, w, com = samples[:, 3:7], samples[:, 10:13], np.array(COM)
+    q, com = samples[:, 3:7], np.array(COM)
     p = samples[:, :3] - rot.turned(q, com) + 5e-4 * rng.standard_normal((len(times), 3))
-    v = rot.turned_back(q, samples[:, 7:10]) - np.cross(w, com) + 0.01 * rng.standard_normal((len(times), 3))
     noisy = rot.product(q, rot.exponential(3e-3 * rng.standard_normal((len(times), 3))))
-    w = w + 0.01 * rng.standard_normal((len(times), 3))
-    odom = [(t, fb.odometry(t, *row)) for t, *row in zip(times_ns, p, noisy, v, w, strict=True)]
+    odom = [(t, fb.odometry(t, *row)) for t, *row in zip(times_ns, p, noisy, strict=True)]
     bag = fb.write(
         tmp_path / "rov.mcap",
         {
@@ -66,7 +64,7 @@ def test_odometry_with_gaps_and_jitter_beside_a_thruster_gives_the_body(tmp_path
         },
     )
     flight = bag_flight(bag, Choice())
-    assert [series.kind for series in flight.series] == ["position", "attitude", "velocity", "rate"]
+    assert [series.kind for series in flight.series] == ["position", "attitude"]
     _near(identify([flight]))
 
 
@@ -100,29 +98,6 @@ def test_tf_and_an_imu_with_another_clock_give_the_body_and_the_clocks_offset(tm
     assert offset.sd < 1e-3
     place = [found.others[f"imu_place.{axis}"] for axis in "xyz"]
     assert all(abs(one.value - x) < 4.5 * one.sd for one, x in zip(place, (0.05, 0.0, 0.02), strict=True))
-
-
-def test_poses_and_twists_in_either_axes_say_the_same(tmp_path: Path) -> None:
-    times_ns, samples = mf.flown(_truth(), mf.tumbling(), np.arange(0.0, 1.0, 0.01))
-    q, w = samples[:, 3:7], samples[:, 10:13]
-    p = samples[:, :3] - rot.turned(q, np.array(COM))
-    v = samples[:, 7:10] - rot.turned(q, np.cross(w, np.array(COM)))
-    poses = [(t, fb.pose(t, *row)) for t, *row in zip(times_ns, p, q, strict=True)]
-    shapes = []
-    for frame in ("map", "body"):
-        turn = (lambda _, x: x) if frame == "map" else rot.turned_back
-        rates = rot.turned(q, w) if frame == "map" else w
-        twists = [(t, fb.twist(t, *row, frame)) for t, *row in zip(times_ns, turn(q, v), rates, strict=True)]
-        bag = fb.write(
-            tmp_path / f"{frame}.mcap",
-            {
-                "/pose": ("geometry_msgs/msg/PoseStamped", poses),
-                "/twist": ("geometry_msgs/msg/TwistStamped", twists),
-            },
-        )
-        shapes.append([one.value for one in identify([bag_flight(bag, Choice())]).shape])
-    assert shapes[0] == pytest.approx(shapes[1], abs=1e-8)
-    assert shapes[0][3] == pytest.approx(1.0 / 3.0, abs=1e-8)
 
 
 def _pushed(tmp_path: Path, seed: int, shape: str, clock_s: float = 0.0) -> tuple[Path, Choice]:
@@ -232,11 +207,11 @@ def test_a_number_that_is_not_finite_is_named_with_its_topic_and_time(tmp_path: 
 
 
 def test_clocks_that_have_no_time_in_common_are_refused_unless_an_offset_is_given(tmp_path: Path) -> None:
-    late = [(t, fb.twist(t, (0, 0, 0), (0, 0, 0), "map")) for t in range(100 * 10**9, 101 * 10**9, 10**8)]
-    bag = _poses(tmp_path, **{"/twist": ("geometry_msgs/msg/TwistStamped", late)})
+    late = [(t, fb.imu(t, (0, 0, 0), (0, 0, 0))) for t in range(100 * 10**9, 101 * 10**9, 10**8)]
+    bag = _poses(tmp_path, **{"/imu": ("sensor_msgs/msg/Imu", late)})
     with pytest.raises(InputError, match="clocks.*no time in common"):
         bag_flight(bag, Choice())
-    assert len(bag_flight(bag, Choice(offsets={"/twist": -100.0})).series) == 4
+    assert len(bag_flight(bag, Choice(offsets={"/imu": -100.0})).series) == 4
 
 
 def test_a_wrench_with_another_clock_is_refused_too(tmp_path: Path) -> None:
@@ -258,7 +233,7 @@ def test_too_few_samples_are_refused(tmp_path: Path, count: int) -> None:
     ("topics", "message"),
     [
         ({"pose": "/nothing"}, "a topic of the bag: /pose"),
-        ({"pose": "/pose", "twist": "/pose"}, "geometry_msgs/msg/TwistStamped"),
+        ({"pose": "/pose", "imu": "/pose"}, "sensor_msgs/msg/Imu"),
         ({"pose": "/pose@drone"}, "/pose alone, as a geometry_msgs/msg/PoseStamped has no choice of frames"),
         ({"pose": "/pose", "wrench": "/w"}, "in frame 'thruster_7'"),
     ],

@@ -11,9 +11,9 @@ import pytest
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.identify import measurements as ms
-from rigid_proto_ros.identify.comparison import Candidate
 from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.report import as_json, as_text, as_urdf
+from rigid_proto_ros.mass.properties import MassProperties
 
 INERTIA = np.diag([2.0, 3.0, 4.0]) * 1e-3
 POKE = (0.5, 0.05, "world", (0.05, 0.02, 0.0), (0.0, 0.5, 2.0), (0.0, 0.0, 0.01))
@@ -67,7 +67,9 @@ def test_what_is_neither_asked_for_nor_given_is_no_number() -> None:
     assert all(one.value is not None for one in (*found.center_of_mass, *found.shape))
     bare = identify([flight], fit=("gravity",))
     assert all(one.value is None for one in (*bare.center_of_mass, *bare.inertia, *bare.shape, *bare.moments))
-    given = identify([flight], fit=("gravity",), known=Known(body=Candidate(truth.mass, truth.inertia)))
+    given = identify(
+        [flight], fit=("gravity",), known=Known(body=MassProperties(truth.mass, truth.center_of_mass, truth.inertia))
+    )
     assert given.mass.value == pytest.approx(0.5)
 
 
