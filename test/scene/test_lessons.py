@@ -121,10 +121,6 @@ def test_dropped_term_keeps_energy_and_the_size_of_l_but_not_its_direction() -> 
     assert degrees_between(right.spin, right.spin[0]).max() > 40.0
 
 
-def test_t_handle_without_the_gyroscopic_term_never_flips() -> None:
-    assert len(fly("t_handle", 10.0, gyroscopic=False).flips(axis=2)) == 0
-
-
 @pytest.mark.parametrize("attach", ["corner", "spine"])
 def test_plumb_line_comes_to_rest_through_the_centre_of_mass(attach: str) -> None:
     point = {"corner": [0.074, 0.105, 0.0138], "spine": [-0.08, 0.0, 0.0]}[attach]

@@ -116,7 +116,7 @@ def test_top_at_rest_is_turned_over_by_the_same_push() -> None:
     assert lowest < -0.9
 
 
-@pytest.mark.parametrize("scene, axis", [("book", 0), ("tennis_racket", 1)])
+@pytest.mark.parametrize("scene, axis", [("book", 0), ("tennis_racket", 1), ("t_handle", 2)])
 def test_bad_throws_look_calm_without_the_gyroscopic_term(scene: str, axis: int) -> None:
     flight = fly(scene, 10.0, gyroscopic=False)
     assert len(flight.flips(axis)) == 0

@@ -201,7 +201,7 @@ def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_button
 
     def picture() -> np.ndarray:
         box = page.canvas
-        return page.look()[: int(box["height"]), : int(box["width"]) - 400]
+        return page.look()[: int(box["height"]), : int(box["width"])]
 
     page.until(lambda: picture().mean() < 90.0, "dark picture")
     seen = picture()
@@ -210,6 +210,7 @@ def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_button
     page.page.get_by_label("Dark", exact=True).first.click(force=True)
     page.until(lambda: picture().mean() > 180.0, "light picture")
 
+    page.tab("Lesson")
     page.page.get_by_label("Class mode", exact=True).first.click(force=True)
     page.until(lambda: not page.page.get_by_role("tab", name="Body").is_visible(), "page without tabs")
     buttons = [b.inner_text() for b in page.page.locator(".mantine-Button-root").all() if b.is_visible()]
