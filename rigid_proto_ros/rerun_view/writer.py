@@ -34,11 +34,6 @@ from .streams import LiveStream, Stream
 REPEATED_ROWS = 16384
 """After as many states viewers are told again what holds since long: a fourth of what the live server keeps."""
 
-LIVE_NUMBERS_MAX = 4_000_000
-"""[bytes] of a mesh's exact numbers that viewers are sent too; larger ones would push the flight out of
-the live server.
-"""
-
 REACH_PER_TIP = 1.7
 """A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
 
@@ -200,7 +195,7 @@ class SceneWriter:
                 self._mesh = vertices, triangles, mesh_sha256
 
     def _send_scene(self, streams: list[Stream]) -> None:
-        """What holds for a run: the scene as text, the mesh's exact numbers."""
+        """What holds for a run: the scene as text, in files the mesh's exact numbers."""
         if not self._scene:
             return
         vertices, triangles, sha256 = self._mesh
@@ -208,9 +203,7 @@ class SceneWriter:
             stream.log_static(style.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
             stream.log_static(style.POINSOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
             stream.log_static(e.SCENE, rr.TextDocument(self._scene, media_type="text/plain"))
-            if vertices is None or triangles is None:
-                continue
-            if isinstance(stream, LiveStream) and vertices.nbytes + triangles.nbytes > LIVE_NUMBERS_MAX:
+            if vertices is None or triangles is None or isinstance(stream, LiveStream):
                 continue
             numbers = rr.AnyValues(
                 sha256=sha256,

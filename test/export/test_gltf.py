@@ -84,7 +84,7 @@ def record_of(scene: str, settings: dict, seconds: float) -> tuple[FlightRecord,
     return record, source_of_scene(scenario, [])
 
 
-@pytest.mark.parametrize("fps", [24.0, 25.0, 30.0, 60.0, 240.0])
+@pytest.mark.parametrize("fps", [24.0, 30.0, 240.0])
 def test_frames_come_evenly_and_are_the_simulated_states_to_the_bit(fps):
     # 700 rad/s published every 10 ms: more than a turn from state to state.
     settings = {"initial.angular_velocity": [0.0, 3.0, 700.0]}
@@ -99,17 +99,12 @@ def test_frames_come_evenly_and_are_the_simulated_states_to_the_bit(fps):
         assert np.array_equal(row, run.simulation.state.row)
 
 
-def test_recorded_states_are_the_frames_where_a_session_cannot_be_simulated_again():
-    record, _ = record_of("hammer", THROWN, 0.3)
-    made, said = frames(record, None, 30.0)
-    assert made is record and "can't be simulated again" in said
-
-
-def test_a_recorded_motion_that_is_not_the_simulated_one_is_drawn_as_recorded():
+def test_a_motion_that_cannot_be_simulated_again_is_drawn_as_recorded():
     record, _ = record_of("hammer", THROWN, 0.3)
     _, other = record_of("hammer", {**THROWN, "gravity": [0.0, 0.0, -9.0]}, 0.3)
-    made, said = frames(record, other, 30.0)
-    assert made is record and "isn't the recorded one" in said
+    for source, reason in ((None, "can't be simulated again"), (other, "isn't the recorded one")):
+        made, said = frames(record, source, 30.0)
+        assert made is record and reason in said
 
 
 def test_the_ghost_flies_beside_the_body(tmp_path):

@@ -21,7 +21,15 @@ from rigid_proto_ros.rerun_view.flusher import FLUSH_PERIOD_S, STALLED_S
 from rigid_proto_ros.rerun_view.observer import RerunObserver
 from rigid_proto_ros.rerun_view.reader import read_session
 from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, whole_bytes
-from rigid_proto_ros.simulation.observer import BodyChanged, BodySnapshot, MeshChanged, Published, Reset, Started
+from rigid_proto_ros.simulation.observer import (
+    BodyChanged,
+    BodySnapshot,
+    MeshChanged,
+    Published,
+    Reset,
+    SceneChanged,
+    Started,
+)
 
 COUNT = 101
 
@@ -84,16 +92,6 @@ def test_every_published_state_has_its_pose_to_float32(recording, states):
     assert np.array_equal(np.array(quaternions)[:, 0], states[:, 3:7].astype(np.float32))
 
 
-def test_mesh_hangs_on_the_com_so_that_it_is_where_the_state_says(recording):
-    times, translations = column(recording, style.BODY_MESH, "Transform3D:translation")
-    _, scales = column(recording, style.BODY_MESH, "Transform3D:scale")
-    assert times.tolist() == [0]
-    # Vertices are drawn about the middle of their box.
-    middle = 0.5 * (flight.VERTICES.min(axis=0) + flight.VERTICES.max(axis=0)) * flight.SCALE
-    assert np.allclose(translations[0], middle - flight.COM, rtol=1e-7, atol=1e-9)
-    assert np.allclose(scales[0], flight.SCALE, rtol=1e-7)
-
-
 def test_plotted_energies_and_momentum_are_those_of_the_states(recording, states):
     # Independent of the code under test: quaternion by its own product, one state at a time.
     def rotate(q, v):
@@ -121,15 +119,6 @@ def test_plotted_energies_and_momentum_are_those_of_the_states(recording, states
         moments = np.linalg.eigvalsh(flight.INERTIA)
         assert np.isclose(0.5 * moments @ np.square(rates[k]), rotational, rtol=1e-12)
         assert np.isclose(np.linalg.norm(np.multiply(moments, rates[k])), np.linalg.norm(L), rtol=1e-12)
-
-
-def test_a_load_is_shown_from_the_first_state_at_which_it_acts(recording):
-    times, vectors = column(recording, f"{style.LOADS}/wrench/force", "Arrows3D:vectors")
-    assert times[[bool(own) for own in vectors]].tolist() == list(range(310_000_000, 1_010_000_000, flight.PERIOD_NS))
-    torque_times, torques = column(recording, f"{style.LOADS}/wrench/torque", "Arrows3D:vectors")
-    assert torque_times.tolist() == times.tolist() and list(map(len, torques)) == list(map(len, vectors))
-    _, texts = column(recording, f"{style.LOADS}/poke/force/label", "Points3D:labels")
-    assert ["3 N"] in texts
 
 
 def test_a_change_of_the_body_moves_the_mesh_from_that_time_on(tmp_path, states):
@@ -171,33 +160,26 @@ def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
     assert second[0].tolist() == [0, 200_000_000] and np.allclose(second[1], [[[1e-9] * 3], [scale]])
 
 
-def test_a_reset_keeps_the_run_before_beside_the_new_one(tmp_path, states):
+def test_a_reset_keeps_the_run_before_beside_the_new_one_which_begins_with_what_is_then_in_force(tmp_path, states):
     path = tmp_path / "session.rrd"
     observer = RerunObserver(record=str(path))
     flight.fly(observer, states[:50])
+    changed = flight.SCENE + "    mass: 2.0\n"
+    observer.on(SceneChanged(490_000_000, changed))
+    observer.on(Reset())
+    observer.on(Published(0, states[0]))
+    # A run whose time never left 0 isn't kept.
     observer.on(Reset())
     for k, row in enumerate(states[50:60]):
         observer.on(Published(k * flight.PERIOD_NS, row))
     observer.close()
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["session.rrd", "session.run1.rrd"]
     newest, before = read_session(path), read_session(tmp_path / "session.run1.rrd")
     assert newest.rows.tobytes() == states[50:60].tobytes()
     assert before.rows.tobytes() == states[:50].tobytes()
     assert newest.mesh_chunks == before.mesh_chunks == 1
-    assert newest.scene == before.scene == flight.SCENE
+    assert (before.scene, newest.scene) == (flight.SCENE, changed)
     assert newest.events == []
-
-
-def test_a_run_that_never_left_time_zero_is_not_kept_at_a_reset(tmp_path, states):
-    path = tmp_path / "session.rrd"
-    observer = RerunObserver(record=str(path))
-    observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
-    observer.on(BodyChanged(0, flight.BODY))
-    observer.on(Published(0, states[0]))
-    observer.on(Reset())
-    observer.on(Published(0, states[1]))
-    observer.close()
-    assert [p.name for p in tmp_path.iterdir()] == ["session.rrd"]
-    assert read_session(path).rows.tobytes() == states[1:2].tobytes()
 
 
 def test_memory_does_not_grow_with_an_index_and_the_end_of_the_file_is_marked(recording):
