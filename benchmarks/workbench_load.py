@@ -108,13 +108,7 @@ def main() -> None:
         return
     from workbench_page import Flown
 
-    from rigid_proto_ros.live.endpoints import Endpoints
-
-    class Listened(Endpoints):
-        """Somebody takes every state, as a subscriber to a topic does: each is due at its own moment."""
-
-        def has_subscribers(self) -> bool:
-            return True
+    from rigid_proto_ros.live.simulation_loop import Endpoints
 
     table = ResultTable(
         FOLDER / "results" / "workbench_load.csv", ("what", "without_page", "with_page", "ratio", "load")
@@ -126,7 +120,8 @@ def main() -> None:
         table.add(row)
         print(f"{what}: {without:.3g} without a page, {with_page:.3g} with one (load {row['load']:.1f})", flush=True)
 
-    flown = Flown("t_handle", endpoints=Listened())
+    # Somebody takes every state, as a subscriber to a topic does: each is due at its own moment.
+    flown = Flown("t_handle", endpoints=Endpoints(has_subscribers=lambda: True))
     port = flown.server.get_port()
     try:
         flown.live.set_parameters({"publish_rate": 1000.0})

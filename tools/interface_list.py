@@ -21,8 +21,7 @@ from pathlib import Path
 import node_interface
 from rigid_proto_ros.base import bundled
 from rigid_proto_ros.cli import main as cli
-from rigid_proto_ros.live import diagnostics
-from rigid_proto_ros.ros import poke_client
+from rigid_proto_ros.ros import diagnostics, poke_client
 from rigid_proto_ros.ros.arguments import own_arguments
 from rigid_proto_ros.scene import parameters, script
 

@@ -130,12 +130,6 @@ INTERFACES = (
     ),
     _topic(PUBLISHED, "/clock", "rosgraph_msgs/Clock", "simulated time", "publish_clock"),
     _topic(PUBLISHED, "/tf", "tf2_msgs/TFMessage", "world to body, where tf2_msgs is installed", "publish_tf"),
-    _topic(
-        PUBLISHED,
-        "/tf_static",
-        "tf2_msgs/TFMessage",
-        "frames of mesh and contacts at the body, where tf2_msgs is installed",
-    ),
     _service(
         "~/reset",
         "Trigger",
@@ -144,7 +138,7 @@ INTERFACES = (
     _service(
         "~/pause",
         "SetBool",
-        "true stops simulated time; false lets it run, once lists sent meanwhile are read and what they need is loaded",
+        "true stops simulated time; false lets it run",
     ),
     _service(
         "~/step",

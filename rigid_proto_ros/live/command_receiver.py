@@ -6,12 +6,16 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
-from ..base.errors import CommandRefused
+from ..base.errors import CommandRefused, InputError
 from ..scene.scenario import check_inertia, nanoseconds
-from ..simulation.commands import Change, Command
-from .schedule import LONG_TEXT, BackgroundThread, ScheduleMessage
+from ..scene.script import expand_schedule, read_schedule, with_contacts
+from ..simulation.checks import check_command
+from ..simulation.commands import Change, Command, Listed
+from ..simulation.setup import Setup
 
 if TYPE_CHECKING:
     from .simulation_loop import SimulationLoop
@@ -32,6 +36,17 @@ COUNTED_BY = {
 DAY_NS = 24 * 3600 * 1_000_000_000
 
 
+@dataclass(frozen=True)
+class Entry:
+    """A command of the schedule, ready to be submitted: its place in its list, and what Simulation.submit takes as
+    checked.
+    """
+
+    command: Command
+    listed: Listed | None
+    checked: tuple[bytes, Setup]
+
+
 class CommandReceiver:
     """All on the physics thread.
 
@@ -45,7 +60,6 @@ class CommandReceiver:
         self.wall_stamp = 0
         self._loop = loop
         self._schedules = 0
-        self._background = BackgroundThread()
 
     def receive(self, topic: str, command: Callable[[], Command]) -> None:
         """Count a command and submit it, to act at its stamp read as that of a message; raises CommandRefused, counted,
@@ -60,7 +74,9 @@ class CommandReceiver:
             sent = command()
             if isinstance(sent, Change) and sent.kind == "inertia":
                 check_inertia(loop.scenario, sent.content)
-            loop.simulation.submit(sent, self._when(sent.stamp_ns))
+            when_ns, counter = self._effective(sent.stamp_ns, loop.stamps.offset_ns)
+            self._count(counter, 1)
+            loop.simulation.submit(sent, when_ns)
         except CommandRefused as refusal:
             loop.simulation.refuse(refusal)
             raise
@@ -70,92 +86,65 @@ class CommandReceiver:
         if sent.kind in ("wrench", "thrusters"):
             loop.request_step()
 
-    def receive_schedule(self, text: Callable[[], str]) -> ScheduleMessage:
-        """Take an entry or a list of entries as YAML, now or once what it needs is loaded and compiled
-        (``submit_finished``); what is wrong with it is counted then. text() gives it, or raises CommandRefused.
+    def receive_schedule(self, text: Callable[[], str]) -> None:
+        """Take an entry of a script, or a list of entries whole or not at all, as YAML; raises CommandRefused, counted
+        by entries. A mesh that it needs is loaded here and now. text() gives it, or raises CommandRefused.
         """
         loop = self._loop
         loop.catch_up()
-        scenario = loop.scenario
         self._schedules += 1
-        schedule = ScheduleMessage(self._schedules)
-        quick = self._background.is_empty
-        schedule.decode(text)
-        if quick and len(schedule.text) <= LONG_TEXT:
-            schedule.read(scenario)
-            quick = not schedule.is_slow
-        else:
-            quick = False
-        if quick:
-            schedule.check(scenario, loop.setup_of)
-            self._submit_schedule(schedule)
-            return schedule
-
-        def work() -> None:
-            if not schedule.commands:
-                schedule.read(scenario)
-            schedule.check(scenario, loop.setup_of)
-
-        self._background.give(schedule, work)
-        return schedule
-
-    @property
-    def in_progress(self) -> bool:
-        """Whether a message of the schedule is still worked out in the background."""
-        return not self._background.is_empty
-
-    def submit_finished(self) -> None:
-        """Submit the messages of the schedule that have been worked out meanwhile."""
-        for number, schedule in enumerate(self._background.finished()):
-            if number == 0:
-                self._loop.catch_up()
-            self._submit_schedule(schedule)
-
-    def _submit_schedule(self, schedule: ScheduleMessage) -> None:
-        """Submit all of a message's entries, or refuse them all."""
-        simulation = self._loop.simulation
+        count = 1
         try:
-            if schedule.refusal is not None:
-                raise schedule.refusal
-            times = [self._effective(entry.command.stamp_ns, listed=True) for entry in schedule.entries]
-        except CommandRefused as refusal:
-            schedule.refusal = refusal
-            simulation.refuse(refusal, schedule.count)
+            listed = read_schedule(text())
+            count = len(listed) if isinstance(listed, list) else 1
+            commands = with_contacts(expand_schedule(listed), loop.scenario.setup.contacts)
+            entries = self._checked(commands, isinstance(listed, list))
+            times = [self._effective(entry.command.stamp_ns, 0) for entry in entries]
+        except InputError as error:
+            reason = error.reason if isinstance(error, CommandRefused) else "schedule"
+            refusal = CommandRefused(reason, error.field, error.received, error.accepted)
+            loop.simulation.refuse(refusal, count)
+            raise refusal from None
         else:
             for counter in ("late", "wall_stamp"):
-                entries = {
-                    entry.command.entry
-                    for entry, (_, counted) in zip(schedule.entries, times, strict=True)
-                    if counted == counter
+                # An entry that stands for several commands counts once.
+                counted = {
+                    entry.command.entry for entry, (_, name) in zip(entries, times, strict=True) if name == counter
                 }
-                self._count_stamps(counter, len(entries))
-            for entry, (when_ns, _) in zip(schedule.entries, times, strict=True):
-                simulation.submit(entry.command, when_ns, entry.listed, entry.checked)
-        self.received["schedule"] += schedule.count
-        schedule.is_submitted = True
+                self._count(counter, len(counted))
+            for entry, (when_ns, _) in zip(entries, times, strict=True):
+                loop.simulation.submit(entry.command, when_ns, entry.listed, entry.checked)
+        finally:
+            self.received["schedule"] += count
 
-    # When they act
+    def _checked(self, commands: list[Command], is_list: bool) -> list[Entry]:
+        """The commands in order of time, those of one time in the order of the list, each checked in the scene that
+        those before it have made of the present one; raises InputError.
+        """
+        entries, scenario = [], self._loop.scenario
+        for k in sorted(range(len(commands)), key=lambda k: commands[k].stamp_ns):
+            command = commands[k]
+            if isinstance(command, Change):
+                scenario = scenario.with_changes(command.content)
+                command = replace(command, apply=partial(self._loop.setup_of, command, scenario.body_mesh))
+            checked = (check_command(command, scenario.setup), scenario.setup)
+            entries.append(Entry(command, (self._schedules, k) if is_list else None, checked))
+        return entries
 
-    def _when(self, stamp_ns: int) -> int:
-        when_ns, counter = self._effective(stamp_ns)
-        self._count_stamps(counter, 1)
-        return when_ns
-
-    def _effective(self, stamp_ns: int, listed: bool = False) -> tuple[int, str]:
+    def _effective(self, stamp_ns: int, offset_ns: int) -> tuple[int, str]:
         horizon_ns = nanoseconds(self._loop.scenario.parameters.schedule_horizon)
-        offset_ns = 0 if listed else self._loop.stamps.offset_ns
         return effective_time(stamp_ns, self._loop.simulation.time_ns, time.time_ns(), horizon_ns, offset_ns)
 
-    def _count_stamps(self, counter: str, count: int) -> None:
+    def _count(self, counter: str, count: int) -> None:
         if counter == "late":
             self.late += count
         elif counter == "wall_stamp" and count:
-            first, self.wall_stamp = self.wall_stamp == 0, self.wall_stamp + count
-            if first:
+            if self.wall_stamp == 0:
                 self._loop.endpoints.warn(
                     "a command is stamped with the system's clock: it acts now, and so do later ones; "
                     "stamps of commands are simulated time"
                 )
+            self.wall_stamp += count
 
 
 def effective_time(stamp_ns: int, now_ns: int, wall_ns: int, horizon_ns: int, offset_ns: int = 0) -> tuple[int, str]:

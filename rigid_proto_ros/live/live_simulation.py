@@ -7,7 +7,8 @@ The node adds topics, services and ROS parameters to this; the interactive page 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from ..base.errors import CommandRefused, InputError
@@ -18,20 +19,15 @@ from ..scene.parameters import with_mass_of_density
 from ..scene.scenario import Scenario
 from ..scene.yaml_text import flow
 from ..simulation.commands import Change, ClearWrench, Command, ReleaseString
-from ..simulation.observer import Observer
+from ..simulation.observer import Observer, Observers, SceneChanged
 from .command_receiver import COUNTED_BY, CommandReceiver
-from .endpoints import Endpoints
-from .observers import LiveObservers
 from .pacing import Stamps
 from .physics_thread import PhysicsThread
-from .simulation_loop import SimulationLoop
-from .warm_up import warm_up_change
-
-LISTS_S = 5.0
-"""[s] That time stands still for a list sent before, until what it needs is loaded and compiled."""
+from .simulation_loop import Endpoints, SimulationLoop
+from .warm_up import warm_up
 
 LOOK_S = 0.002
-"""Between looks whether lists are worked out, or a step is made [s]."""
+"""Between looks whether a step is made [s]."""
 
 
 class LiveSimulation:
@@ -54,16 +50,18 @@ class LiveSimulation:
         self.endpoints = endpoints or Endpoints()
         self.stamps = Stamps(clock)
         self.frames = frame_names(scenario.parameters, name)
-        self.observers = LiveObservers(name, observers, self._recording_failed)
-        self.loop = SimulationLoop(scenario, self.observers.observer, self.endpoints, self.stamps)
-        self.observers.record_to(self.observers.open_recorder(scenario))
-        self.loop.watch(self.observers.observer)
+        self._observers = tuple(observers)
+        self._recording_error = ""
+        self._recorder: Observer | None = None
+        self.loop = SimulationLoop(scenario, Observers(*observers), self.endpoints, self.stamps)
+        self._recorder = self._open_recorder(scenario)
+        self._watch()
         self._on_crash: Callable[[], None] = lambda: None
         self._thread = PhysicsThread(self.loop, lambda: self._on_crash())
 
     def announce(self) -> None:
         """Tell the observers what is going to fly; once, before ``start``."""
-        notify_start(self.observers.observer, self.scenario)
+        notify_start(self.loop.observer, self.scenario)
         self.loop.simulation.announce()
         self.loop.notify_scene()
 
@@ -78,7 +76,7 @@ class LiveSimulation:
         """End the motion, then the observers: what they hold goes out."""
         self._thread.stop()
         self.loop.simulation.notify_end()
-        self.observers.close()
+        self.loop.observer.close()
 
     def call(self, function: Callable[[], Any], timeout_s: float = 10.0) -> Any:
         """Run a function on the physics thread between two ticks and return what it returns, or raise what it raises.
@@ -123,13 +121,9 @@ class LiveSimulation:
 
     def schedule(self, text: str) -> None:
         """Take an entry of a script, or a list of entries, as YAML, ``t`` in simulated seconds; a list is taken or
-        refused whole. Returns once it is taken, though that loads a mesh; raises CommandRefused, counted.
+        refused whole. Raises CommandRefused, counted.
         """
-        taken = self.call(lambda: self.commands.receive_schedule(lambda: text))
-        while not taken.is_submitted:
-            time.sleep(LOOK_S)
-        if taken.refusal is not None:
-            raise taken.refusal
+        self.call(lambda: self.commands.receive_schedule(lambda: text))
 
     def clear_wrench(self) -> None:
         """End the held wrenches and the running pulses; scheduled ones stay."""
@@ -145,10 +139,7 @@ class LiveSimulation:
     # Time
 
     def pause(self, paused: bool) -> None:
-        """Stop simulated time, or let it run, once lists sent meanwhile are worked out."""
-        if self.paused and not paused:
-            for _ in self._take_lists(lambda: self.call(self.loop.take_commands)):
-                time.sleep(LOOK_S)
+        """Stop simulated time, or let it run, once what was sent meanwhile is taken."""
         self.call(lambda: self.loop.pause(paused))
 
     def reset(self) -> None:
@@ -166,7 +157,7 @@ class LiveSimulation:
             self.loop.replace(scenario)
             self.loop.reset()
 
-        warm_up_change(self.scenario, scenario)
+        self._warm_up_change(scenario)
         self.call(begin)
         self.endpoints.parameters_changed()
 
@@ -174,30 +165,10 @@ class LiveSimulation:
         """While paused, advance over so many publications; returns the simulated time reached [ns]. Raises InputError
         while time runs, or when it takes too long.
         """
-        steps = self.steps(periods)
+        steps = self.loop.steps(periods)
         while not self.call(lambda: next(steps, True)):
             time.sleep(LOOK_S)
         return self.loop.simulation.time_ns
-
-    def steps(self, periods: int = 1) -> Iterator[None]:
-        """The same on the physics thread; yields between ticks."""
-        if self.paused:
-            yield from self._take_lists(self.loop.take_commands)
-        if not self.paused:
-            raise InputError("step", "the simulation is running; pause it first")
-        yield from self.loop.steps(periods)
-
-    def _take_lists(self, take_commands: Callable[[], None]) -> Generator[None, None, None]:
-        """Before time goes on: a list sent while it stood acts then, though it has a mesh to be loaded. Yields while
-        that is waited for; raises InputError when it takes longer than LISTS_S.
-        """
-        deadline = time.monotonic() + LISTS_S
-        take_commands()
-        while self.commands.in_progress:
-            if time.monotonic() > deadline:
-                raise InputError("schedule", f"a list is still being prepared after {LISTS_S:g} s; try again")
-            yield
-            take_commands()
 
     # Parameters
 
@@ -210,7 +181,7 @@ class LiveSimulation:
         changes = with_mass_of_density(changes)
         present = loop.scenario
         planned = present.with_changes(changes)
-        warm_up_change(present, planned)
+        self._warm_up_change(planned)
         if changes.get("record", "") == present.parameters.record:
             changes = {name: value for name, value in changes.items() if name != "record"}
 
@@ -231,7 +202,7 @@ class LiveSimulation:
         if "record" in changes:
             # Opened last: a refused change must leave the file of that name as it is.
             self.call(check)
-            recorder = self.observers.open_recorder(planned)
+            recorder = self._open_recorder(planned)
         try:
             self.call(change)
         except InputError:
@@ -239,31 +210,85 @@ class LiveSimulation:
                 recorder.close()
             raise
         if "record" in changes:
-            finished = self.call(lambda: self.observers.switch_recording(loop, recorder))
+            finished = self.call(lambda: self._switch_recording(recorder))
             if finished is not None:
                 finished.close()
 
+    def _warm_up_change(self, planned: Scenario) -> None:
+        """Compile what another integrator flies by."""
+        if planned.setup.integrator is not self.scenario.setup.integrator:
+            with suppress(CommandRefused):  # what acts when the change is made decides, and that is counted
+                warm_up(planned.setup)
+
     # Observers
+
+    def _watch(self) -> None:
+        self.loop.watch(Observers(*self._observers, *filter(None, (self._recorder,))))
+
+    def _introduce(self, observer: Observer) -> None:
+        notify_start(observer, self.scenario)
+        observer.on(SceneChanged(self.loop.simulation.time_ns, self.scenario.text))
+        self.loop.simulation.introduce(observer)
 
     def add_observer(self, observer: Observer) -> None:
         """Tell an observer what flies, and all that happens from now on; its methods run on the physics thread."""
-        self.call(lambda: self.observers.add(self.loop, observer))
+
+        def add() -> None:
+            self._observers = (*self._observers, observer)
+            self._watch()
+            self._introduce(observer)
+
+        self.call(add)
 
     def remove_observer(self, observer: Observer) -> None:
         """Tell this observer nothing more."""
-        self.call(lambda: self.observers.remove(self.loop, observer))
+
+        def remove() -> None:
+            self._observers = tuple(other for other in self._observers if other is not observer)
+            self._watch()
+
+        self.call(remove)
+
+    # The recording, which can be changed in flight
+
+    def _open_recorder(self, scenario: Scenario) -> Observer | None:
+        """The recorder that ``record`` asks for; raises InputError when its file can't be written."""
+        path = scenario.parameters.record
+        if not path:
+            return None
+        from ..rerun_view.session_files import make_recorder
+
+        return make_recorder(path, self.name, scenario.parameters, self._recording_failed)
+
+    def _switch_recording(self, recorder: Observer | None) -> Observer | None:
+        """On the physics thread: the new recorder is told what flies. Returns the old one, to be closed by whom nobody
+        waits for.
+        """
+        finished = self._recorder
+        self.loop.simulation.notify_end()
+        self._recording_error = getattr(finished, "error", "") if recorder is None else ""
+        self._recorder = recorder
+        self._watch()
+        if recorder is not None:
+            self._introduce(recorder)
+        return finished
+
+    @property
+    def recording_trouble(self) -> str:
+        """Why the last recording has stopped, or that the present one takes nothing; empty when all is well."""
+        return self._recording_error or getattr(self._recorder, "stalled", "")
 
     def _recording_failed(self, message: str) -> None:
-        self.endpoints.failed(message)
+        self.endpoints.warn(message)
         self.endpoints.parameters_changed()
 
     def give_up_failed_recording(self) -> None:
         """Where a recording has stopped by itself: close it, and ``record`` is empty from now on."""
-        if not self.observers.has_failed_recording:
+        if not getattr(self._recorder, "error", ""):
             return
 
         def give_up() -> Observer | None:
-            recorder = self.observers.switch_recording(self.loop, None)
+            recorder = self._switch_recording(None)
             self.loop.change({"record": ""})
             return recorder
 

@@ -25,7 +25,7 @@ that choose their own steps take up to some thousands in it.
 GROWTH = 4
 
 TICK_NS = 10_000_000
-"""Loops with nothing else to do wake at multiples of this [ns of wall time], and take their commands."""
+"""A loop with nothing else to do wakes this often [ns of wall time], and takes its commands."""
 
 LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
 """A message's stamp counts seconds in 32 bits."""
@@ -145,8 +145,7 @@ class Pace:
 
     def anchor(self, simulated_ns: int) -> None:
         """From now on simulated time goes on from ``simulated_ns``."""
-        # On the grid of TICK_NS, a little ahead: loops that start at different moments then wake together.
-        self.anchored_ns = self.followed() if self.followed else -(-time.monotonic_ns() // TICK_NS) * TICK_NS
+        self.anchored_ns = self.followed() if self.followed else time.monotonic_ns()
         self._last_reading_ns = self.anchored_ns
         self._anchor_simulated_ns = simulated_ns
 

@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: MIT
 """One body in real time: when it is advanced, publishes and takes commands. All runs on the physics thread
-(physics_thread.py); where states go and commands come from is up to its endpoints (endpoints.py).
+(physics_thread.py); where states go and commands come from is up to its endpoints.
 """
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from ..base.errors import InputError
+from ..motion.state import State
 from ..scene.scenario import BodyMesh, Scenario
 from ..scene.scenario_run import ScenarioRun
 from ..simulation.commands import Change
 from ..simulation.observer import Observer, Published
 from ..simulation.setup import Setup
 from .command_receiver import CommandReceiver
-from .endpoints import Endpoints
 from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Stamps, Timekeeping, WorkBudget
 
 ACTIVE_DRAIN_NS = 500_000
@@ -27,9 +29,6 @@ LEAD = 0.2
 PAUSED_NS = 100_000_000
 """States go out at 10 Hz while paused [ns of wall time]."""
 
-REFUSED_STEPS_NS = 100_000_000
-"""While time runs, requests to step, which are refused then, are looked for this often [ns of wall time]."""
-
 LOCKSTEP_NS = 100_000
 """In lockstep commands are looked for this often [ns of wall time], for some seconds after the last one."""
 
@@ -38,6 +37,25 @@ FOLLOW_NS = 1_000_000
 
 STEP_PATIENCE_S = 10.0
 """How long a request to step waits for the end of it."""
+
+
+@dataclass
+class Endpoints:
+    """What surrounds a loop; by default nothing does. All but the last two are called on the physics thread.
+
+    publish(state): one is due. has_subscribers(): whether anybody gets it; without, no state is built for them.
+    take_commands(wall_ns, all_topics): submit what has arrived, on quiet topics too if all_topics; whether commands
+    come in these seconds. serve_steps(wall_ns): answer requests for steps; whether more are to be expected soon.
+    parameters_changed(): a command has changed them, or a recording has stopped by itself. warn(message): tell the
+    user.
+    """
+
+    publish: Callable[[State], None] = lambda _: None
+    has_subscribers: Callable[[], bool] = lambda: False
+    take_commands: Callable[[int, bool], bool] = lambda *_: False
+    serve_steps: Callable[[int], bool] = lambda _: False
+    parameters_changed: Callable[[], None] = lambda: None
+    warn: Callable[[str], None] = lambda message: print(message, file=sys.stderr)
 
 
 class SimulationLoop(ScenarioRun):
@@ -68,7 +86,7 @@ class SimulationLoop(ScenarioRun):
         self._present_ns = 0
         self._last_drain_ns = 0
         self._paused_publication_ns = 0
-        self._next_listener_check_ns = self._next_refused_steps_ns = 0
+        self._next_listener_check_ns = 0
         self._caught_up = True
         self._end_ns: int | None = None
         self._on_end: Callable[[], None] = lambda: None
@@ -127,11 +145,7 @@ class SimulationLoop(ScenarioRun):
 
     def take_commands(self) -> None:
         """Take all commands that have arrived."""
-        self._take_commands(time.monotonic_ns(), True)
-
-    def _take_commands(self, wall_ns: int, all_topics: bool) -> bool:
-        self.commands.submit_finished()
-        return self.endpoints.take_commands(wall_ns, all_topics)
+        self.endpoints.take_commands(time.monotonic_ns(), True)
 
     def catch_up(self) -> None:
         """Advance to this tick's present, or as far towards it as the tick's time allows: what a command means by now.
@@ -158,11 +172,14 @@ class SimulationLoop(ScenarioRun):
         self._step_on()
         return not self.stepping
 
-    def steps(self, periods: int) -> Iterator[None]:
+    def steps(self, periods: int = 1) -> Iterator[None]:
         """While paused, advance over so many publications; yields while the thread's ticks make them.
 
-        Raises InputError when that takes longer than STEP_PATIENCE_S; the step goes on by itself then.
+        Raises InputError while time runs, or when it takes longer than STEP_PATIENCE_S; the step goes on by itself
+        then.
         """
+        if not self.timekeeping.paused:
+            raise InputError("step", "the simulation is running; pause it first")
         end = time.monotonic() + STEP_PATIENCE_S
         begun = False
         # One after another: a step that somebody else has begun is made first.
@@ -196,7 +213,7 @@ class SimulationLoop(ScenarioRun):
         self.simulation.reset(self.scenario.setup)
         if self.ghost is not None:
             self.ghost.reset(self.scenario)
-        elif self._is_observed:
+        elif Published in self.observer.takes:
             self.begin_ghost()
         self._publications.restart()
         self._end_steps()
@@ -206,7 +223,7 @@ class SimulationLoop(ScenarioRun):
 
     def start(self) -> None:
         """Simulated time begins now."""
-        if self._is_observed:
+        if Published in self.observer.takes:
             self.begin_ghost()
         self._anchor()
 
@@ -232,9 +249,7 @@ class SimulationLoop(ScenarioRun):
         if wall_ns >= self._next_listener_check_ns:
             self._next_listener_check_ns = wall_ns + TICK_NS
             self._check_listeners()
-        if wall_ns >= self._next_refused_steps_ns:
-            self._next_refused_steps_ns = wall_ns + REFUSED_STEPS_NS
-            self.endpoints.serve_steps(wall_ns)
+            self.endpoints.serve_steps(wall_ns)  # refuses them
         present_ns = self._simulated_present_ns()
         if present_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
@@ -255,20 +270,16 @@ class SimulationLoop(ScenarioRun):
                 self.timekeeping.overruns += 1
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
-        self._commands_come = self._take_commands(wall_ns, False)
+        self._commands_come = self.endpoints.take_commands(wall_ns, False)
         if ends or not self._has_listeners or self._pace.followed or not self._caught_up:
             self.catch_up()
         if ends and self._end_ns is not None and self.simulation.time_ns >= self._end_ns:
             self.timekeeping.paused = True
             self._on_end()
 
-    @property
-    def _is_observed(self) -> bool:
-        return Published in self.observer.takes
-
     def _check_listeners(self) -> None:
         self._has_subscribers = self.endpoints.has_subscribers()
-        self._has_listeners = self._has_subscribers or self._is_observed
+        self._has_listeners = self._has_subscribers or Published in self.observer.takes
 
     def _step_on(self) -> None:
         while self._steps_left and self._publish_next():
@@ -284,7 +295,7 @@ class SimulationLoop(ScenarioRun):
             self._anchor()
         now_ns = time.monotonic_ns()
         self._last_drain_ns = now_ns
-        self._commands_come = self._take_commands(now_ns, False)
+        self._commands_come = self.endpoints.take_commands(now_ns, False)
         if self._steps_requested and not self.stepping:
             self._steps_requested -= 1
             self.step()
@@ -325,7 +336,7 @@ class SimulationLoop(ScenarioRun):
             return False
         if not self.timekeeping.paused:
             self.timekeeping.paused = True
-            self.endpoints.failed(f"paused in the last good state: {self.simulation.failure}")
+            self.endpoints.warn(f"paused in the last good state: {self.simulation.failure}")
         return True
 
     # Time
@@ -359,8 +370,7 @@ class SimulationLoop(ScenarioRun):
 
     def next_wake_ns(self) -> int:
         """When ``tick`` is due next [ns of wall time]."""
-        # On a grid that all loops of the process share, so that one wake-up serves them all.
-        latest_ns = (self._last_drain_ns // TICK_NS + 1) * TICK_NS
+        latest_ns = self._last_drain_ns + TICK_NS
         factor = self._pace.factor
         if self.stepping or self._steps_requested or not self._caught_up:
             return 0

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""What /diagnostics says of one body, once a second."""
+"""What /diagnostics says of one body, once a second: counters, energies, and what went wrong since the last report."""
 
 from __future__ import annotations
 
-import threading
-import time
-import traceback
+from collections.abc import Mapping
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
-from ..live.diagnostics import COUNTED, increase, report, warnings_since
+from ..live.command_receiver import TOPICS
 from ..live.live_simulation import LiveSimulation
+from .commands import CommandSubscriber
 
 WARNING_S = 10.0
 """How often the log says that real time is given up."""
@@ -19,30 +20,92 @@ WARNING_S = 10.0
 REPORT_S = 1.0
 """Time between two reports on /diagnostics."""
 
+REFUSAL_REASONS = (
+    *("frame", "nonfinite", "magnitude", "stamp", "ray_miss"),
+    *("tensor", "integrator", "schedule", "thrusters", "state"),
+)
+
+WARNED_OF = {
+    "refused_total": "{:.0f} refused",
+    "messages_lost": "{:.0f} lost on the way",
+    "queue_full": "messages may have been lost: a queue of commands was full",
+    "overruns": "{:.0f} published late",
+    "real_time_lost_s": "{:.2g} s behind real time",
+}
+"""Counters whose growth makes a report a warning, and what it says of how much they grew."""
+
+
+def values_of(live: LiveSimulation, subscriber: CommandSubscriber | None = None) -> dict[str, object]:
+    """Counters and values by the keys of /diagnostics; from any thread."""
+    loop = live.loop
+    commands, simulation, timekeeping = loop.commands, loop.simulation, loop.timekeeping
+    # First: whatever happened up to then is counted in what follows.
+    time_ns = simulation.time_ns
+    momentum = simulation.angular_momentum
+    # Counted last by the physics thread, so read first: who finds a message received finds its refusal too.
+    received = dict(commands.received)
+    refused = dict(simulation.refused)
+    return {
+        "sim_time_ns": time_ns,
+        "stamp_offset_ns": loop.stamps.offset_ns,
+        "publish_rate": loop.scenario.parameters.publish_rate,
+        "overruns": timekeeping.overruns,
+        "real_time_lost_s": timekeeping.real_time_lost_s,
+        **{f"{topic}_received": received.get(topic, 0) for topic in TOPICS},
+        "commands_received": sum(received.values()),
+        "refused_total": sum(refused.values()),
+        **{f"refused_{reason}": refused.get(reason, 0) for reason in REFUSAL_REASONS},
+        "late": commands.late,
+        "wall_stamp": commands.wall_stamp,
+        "messages_lost": subscriber.messages_lost if subscriber else 0,
+        "queue_full": subscriber.queue_full if subscriber else 0,
+        "kinetic_energy": simulation.kinetic_energy,
+        "potential_energy": simulation.potential_energy,
+        "angular_momentum_norm": float((momentum * momentum).sum()) ** 0.5,
+        "angular_momentum_drift": simulation.angular_momentum_drift,
+        "integrator": simulation.setup.integrator.name,
+        "accuracy_floor": simulation.accuracy_floor,
+        "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",
+        "recording": loop.scenario.parameters.record,
+        "warning": simulation.failure or live.recording_trouble or simulation.too_coarse or simulation.too_slow,
+    }
+
+
+def increase(key: str, before: Mapping[str, object], now: Mapping[str, object]) -> float:
+    """By how much a counter rose."""
+    past, present = (float(str(values.get(key, 0.0))) for values in (before, now))
+    return present - past
+
 
 class Diagnostics:
     """Of one node; the level of a report follows from what went wrong since the one before."""
 
-    def __init__(self, node: Node, live: LiveSimulation) -> None:
+    def __init__(self, node: Node, live: LiveSimulation, subscriber: CommandSubscriber) -> None:
         self._node = node
         self._live = live
-        self._other_publishers = 0
+        self._subscriber = subscriber
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._before: dict[str, object] = {}
-        self._reported_s = time.monotonic()
+        self._before = values_of(live, subscriber)
+        # Steady: the node's own clock stands still with /clock.
+        node.create_timer(REPORT_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def report(self) -> None:
-        """Publish how it stands, and log what is new and wrong."""
+    def _report(self) -> None:
+        """Publish how it stands, and log that real time is given up."""
         # Before the values are read: what was done before the stamp is in them.
         stamp = self._node.get_clock().now().to_msg()
-        values = report(self._live)
-        values["warning"] = values["warning"] or self._namesake()
-        warnings = warnings_since(self._before, values)
-        self._warn_of_lost_time(increase("real_time_lost_s", self._before, values))
-        self._before = {key: value for key, value in values.items() if key in COUNTED or key.startswith("refused_")}
+        before, values = self._before, values_of(self._live, self._subscriber)
+        self._before = values
+        if (lost_s := increase("real_time_lost_s", before, values)) > 0.0:
+            self._node.get_logger().warning(
+                f"too much to do here: {lost_s:.2g} s of real time given up; simulated time is behind the wall clock",
+                throttle_duration_sec=WARNING_S,
+            )
         if self._publisher.get_subscription_count() == 0:
             return
-        warnings += [str(values["warning"])] if values["warning"] else []
+        warnings = [
+            text.format(grown) for key, text in WARNED_OF.items() if (grown := increase(key, before, values)) > 0.0
+        ]
+        warnings += filter(None, [str(values["warning"])])
         status = DiagnosticStatus(
             name=f"{self._node.get_fully_qualified_name()}: simulation", hardware_id="simulated rigid body"
         )
@@ -52,51 +115,3 @@ class Diagnostics:
         message = DiagnosticArray(status=[status])
         message.header.stamp = stamp
         self._publisher.publish(message)
-
-    def _warn_of_lost_time(self, lost_s: float) -> None:
-        """In the log, at most once in WARNING_S: the share of the time since the last report that was given up."""
-        before_s, self._reported_s = self._reported_s, time.monotonic()
-        if lost_s > 0.0:
-            share = min(1.0, lost_s / (self._reported_s - before_s))
-            self._node.get_logger().warning(
-                f"too much to do here: {share:.0%} of real time given up; simulated time falls behind the wall clock",
-                throttle_duration_sec=WARNING_S,
-            )
-
-    def _namesake(self) -> str:
-        """A warning when somebody else publishes the same states; logged when it begins."""
-        before, self._other_publishers = self._other_publishers, self._node.count_publishers("~/pose") - 1
-        if self._other_publishers <= 0:
-            return ""
-        warning = (
-            f"another node publishes {self._node.get_fully_qualified_name()}/pose: "
-            "nodes of the same name receive each other's commands"
-        )
-        if before <= 0:
-            self._node.get_logger().warning(warning)
-        return warning
-
-
-class Reports(threading.Thread):
-    """Lets the node report once a second. An executor would go through every entity of the node for it, and its timers
-    stand still with /clock.
-    """
-
-    def __init__(self, diagnostics: Diagnostics) -> None:
-        super().__init__(name="reports", daemon=True)
-        self._diagnostics = diagnostics
-        self._no_more = threading.Event()
-
-    def run(self) -> None:
-        """On the thread."""
-        while not self._no_more.wait(REPORT_S):
-            try:
-                self._diagnostics.report()
-            except Exception:
-                # A fault of ours in one report must not end the others.
-                traceback.print_exc()
-
-    def stop(self) -> None:
-        """End: nobody reports of a node that is being destroyed."""
-        self._no_more.set()
-        self.join(REPORT_S)

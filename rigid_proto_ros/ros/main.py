@@ -7,16 +7,21 @@ included, since compiling kernels can take minutes and nothing interrupts it.
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 import threading
+import traceback
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.interrupts import leave
 from ..live.shutdown import Shutdown, begin_closing, begin_teardown
 
 if TYPE_CHECKING:
-    from .node_process import NodeProcess
+    from ..scene.scenario import Scenario
+    from ..simulation.observer import Observer
+    from .node import RigidBodyNode
 
 LAST_START_S = 0.2
 """How long a start that is nearly done is waited for at the end; one that compiles is left alone."""
@@ -28,10 +33,10 @@ def main(argv: list[str] | None = None, as_job: bool = False) -> int:
     """
     try:
         with Shutdown() as shutdown:
-            start = _Start(sys.argv if argv is None else argv, shutdown)
-            start.start()
+            process = NodeProcess(sys.argv if argv is None else argv, shutdown.request)
+            process.start()
             number = shutdown.wait()
-            status = start.end()
+            status = process.end()
             if as_job and number:
                 status = status or 128 + number
             leave(status)
@@ -40,15 +45,22 @@ def main(argv: list[str] | None = None, as_job: bool = False) -> int:
         return 2
 
 
-class _Start(threading.Thread):
-    """Starts the node that the arguments ask for; should that fail, it requests the shutdown."""
+class NodeProcess(threading.Thread):
+    """The thread that starts the node which the arguments ask for, and what has to be closed at the end.
 
-    def __init__(self, argv: list[str], shutdown: Shutdown) -> None:
+    request_end() is called when the process should end by itself: after a fault, or when simulated time has come to
+    ``--until``.
+    """
+
+    def __init__(self, argv: list[str], request_end: Callable[[], None]) -> None:
         super().__init__(name="start", daemon=True)
         self._argv = argv
-        self._shutdown = shutdown
-        self._process: NodeProcess | None = None
+        self._request_end = request_end
         self._error: BaseException | None = None
+        self._crashed = self._ending = False
+        self._node: RigidBodyNode | None = None
+        self._close_page: Callable[[], None] = lambda: None
+        self._leave_executor: Callable[[], None] = lambda: None
 
     def run(self) -> None:
         """On the thread."""
@@ -56,33 +68,139 @@ class _Start(threading.Thread):
             from .arguments import given_arguments, own_arguments, remapped_node_name
 
             # First, since it says better than ROS what is wrong with a parameter.
-            given = given_arguments(self._argv, remapped_node_name(self._argv), _warn)
-            own = own_arguments(self._argv)
-            from .node_process import NodeProcess
-
-            self._process = NodeProcess(self._argv, given, self._shutdown.request, own.until)
-            self._process.start()
+            given = given_arguments(self._argv, remapped_node_name(self._argv), _tell)
+            self._begin(given, own_arguments(self._argv).until)
         except BaseException as error:  # raised again by the main thread
             self._error = error
-            self._shutdown.request()
+            self._request_end()
+
+    def _begin(self, given: Mapping[str, object], until_s: float | None) -> None:
+        """Make the node, which may compile for minutes, and let it run. Raises InputError."""
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.signals import SignalHandlerOptions
+
+        from ..base.compilation import notify_when_compiling
+        from ..live.warm_up import warm_up
+        from ..scene.scenario import nanoseconds
+        from .node import RigidBodyNode
+
+        try:
+            # The middleware must outlive the physics thread, so rclpy's own handlers of signals stay out.
+            rclpy.init(args=self._argv, signal_handler_options=SignalHandlerOptions.NO)
+        except Exception as error:  # rclpy's own error types differ between versions
+            raise InputError("ROS arguments", " ".join(self._argv[1:]), " ".join(str(error).split())) from None
+        with notify_when_compiling(lambda: _tell("compiling kernels, at the first start only; a minute or two ...")):
+            node = self._node = RigidBodyNode(given, make_viewer)
+            node.states.pack_all(warm_up(node.live.scenario.setup))
+        self._close_page = open_page(node)
+        if until_s is not None:
+            node.live.loop.end_at(nanoseconds(until_s), self._request_end)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executing = threading.Thread(target=self._spin, args=(executor.spin,), name="executor", daemon=True)
+        executing.start()
+
+        def leave_executor() -> None:
+            executor.shutdown(timeout_sec=0.5)
+            executing.join(timeout=0.5)
+
+        self._leave_executor = leave_executor
+        node.live.start(self._on_crash)
+        scenario = node.live.scenario
+        mesh, body = scenario.parameters.mesh or "a body without a mesh", scenario.setup.body
+        node.get_logger().info(
+            f"{node.get_fully_qualified_name()} is simulating {mesh}: {body.mass:.6g} kg, "
+            f"integrator {scenario.setup.integrator.name}"
+        )
+
+    def _spin(self, spin: Callable[[], None]) -> None:
+        from rclpy.executors import ExternalShutdownException
+
+        while not self._ending:
+            try:
+                spin()
+                break
+            except ExternalShutdownException:
+                break
+            except Exception:
+                # One request that fails by a fault of ours must not take the other services with it.
+                traceback.print_exc()
+        self._request_end()
+
+    def _on_crash(self) -> None:
+        self._crashed = True
+        self._request_end()
 
     def end(self) -> int:
         """On the main thread, when the shutdown was requested: close what there is. Returns the exit status, or raises
         what the start has raised.
         """
         self.join(LAST_START_S)
-        if self._error is not None:
-            if self._process is not None:
-                self._process.close()
-                self._process.leave_ros()
-            raise self._error
-        begin_closing()
-        status = 0 if self._process is None else self._process.close()
-        if not self.is_alive() and self._process is not None:
+        if self._error is None:
+            begin_closing()
+        self._ending = True
+        self._close_page()
+        if self._node is not None:
+            self._node.live.stop()
+        status = 1 if self._crashed else 0
+        if self._error is None and not self.is_alive():
             begin_teardown(status)
-            self._process.leave_ros()
+        if not self.is_alive() and "rclpy" in sys.modules:
+            self._leave_ros()
+        if self._error is not None:
+            raise self._error
         return status
 
+    def _leave_ros(self) -> None:
+        import rclpy
 
-def _warn(warning: str) -> None:
-    print(f"rigid_body_node: {warning}", file=sys.stderr)
+        self._leave_executor()
+        if self._node is not None:
+            self._node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
+    """The live view, or None; Rerun is imported only when something is to be shown or recorded with it."""
+    parameters = scenario.parameters
+    if parameters.viewer in ("none", "workbench"):
+        return None
+    from ..rerun_view.observer import RerunObserver
+
+    def tell(line: str) -> None:
+        print(f"{node_name}: {line}", file=sys.stderr)
+
+    return RerunObserver(
+        viewer=parameters.viewer,
+        rerun_port=_asked_for("rerun_port", parameters.rerun_port),
+        web_port=_asked_for("web_port", parameters.web_port),
+        name=node_name,
+        report=tell,
+        on_error=tell,
+    )
+
+
+def open_page(node: RigidBodyNode) -> Callable[[], None]:
+    """The interactive page, where it is asked for; returns what closes it."""
+    parameters = node.live.scenario.parameters
+    if parameters.viewer != "workbench":
+        return lambda: None
+    if importlib.util.find_spec("viser") is None:
+        raise InputError("viewer", is_missing("viser", "workbench"))
+    from ..workbench.main import Workbench
+
+    page = Workbench(node.live, _asked_for("workbench_port", parameters.workbench_port))
+    print(f"{node.get_name()}: the workbench is at {page.address}", file=sys.stderr)
+    return page.close
+
+
+def _asked_for(name: str, port: int) -> int | None:
+    """None for a default port, which may move to the next free one."""
+    from ..scene.parameters import PARAMETERS
+
+    return None if port == PARAMETERS[name].default else port
+
+
+def _tell(line: str) -> None:
+    print(f"rigid_body_node: {line}", file=sys.stderr)

@@ -18,7 +18,7 @@ from ..base.errors import InputError
 from ..live.live_simulation import LiveSimulation
 from ..scene.declaration import LIVE, READ_ONLY, Parameter
 from ..scene.parameters import PARAMETERS, is_ros_parameter, parameter_named, with_mass_of_density
-from .state_publisher import StatePublisher
+from .publishers import StatePublisher
 
 _TYPES = {
     "double": ParameterType.PARAMETER_DOUBLE,

@@ -8,7 +8,6 @@ and set. There is no world, so nothing is spawned, loaded or deleted.
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 from rclpy.node import Node
@@ -23,7 +22,6 @@ SERVICES = (
     ("GetSimulationState", "get_simulation_state"),
     ("SetSimulationState", "set_simulation_state"),
     ("StepSimulation", "step_simulation"),
-    ("GetEntities", "get_entities"),
     ("GetEntityState", "get_entity_state"),
     ("SetEntityState", "set_entity_state"),
 )
@@ -38,7 +36,6 @@ class SimulationInterfaces:
         self._live = live
         self._loop = live.loop
         self._messages = messages
-        self._stopped = False
 
     def offer(self, node: Node, services: Any) -> None:
         """Create the services, private to the node."""
@@ -78,37 +75,25 @@ class SimulationInterfaces:
         return self._done(response)
 
     def _simulation_state(self) -> int:
-        """Stopped is paused at time 0 after a request to stop: nothing else tells the two apart."""
-        states, loop = self._messages.SimulationState, self._loop
-        if not loop.timekeeping.paused:
-            return states.STATE_PLAYING
-        stopped = self._stopped and loop.simulation.time_ns == 0
-        return states.STATE_STOPPED if stopped else states.STATE_PAUSED
+        states = self._messages.SimulationState
+        return states.STATE_PAUSED if self._live.paused else states.STATE_PLAYING
 
     def get_simulation_state(self, _: Any, response: Any) -> Any:
-        """Playing, paused or stopped."""
+        """Playing or paused."""
         response.state.state = self._simulation_state()
         return self._done(response)
 
     def set_simulation_state(self, request: Any, response: Any) -> Any:
-        """Play, pause, or stop, which is to pause and reset."""
+        """Play or pause."""
         states = self._messages.SimulationState
         wanted = request.state.state
-        if wanted not in (states.STATE_STOPPED, states.STATE_PLAYING, states.STATE_PAUSED):
-            accepted = "0 stopped, 1 playing or 2 paused; end the node by a signal"
+        if wanted not in (states.STATE_PLAYING, states.STATE_PAUSED):
+            accepted = "1 playing or 2 paused; reset_simulation for time 0, and a signal ends the node"
             return self._unsupported(response, f"state {wanted}: {accepted}")
         if wanted == self._simulation_state():
             return _ended(response, response.ALREADY_IN_TARGET_STATE)
-        self._stopped = wanted == states.STATE_STOPPED
-        if self._stopped:
-            self._live.call(self._stop)
-        else:
-            self._live.pause(wanted == states.STATE_PAUSED)
+        self._live.pause(wanted == states.STATE_PAUSED)
         return self._done(response)
-
-    def _stop(self) -> None:
-        self._loop.pause(True)
-        self._loop.reset()
 
     def step_simulation(self, request: Any, response: Any) -> Any:
         """Step over publications, while paused."""
@@ -121,17 +106,6 @@ class SimulationInterfaces:
         return self._done(response)
 
     # The body
-
-    def get_entities(self, request: Any, response: Any) -> Any:
-        """The body's name, where the filter, a regular expression, lets it through."""
-        filters = request.filters
-        if filters.tags.tags or filters.categories or filters.bounds.type != self._messages.Bounds.TYPE_EMPTY:
-            return self._unsupported(response, "filters: by name alone")
-        try:
-            response.entities = [self._live.name] if re.search(filters.filter, self._live.name) else []
-        except re.error as error:
-            return self._failed(response, f"filter {filters.filter!r}: {error}")
-        return self._done(response)
 
     def get_entity_state(self, request: Any, response: Any) -> Any:
         """True pose, twist and acceleration, in world axes."""

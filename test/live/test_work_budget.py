@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import time
+import itertools
 
 import pytest
 from flights import SECOND, wrench
 
-from rigid_proto_ros.live.endpoints import Endpoints
-from rigid_proto_ros.live.pacing import TICK_NS, WorkBudget
-from rigid_proto_ros.live.simulation_loop import SimulationLoop
+from rigid_proto_ros.live.pacing import WorkBudget
+from rigid_proto_ros.live.simulation_loop import Endpoints, SimulationLoop
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -24,7 +23,7 @@ ENDLESS = {
 """10¹⁵ steps to the next publication: years."""
 
 
-class Rig(Endpoints):
+class Rig:
     """A flight whose publications and commands are at hand."""
 
     def __init__(self, values: dict) -> None:
@@ -32,16 +31,13 @@ class Rig(Endpoints):
         self.commands: list = []
         self.has_listeners = True
         self.lively = False
-        self.loop = SimulationLoop(make_scenario(values), endpoints=self)
+        endpoints = Endpoints(
+            publish=lambda state: self.published.append(state.time_ns),
+            has_subscribers=lambda: self.has_listeners,
+            take_commands=self.take_commands,
+        )
+        self.loop = SimulationLoop(make_scenario(values), endpoints=endpoints)
         self.loop.start()
-        # Simulated time begins at the next moment that all loops of a process share.
-        time.sleep(1.1e-9 * TICK_NS)
-
-    def publish(self, state) -> None:
-        self.published.append(state.time_ns)
-
-    def has_subscribers(self) -> bool:
-        return self.has_listeners
 
     def take_commands(self, wall_ns: int, all_topics: bool) -> bool:
         if self.commands:
@@ -97,6 +93,20 @@ def test_a_step_that_takes_years_is_begun_and_given_up_by_resuming():
     assert set(rig.published) <= {0}
     rig.loop.pause(False)
     assert not rig.loop.stepping
+
+
+def test_a_step_asked_for_while_another_is_made_follows_it(monkeypatch) -> None:
+    rig = Rig({"start_paused": True, "publish_rate": 1000.0})
+    rig.loop.tick()
+    reached_ns = rig.loop.simulation.time_ns
+    advance, calls = WorkBudget.advance, itertools.count()
+    # As where a tick's time is over before the step is made.
+    monkeypatch.setattr(WorkBudget, "advance", lambda *given: next(calls) % 3 != 0 and advance(*given))
+    waiting = [rig.loop.steps(5), rig.loop.steps(7)]
+    while waiting:
+        waiting = [steps for steps in waiting if next(steps, True) is None]
+        rig.loop.tick()
+    assert rig.loop.simulation.time_ns == reached_ns + 12 * SECOND // 1000
 
 
 @pytest.mark.parametrize("listeners", [True, False])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from command_rig import COMMANDS, inertia_message, point_message, wrench_message
 
-from rigid_proto_ros.ros.event_publisher import WARNING_S
+from rigid_proto_ros.ros.publishers import WARNING_S
 from rigid_proto_ros.scene import cdr
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.simulation import Simulation

@@ -13,11 +13,9 @@ pytest.importorskip("rclpy")
 
 from rigid_proto_ros.live.pacing import Stamps
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.ros.event_publisher import FramesOnBody
-from rigid_proto_ros.ros.state_publisher import StatePublisher
+from rigid_proto_ros.ros.publishers import StatePublisher
 from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.simulation.simulation import Simulation
 
 SECOND = 10**9
 
@@ -74,12 +72,12 @@ def test_the_imu_feels_the_exact_specific_force_at_its_contact_and_turns_at_the_
 @pytest.fixture
 def tf2_stand_in(monkeypatch):
     """tf2_msgs isn't in the wheels: its one message stands in, and a node that only makes publishers. What goes out on
-    /tf and /tf_static.
+    /tf.
     """
     published = []
 
     def publisher(message_type, topic, *_, **__):
-        sent = published.append if topic in ("/tf", "/tf_static") else lambda message: None
+        sent = published.append if topic == "/tf" else lambda message: None
         return SimpleNamespace(publish=sent, get_subscription_count=lambda: 1)
 
     messages = SimpleNamespace(TFMessage=lambda transforms: SimpleNamespace(transforms=transforms))
@@ -90,7 +88,7 @@ def tf2_stand_in(monkeypatch):
 
 def test_the_transform_is_the_pose(tf2_stand_in):
     node, published = tf2_stand_in
-    states = StatePublisher(node, "world", "body", lambda: np.zeros(3), Stamps())
+    states = StatePublisher(node, ("world", "body"), lambda: np.zeros(3), Stamps())
     states.configure(Parameters(publish_tf=True))
     state = State(3 * SECOND + 7, np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.9, 0, 0, 0, 0, 0, 0]))
     states.pack_all(state)
@@ -106,16 +104,3 @@ def test_the_transform_is_the_pose(tf2_stand_in):
     assert (transform.header.frame_id, transform.child_frame_id) == ("world", "body")
     t, r = transform.transform.translation, transform.transform.rotation
     assert [t.x, t.y, t.z, r.x, r.y, r.z, r.w] == state.row[:7].tolist()
-
-
-def test_mesh_and_contacts_go_out_at_the_body(tf2_stand_in):
-    node, published = tf2_stand_in
-    setup = make_scenario({"mesh": "hammer", "scale": 2.0, "contacts.face": [0.1, 0.0, 0.3]}).setup
-    FramesOnBody(node, "base_link", setup.contacts).publish((0, 7), Simulation(setup).snapshot())
-    sent = {t.child_frame_id: t for t in published[0].transforms}
-    assert set(sent) == {"base_link/mesh", "base_link/face"}
-    assert {t.header.frame_id for t in sent.values()} == {"base_link"}
-    face = sent["base_link/face"].transform.translation
-    assert [face.x, face.y, face.z] == pytest.approx(setup.body.point((0.1, 0.0, 0.3)).tolist(), abs=1e-15)
-    mesh = sent["base_link/mesh"].transform.translation
-    assert [mesh.x, mesh.y, mesh.z] == (-setup.body.center_of_mass).tolist()

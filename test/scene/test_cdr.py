@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import String
 
-from rigid_proto_ros.ros.command_subscriber import read_stamped
+from rigid_proto_ros.ros.commands import read_command
 from rigid_proto_ros.session.messages import read_state
 
 texts = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=40)
@@ -88,7 +88,7 @@ def test_states_are_the_serialized_messages_for_frames_of_any_length(length):
 def test_any_bytes_are_read_or_refused_like_rclpy_does(body):
     data = b"\x00\x01\x00\x00" + body
     try:
-        read = read_stamped("wrench", data, ("world", "body"))
+        read = read_command("wrench", data, ("world", "body"))
     except Exception:  # refused; by us or by rclpy
         return
     assert isinstance(read.stamp_ns, int) and isinstance(read.frame_id, str)

@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""Pose, twist, odometry, IMU, /clock and /tf: packed bytes, and nothing packed for a topic that nobody listens to."""
+"""What the node publishes of its body: states as packed bytes, for topics that somebody listens to, and what happens to
+it: inertia and scene (latched), applied commands and the event log.
+"""
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped, TransformStamped, TwistStamped
+from geometry_msgs.msg import InertiaStamped, PoseStamped, TransformStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
+from std_msgs.msg import String
 
 from ..base.rotation import rotate
 from ..live.pacing import Stamps
@@ -29,89 +35,95 @@ from ..scene.sensor_noise import (
     SensorNoise,
     sensor_noise,
 )
+from ..session.messages import applied_bytes
+from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Refused, SceneChanged
 from . import qos
+
+WARNING_S = 1.0
+"""Between two warnings of one reason, wall time."""
 
 Topics = list[tuple[Publisher, Callable[[int, list[float]], Any]]]
 """A publisher, and how its message is made from time and state."""
 
 
-class StatePublisher:
-    """Publishes states of one body. Use ``configure`` for what parameters switch on and off.
+def _publisher(node: Node, message_type: type, topic: str, profile: QoSProfile) -> Publisher:
+    return node.create_publisher(message_type, f"~/{topic}", qos.own(profile), qos_overriding_options=qos.OVERRIDABLE)
 
-    specific_force() gives what an accelerometer at the chosen contact shows at the present state.
+
+class StatePublisher:
+    """Pose, twist, odometry, IMU, /clock and /tf of one body. Use ``configure`` for what parameters switch on and off.
+
+    frames: the world's and the body's. specific_force() gives what an accelerometer at the chosen contact shows at the
+    present state.
     """
 
     def __init__(
-        self,
-        node: Node,
-        world_frame: str,
-        body_frame: str,
-        specific_force: Callable[[], np.ndarray],
-        stamps: Stamps,
+        self, node: Node, frames: tuple[str, str], specific_force: Callable[[], np.ndarray], stamps: Stamps
     ) -> None:
         self._node = node
         self._stamps = stamps
         self._specific_force = specific_force
-        self._frames = world_frame, body_frame
-
-        def publisher(message_type: type, topic: str) -> Publisher:
-            return node.create_publisher(
-                message_type, f"~/{topic}", qos.own(qos.STATE), qos_overriding_options=qos.OVERRIDABLE
-            )
-
-        self._pose = publisher(PoseStamped, "pose")
-        self._twist = publisher(TwistStamped, "twist")
-        self._odom = publisher(Odometry, "odom")
-        self._imu = publisher(Imu, "imu")
-        self._imu_frame = body_frame
+        self._frames = frames
+        self._imu_frame = frames[1]
+        self._topics: Topics = [
+            (_publisher(node, PoseStamped, "pose", qos.STATE), self._pose_message),
+            (_publisher(node, TwistStamped, "twist", qos.STATE), self._twist_message),
+            (_publisher(node, Odometry, "odom", qos.STATE), self._odom_message),
+            (_publisher(node, Imu, "imu", qos.STATE), self._imu_message),
+        ]
         self._clock: Publisher | None = None
         self._tf: Publisher | None = None
-        self._made_clock: Publisher | None = None
-        self._made_tf: Publisher | None = None
         self._tf_message: Any = None
+        self._silent: tuple[Publisher | None, ...] = ()
         self._wanted: Topics = []
         self._noise: SensorNoise | None = None
 
     def configure(self, parameters: Parameters) -> None:
         """Switch /clock, /tf and noise on and off, and put the IMU where it is mounted; on the executor's thread."""
-        # The frames of contacts have the body's axes.
         contact = parameters.imu_contact
         self._imu_frame = f"{self._frames[1]}/{contact}" if contact else self._frames[1]
         self._noise = sensor_noise(parameters)
-        # Once made they are kept, silent: the physics thread may be publishing at the moment that they are switched
-        # off.
-        if parameters.publish_clock and self._made_clock is None:
-            self._made_clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
-        if parameters.publish_tf and self._made_tf is None:
-            self._made_tf = self._tf_publisher()
-        self._clock = self._made_clock if parameters.publish_clock else None
-        self._tf = self._made_tf if parameters.publish_tf else None
+        if parameters.publish_clock and self._clock is None:
+            self._clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
+            self._topics = [(self._clock, lambda time_ns, _: cdr.time(time_ns)), *self._topics]
+        if parameters.publish_tf and self._tf is None:
+            self._begin_tf()
+        # Once made they are kept: the physics thread may be publishing at the moment that they are switched off.
+        self._silent = tuple(
+            publisher
+            for publisher, on in ((self._clock, parameters.publish_clock), (self._tf, parameters.publish_tf))
+            if not on
+        )
 
-    def _tf_publisher(self) -> Publisher | None:
+    def _begin_tf(self) -> None:
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError:
             self._node.get_logger().warning("publish_tf: tf2_msgs isn't installed (ros-jazzy-tf2-msgs); no /tf")
-            return None
+            return
         self._tf_message = TFMessage
-        return self._node.create_publisher(TFMessage, "/tf", qos.TF)
+        self._tf = self._node.create_publisher(TFMessage, "/tf", qos.TF)
+        self._topics = [*self._topics, (self._tf, self._transform)]
 
     def find_subscribers(self) -> bool:
         """Note which topics have subscribers, for ``publish``; whether any has."""
-        self._wanted = [(p, message) for p, message in self._topics() if p.get_subscription_count()]
+        self._wanted = [
+            (publisher, message)
+            for publisher, message in self._topics
+            if publisher not in self._silent and publisher.get_subscription_count()
+        ]
         return bool(self._wanted)
 
     def publish(self, state: State) -> None:
         """Publish one state on every topic that had a subscriber when that was last noted."""
-        if not self._wanted:
-            return
-        row = state.row.tolist()
-        for publisher, message in self._wanted:
-            publisher.publish(message(state.time_ns, row))
+        if self._wanted:
+            row = state.row.tolist()
+            for publisher, message in self._wanted:
+                publisher.publish(message(state.time_ns, row))
 
     def pack_all(self, state: State) -> None:
         """Make every message once and publish none, so that what they need is compiled."""
-        for _, message in self._topics():
+        for _, message in self._topics:
             message(state.time_ns, state.row.tolist())
 
     def _stamp_ns(self, time_ns: int) -> int:
@@ -120,15 +132,6 @@ class StatePublisher:
     def _with_noise(self, topic: str, time_ns: int, row: list[float]) -> list[float]:
         """The state (13,) with its noise."""
         return row if self._noise is None else self._noise.measured(topic, time_ns, row)
-
-    def _topics(self) -> Topics:
-        topics: Topics = [(self._pose, self._pose_message), (self._twist, self._twist_message)]
-        topics += [(self._odom, self._odom_message), (self._imu, self._imu_message)]
-        if self._clock is not None:
-            topics.insert(0, (self._clock, lambda time_ns, _: cdr.time(time_ns)))
-        if self._tf is not None:
-            topics.append((self._tf, self._transform))
-        return topics
 
     def _pose_message(self, time_ns: int, row: list[float]) -> bytes:
         row = self._with_noise("pose", time_ns, row)
@@ -186,3 +189,56 @@ class StatePublisher:
 def _isotropic(variance: float) -> list[float]:
     """A covariance (9,) alike in all directions."""
     return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
+
+
+class EventPublisher(Observer):
+    """An observer that publishes on the physics thread what happens, which is rare. stamps: set before the first."""
+
+    takes = frozenset({SceneChanged, BodyChanged, Applied, Refused, Logged})
+
+    def __init__(self, node: Node, body_frame: str) -> None:
+        self._logger = node.get_logger()
+        self.stamps = Stamps()
+        self._body_frame = body_frame
+        self._inertia = _publisher(node, InertiaStamped, "inertia", qos.LATCHED)
+        self._scene = _publisher(node, String, "scene", qos.LATCHED)
+        self._applied = _publisher(node, WrenchStamped, "applied", qos.EVENT)
+        self._events = _publisher(node, String, "events", qos.EVENT)
+        self._warned: dict[str, float] = {}
+
+    def wants(self, kind: type) -> bool:
+        """Lines of the event log only while somebody listens to their topic."""
+        return self._events.get_subscription_count() > 0 if kind is Logged else kind in self.takes
+
+    def on(self, event: Event) -> None:
+        """Publish it, or warn of it."""
+        match event:
+            case Logged(_, line):
+                if self.wants(Logged):
+                    self._events.publish(cdr.string(line))
+            case SceneChanged(_, scene):
+                # All parameters, and the mesh's hash in a comment, as a parameter file.
+                self._scene.publish(cdr.string(scene))
+            case BodyChanged(time_ns, body):
+                # COM in scaled mesh coordinates, tensor about it in mesh axes.
+                (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = body.inertia.tolist()
+                numbers = (body.mass, *body.center_of_mass.tolist(), ixx, ixy, ixz, iyy, iyz, izz)
+                stamp_ns = time_ns + self.stamps.offset_ns
+                self._inertia.publish(cdr.stamped_doubles(stamp_ns, f"{self._body_frame}/mesh", numbers))
+            case Applied(time_ns) if self._applied.get_subscription_count():
+                # About the COM in the body's frame, which TF knows. What its sender said of point, axes, slot and
+                # duration stands in its event.
+                stamp_ns = time_ns + self.stamps.offset_ns
+                self._applied.publish(applied_bytes(stamp_ns, self._body_frame, event.load, event.body, event.attitude))
+            case Refused(_, reason, message):
+                self._warn(reason, message)
+
+    def _warn(self, reason: str, message: str) -> None:
+        """For what is refused when it comes and for what turns out impossible when it is to act.
+
+        At most one a second for each reason: a flood of one kind doesn't hide what else goes wrong.
+        """
+        now = time.monotonic()
+        if now >= self._warned.get(reason, -math.inf) + WARNING_S:
+            self._warned[reason] = now
+            self._logger.warning(f"refused: {message}")

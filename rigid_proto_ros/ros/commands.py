@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: MIT
+"""The command topics: taken by the physics thread at each tick, converted, and submitted; and ``~/step``, taken
+likewise.
+
+A message taken from the middleware's queue like this costs a third of one that an executor hands to a callback, and is
+taken at the moment that the motion needs it. rclpy has no public way for it, so this one file uses what its own
+executors use: ``take_message`` of a subscription's handle, ``service_take_request`` of a service's, and the callback
+groups of its executors. Tried with rclpy 7.1.6 (Jazzy).
+
+Lost messages are counted by the middleware, which tells the executor of them in the public way: those that a sender had
+to drop before they were fetched. What this side's own queue drops when it is full nobody counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
+from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from rclpy.waitable import Waitable
+from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import Trigger
+
+from ..base.errors import CommandRefused, InputError
+from ..live.command_receiver import CommandReceiver
+from ..live.live_simulation import LiveSimulation
+from ..scene.command_codec import Names, of_message
+from ..simulation.commands import Command, ThrusterCommand
+from . import qos
+
+QUIET_NS = 4_000_000
+"""How often topics are read while nothing comes [ns of wall time]."""
+
+ACTIVE_NS = 5_000_000_000
+"""They are read in every tick for this long after a message [ns of wall time]."""
+
+TOPICS = {
+    "wrench": WrenchStamped,
+    "poke": WrenchStamped,
+    "string/target": PointStamped,
+    "string/attach": PointStamped,
+    "inertia/set": InertiaStamped,
+    "schedule": String,
+    "thrusters": Float64MultiArray,
+}
+
+
+class ManualCallbackGroup(CallbackGroup):
+    """A callback group of whose entities an executor serves the events alone."""
+
+    def can_execute(self, entity: object) -> bool:
+        """Whether it is an event."""
+        return isinstance(entity, Waitable)
+
+    def beginning_execution(self, entity: object) -> bool:
+        """Whether it is an event."""
+        return isinstance(entity, Waitable)
+
+    def ending_execution(self, entity: object) -> None:
+        """Nothing is held."""
+
+
+class CommandQueue:
+    """The messages of one topic below the node's name, as bytes.
+
+    queue_full: how often the queue was found full, so that messages may have been dropped here, nobody knows how many.
+    messages_lost: how many the middleware has said that their senders dropped.
+    """
+
+    def __init__(self, node: Node, topic: str, group: CallbackGroup) -> None:
+        self.topic = topic
+        self.queue_full = 0
+        self.messages_lost = 0
+        self._subscription = node.create_subscription(
+            TOPICS[topic],
+            f"~/{topic}",
+            _never_called,
+            qos.own(qos.COMMAND),
+            callback_group=group,
+            event_callbacks=SubscriptionEventCallbacks(message_lost=self._on_lost),
+            raw=True,
+            qos_overriding_options=qos.OVERRIDABLE,
+        )
+
+    def take(self) -> Iterator[bytes]:
+        """What has arrived, message by message; at most as many as a queue holds, so that a flood can't hold up the
+        motion for ever.
+        """
+        handle = self._subscription.handle
+        with handle:
+            for count in range(qos.COMMAND_DEPTH):
+                taken = handle.take_message(TOPICS[self.topic], True)
+                if taken is None:
+                    return
+                if count == self._subscription.qos_profile.depth - 1:
+                    self.queue_full += 1
+                yield taken[0]
+
+    def _on_lost(self, status: Any) -> None:
+        self.messages_lost = status.total_count
+
+
+class CommandSubscriber:
+    """The subscriptions of one node. frames: what it calls the world's and the body's frame."""
+
+    def __init__(self, node: Node, commands: CommandReceiver, frames: Names, has_thrusters: bool) -> None:
+        self._commands = commands
+        self._frames = frames
+        self._next_quiet_ns = self._active_until_ns = 0
+        group = ManualCallbackGroup()
+        self._queues = [CommandQueue(node, topic, group) for topic in TOPICS if has_thrusters or topic != "thrusters"]
+
+    @property
+    def queue_full(self) -> int:
+        """How often a queue was found full."""
+        return sum(queue.queue_full for queue in self._queues)
+
+    @property
+    def messages_lost(self) -> int:
+        """How many messages the middleware has said to be lost."""
+        return sum(queue.messages_lost for queue in self._queues)
+
+    def take(self, wall_ns: int, at_once: bool = False) -> bool:
+        """Submit everything that has arrived; what is refused is counted and notified of, and the rest goes on.
+        Returns whether something has arrived within the last ACTIVE_NS. Quiet topics are read every QUIET_NS, or now
+        if ``at_once``.
+        """
+        if at_once or wall_ns >= self._next_quiet_ns or wall_ns < self._active_until_ns:
+            self._next_quiet_ns = wall_ns + QUIET_NS
+            for queue in self._queues:
+                for data in queue.take():
+                    self._active_until_ns = wall_ns + ACTIVE_NS
+                    try:
+                        self._submit(queue.topic, data)
+                    except CommandRefused:
+                        pass  # counted, and the observer was told
+        return wall_ns < self._active_until_ns
+
+    def _submit(self, topic: str, data: bytes) -> None:
+        if topic == "schedule":
+            self._commands.receive_schedule(lambda: read_message(data, String).data)
+        else:
+            self._commands.receive(topic.partition("/")[0], lambda: read_command(topic, data, self._frames))
+
+
+def read_command(topic: str, data: bytes, frames: Names) -> Command:
+    """The command of a message on a topic other than ``schedule``; raises CommandRefused."""
+    if topic == "thrusters":
+        return ThrusterCommand(tuple(read_message(data, Float64MultiArray).data))
+    try:
+        # From its bytes, without a message object.
+        return of_message(topic, data, frames)
+    except CommandRefused:
+        raise
+    except ValueError:
+        raise _undecodable(data, TOPICS[topic]) from None
+
+
+def read_message(data: bytes, message_type: type) -> Any:
+    """A message from its bytes; raises CommandRefused for bytes that are none of its type."""
+    try:
+        return deserialize_message(data, message_type)
+    except Exception:  # rclpy's own error types differ between versions and middlewares
+        raise _undecodable(data, message_type) from None
+
+
+def _undecodable(data: bytes, message_type: type) -> CommandRefused:
+    accepted = f"a {message_type.__name__} as little-endian CDR"
+    return CommandRefused("frame", "message", f"{len(data)} bytes that can't be decoded", accepted)
+
+
+EXPECTED_NS = 1_000_000_000
+"""How long after a request to step the next one is looked for often [ns of wall time]."""
+
+
+class StepService:
+    """``~/step`` of one node; the loop calls ``serve``. A controller in lockstep waits for every answer, and an
+    executor, which gathers all that it waits for anew each time, costs several times what the step itself does.
+    """
+
+    def __init__(self, node: Node, live: LiveSimulation) -> None:
+        self._live = live
+        self._service = node.create_service(Trigger, "~/step", _never_called, callback_group=ManualCallbackGroup())
+        self._under_way: tuple[Any, Iterator[None]] | None = None
+        self._expected_until_ns = 0
+
+    def serve(self, wall_ns: int) -> bool:
+        """Take what is asked for, one request after another, each for as long as a tick has time, and answer. Returns
+        whether more is to be expected soon.
+        """
+        while self._under_way is not None or self._take():
+            assert self._under_way is not None
+            self._expected_until_ns = wall_ns + EXPECTED_NS
+            header, steps = self._under_way
+            answer = Trigger.Response(success=True)
+            try:
+                next(steps)
+                return True
+            except StopIteration:
+                time_s, received = self._live.loop.simulation.time_ns / 1e9, self._live.commands.received.total()
+                answer.message = f"simulated time is {time_s:.9g} s; {received} commands received"
+            except InputError as error:
+                answer = Trigger.Response(success=False, message=str(error))
+            self._under_way = None
+            self._service.send_response(answer, header)
+        return wall_ns < self._expected_until_ns
+
+    def _take(self) -> bool:
+        """Whether there is a request."""
+        handle = self._service.handle
+        with handle:
+            _, header = handle.service_take_request(Trigger.Request)
+        if header is not None:
+            self._under_way = header, self._live.loop.steps()
+        return header is not None
+
+
+def _never_called(*_: object) -> None:
+    """What a subscription and a service must be given."""
