@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import math
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from rclpy.utilities import remove_ros_args
 
@@ -87,26 +87,23 @@ def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]
     for option, text in _ros_options(argv):
         if option == "--params-file":
             given.update(scene_values(text, warn, node_name))
-        else:
+        elif option in ("-p", "--param"):
             given.update(with_mass_of_density(_assignment(text, node_name)))
     return given
 
 
-def _ros_options(argv: list[str]) -> list[tuple[str, str]]:
+def _ros_options(argv: list[str]) -> Iterator[tuple[str, str]]:
     """Options with a value between ``--ros-args`` and ``--``."""
-    found, inside = [], False
+    inside = False
     arguments = iter(argv)
     for argument in arguments:
-        if argument == "--ros-args":
-            inside = True
-        elif argument == "--":
-            inside = False
-        elif inside and argument in ("-p", "--param", "--params-file"):
+        if argument in ("--ros-args", "--"):
+            inside = argument == "--ros-args"
+        elif inside and argument in ("-p", "--param", "--params-file", "-r", "--remap"):
             value = next(arguments, None)
             if value is None:
                 raise InputError(argument, "needs a value")
-            found.append(("--params-file" if argument == "--params-file" else "-p", value))
-    return found
+            yield argument, value
 
 
 def _assignment(text: str, node_name: str) -> dict[str, object]:
@@ -127,15 +124,12 @@ def _assignment(text: str, node_name: str) -> dict[str, object]:
 
 
 def remapped_node_name(argv: list[str], name: str = NODE_NAME) -> str:
-    """The node's name, after its namespace if it is given one, by ``-r __node:=name`` and ``-r __ns:=/namespace`` (also
-    ``--remap``, ``__name``); the last ones count.
-    """
+    """The node's name, after its namespace if it is given one, by ``-r __node:=name`` and ``-r __ns:=/namespace``."""
     namespace = ""
-    for option, value in zip(argv, argv[1:], strict=False):
-        if option in ("-r", "--remap"):
-            left, assigned, right = value.partition(":=")
-            if assigned and left.rpartition(":")[2] in ("__node", "__name"):
-                name = right
-            elif assigned and left == "__ns":
-                namespace = right.strip("/")
+    for option, text in _ros_options(argv):
+        left, _, right = text.partition(":=")
+        if option in ("-r", "--remap") and left in ("__node", "__name"):
+            name = right
+        elif option in ("-r", "--remap") and left == "__ns":
+            namespace = right.strip("/")
     return f"{namespace}/{name}" if namespace else name

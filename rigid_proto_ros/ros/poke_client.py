@@ -116,34 +116,39 @@ def _script(args: argparse.Namespace) -> list[Command]:
 
 def _point(text: str) -> str | dict:
     """A point as a frame writes it, as a script entry writes it."""
-    word, _, values = text.partition("/")
-
-    def triple(part: str) -> list[float]:
-        try:
-            return [float(x) for x in part.split(",")]
-        except ValueError:
-            raise InputError("--at", text, "numbers x,y,z without blanks") from None
-
-    if word == "vertex" and values.isdigit():
-        return {"vertex": int(values)}
-    if word == "point" and values:
-        return {"point": triple(values)}
-    if word == "ray" and values.count("/") == 1:
-        origin, direction = values.split("/")
-        return {"ray": {"origin": triple(origin), "direction": triple(direction)}}
+    try:
+        match text.split("/"):
+            case ["vertex", number]:
+                return {"vertex": int(number)}
+            case ["point", numbers]:
+                return {"point": _three(numbers)}
+            case ["ray", origin, direction]:
+                return {"ray": {"origin": _three(origin), "direction": _three(direction)}}
+    except ValueError:
+        accepted = "com, origin, a contact, vertex/<i>, point/<x>,<y>,<z>, ray/<x>,<y>,<z>/<x>,<y>,<z>"
+        raise InputError("--at", text, accepted) from None
     return text
 
 
+def _three(text: str) -> list[float]:
+    return [float(number) for number in text.split(",")]
+
+
 def _print_plan(script: list[Command]) -> None:
+    from ..simulation.commands import Change, MoveString, TieString, WrenchCommand
+
     for command in script:
-        content = {
-            "wrench": lambda c: f"{c.frame_id}  force {list(c.force)}  torque {list(c.torque)}",
-            "string_target": lambda c: f"{c.frame_id}  {list(c.point)}",
-            "string_attach": lambda c: f"{c.frame_id}  {c.contact or list(c.point)}",
-            "set": lambda c: str(c.content),
-        }
-        content["poke"] = content["wrench"]
-        text = content[command.kind](command) if command.kind in content else ""
+        match command:
+            case WrenchCommand():
+                text = f"{command.frame_id}  force {list(command.force)}  torque {list(command.torque)}"
+            case MoveString():
+                text = f"{command.frame_id}  {list(command.point)}"
+            case TieString():
+                text = f"{command.frame_id}  {command.contact or list(command.point)}"
+            case Change():
+                text = str(command.content)
+            case _:
+                text = ""
         print(f"{command.stamp_ns / 1e9:12.6f} s  {command.kind:14s} {text}".rstrip())
 
 
@@ -164,6 +169,4 @@ def _send(script: list[Command], args: argparse.Namespace, argv: list[str]) -> i
             sender.destroy_node()
         rclpy.try_shutdown()
     print(report.text)
-    for line in report.told:
-        print(f"  {line}")
     return 0 if report.all_in_time else 1

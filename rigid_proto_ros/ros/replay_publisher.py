@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -30,6 +30,8 @@ from ..simulation.commands import Change, Command
 from . import qos
 from .script_sender import ScriptSender
 
+WAIT_FOR_NODE_S = 10.0
+
 WAIT_FOR_SUBSCRIBERS_S = 3.0
 """States wait this long for somebody to listen; then they go out all the same."""
 
@@ -40,16 +42,6 @@ NOT_SENT = ("record", "viewer")
 """Parameters of the recording node's own surroundings: sent to another, they would overwrite its recordings."""
 
 
-class CommandSender(ScriptSender):
-    """Sends a session's commands; beside a script's these may be inertia messages."""
-
-    def __init__(self, node_name: str, timeout_s: float = 10.0) -> None:
-        super().__init__(node_name, timeout_s)
-        inertia = self.create_publisher(InertiaStamped, f"{self.target}/inertia/set", qos.COMMAND)
-        self._topics["inertia/set"] = inertia
-        self._spin_until(lambda: inertia.get_subscription_count() > 0, f"{self.target} to listen for inertia")
-
-
 def publish_commands(session: RecordedSession, node_name: str) -> int:
     """Reset the node and send it the session's commands, each at its time; returns the exit status, 1 if any was late.
 
@@ -57,7 +49,7 @@ def publish_commands(session: RecordedSession, node_name: str) -> int:
     """
     commands = session_commands(session)
     with _context():
-        sender = CommandSender(node_name)
+        sender = ScriptSender(node_name, WAIT_FOR_NODE_S)
         try:
             report = sender.send(commands, reset=True)
         finally:
@@ -104,12 +96,14 @@ def publish_states(session: RecordedSession, speed: float) -> int:
 
 def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
     types = {"pose": PoseStamped, "twist": TwistStamped, "odom": Odometry}
+    # The frames' names that the session flew with.
+    frames = frame_names(recorded_parameters(session), session.node_name)
     streams, senders = _streams(session), {}
     for name in streams:
         publisher = node.create_publisher(types[name], f"/{session.node_name}/{name}", qos.STATE)
-        senders[name] = (publisher, _packing(name, session))
+        senders[name] = publisher
     clock = node.create_publisher(Clock, "/clock", qos.CLOCK)
-    _wait_for_subscribers(node, [*(publisher for publisher, _ in senders.values()), clock])
+    _wait_for_subscribers(node, [*senders.values(), clock])
     merged = sorted(
         ((t, k, name) for name, rows in streams.items() for k, t in enumerate(rows.times.tolist())),
         key=lambda message: message[0],
@@ -123,9 +117,12 @@ def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
         if time_ns != told_ns:
             told_ns = time_ns
             clock.publish(cdr.time(time_ns))
-        publisher, pack = senders[name]
-        publisher.publish(pack(time_ns, streams[name].rows[k].tolist()))
-    for publisher, _ in senders.values():
+        row = streams[name].rows[k].tolist()
+        if name == "odom":
+            senders[name].publish(cdr.odometry(time_ns, frames, row[:7], row[7:]))
+        else:
+            senders[name].publish(cdr.stamped_doubles(time_ns, frames[0], row))
+    for publisher in senders.values():
         publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=10.0))
 
 
@@ -154,14 +151,6 @@ def _streams(session: RecordedSession) -> dict[str, StampedRows]:
         )
         for name, project in PROJECTIONS.items()
     }
-
-
-def _packing(name: str, session: RecordedSession) -> Callable[[int, list[float]], bytes]:
-    """How a row of a topic becomes bytes, with the frames' names that the session flew with."""
-    frames = frame_names(recorded_parameters(session), session.node_name)
-    if name == "odom":
-        return lambda time_ns, row: cdr.odometry(time_ns, frames, row[:7], row[7:])
-    return lambda time_ns, row: cdr.stamped_doubles(time_ns, frames[0], row)
 
 
 @contextmanager

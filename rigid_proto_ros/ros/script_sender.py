@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,8 +11,7 @@ from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PointStamped, PoseStamped, WrenchStamped
-from rcl_interfaces.msg import Log
+from geometry_msgs.msg import InertiaStamped, PointStamped, PoseStamped, WrenchStamped
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.node import Node
@@ -44,27 +42,20 @@ STALLED_S = 15.0
 STANDSTILL_REPORTS = 3
 """Simulated time that so many reports find unmoved is paused by somebody, or follows a clock that stands."""
 
-LOG_S = 3.0
-"""How long the node's log is waited for when a refusal was counted of which it has said nothing yet."""
-
 BURST_S = 0.5
-"""Reports that have waited in the queue come together: of so many seconds the last one counts; the node
-makes one a second.
-"""
+"""Reports that have waited in the queue come together within this time; the node makes one a second."""
 
 
 @dataclass(frozen=True)
 class Report:
     """sent: messages by topic. late, refused: what the node's counters rose by until ``reached_ns``; reasons: refused
-    ones by reason; told: what the node's log said of them, at most one line a second. last_ns: when the last command
-    acts.
+    ones by reason. last_ns: when the last command acts.
     """
 
     sent: dict[str, int]
     late: int
     refused: int
     reasons: dict[str, int]
-    told: tuple[str, ...]
     last_ns: int
     reached_ns: int
 
@@ -94,9 +85,8 @@ class ScriptSender(Node):
         super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
         self.target = node_name if node_name.startswith("/") else f"/{node_name}"
         self._counters: dict[str, str] = {}
-        self._refusals: list[str] = []
         self._reports = 0
-        self._get_parameters: Client | None = None
+        self._get_parameters = self.create_client(GetParameters, f"{self.target}/get_parameters")
         publisher = self.create_publisher
         self._topics = {
             "wrench": publisher(WrenchStamped, f"{self.target}/wrench", qos.COMMAND),
@@ -104,11 +94,11 @@ class ScriptSender(Node):
             "schedule": publisher(String, f"{self.target}/schedule", qos.COMMAND),
             "string/target": publisher(PointStamped, f"{self.target}/string/target", qos.COMMAND),
             "string/attach": publisher(PointStamped, f"{self.target}/string/attach", qos.COMMAND),
+            "inertia/set": publisher(InertiaStamped, f"{self.target}/inertia/set", qos.COMMAND),
         }
         self._reset_client = self.create_client(Trigger, f"{self.target}/reset")
         self._pause_client = self.create_client(SetBool, f"{self.target}/pause")
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
-        self.create_subscription(Log, "/rosout", self._on_log, 100)
         self._wait_for_node(timeout_s)
 
     def send(self, script: list[Command], reset: bool = False, lead_s: float = 0.2) -> Report:
@@ -142,24 +132,18 @@ class ScriptSender(Node):
             number += len(message.commands)
             for command in message.commands:
                 sent[topic_of(command)] += 1
-            self._show(f"sent {number} of {len(script)}")
         self._confirm(len(script))
         if paused:
             self._call(self._pause_client, SetBool.Request(data=False))
         last_ns = start_ns + (script[-1].stamp_ns if script else 0)
         if script:
             self._wait_until_acted(last_ns)
-        self._show("")
         # All of one report: what it has reached, it has counted.
         rose = {key: int(self._counters[key]) - int(before[key]) for key in before if key.startswith("refused_")}
         refused = rose.pop("refused_total")
         reasons = {key.removeprefix("refused_"): count for key, count in rose.items() if count}
-        # The log's lines may come behind the report: one for each reason, unless the node had just told of the same.
-        deadline = time.monotonic() + LOG_S
-        while len(self._refusals) < len(reasons) and time.monotonic() < deadline:
-            rclpy.spin_once(self, timeout_sec=0.05)
         late = int(self._counters["late"]) - int(before["late"])
-        return Report(sent, late, refused, reasons, tuple(self._refusals), last_ns, self._reported_ns())
+        return Report(sent, late, refused, reasons, last_ns, self._reported_ns())
 
     def _contacts(self, script: list[Command]) -> dict[str, tuple]:
         """The contacts that the script ties strings to, as the node has them."""
@@ -168,8 +152,6 @@ class ScriptSender(Node):
 
     def parameter(self, name: str) -> Any:
         """The node's value of a parameter; None where it has none of that name."""
-        if self._get_parameters is None:
-            self._get_parameters = self.create_client(GetParameters, f"{self.target}/get_parameters")
         client = self._get_parameters
         self._spin_until(client.service_is_ready, f"the service {client.srv_name}")
         future = client.call_async(GetParameters.Request(names=[name]))
@@ -184,24 +166,18 @@ class ScriptSender(Node):
             if timeout_s and time.monotonic() > deadline:
                 raise InputError("--node", self.target, f"a running rigid_body node within {timeout_s:g} s")
             rclpy.spin_once(self, timeout_sec=0.1)
-            self._show(f"waiting for {self.target}")
             ready = (
                 bool(self._counters)
                 and self._reset_client.service_is_ready()
                 and self._pause_client.service_is_ready()
                 and all(p.get_subscription_count() for p in self._topics.values())
             )
-        self._show("")
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name == f"{self.target}: simulation":
                 self._counters = {v.key: v.value for v in status.values}
                 self._reports += 1
-
-    def _on_log(self, message: Log) -> None:
-        if message.name == self.target.strip("/").replace("/", ".") and message.msg.startswith("refused: "):
-            self._refusals.append(message.msg)
 
     def _now_ns(self) -> int:
         """The stamp of a state published from now on."""
@@ -222,7 +198,6 @@ class ScriptSender(Node):
             self._confirm(number - MAX_UNCONFIRMED + 1)
         while stamp_ns > self._reported_ns() + ahead_ns:
             rclpy.spin_once(self, timeout_sec=0.5)
-            self._show(f"sent {number}, waiting for simulated time")
 
     def _confirmed(self) -> int:
         return int(self._counters["commands_received"]) - self._received_before
@@ -237,14 +212,13 @@ class ScriptSender(Node):
         """
         unmoved = 0
         while (before_ns := self._reported_ns()) <= last_ns and unmoved < STANDSTILL_REPORTS:
-            self._show(f"all sent, waiting for {last_ns / 1e9:.6g} s of simulated time")
-            reported = partial(self._has_reported, last_ns, self._reports, time.monotonic() + BURST_S)
-            self._spin_until(reported, f"a report of {self.target}")
+            is_new = partial(self._has_reported, self._reports, time.monotonic() + BURST_S)
+            self._spin_until(is_new, f"a report of {self.target}")
             unmoved = unmoved + 1 if self._reported_ns() == before_ns else 0
 
-    def _has_reported(self, last_ns: int, number: int, burst_end: float) -> bool:
-        """A report from after ``last_ns``, or the last one of those that came together."""
-        return self._reported_ns() > last_ns or (self._reports > number and time.monotonic() > burst_end)
+    def _has_reported(self, number: int, burst_end: float) -> bool:
+        """Whether there are more reports than ``number``, the last one of those that came together among them."""
+        return self._reports > number and time.monotonic() > burst_end
 
     def _reported_ns(self) -> int:
         """Simulated time of the last report."""
@@ -263,7 +237,3 @@ class ScriptSender(Node):
             if time.monotonic() > deadline:
                 raise InputError("--node", self.target, f"{what} within {STALLED_S:g} s")
             rclpy.spin_once(self, timeout_sec=0.05)
-
-    def _show(self, text: str) -> None:
-        if sys.stderr.isatty():
-            print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
