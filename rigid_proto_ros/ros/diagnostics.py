@@ -67,7 +67,7 @@ def values_of(live: LiveSimulation, subscriber: CommandSubscriber | None = None)
         "accuracy_floor": simulation.accuracy_floor,
         "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",
         "recording": loop.scenario.parameters.record,
-        "warning": simulation.failure or live.recording_trouble or simulation.too_coarse or simulation.too_slow,
+        "warning": simulation.failure or live.recording_trouble or simulation.too_coarse,
     }
 
 
