@@ -17,9 +17,6 @@ from typing import Any
 from ..base.errors import InputError
 from .simulation_loop import SimulationLoop
 
-Call = Callable[[Callable[[], Any]], Any]
-"""Runs a function on the physics thread and returns what it returns; raises InputError when that is too busy."""
-
 SHORT_NS = 3_000_000
 """Waits below this [ns] are a plain sleep, a third of the cost of one that a request can end."""
 

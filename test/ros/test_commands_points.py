@@ -65,8 +65,7 @@ def corner(scene) -> np.ndarray:
     return scene.body_mesh.surface.vertices[VERTEX]
 
 
-@pytest.mark.parametrize("held", [True, False], ids=["wrench", "poke"])
-@pytest.mark.parametrize("axes", ["world", "body"])
+@pytest.mark.parametrize(("axes", "held"), [("world", False), ("body", True)])
 def test_a_point_named_by_vertex_contact_or_coordinates_is_one_point(scene, corner, axes, held):
     # Equal to the bit: all three resolve to the same doubles.
     start = SECOND // 10
@@ -98,8 +97,7 @@ def test_the_mesh_origin_is_a_point_like_any_other(scene):
     assert relative_difference(ends[0], flown(scene, (start, "world@com", FORCE, (0, 0, 0), False))) > 1e-3
 
 
-@pytest.mark.parametrize("axes", ["world", "body"])
-@pytest.mark.parametrize("held", [True, False], ids=["wrench", "poke"])
+@pytest.mark.parametrize(("axes", "held"), [("world", False), ("body", True)])
 def test_a_ray_acts_where_it_first_meets_the_turning_body_and_stays_with_that_point(scene, axes, held):
     start = SECOND // 10
     state = Simulation(scene.setup).advance(start)

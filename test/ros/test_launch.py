@@ -32,11 +32,6 @@ def declared(tree: ast.Module) -> dict[str, tuple[str, str]]:
     return {name: (default, description) for name, default, description in ast.literal_eval(table)}
 
 
-def test_defines_what_ros2_launch_calls(tree: ast.Module) -> None:
-    functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
-    assert not functions["generate_launch_description"].args.args
-
-
 def test_imports_nothing_but_launch_and_this_package(tree: ast.Module) -> None:
     modules = {
         name.split(".")[0]
@@ -71,10 +66,6 @@ def test_arguments_that_become_parameters_are_parameters_with_accepted_defaults(
     arguments = declared(tree)
     for name in ("mesh", "viewer", "record"):
         PARAMETERS[name].convert(arguments[name][0])
-
-
-def test_package_declares_launch() -> None:
-    assert "<exec_depend>launch_ros</exec_depend>" in (SOURCE / "package.xml").read_text("utf-8")
 
 
 def test_client_accepts_the_options_that_the_launch_file_gives_it(tree: ast.Module, capsys) -> None:
