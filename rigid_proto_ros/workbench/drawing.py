@@ -41,6 +41,9 @@ LABEL = "-"
 LINE_PIXELS = 3.0
 """Thickness of lines, however far off they are: those of a telephone's picture would be seen in pieces."""
 
+GHOST_SIZE = 0.99
+"""A ghost that lies exactly in its body would show through in patches."""
+
 HEAD = 2.6
 """Radius of an arrow's head, in those of its shaft."""
 
@@ -140,7 +143,7 @@ class ViserBackend(Backend):
             color=look.colours[0],
             opacity=None if solid else look.opacity,
             side="double",
-            scale=1.0 / self.unit,
+            scale=self._size_of(name) / self.unit,
             cast_shadow=solid,
             visible=False,
         )
@@ -166,7 +169,10 @@ class ViserBackend(Backend):
         if attitudes is not None:
             node.wxyz = wxyz(attitudes[-1])
         if scale is not None:
-            node.scale = tuple((scale / self.unit).tolist())
+            node.scale = tuple((self._size_of(name) * scale / self.unit).tolist())
+
+    def _size_of(self, name: str) -> float:
+        return GHOST_SIZE if name == style.GHOST_MESH else 1.0
 
     def arrows(self, name: str, counts: np.ndarray, vectors: np.ndarray, origins: np.ndarray | None = None) -> None:
         """The arrows of the last state."""
