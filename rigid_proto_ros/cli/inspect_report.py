@@ -119,8 +119,6 @@ def print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
             print(f"  differs from the uniform solid: inertia {d.inertia_error:.2g} ({_ratio(d)}), {center}{off}")
         for cause in d.causes:
             print(f"  cause: {cause}")
-        for doubt in d.doubts:
-            print(f"  doubt: {doubt}")
         if d.status not in ("uniform", "not uniform"):
             _print_expected(d)
     if len(diagnoses) > 1:
@@ -170,9 +168,6 @@ def print_fixed_links(links: list[FixedLink], out: str) -> None:
         status = f"{before.status} -> {after.status}" if link.written else before.status
         rows.append((before.link, status, mass, *errors, done))
     table(rows, ("link", "", "mass [kg]", "error of the inertia", "of the centre of mass", ""))
-    for link in links:
-        for doubt in link.after.doubts if link.written else ():
-            print(f"{link.before.link}: written, but {doubt}")
     written, left = (sum(map(bool, column)) for column in zip(*((x.written, x.left) for x in links), strict=True))
     print(f"{out}: {written} of {len(links)} inertials rewritten, {left} left as they are")
 

@@ -10,11 +10,10 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..mass.properties import MassProperties
-from .conversions import likely_cause
 from .fitting import CannotFlyError, fit_flights
 from .measurements import ACCELERATION, MeasuredFlight, topics_of
 from .report import Identification
-from .residual_checks import check_residuals
+from .residual_checks import check_residuals, likely_cause
 from .unknowns import DEFAULT_FIT, Values, make_unknowns, possible_tensor
 from .verdict import Identifiability
 

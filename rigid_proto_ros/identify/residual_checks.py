@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""Whether the residuals are noise: their size and whiteness, outliers, and where in the flight they are largest."""
+"""Whether the residuals are noise, by their size and whiteness; and what else samples could mean that no rigid body
+shows: other units, another direction of gravity, another order.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.stats import chi2
 
-from .fitting import Estimate, residuals_by_series
+from .fitting import CannotFlyError, Estimate, fit_flights, residuals_by_series, short_misfit
 from .local_motion import noise_by_differences
-from .measurements import UNITS, MeasuredFlight, Series
+from .measurements import ACCELERATION, ATTITUDE, POSITION, RATE, UNITS, MeasuredFlight, Series
+from .unknowns import Unknowns, Values
 
 LAGS = 10
 """Of the autocorrelation."""
@@ -21,21 +25,27 @@ FAR = 5.0
 """Standard deviations beyond which a sample is called an outlier; noise alone does that once in half a
 million numbers.
 """
-WINDOWS = 10
-"""Parts of a flight whose residuals are compared."""
-WORSE = 3.0
-"""So many times the mean square of the other parts is something that happened then."""
 NEGLIGIBLE = 1e-7
 """Of the largest value of a series: what is left of a simulated flight is rounding and no error of the model."""
 TOO_LARGE = 1.5
 """Residuals so many times the noise between neighbouring samples are no noise."""
+USUAL = (
+    "usual causes: positions that aren't in m, rates in degrees, accelerations in g, gravity along another axis"
+    " (--gravity), quaternions that begin with w, a wrench along other axes (--wrench TOPIC@FRAME), clocks (--offset)"
+)
+_SCALES = (
+    ((POSITION,), 1e-3, "positions are in mm"),
+    ((POSITION,), 1e-2, "positions are in cm"),
+    ((RATE,), np.pi / 180.0, "rates are in degrees a second"),
+    ((ACCELERATION,), 9.80665, "accelerations are in g"),
+)
+_DIRECTIONS = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
 
 
 @dataclass(frozen=True)
 class ResidualCheck:
     """noise: standard deviation as estimated. by_differences: what neighbouring samples say it is. probability: of
-    white noise looking so (Ljung and Box). outliers: how many samples lie far off. worst_s: middle of the part of the
-    flight that is far worse than the others.
+    white noise looking so (Ljung and Box). outliers: how many samples lie far off.
     """
 
     flight: str
@@ -46,7 +56,6 @@ class ResidualCheck:
     by_differences: float
     probability: float
     outliers: int
-    worst_s: float | None
 
     @property
     def is_white(self) -> bool:
@@ -72,7 +81,6 @@ def check_residuals(flights: Sequence[MeasuredFlight], estimate: Estimate) -> li
 
 def _check(flight: MeasuredFlight, series: Series, residuals: np.ndarray, noise: float) -> ResidualCheck:
     scaled = residuals / noise
-    seconds = 1e-9 * (series.times_ns - flight.begin_ns)
     return ResidualCheck(
         flight.name,
         series.name,
@@ -82,7 +90,6 @@ def _check(flight: MeasuredFlight, series: Series, residuals: np.ndarray, noise:
         max(noise_by_differences(series), NEGLIGIBLE * float(np.abs(series.values).max())),
         _whiteness(scaled),
         int(np.sum(np.max(np.abs(scaled), axis=1) > FAR)),
-        _worst(scaled, seconds),
     )
 
 
@@ -103,16 +110,6 @@ def _whiteness(scaled: np.ndarray) -> float:
     return float(chi2.sf(total, 3 * lags))
 
 
-def _worst(scaled: np.ndarray, seconds: np.ndarray) -> float | None:
-    if len(scaled) < 4 * WINDOWS:
-        return None
-    parts = np.array_split(np.arange(len(scaled)), WINDOWS)
-    sizes = np.array([float((scaled[part] ** 2).mean()) for part in parts])
-    worst = int(np.argmax(sizes))
-    others = (sizes.sum() - sizes[worst]) / (WINDOWS - 1)
-    return float(seconds[parts[worst]].mean()) if sizes[worst] > WORSE * others else None
-
-
 def remarks(checks: Sequence[ResidualCheck]) -> list[str]:
     """What they show, in sentences; empty when all is noise."""
     found = []
@@ -123,15 +120,71 @@ def remarks(checks: Sequence[ResidualCheck]) -> list[str]:
             found.append(f"{where}: {many} more than {FAR:g} standard deviations off")
         if check.is_noise:
             continue
-        if check.worst_s is not None:
-            found.append(
-                f"{where}: the model doesn't fit about {check.worst_s:.3g} s after the start of the motion:"
-                " a contact, or a wrench that isn't in the bag; --from and --to exclude it"
-            )
-        else:
-            found.append(
-                f"{where}: the residuals of {check.noise:.3g} {check.unit} aren't white noise, and neighbouring samples"
-                f" differ by {check.by_differences:.3g} only: drag (--fit damping), gravity (--fit gravity), clocks"
-                " (--fit offset), or a wrench that isn't in the bag; the standard deviations are too small"
-            )
+        found.append(
+            f"{where}: the residuals of {check.noise:.3g} {check.unit} aren't white noise, and neighbouring samples"
+            f" differ by {check.by_differences:.3g} only: drag (--fit damping), gravity (--fit gravity), clocks"
+            " (--fit offset), a contact (--from and --to exclude it), or a wrench that isn't in the bag; the standard"
+            " deviations are too small"
+        )
     return found
+
+
+def likely_cause(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> str:
+    """Which conversion makes the flights fit, or at least short parts of them, in words, or the usual causes; empty
+    where short parts fit as they are and no other unit of a sensor makes the whole fit.
+    """
+    fits_short = short_misfit(flights, unknowns, values) <= 1.0
+    partly = ""
+    # Poses of wrong units or axes don't fit for a moment; accelerations may, with another mass.
+    for cause, remedy, converted, gravity in _conversions(flights, values, sensors_only=fits_short):
+        other = replace(values, gravity=gravity)
+        if short_misfit(converted, unknowns, other) > 1.0:
+            continue
+        if _fits(converted, unknowns, other):
+            return f"it fits if {cause}: {remedy}"
+        partly = partly or f"short parts fit if {cause}: {remedy}"
+    return "" if fits_short else partly or USUAL
+
+
+def _fits(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> bool:
+    """Whether the whole flights leave no more than noise."""
+    try:
+        estimate = fit_flights(flights, unknowns, values)
+        return all(check.is_noise for check in check_residuals(flights, estimate))
+    except CannotFlyError:
+        return False
+
+
+def _conversions(
+    flights: Sequence[MeasuredFlight], values: Values, sensors_only: bool
+) -> Iterator[tuple[str, str, list[MeasuredFlight], np.ndarray]]:
+    """Cause, remedy, and flights and gravity as they are then; of rates and accelerations alone or of all."""
+    kinds = {series.kind for flight in flights for series in flight.series}
+    for scaled, factor, cause in _SCALES:
+        if scaled[0] in kinds and not (sensors_only and POSITION in scaled):
+            yield (
+                cause,
+                f"multiply them by {factor:.6g}",
+                _changed(flights, scaled, partial(np.multiply, factor)),
+                values.gravity,
+            )
+    if sensors_only:
+        return
+    for direction in _DIRECTIONS:
+        gravity = 9.81 * np.array(direction)
+        if not np.allclose(gravity, values.gravity):
+            text = " ".join(f"{g:g}" for g in gravity.tolist())
+            yield f"gravity is {text} m/s²", f"--gravity {text}", list(flights), gravity
+    if values.gravity.any():
+        yield "there is no gravity", "--gravity 0 0 0", list(flights), np.zeros(3)
+    reordered = _changed(flights, (ATTITUDE,), partial(np.roll, shift=-1, axis=1))
+    yield "quaternions begin with w", "reorder them to x y z w", reordered, values.gravity
+
+
+def _changed(
+    flights: Sequence[MeasuredFlight], kinds: Sequence[str], convert: Callable[[np.ndarray], np.ndarray]
+) -> list[MeasuredFlight]:
+    def one(series: Series) -> Series:
+        return replace(series, values=convert(series.values)) if series.kind in kinds else series
+
+    return [replace(flight, series=tuple(one(series) for series in flight.series)) for flight in flights]

@@ -43,7 +43,7 @@ VERDICTS = (*WRONG, NOT_UNIFORM, UNIFORM, UNKNOWN)
 class LinkDiagnosis:
     """One link: ``status`` is one of VERDICTS; errors are relative (COM over the box's diagonal), ``ratio`` is the
     tensor's size over that of the uniform solid; ``judged_by`` says whether by its visual or its collision shapes, of
-    which ``volume`` [m³] is the sum; ``doubts``: what they enclose twice."""
+    which ``volume`` [m³] is the sum."""
 
     link: str
     mesh: str
@@ -58,7 +58,6 @@ class LinkDiagnosis:
     note: str = ""
     judged_by: str = ""
     volume: float = 0.0
-    doubts: tuple[str, ...] = ()
 
     @property
     def error(self) -> float:
@@ -85,7 +84,6 @@ class LinkDiagnosis:
             "expected": expected,
             "note": self.note,
             "judged_by": self.judged_by,
-            "doubts": list(self.doubts),
         }
 
 
@@ -126,7 +124,7 @@ def diagnose(link: Link, parts: LinkShapes, options: Options, judged_by: str = "
     plain = LinkDiagnosis(link.name, parts.names, UNKNOWN, link.mass, judged_by=judged_by)
     try:
         volume = parts.volume()
-        plain = replace(plain, volume=volume, doubts=parts.doubts)
+        plain = replace(plain, volume=volume)
         wanted = options.mass_of(volume)
         if link.problem:
             return replace(plain, note=link.problem, expected=parts.properties(wanted or WATER * volume))

@@ -16,7 +16,6 @@ from ..mass.from_mesh import MeshBody, mesh_body
 from ..mass.moments import referenced_vertices, solid_moments
 from ..mass.properties import MassProperties
 from ..mass.tensor import tensor_from_six
-from ..mass.verdict import COUNTED_TWICE, OVERLAPPING, WARNING
 from ..mesh.hull import box_surface, convex_hull
 from ..mesh.locate import Search
 from ..mesh.reading import MAX_TRIANGLES, load_mesh
@@ -123,18 +122,6 @@ class LinkShapes:
     def names(self) -> str:
         """What the shapes are called: mesh names and kinds."""
         return ", ".join(dict.fromkeys(body.mesh.name if body else shape.kind for shape, body in self.parts))
-
-    @property
-    def doubts(self) -> tuple[str, ...]:
-        """What the meshes' verdicts say of volume that counts twice."""
-        bodies = {body.mesh.path: body for _, body in self.parts if body}
-        return tuple(
-            f"{body.mesh.name}: {finding.message}"
-            for body in bodies.values()
-            for finding in body.verdict.findings
-            if finding.code in COUNTED_TWICE and finding.severity == WARNING
-            if not (finding.code == OVERLAPPING and body.verdict.united)
-        )
 
     @cached_property
     def points(self) -> np.ndarray:
