@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,7 +49,8 @@ def session_runs(content: BagContent, path: Path, node: str = "") -> list[Record
     missing = [f"{prefix}/{name}" for name, is_there in there.items() if not is_there]
     resets = [log for (log, _), (_, kind, _) in zip(events, decoded, strict=True) if kind == "reset"]
     if not events and states:
-        resets = _log_times_of_restarts(next(iter(states.values())))
+        logs, rows = next(iter(states.values()))
+        resets = logs[1:][np.diff(rows.times) < 0].tolist()
     whole = RecordedSession(
         complete=content.complete,
         node_name=prefix.strip("/"),
@@ -62,12 +62,12 @@ def session_runs(content: BagContent, path: Path, node: str = "") -> list[Record
     )
     cuts = {name: _cuts(logs, rows.times, resets) for name, (logs, rows) in states.items()}
     runs = []
-    for k in range(len(resets) + 1):
-        run = replace(whole, scene=_scene_at(scenes, resets[k - 1] if k else None))
+    for k, (begin, end) in enumerate(zip([None, *resets], [*resets, None], strict=True)):
+        # The scene in force at a reset; at the recording's own start the first one that it holds.
+        before = [text for log, text in scenes if begin is not None and log <= begin]
+        run = replace(whole, scene=before[-1] if before else scenes[0][1] if scenes else "")
         run.mesh_sha256 = mesh_sha256_of(run.scene)
         run.accuracy_floor = content.metadata.get(FLOOR.format(k), {}).get("floor", "")
-        begin = resets[k - 1] if k else None
-        end = resets[k] if k < len(resets) else None
         run.events = [
             (time_ns, line)
             for (log, line), (time_ns, _, _) in zip(events, decoded, strict=True)
@@ -145,11 +145,6 @@ def _simulated(stamp_ns: int, log: int, clocks: list[tuple[int, int, int]]) -> i
     return stamp_ns
 
 
-def _log_times_of_restarts(state: tuple[np.ndarray, StampedRows]) -> list[int]:
-    logs, rows = state
-    return logs[1:][np.diff(rows.times) < 0].tolist()
-
-
 def _cuts(logs: np.ndarray, stamps: np.ndarray, resets: list[int]) -> list[int]:
     """Where a topic's messages of each run begin, and the end: at the restart of the stamps nearest to each reset."""
     restarts = np.flatnonzero(np.diff(stamps) < 0) + 1
@@ -162,28 +157,19 @@ def _cuts(logs: np.ndarray, stamps: np.ndarray, resets: list[int]) -> list[int]:
     return [*cuts, len(stamps)]
 
 
-def _scene_at(scenes: list[tuple[int, str]], reset: int | None) -> str:
-    """The scene in force at a reset; at the recording's own start the first one that it holds."""
-    before = [text for log, text in scenes if reset is not None and log <= reset]
-    return before[-1] if before else scenes[0][1] if scenes else ""
-
-
 def _shown_rows(published: dict[str, StampedRows]) -> tuple[np.ndarray, np.ndarray]:
     """State rows (n, 13) and their times, one per stamp, from what was published; velocities that weren't are 0."""
     merged: dict[int, list[float]] = {}
+    listed = {name: list(zip(r.times.tolist(), r.rows.tolist(), strict=True)) for name, r in published.items()}
     for name in ("odom", "pose"):
-        for time_ns, row in _listed(published.get(name)):
+        for time_ns, row in listed.get(name, []):
             state = merged.setdefault(time_ns, [0.0] * 6 + [1.0] + [0.0] * 6)
             state[:7] = row[:7]
             if name == "odom":
                 state[7:10], state[10:13] = rotate(*row[3:7], *row[7:10]), row[10:13]
-    for time_ns, row in _listed(published.get("twist")):
+    for time_ns, row in listed.get("twist", []):
         if time_ns in merged:
             state = merged[time_ns]
             state[7:10], state[10:13] = row[:3], rotate_inverse(*state[3:7], *row[3:6])
     times = sorted(merged)
     return np.array(times, dtype=np.int64), np.array([merged[t] for t in times]).reshape(-1, 13)
-
-
-def _listed(rows: StampedRows | None) -> Iterable[tuple[int, list[float]]]:
-    return () if rows is None else zip(rows.times.tolist(), rows.rows.tolist(), strict=True)
