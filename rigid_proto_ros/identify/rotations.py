@@ -43,8 +43,3 @@ def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     u, s = q[..., :3], q[..., 3:]
     t = 2.0 * cross(u, v)
     return v + s * t + cross(u, t)
-
-
-def turned_back(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) from world to body axes."""
-    return turned(inverse(q), v)

@@ -26,8 +26,6 @@ from .moments import solid_moments
 INFO, WARNING, ERROR = "info", "warning", "error"
 UNREFERENCED = "unreferenced_vertices"
 OVERLAPPING, NESTED, SELF_CROSSING = "overlapping_components", "nested_components", "self_crossing"
-COUNTED_TWICE = (OVERLAPPING, NESTED, SELF_CROSSING)
-"""Codes of surfaces whose volume counts twice what they enclose twice."""
 NO_OVERLAP = 1e-6
 """Part of the volume below which an overlap is a remark, no warning."""
 MAX_NESTED_COMPONENTS = 2000

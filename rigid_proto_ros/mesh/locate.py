@@ -75,11 +75,6 @@ def _package_folders(package: str, search: Search) -> Iterator[Path]:
             yield folder / package
 
 
-def package_folder(package: str, search: Search) -> Path | None:
-    """The first folder that is the package, None where there is none."""
-    return next((folder.resolve() for folder in _package_folders(package, search) if folder.is_dir()), None)
-
-
 def resolve_mesh(name: str, search: Search = NOWHERE_ELSE) -> Path:
     """The file that ``name`` (a path, ``package://package/path``, ``model://model/path`` or a bundled name) stands for.
 
