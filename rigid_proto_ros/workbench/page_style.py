@@ -64,7 +64,7 @@ color-body); margin-top: 0.4em; }} .{ANSWERS} {{ display: none; }}
 }}
 @media {MEDIUM} {{
   {_DOCKED_ROW} {{ width: 100% !important; }}
-  .mantine-Tabs-tab {{ padding: 0.5em 0.4em; font-size: 0.85em; }}
+  [role="tab"] {{ padding: 0 0.4em !important; }}
 }}
 @media {MEDIUM} and (orientation: landscape) {{
   {_DOCK} {{ width: {100 - BESIDE_SHARE}% !important; }}
@@ -87,7 +87,7 @@ color-body); margin-top: 0.4em; }} .{ANSWERS} {{ display: none; }}
 
 CLASS_STYLE = f"""<style>
 :root {{ --mantine-scale: 1.25; }}
-.mantine-Tabs-list, [role="tablist"] {{ display: none !important; }}
+[role="tablist"] {{ display: none !important; }}
 .{MARK} b {{ font-size: 1.7em; }}
 </style>"""
 

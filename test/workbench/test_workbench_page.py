@@ -167,6 +167,9 @@ def test_body_and_controls_of_time_are_in_sight_in_windows_of_every_size(page, w
         box = page.page.locator("button:visible", has_text=name).first.bounding_box()
         assert box["x"] >= 0.0 and box["x"] + box["width"] <= width, name
         assert box["y"] >= 0.0 and box["y"] + box["height"] <= height, name
+    tabs = [tab.bounding_box() for tab in page.page.get_by_role("tab").all()]
+    assert len({round(tab["y"]) for tab in tabs}) == 1, "tabs on two lines"
+    assert max(tab["x"] + tab["width"] for tab in tabs) <= width
     box, (x, y) = page.canvas, com_pixel(page)
     assert box["width"] * box["height"] > 0.45 * width * height
     assert box["x"] < x < box["x"] + box["width"] and box["y"] < y < box["y"] + box["height"]
