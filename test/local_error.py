@@ -13,7 +13,6 @@ from mpmath import mp, mpf
 from reference_motion import angle_between, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
-from rigid_proto_ros.motion.variables import LOW
 from rigid_proto_ros.simulation.flight import steps_of_segment
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -78,10 +77,7 @@ def local_error(step: CommittedStep, digits: int = 22) -> float:
     """Largest of attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s) of a step."""
     p, length = step.problem, step.problem.length
     with mp.workdps(digits + 10):
-        # Attitude and displacement have low words beside them.
         y = [mpf(float(c)) for c in step.before]
-        for k in range(7):
-            y[k if k < 4 else k + 3] += y[LOW + k]
         row = [*y[7:10], *y[0:4], *y[10:13], *y[4:7]]
         span = mpf(step.end_ns - step.begin_ns) / 10**9
         (exact,) = reference_motion(reference_problem(p), row, [span], digits)

@@ -14,7 +14,7 @@ from rigid_proto_ros.motion.loads import LoadSum
 from rigid_proto_ros.motion.problem import PROBLEM, Environment, begin_body, begin_problem, begin_string
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringState
-from rigid_proto_ros.motion.variables import STORED, to_variables
+from rigid_proto_ros.motion.variables import VARIABLES, to_variables
 from rigid_proto_ros.simulation import flight as fl
 
 
@@ -41,8 +41,8 @@ def make_problem(
 
 
 def new_variables(row: np.ndarray, p: np.record) -> np.ndarray:
-    """Variables (STORED,) of a state row at a segment's start."""
-    y = np.zeros(STORED)
+    """Variables (VARIABLES,) of a state row at a segment's start."""
+    y = np.zeros(VARIABLES)
     to_variables(row, p, y)
     return y
 

@@ -27,9 +27,6 @@ VELOCITY = 10  # (3,)
 HAND_WORK = 13
 HEAT = 14
 VARIABLES = 15
-"""How many integrators step."""
-LOW = 15  # (7,) low words of attitude and displacement, kept by those integrators that need more digits than a double's
-STORED = 22
 
 MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""

@@ -25,7 +25,7 @@ from ..motion.integrators.series_steps import CONTROL, begin_control
 from ..motion.integrators.stepping import commit, is_provided, reach
 from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
 from ..motion.problem import PROBLEM, STRING, begin_problem, begin_string
-from ..motion.variables import HAND_WORK, HEAT, MAX_SPEED, STORED, to_good_row, to_variables
+from ..motion.variables import HAND_WORK, HEAT, MAX_SPEED, VARIABLES, to_good_row, to_variables
 from .commands import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE
 
 FLIGHT = record_type(
@@ -35,9 +35,9 @@ FLIGHT = record_type(
         ("start_ns", np.int64),  # of the segment
         ("start", np.float64, 13),  # the state then
         ("committed_ns", np.int64),  # where the last full step of the segment ended
-        ("variables", np.float64, STORED),  # there
-        ("trial", np.float64, STORED),
-        ("following", np.float64, STORED),  # of an adaptive method
+        ("variables", np.float64, VARIABLES),  # there
+        ("trial", np.float64, VARIABLES),
+        ("following", np.float64, VARIABLES),  # of an adaptive method
         ("control", CONTROL),  # likewise
         ("common", PROBLEM),  # what the problems of all segments of this body have in common
         ("problem", PROBLEM),  # of the segment
@@ -173,7 +173,7 @@ def complete_problem(flight: np.record, row: np.ndarray, time_ns: int, p: np.rec
 def begin_variables(flight: np.record, methods: np.ndarray, room: np.ndarray) -> None:
     """Begin a segment whose problem is made."""
     p, y = flight.problem, flight.variables
-    for k in range(STORED):
+    for k in range(VARIABLES):
         y[k] = 0.0
     to_variables(flight.start, p, y)
     before = flight.method
@@ -245,7 +245,7 @@ def advance_segment(flight: np.record, methods: np.ndarray, room: np.ndarray, un
 @njit(cache=True, error_model="numpy", allocates=False)
 def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> tuple[float, ...]:
     """At now_ns, from the equations of motion: of the COM [m/s², world], angular [rad/s², body axes]; six numbers.
-    problem (1,) and y (STORED,) are scratch.
+    problem (1,) and y (VARIABLES,) are scratch.
     """
     problem[0] = flight.common
     p = problem[0]

@@ -17,7 +17,7 @@ from ..motion.loads import LoadSum
 from ..motion.problem import PROBLEM
 from ..motion.state import State, angular_momentum
 from ..motion.string import StringState
-from ..motion.variables import STORED
+from ..motion.variables import VARIABLES
 from . import flight as fl
 from .commands import Waiting
 from .flight_arrays import ActingLoad, FlightArrays
@@ -194,7 +194,7 @@ class Observables:
 
     def _accelerations(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the COM (3,) [m/s², world] and angular (3,) [rad/s², body axes], now."""
-        six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(STORED)))
+        six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(VARIABLES)))
         return six[:3], six[3:]
 
     def _load_sum(self) -> LoadSum:

@@ -58,15 +58,3 @@ def test_every_kernel_of_the_package_is_kept_that_way():
         if line.startswith("from numba import") and "njit" in line or "numba.njit" in line
     ]
     assert direct == []
-
-
-def test_numba_brings_no_coverage_unless_something_is_measured():
-    said = []
-    for first in ("", "import coverage; "):
-        code = first + (
-            "import sys; import rigid_proto_ros.base.compilation; from numba.misc import coverage_support as own; "
-            "print('coverage' in sys.modules, own.coverage_available); import coverage"
-        )
-        ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-        said.append(ran.stdout.split())
-    assert said == [["False", "False"], ["True", "True"]]

@@ -4,6 +4,7 @@
 Each flight ends right, refused, or stopped in its last good state with a reason; never in NaN and never in an exception.
 """
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -19,10 +20,7 @@ from rigid_proto_ros.motion.string import StringSettings
 TENSOR = np.array([[1.3, 0.2, -0.1], [0.2, 2.0, 0.3], [-0.1, 0.3, 2.9]])
 ROW = np.array([0.0, 0.0, 0.0, 0.1, -0.2, 0.3, 0.9, 0.4, 0.1, -0.3, 0.9, 1.3, -0.6])
 ROW[3:7] /= np.linalg.norm(ROW[3:7])
-EXPONENTS = (-308, -300, -200, -100, -30, 0, 15, 16, 30, 100, 200, 300, 308)
-FEW_EXPONENTS = (-308, -30, 0, 16, 308)
-MORE_EXPONENTS = (*EXPONENTS, -16, -8, 3, 6, 8, 12, 14)
-"""Forces that auto resolves at up to 1e7 rad/s take it seconds."""
+EXPONENTS = (-308, -30, 0, 16, 308)
 STEPS_S = (1e-9, 1e-8, 1e-6, 1e-4, 1e-2, 0.3, 0.7146, 1.0, 10.0, 100.0, 1000.0)
 FRAMES = ("world@com", "body@com", "world@point/.3,-.2,.1", "body@point/.3,-.2,.1")
 LOADS = ("free", "body wrench", "world wrench", "string", "stiff string", "damping")
@@ -59,27 +57,16 @@ def fly_with_force(name, frame, force, step_s):
     return "stopped" if sane_end(simulation) else "right"
 
 
-def check_forces(name, steps_s, exponents=EXPONENTS):
-    for frame in FRAMES:
-        for exponent in exponents:
-            for step_s in steps_s:
-                force = np.array([0.6, -0.7, 0.4]) * 10.0**exponent
-                end = fly_with_force(name, frame, force.tolist(), step_s)
-                if exponent > 16:
-                    # More than 1e15 m/s² for this body.
-                    assert end.startswith("refused"), (name, frame, exponent, step_s)
-                if exponent <= 0:
-                    assert not end.startswith("refused magnitude"), (name, frame, exponent, step_s)
-                    assert end != "stopped", (name, frame, exponent, step_s)
-
-
-@pytest.mark.parametrize("stress", [False, pytest.param(True, marks=pytest.mark.stress)])
 @pytest.mark.parametrize("name", sorted(INTEGRATORS))
-def test_any_force_ends_right_or_refused_or_stopped(name, stress):
-    if not stress:
-        check_forces(name, (1e-3,), FEW_EXPONENTS)
-    else:
-        check_forces(name, (1e-4,) if name == "auto" else (1e-4, 3e-3, 0.07, 1.0), MORE_EXPONENTS)
+def test_any_force_ends_right_or_refused_or_stopped(name):
+    for frame, exponent in itertools.product(FRAMES, EXPONENTS):
+        end = fly_with_force(name, frame, (np.array([0.6, -0.7, 0.4]) * 10.0**exponent).tolist(), 1e-3)
+        if exponent > 16:
+            # More than 1e15 m/s² for this body.
+            assert end.startswith("refused"), (frame, exponent)
+        if exponent <= 0:
+            assert not end.startswith("refused magnitude"), (frame, exponent)
+            assert end != "stopped", (frame, exponent)
 
 
 def loaded_flight(name, load, step_s):

@@ -10,14 +10,14 @@ from rigid_proto_ros.base.rotation import multiply
 from rigid_proto_ros.motion.integrators import INTEGRATORS, series_steps
 from rigid_proto_ros.motion.integrators.series_steps import MAX_DEGREE
 from rigid_proto_ros.motion.problem import PROBLEM
-from rigid_proto_ros.motion.variables import STORED
+from rigid_proto_ros.motion.variables import VARIABLES
 
 MOMENTS = np.array((1.0, 2.0, 3.0))
 AXIS = np.array((0.3, 1.0, -0.2)) / np.linalg.norm((0.3, 1.0, -0.2))
 
 
 def segment(spin, torque_world, moments=MOMENTS):
-    p, y = new_record(PROBLEM), np.zeros(STORED)
+    p, y = new_record(PROBLEM), np.zeros(VARIABLES)
     p.moments = moments
     p.mass = p.length = p.gyroscopic = 1.0
     p.torque_world = torque_world
@@ -35,7 +35,7 @@ def flown(name, p, y, step, duration):
 def exact_flow(y, p, accuracy, h_ns):
     """Variables after h_ns by the power series of the whole motion at a rate a thousandth of the accuracy."""
     control = new_control(1e-3 * accuracy, MAX_DEGREE)
-    room, following, y = series_steps.motion_workspace(MAX_DEGREE), np.zeros(STORED), y.copy()
+    room, following, y = series_steps.motion_workspace(MAX_DEGREE), np.zeros(VARIABLES), y.copy()
     far = series_steps.motion_steps(y, p, control, following, room, h_ns, False)
     assert not control.failed
     if far < h_ns:

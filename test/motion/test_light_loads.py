@@ -20,11 +20,10 @@ def random_body(rng: np.random.Generator):
     return make_body(mass, rng.normal(size=3) * size[1], np.diag(moments), rng.choice([-1.0, 1.0], 3) * size[1:])
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_a_light_load_is_resolved_as_any_other_and_none_too_strong_is_light(seed):
-    rng = np.random.default_rng(seed)
+def test_a_light_load_is_resolved_as_any_other_and_none_too_strong_is_light():
+    rng = np.random.default_rng(1)
     light = 0
-    for _ in range(200):
+    for _ in range(1000):
         body = random_body(rng)
         frame = parse_frame(f"{rng.choice(['world', 'body'])}@{rng.choice(POINTS)}")
         numbers = (10.0 ** rng.uniform(-5, 18) * rng.normal(size=6)).tolist()
@@ -36,7 +35,7 @@ def test_a_light_load_is_resolved_as_any_other_and_none_too_strong_is_light(seed
         load = resolve_load(frame, force, torque, body, None, {}, None)
         load.check_magnitude(body)
         assert row == load.packed
-    assert light > 10
+    assert light > 200
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])

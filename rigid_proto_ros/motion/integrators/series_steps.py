@@ -26,7 +26,7 @@ from ...base.compilation import njit
 from ...base.elementary import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of, logarithm
 from ...base.records import copy_numbers, record_type
 from ...base.simd import Packed, aligned, filled, four, joined, largest, load
-from ..variables import ATTITUDE, HEAT, STORED, is_good
+from ..variables import ATTITUDE, HEAT, VARIABLES, is_good
 from .error_measure import FLOOR, WEIGHINGS, Weights, heavier, jump_of_displacement, scales
 from .series import (
     A_KNOT,
@@ -357,7 +357,7 @@ def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, 
             # One switch a step: each multiplies what the step has erred before it.
             return before_ns
         if parts == 1:
-            copy_numbers(y, last[:STORED])
+            copy_numbers(y, last[:VARIABLES])
             control.switch = switch
         _move(series, p, degree, switch, law, last)
         start, series = last, c[degree + 2 : 2 * (degree + 2)]

@@ -26,7 +26,7 @@ from ...base.compilation import njit
 from ...base.rotation import norm
 from ..string import NO_DIRECTION
 from .equations import knot_of, stretch
-from .series import A_KNOT, DISTANCE, STRETCH, TENSION, Knot, distance_series, knot_and_stretch, stretch_at
+from .series import A_KNOT, DISTANCE, STRETCH, TENSION, Knot, distance_series, stretch_at
 
 SLACK, PULLS, SHORTENS, PASSES = 0.0, 1.0, 2.0, 3.0
 """PASSES: of a step past the free end of a string that pushes at no length."""
@@ -66,7 +66,9 @@ def knot_at(y: np.ndarray, p: np.record) -> Knot:
     """The knot of a string at variables y; zeros where none is tied."""
     if not p.has_string:
         return 0.0, 0.0, 0.0, 0.0, 0.0
-    return knot_and_stretch(y, p)
+    a, _ = knot_of(y, p)
+    length = norm(*a)
+    return *a, length, length - p.rest_length
 
 
 @njit(cache=True, error_model="numpy")
@@ -243,7 +245,7 @@ def next_law(
 
 @njit(cache=True, error_model="numpy")
 def _square_less_rest(a: np.ndarray, x: float, rest: float) -> np.ndarray:
-    """Coefficients of |a|² − rest² from those of a (n, 3); x: the stretch at 0, known to more digits than |a|."""
+    """Coefficients of |a|² − rest² from those of a (n, 3); x: the stretch at 0."""
     last = a.shape[0] - 1
     g = np.zeros(2 * last + 1)
     for i in range(last + 1):
