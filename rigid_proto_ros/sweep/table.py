@@ -76,6 +76,7 @@ def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, A
     step = max(1, min(CHUNK_ROWS, CHUNK_COMMANDS // max(1, commands), -(-study.rows // (2 * threads))))
     starts = iter(range(0, study.rows, step))
     done = simulated = failed = 0
+    interrupt: KeyboardInterrupt | None = None
     schema = as_arrow(run_chunk(study, 0, 0)).schema
     text = [name for name, kind in zip(schema.names, schema.types, strict=True) if kind == pa.string()]
     pool, pending = ThreadPoolExecutor(threads), deque[Future[Chunk]]()
@@ -96,9 +97,10 @@ def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, A
                 simulated += chunk.simulated
                 failed += sum(reason is not None for reason in chunk.columns["failure"])
                 shown.fraction(done, study.rows)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as error:
+            interrupt = error  # kept, by which it counts as handled (base/interrupts.py)
             if not done:
-                raise Interrupted(0) from None
+                raise Interrupted(0) from error
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
         metadata = {
@@ -115,6 +117,6 @@ def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, A
             **versions(),
         }
         writer.add_key_value_metadata({KEY: json.dumps(metadata).encode()})
-    if done < study.rows:
-        raise Interrupted(done)
+    if interrupt is not None:
+        raise Interrupted(done) from interrupt
     return metadata

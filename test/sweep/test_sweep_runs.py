@@ -2,16 +2,16 @@
 """A sweep as it is run: whole, stopped, and one row alone."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
-from unittest.mock import Mock
 
 import pytest
 import yaml
 from sweep_studies import POKES, PULLED, study
 
-from rigid_proto_ros.base.progress import Progress
+from rigid_proto_ros.base.interrupts import with_this_package
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.sweep import table
 from rigid_proto_ros.sweep.rows import run_chunk
 from rigid_proto_ros.sweep.table import KEY, run_study
 
@@ -39,30 +39,37 @@ def test_a_table_holds_every_row_in_order_and_what_it_was_made_with(tmp_path) ->
     assert [path.name for path in file.parent.iterdir()] == ["table.parquet"]
 
 
-@pytest.mark.parametrize("chunks", [0, 2])
-def test_ctrl_c_leaves_a_readable_table_of_the_rows_before(chunks, tmp_path, monkeypatch) -> None:
-    own, file = study(POKES, samples=60), tmp_path / "table.parquet"
-    told = 0
+INTERRUPTED = """
+import os, signal, sys, time
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.sweep import table
+fly, write = table.run_chunk, table.as_arrow
+def slow(*arguments):
+    time.sleep(1.2)
+    return fly(*arguments)
+def interrupted(chunk):
+    if len(chunk) and chunk.columns["row"][0] >= row:
+        os.kill(os.getpid(), signal.SIGINT)
+    return write(chunk)
+table.run_chunk, table.as_arrow, table.CHUNK_ROWS = slow, interrupted, 4
+row = int(sys.argv.pop())
+sys.exit(main())
+"""
+"""A sweep by chunks of four rows that gets Ctrl-C when it comes to a row. What is under way then ends after longer than
+an interrupt that nobody handles takes to be raised anew."""
 
-    def interrupt(*_: float) -> None:
-        nonlocal told
-        told += 1
-        if told == chunks:
-            raise KeyboardInterrupt
 
-    if chunks:
-        monkeypatch.setattr(Progress, "fraction", interrupt)
-    else:
-        monkeypatch.setattr(
-            table, "as_arrow", Mock(side_effect=[table.as_arrow(run_chunk(own, 0, 0)), KeyboardInterrupt])
-        )
-    with pytest.raises(table.Interrupted) as stopped:
-        run_study(own, file, progress=False)
-    if not chunks:
-        assert stopped.value.rows_done == 0 and list(tmp_path.iterdir()) == []
+@pytest.mark.parametrize("row", [0, 8])
+def test_ctrl_c_leaves_a_readable_table_of_the_rows_before(row: int, tmp_path) -> None:
+    (tmp_path / "s.yaml").write_text(yaml.safe_dump(POKES, sort_keys=False))
+    command = [sys.executable, "-c", INTERRUPTED, "sweep", "s.yaml", str(row)]
+    ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, env=with_this_package())
+    assert ran.returncode == 130
+    if row == 0:
+        assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
         return
-    rows = content(file)["row"]
-    assert rows == list(range(stopped.value.rows_done)) and 0 < len(rows) < own.rows
+    assert f"{row} of 24 rows are in s.parquet" in ran.stderr
+    assert content(tmp_path / "s.parquet")["row"] == list(range(row))
 
 
 @pytest.mark.parametrize("spec", [POKES, PULLED], ids=["pokes", "string"])
