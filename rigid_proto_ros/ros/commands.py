@@ -20,6 +20,7 @@ from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
 from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.qos import qos_policy_name_from_kind
 from rclpy.serialization import deserialize_message
 from rclpy.waitable import Waitable
 from std_msgs.msg import Float64MultiArray, String
@@ -75,13 +76,16 @@ class CommandQueue:
         self.topic = topic
         self.queue_full = 0
         self.messages_lost = 0
+        self._logger = node.get_logger()
         self._subscription = node.create_subscription(
             TOPICS[topic],
             f"~/{topic}",
             _never_called,
             qos.own(qos.COMMAND),
             callback_group=group,
-            event_callbacks=SubscriptionEventCallbacks(message_lost=self._on_lost),
+            event_callbacks=SubscriptionEventCallbacks(
+                message_lost=self._on_lost, incompatible_qos=self._on_incompatible
+            ),
             raw=True,
             qos_overriding_options=qos.OVERRIDABLE,
         )
@@ -102,6 +106,13 @@ class CommandQueue:
 
     def _on_lost(self, status: Any) -> None:
         self.messages_lost = status.total_count
+
+    def _on_incompatible(self, status: Any) -> None:
+        policy = qos_policy_name_from_kind(status.last_policy_kind)
+        self._logger.warning(
+            f"a publisher on {self._subscription.topic_name} offers incompatible QoS (last policy: {policy}): "
+            "none of its messages will be received; commands have to be reliable"
+        )
 
 
 class CommandSubscriber:

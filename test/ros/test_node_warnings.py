@@ -18,7 +18,7 @@ from rigid_proto_ros.ros.diagnostics import REPORT_S, WARNING_S
 def test_a_publisher_with_incompatible_qos_on_a_command_topic_is_warned_of(rig):
     rig.do("advertise", topic=rig.name("string/target"), type="PointStamped", wait=False, best_effort=True)
     try:
-        said = "/rigid_body/string/target', offering incompatible QoS"
+        said = "a publisher on /rigid_body/string/target offers incompatible QoS (last policy: RELIABILITY)"
         rig.until(lambda: said in rig.node_process.log.read_text(), "a warning")
     finally:
         rig.advertise("string/target")

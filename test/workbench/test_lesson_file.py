@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import io
 import re
+import sys
 import time
 
 import numpy as np
@@ -38,7 +39,9 @@ def test_the_file_holds_the_lessons_words_and_refers_to_nothing_outside_it(tmp_p
     ],
 )
 def test_what_makes_no_file_is_refused_in_one_line(arguments, words, tmp_path, capsys) -> None:
-    assert main(["lesson", *(word.replace("{tmp}", str(tmp_path)) for word in arguments)]) == 2
+    with pytest.raises(SystemExit) as end:  # as argparse ends what it refuses itself
+        sys.exit(main(["lesson", *(word.replace("{tmp}", str(tmp_path)) for word in arguments)]))
+    assert end.value.code == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and all(word in said for word in words)
     assert not list(tmp_path.iterdir())
