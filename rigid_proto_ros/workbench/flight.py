@@ -287,16 +287,18 @@ class Flight:
         if past is None or moment_ns is None:
             return
 
-        def branch() -> bool:
+        def prepare() -> tuple[Scenario, str]:
             values: dict[str, object] = {}
             branch = branch_at(past, moment_ns)
             values.update(read_scene_text(branch.scene).values)
             values.update(self._kept)
-            self._begin(make_scenario(values), json.dumps(branch.entries) if branch.entries else "", False)
-            return True
+            return make_scenario(values), json.dumps(branch.entries) if branch.entries else ""
 
-        if await self._ask("going back", branch):
+        found = await self._ask("going back", prepare)
+        if found is not None:
+            # Before it begins: what is told while the past is looked at isn't heard.
             self._past = self.moment_ns = None
+            await self._ask("going back", functools.partial(self._begin, *found, False))
 
 
 def _is_of_the_node(name: str) -> bool:

@@ -65,6 +65,7 @@ color-body); margin-top: 0.4em; }} .{ANSWERS} {{ display: none; }}
 @media {MEDIUM} {{
   {_DOCKED_ROW} {{ width: 100% !important; }}
   [role="tab"] {{ padding: 0 0.4em !important; }}
+  .{MARK} {{ padding: 0 0.1em; }}
 }}
 @media {MEDIUM} and (orientation: landscape) {{
   {_DOCK} {{ width: {100 - BESIDE_SHARE}% !important; }}
