@@ -16,14 +16,14 @@ from .from_mesh import MeshBody
 from .model_difference import ModelDifference, model_difference
 from .moments import referenced_vertices
 from .properties import MassProperties, scale_vector
-from .tensor import degenerate_pairs, equimomental_shapes, principal_axes
+from .tensor import principal_axes
 from .verdict import WARNING, Finding, stated_unit, unit_suspicion
 
 MODELS = tuple(model for model in INERTIA_MODELS if model != "explicit")
 JSON_KEYS = (
     *("mesh", "vertices", "triangles", "watertight", "winding_consistent", "components", "volume", "area", "mass"),
-    *("density", "center_of_mass", "inertia", "principal_moments", "principal_axes", "principal_degenerate"),
-    *("equimomental_box", "equimomental_ellipsoid", "bounding_box", "models", "verdict"),
+    *("density", "center_of_mass", "inertia", "principal_moments", "principal_axes", "bounding_box", "models"),
+    "verdict",
 )
 
 
@@ -108,7 +108,6 @@ def as_json(inspection: Inspection) -> dict:
         return {**dict.fromkeys(JSON_KEYS), "verdict": verdict}
     body, chosen = inspection.body, inspection.chosen
     moments, axes = principal_axes(chosen.inertia)
-    box, ellipsoid = equimomental_shapes(chosen.mass, moments)
     return {
         "mesh": body.mesh.path,
         "vertices": len(body.mesh.vertices),
@@ -124,9 +123,6 @@ def as_json(inspection: Inspection) -> dict:
         "inertia": chosen.inertia.tolist(),
         "principal_moments": moments.tolist(),
         "principal_axes": axes.tolist(),
-        "principal_degenerate": list(degenerate_pairs(moments)),
-        "equimomental_box": box.tolist(),
-        "equimomental_ellipsoid": ellipsoid.tolist(),
         "bounding_box": {"min": inspection.lower.tolist(), "max": inspection.upper.tolist()},
         "models": {
             name: None

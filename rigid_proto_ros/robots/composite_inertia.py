@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A robot whose joints are held, as one rigid body: mass properties from its inertials, and one mesh of its links."""
+"""A robot with its joints at 0 as one rigid body: mass properties from its inertials, and one mesh of its links."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from ..base.errors import InputError
 from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor
 from ..mesh.locate import Search
-from ..mesh.reading import MAX_TRIANGLES, load_mesh
+from ..mesh.reading import load_mesh
 from .link_shapes import Meshes, primitive_surface
 from .model import COLLISION, HERE, VISUAL, Link, Pose, Shape, valid_numbers
 from .reading import read_robot
@@ -23,8 +22,7 @@ from .reading import read_robot
 @dataclass(frozen=True)
 class Lump:
     """``properties``: of all links together. vertices (n, 3), triangles (m, 3): their shapes. links: names and masses
-    of those that count. massless: names of links without an inertial; absent: why a shape isn't in the mesh;
-    doubts: links whose tensor no body has."""
+    of those that count. massless: names of links without an inertial; absent: why a shape isn't in the mesh."""
 
     properties: MassProperties
     vertices: np.ndarray
@@ -32,21 +30,19 @@ class Lump:
     links: tuple[tuple[str, float], ...]
     massless: tuple[str, ...]
     absent: tuple[str, ...]
-    doubts: tuple[str, ...]
 
 
 @np.errstate(all="ignore")  # of numbers near the largest, which are refused
-def lump_robot(path: Path, joints: Mapping[str, float], folders: tuple[Path, ...] = ()) -> Lump:
-    """The robot at joint values [rad or m] by name, the others at 0, in the frame of its root link (URDF), of the model
-    (SDF) or of the world (MJCF).
+def lump_robot(path: Path, folders: tuple[Path, ...] = ()) -> Lump:
+    """The robot with all joints at 0, in the frame of its root link (URDF), of the model (SDF) or of the world (MJCF).
 
-    Raises InputError for a file without inertials, for joints that it doesn't have, and for links that make no tree.
+    Raises InputError for a file without inertials, and for links that make no tree.
     """
     robot = read_robot(path)
     search = Search(path.parent, folders)
     links = robot.simulated() if robot.simulated else [_computed(link, Meshes(search)) for link in robot.links]
     with valid_numbers(path.name):  # of the joints, which are read now
-        poses = robot.poses(joints)
+        poses = robot.poses()
     lost = next((link.name for link in links if link.name not in poses), None)
     if lost is not None:
         raise InputError("lump", f"link {lost!r} is connected to no other; accepted: one tree of links")
@@ -61,7 +57,6 @@ def lump_robot(path: Path, joints: Mapping[str, float], folders: tuple[Path, ...
         tuple((link.name, link.mass) for link, _ in heavy),
         tuple(link.name for link in links if link.problem),
         absent,
-        tuple(filter(None, (_doubt(link) for link, _ in heavy))),
     )
 
 
@@ -81,16 +76,6 @@ def _computed(link: Link, meshes: Meshes) -> Link:
     mass = link.mass if link.mass > 0.0 else whole.mass
     inertia = whole.inertia * (mass / whole.mass)
     return replace(link, mass=mass, center_of_mass=whole.center_of_mass, inertia=inertia, problem="")
-
-
-def _doubt(link: Link) -> str:
-    """What is wrong with a link's own tensor; that of a point mass is 0."""
-    try:
-        if np.any(link.inertia):
-            check_tensor(link.inertia, source=f"link {link.name}")
-    except InputError as error:
-        return str(error)
-    return ""
 
 
 def together(links: list[tuple[Link, Pose]], whole: str) -> MassProperties:
@@ -116,38 +101,35 @@ def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[np.ndarray,
     """Vertices, triangles, and what is missing, of what the links show; of those that show nothing what they collide
     with.
     """
-    parts: list[tuple[np.ndarray, np.ndarray]] = []
-    absent = []
+    vertices, triangles, count, absent = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0, []
     for link, pose in links:
         shown = [shape for shape in link.shapes if shape.role == VISUAL]
-        for shape in shown or [shape for shape in link.shapes if shape.role == COLLISION]:
+        for shape in shown or link.shapes:
             try:
-                vertices, triangles = _surface(shape, search)
+                points, corners = _surface(shape, search)
             except InputError as error:
                 absent.append(f"{link.name}: {error}")
                 continue
             whole = pose @ Pose(shape.rotation, shape.position)
-            parts.append((vertices @ whole.rotation.T + whole.position, triangles))
-    if not parts:
-        return np.zeros((0, 3)), np.zeros((0, 3), np.int64), tuple(absent)
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
-    triangles = [part + start for (_, part), start in zip(parts, starts[:-1], strict=True)]
-    return np.concatenate([vertices for vertices, _ in parts]), np.concatenate(triangles), tuple(absent)
+            vertices.append(points @ whole.rotation.T + whole.position)
+            triangles.append(corners + count)
+            count += len(points)
+    return np.concatenate(vertices), np.concatenate(triangles), tuple(absent)
 
 
 def _surface(shape: Shape, search: Search) -> tuple[np.ndarray, np.ndarray]:
     """Vertices and triangles of a shape in its own frame; raises InputError for one that can't be had."""
     if shape.problem:
         raise InputError(shape.file or shape.kind, shape.problem)
-    if shape.kind == "mesh":
-        mesh = load_mesh(shape.file, max_triangles=MAX_TRIANGLES, search=search)
-        used, local = np.unique(mesh.triangles, return_inverse=True)
-        vertices = mesh.vertices[used] * shape.scale
-        if not np.isfinite(vertices).all():
-            raise InputError(shape.file, "vertices that are not finite")
-        triangles = local.reshape(-1, 3)
-        return vertices, triangles[:, ::-1] if np.prod(shape.scale) < 0.0 else triangles
-    return primitive_surface(shape.kind, shape.size)
+    if shape.kind != "mesh":
+        return primitive_surface(shape.kind, shape.size)
+    mesh = load_mesh(shape.file, search=search)
+    used, local = np.unique(mesh.triangles, return_inverse=True)
+    vertices = mesh.vertices[used] * shape.scale
+    if not np.isfinite(vertices).all():
+        raise InputError(shape.file, "vertices that are not finite")
+    triangles = local.reshape(-1, 3)
+    return vertices, triangles[:, ::-1] if np.prod(shape.scale) < 0.0 else triangles
 
 
 def obj_text(vertices: np.ndarray, triangles: np.ndarray) -> str:

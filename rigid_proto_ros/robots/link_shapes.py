@@ -7,7 +7,6 @@ import functools
 import math
 from collections.abc import Iterable
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from ..mass.properties import MassProperties
 from ..mass.tensor import tensor_from_six
 from ..mesh.hull import box_surface, convex_hull
 from ..mesh.locate import Search
-from ..mesh.reading import MAX_TRIANGLES, load_mesh
+from ..mesh.reading import load_mesh
 from .model import Shape
 
 SEGMENTS = 48
@@ -85,17 +84,15 @@ def _revolved(radius: np.ndarray, height: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 class Meshes:
-    """The meshes that a robot's shapes name, each loaded once; ``treatment``: arguments of mesh_body."""
+    """The meshes that a robot's shapes name, each loaded once; accept_open as in ``mesh_body``."""
 
-    def __init__(self, search: Search, max_triangles: int = MAX_TRIANGLES, **treatment: Any) -> None:
+    def __init__(self, search: Search, accept_open: float = 0.0) -> None:
         self.search = search
-        self.max_triangles = max_triangles
-        self.treatment = treatment
+        self.accept_open = accept_open
         self.body = functools.cache(self._body)
 
     def _body(self, file: str) -> MeshBody:
-        mesh = load_mesh(file, max_triangles=self.max_triangles, search=self.search)
-        return mesh_body(mesh, **self.treatment)
+        return mesh_body(load_mesh(file, search=self.search), accept_open=self.accept_open)
 
     def parts(self, shapes: Iterable[Shape]) -> LinkShapes:
         """The shapes with their meshes; raises InputError for one that can't be taken."""
@@ -103,11 +100,9 @@ class Meshes:
         for shape in shapes:
             if shape.problem:
                 raise InputError(shape.file or shape.kind, shape.problem)
-            if shape.kind == "mesh":
-                found.append((shape, self.body(shape.file)))
-            else:
+            if shape.kind != "mesh":
                 primitive_solid(shape.kind, shape.size)
-                found.append((shape, None))
+            found.append((shape, self.body(shape.file) if shape.kind == "mesh" else None))
         return LinkShapes(found)
 
 
@@ -135,23 +130,16 @@ class LinkShapes:
             found.append(own @ shape.rotation.T + shape.position)
         return np.concatenate(found)
 
-    @cached_property
-    def _box(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper corner (3,) of the box, in the first shape's axes, around all."""
-        local = self.points @ self.first.rotation
-        return local.min(axis=0), local.max(axis=0)
-
     @property
     def diagonal(self) -> float:
-        """Diagonal of the box, in the first shape's axes, around all."""
-        lower, upper = self._box
-        return float(np.linalg.norm(upper - lower))
+        """Diagonal of the box, in the link's axes, around all."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     @property
     def middle(self) -> np.ndarray:
-        """Centre (3,) of that box, in the link's frame."""
-        lower, upper = self._box
-        return self.first.rotation @ (0.5 * (lower + upper))
+        """Centre (3,) of the box, in the first shape's axes, around all."""
+        local = self.points @ self.first.rotation
+        return self.first.rotation @ (0.5 * (local.min(axis=0) + local.max(axis=0)))
 
     def volume(self) -> float:
         """Volume [m³], what overlaps counted twice; raises InputError for a mesh that bounds none."""
@@ -204,9 +192,8 @@ class LinkShapes:
             moment += own
         return mass / measure * (np.trace(moment) * np.eye(3) - moment)
 
-    @cached_property
-    def hull(self) -> MassProperties | None:
-        """The convex hull of a single mesh as a solid of 1 kg; None when it has no volume."""
+    def hull(self, mass: float) -> MassProperties | None:
+        """The convex hull of a single mesh as a solid of ``mass`` kg; None when it has no volume."""
         if len(self.parts) > 1 or self.parts[0][1] is None:
             return None
         try:
@@ -214,4 +201,4 @@ class LinkShapes:
         except InputError:
             return None
         second = tensor_from_six((hull.second / hull.measure).tolist())
-        return MassProperties(1.0, hull.centroid, np.trace(second) * np.eye(3) - second)
+        return MassProperties(mass, hull.centroid, mass * (np.trace(second) * np.eye(3) - second))

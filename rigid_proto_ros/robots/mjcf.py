@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import contextlib
 import warnings
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -20,13 +20,9 @@ from ..base.errors import InputError, is_missing
 from ..base.files import read_bounded
 from .model import (
     COLLISION,
+    HERE,
     MAX_BYTES,
-    OTHER,
-    SLIDES,
-    TURNS,
     VISUAL,
-    Connection,
-    Joint,
     Link,
     Pose,
     Robot,
@@ -38,29 +34,24 @@ from .model import (
 )
 
 MAX_INCLUDES = 200
+"""Of one model, the includes of included files counted."""
 
 
-def _with_includes(parent: Element, path: Path, above: tuple[Path, ...]) -> int:
-    """Put the content of included files, named from the main file's folder, in the place of each <include>, and count
-    them; ``above``: the files that are being read.
+def _include(parent: Element, path: Path, left: Iterator[int]) -> None:
+    """Put the content of included files, named from the main file's folder, in the place of each <include>: MuJoCo
+    itself takes no file twice. ``left``: how many more may follow.
     """
-    count = 0
     for child in list(parent):
         if child.tag != "include":
-            count += _with_includes(child, path, above)
+            _include(child, path, left)
             continue
-        file = (path.parent / child.get("file", "")).resolve()
-        if file in above or len(above) > MAX_INCLUDES:
-            raise InputError(
-                "robot file", f"<include file={child.get('file')!r}>", "files that don't include themselves"
-            )
+        if next(left, None) is None:
+            raise InputError("robot file", f"{path.name} includes more files", f"at most {MAX_INCLUDES}")
+        file = path.parent / child.get("file", "")
         content = parse_xml(read_bounded(file, MAX_BYTES, "robot file", "an MJCF file to include"), file)
-        count += 1 + _with_includes(content, path, (*above, file))
+        _include(content, path, left)
         place = list(parent).index(child)
         parent[place : place + 1] = list(content)
-    if count > MAX_INCLUDES:
-        raise InputError("robot file", f"{path.name} includes {count} files", f"at most {MAX_INCLUDES}")
-    return count
 
 
 class _Source:
@@ -71,36 +62,22 @@ class _Source:
             import mujoco
         except ImportError:
             raise InputError("robot file", f"MJCF: {is_missing('mujoco', 'robots')}") from None
-        self.mujoco: ModuleType = mujoco
+        self.mujoco: Any = mujoco
         self.text = ElementTree.tostring(root, encoding="unicode")
         self.path = path
 
     def parsed(self) -> Any:
         """A new MjSpec: what the file says, default classes applied, models attached, nothing computed."""
-        try:
-            with contextlib.chdir(self.path.parent):
-                spec = self.mujoco.MjSpec.from_string(self.text)
-        except ValueError as error:
-            raise self._refusal("reads", error) from None
+        with self._refusing("reads"):
+            spec = self.mujoco.MjSpec.from_string(self.text)
         spec.compiler.fusestatic = spec.compiler.discardvisual = False  # which would drop bodies and geoms
-        unneeded = ("keys", "sensors", "actuators", "equalities", "tendons", "pairs", "excludes", "skins", "tuples")
-        for kind in unneeded:
-            for element in list(getattr(spec, kind)):
-                spec.delete(element)
+        self._delete(spec, "keys sensors actuators equalities tendons pairs excludes skins tuples")
         return spec
 
-    def compiled(self, spec: Any) -> Any:
-        """The MjModel of a spec."""
-        try:
-            with contextlib.chdir(self.path.parent), warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of attributes that will be dropped some day
-                return spec.compile()
-        except ValueError as error:
-            raise self._refusal("compiles", error) from None
-
-    def _refusal(self, verb: str, error: ValueError) -> InputError:
-        reason = " ".join(str(error).replace("XML Error:", "").replace("Error:", "").split())
-        return InputError("robot file", self.path.name, f"what MuJoCo {verb} ({reason})")
+    def _delete(self, spec: Any, kinds: str) -> None:
+        for kind in kinds.split():
+            for element in list(getattr(spec, kind)):
+                spec.delete(element)
 
     def without_files(self) -> Any:
         """A new spec whose meshes, height fields and textures are gone: small spheres stand where they were."""
@@ -112,10 +89,23 @@ class _Source:
             geom.meshname = geom.hfieldname = geom.material = ""
         for site in spec.sites:
             site.material = ""
-        for kind in ("meshes", "hfields", "materials", "textures"):
-            for element in list(getattr(spec, kind)):
-                spec.delete(element)
+        self._delete(spec, "meshes hfields materials textures")
         return spec
+
+    def compiled(self, spec: Any) -> Any:
+        """The MjModel of a spec."""
+        with self._refusing("compiles"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of attributes that will be dropped some day
+            return spec.compile()
+
+    @contextlib.contextmanager
+    def _refusing(self, verb: str) -> Iterator[None]:
+        try:
+            with contextlib.chdir(self.path.parent):
+                yield
+        except ValueError as error:
+            reason = " ".join(str(error).replace("XML Error:", "").replace("Error:", "").split())
+            raise InputError("robot file", self.path.name, f"what MuJoCo {verb} ({reason})") from None
 
 
 def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int) -> Shape | None:
@@ -126,9 +116,11 @@ def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int)
     role = COLLISION if raw.contype or raw.conaffinity else VISUAL
     shape = Shape(role, kind, rotation_from_wxyz(model.geom_quat[number]), model.geom_pos[number].copy())
     if kind == "mesh":
-        return _mesh(shape, raw.meshname, meshes, spec.strippath)
-    if raw.meshname:
-        return replace(shape, problem=f"a {kind} fitted to a mesh")
+        mesh = meshes.get(raw.meshname)
+        if mesh is None or not mesh.file or np.any(mesh.refpos) or mesh.refquat.tolist() != [1.0, 0.0, 0.0, 0.0]:
+            return replace(shape, file=raw.meshname, problem="a mesh without a file, or with refpos or refquat")
+        file = Path(mesh.file).name if spec.strippath else mesh.file
+        return replace(shape, file=str(Path(mesh.compiler.meshdir or "") / file), scale=mesh.scale.copy())
     a, b, c = (2.0 * model.geom_size[number]).tolist()
     sizes = {
         "box": (a, b, c),
@@ -137,21 +129,9 @@ def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int)
         "sphere": (0.5 * a,),
         "ellipsoid": (0.5 * a, 0.5 * b, 0.5 * c),
     }
-    if kind not in sizes:
-        return replace(shape, problem=f"a geom of type {kind}, which isn't known here")
+    if raw.meshname or kind not in sizes:
+        return replace(shape, problem=f"a {kind} fitted to a mesh" if raw.meshname else f"a geom of type {kind}")
     return replace(shape, size=sizes[kind])
-
-
-def _mesh(shape: Shape, name: str, meshes: dict[str, Any], strip: bool) -> Shape:
-    if name not in meshes:
-        return replace(shape, file=name, problem=f"mesh {name!r}, which no <asset> declares")
-    mesh = meshes[name]
-    if not mesh.file:
-        return replace(shape, file=name, problem="a mesh that is written out in the file itself")
-    if np.any(mesh.refpos) or mesh.refquat.tolist() != [1.0, 0.0, 0.0, 0.0]:
-        return replace(shape, file=mesh.file, problem="a mesh with refpos or refquat")
-    file = Path(mesh.file).name if strip else mesh.file
-    return replace(shape, file=str(Path(mesh.compiler.meshdir or "") / file), scale=mesh.scale.copy())
 
 
 def _link(spec: Any, body: Any, name: str, shapes: list[Shape | None], inertial: Element | None) -> Link:
@@ -173,21 +153,13 @@ def _link(spec: Any, body: Any, name: str, shapes: list[Shape | None], inertial:
     return printed_link(bare, repr(body.mass), center, [repr(v) for v in six], rotation_from_wxyz(quaternion), inertial)
 
 
-def _connections(source: _Source, model: Any, names: list[str]) -> list[Connection]:
-    """The bodies in their parents, with their joints."""
-    kinds = {int(source.mujoco.mjtJoint.mjJNT_HINGE): TURNS, int(source.mujoco.mjtJoint.mjJNT_SLIDE): SLIDES}
-    found = []
+def _poses(model: Any, names: list[str]) -> dict[str, Pose]:
+    """Poses of the bodies in the world, as the file has them."""
+    poses = [HERE]
     for body in range(1, model.nbody):
-        path: list[Pose | Joint] = [Pose(rotation_from_wxyz(model.body_quat[body]), model.body_pos[body])]
-        for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
-            anchor = Pose(np.eye(3), model.jnt_pos[joint])
-            kind = kinds.get(int(model.jnt_type[joint]), OTHER)
-            zero = float(model.qpos0[model.jnt_qposadr[joint]]) if kind != OTHER else 0.0
-            name = model.joint(joint).name or f"joint {joint}"
-            path += [anchor, Joint(name, kind, model.jnt_axis[joint], zero), anchor.inverse()]
-        parent = int(model.body_parentid[body])
-        found.append(Connection(names[parent] if parent else None, names[body], tuple(path)))
-    return found
+        own = Pose(rotation_from_wxyz(model.body_quat[body]), model.body_pos[body])
+        poses.append(poses[model.body_parentid[body]] @ own)
+    return dict(zip(names, poses, strict=True))
 
 
 def _simulated(source: _Source, links: list[Link], names: list[str]) -> list[Link]:
@@ -201,20 +173,21 @@ def _simulated(source: _Source, links: list[Link], names: list[str]) -> list[Lin
     found = []
     for body, name in list(enumerate(names))[1:]:
         rotation = rotation_from_wxyz(model.body_iquat[body])
-        inertia = rotation @ np.diag(model.body_inertia[body]) @ rotation.T
-        link = known.get(name) or bare_link(name, (), None)
-        problem = "" if model.body_mass[body] > 0.0 else "no mass"
-        center = model.body_ipos[body].copy()
-        found.append(
-            replace(link, mass=float(model.body_mass[body]), center_of_mass=center, inertia=inertia, problem=problem)
+        link = replace(
+            known.get(name) or bare_link(name, (), None),
+            mass=float(model.body_mass[body]),
+            center_of_mass=model.body_ipos[body].copy(),
+            inertia=rotation @ np.diag(model.body_inertia[body]) @ rotation.T,
+            problem="" if model.body_mass[body] > 0.0 else "no mass",
         )
+        found.append(link)
     return found
 
 
 def read_mjcf(root: Element, path: Path) -> Robot:
     """The bodies of a <mujoco>; raises InputError for what MuJoCo refuses, and without it."""
     inertials = {body.get("name", ""): body.find("inertial") for body in root.iter("body")}
-    _with_includes(root, path, (path.resolve(),))
+    _include(root, path, iter(range(MAX_INCLUDES)))
     source = _Source(root, path)
     spec, frames = source.parsed(), source.without_files()
     for body in frames.bodies[1:]:  # what the file says of inertials may be what MuJoCo refuses
@@ -231,9 +204,4 @@ def read_mjcf(root: Element, path: Path) -> Robot:
         link = _link(spec, raw, names[placed.id], shapes[placed.id], inertials.get(raw.name) if raw.name else None)
         if link.shapes or not link.problem:
             links.append(link)
-    return Robot(
-        links,
-        names[1:],
-        lambda: _connections(source, model, names),
-        lambda: _simulated(source, links, names),
-    )
+    return Robot(links, lambda: _poses(model, names), lambda: _simulated(source, links, names))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A robot as its file has it, in whichever format: links with inertials and shapes, and the joints that place them."""
+"""A robot as its file has it, in whichever format: links with inertials and shapes, and where they are."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,12 +15,11 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import InputError, one_of
+from ..base.errors import InputError
 from ..base.rotation import matrix_from_quaternion
 from ..mass.tensor import tensor_from_six
 
 VISUAL, COLLISION = "visual", "collision"
-TURNS, SLIDES, FIXED, OTHER = "turns", "slides", "fixed", "other"
 WATER = 1000.0
 """kg/m³ of a shape of which nothing else is said."""
 MAX_BYTES = 50_000_000
@@ -36,10 +35,6 @@ class Pose:
 
     def __matmul__(self, inner: Pose) -> Pose:
         return Pose(self.rotation @ inner.rotation, self.rotation @ inner.position + self.position)
-
-    def inverse(self) -> Pose:
-        """The other frame's pose in this one."""
-        return Pose(self.rotation.T, -(self.rotation.T @ self.position))
 
 
 HERE = Pose(np.eye(3), np.zeros(3))
@@ -86,103 +81,15 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Joint:
-    """A motion along or about ``axis`` (3,) in its own frame, by the joint's value [rad or m] less ``zero``. ``mimic``:
-    the joint that it follows, with factor and offset."""
-
-    name: str
-    kind: str
-    axis: np.ndarray
-    zero: float = 0.0
-    mimic: tuple[str, float, float] | None = None
-
-    def moved(self, value: float) -> Pose:
-        """The pose that ``value`` gives."""
-        if value == self.zero:
-            return HERE
-        size = float(np.linalg.norm(self.axis))
-        if not size > 0.0:
-            raise InputError("joint", self.axis.tolist(), "an axis that isn't zero")
-        if self.kind == SLIDES:
-            return Pose(np.eye(3), self.axis / size * (value - self.zero))
-        half = 0.5 * (value - self.zero)
-        return Pose(rotation_from_wxyz([math.cos(half), *(math.sin(half) * self.axis / size)]), np.zeros(3))
-
-
-@dataclass(frozen=True)
-class Connection:
-    """What holds a link to its parent (None: to the frame of the file): poses and joints, from the parent on."""
-
-    parent: str | None
-    child: str
-    path: tuple[Pose | Joint, ...]
-
-
-@dataclass(frozen=True)
 class Robot:
-    """``links``: those with an inertial or a shape, in the file's order. ``names``: of all links. ``connections``
-    raises InputError for joints that can't be read. ``simulated``: the links with the inertials that the format's own
-    simulator takes, where these aren't the file's."""
+    """``links``: those with an inertial or a shape, in the file's order. ``poses`` gives the pose of each link by name
+    with all joints at 0, in the frame of the root link (URDF), of the model (SDF) or of the world (MJCF), and raises
+    InputError for links that make no tree. ``simulated``: the links with the inertials that the format's own simulator
+    takes, where these aren't the file's."""
 
     links: list[Link]
-    names: list[str]
-    connections: Callable[[], Iterable[Connection]]
+    poses: Callable[[], dict[str, Pose]]
     simulated: Callable[[], list[Link]] | None = None
-
-    def poses(self, values: Mapping[str, float]) -> dict[str, Pose]:
-        """Poses of the links by name, in the frame of the root link (URDF), of the model (SDF) or of the world (MJCF),
-        at joint ``values`` [rad or m].
-
-        Raises InputError for joints that aren't there or have no one value, and for links that make no tree.
-        """
-        connections = list(self.connections())
-        below: dict[str | None, list[Connection]] = {}
-        children: set[str] = set()
-        for connection in connections:
-            if connection.child in children:
-                accepted = "joints that make a tree"
-                raise InputError("lump", f"link {connection.child!r} is the child of two joints; accepted: {accepted}")
-            children.add(connection.child)
-            below.setdefault(connection.parent, []).append(connection)
-        roots = [name for name in self.names if name not in children]
-        if not (None in below and not roots) and len(roots) != 1:
-            raise InputError("lump", f"{len(roots)} root links ({', '.join(roots[:4])}); accepted: one tree of links")
-        value = _values(connections, values)
-        poses: dict[str, Pose] = dict.fromkeys(roots, HERE)
-        waiting: list[str | None] = [None, *roots]
-        while waiting:
-            parent = waiting.pop()
-            for connection in below.get(parent, ()):
-                pose = HERE if parent is None else poses[parent]
-                for step in connection.path:
-                    pose = pose @ (step.moved(value(step)) if isinstance(step, Joint) else step)
-                poses[connection.child] = pose
-                waiting.append(connection.child)
-        return poses
-
-
-def _values(connections: list[Connection], given: Mapping[str, float]) -> Callable[[Joint], float]:
-    """The value of each joint; raises InputError for given ones of joints that aren't there, or have no one value."""
-    joints = {step.name: step for connection in connections for step in connection.path if isinstance(step, Joint)}
-    movable = [name for name, joint in joints.items() if joint.kind in (TURNS, SLIDES)]
-    for name in given:
-        if name not in joints:
-            raise InputError("joint", name, one_of(name, movable) if movable else "a robot with joints")
-        if name not in movable:
-            reason = "is fixed" if joints[name].kind == FIXED else "has more than one axis"
-            raise InputError("joint", f"{name} {reason}; {one_of('', movable) or 'no joint moves'}")
-
-    def value(joint: Joint, depth: int = 0) -> float:
-        if joint.name in given:
-            return given[joint.name]
-        if joint.mimic is None or joint.mimic[0] not in joints:
-            return joint.zero
-        if depth > len(joints):
-            raise InputError("lump", f"joint {joint.name!r} mimics itself")
-        followed, factor, offset = joint.mimic
-        return factor * value(joints[followed], depth + 1) + offset
-
-    return value
 
 
 def parse_xml(data: bytes, path: Path) -> Element:

@@ -28,18 +28,18 @@ REFINED = (0.1, 0.03, 0.01, 0.003, 0.001)
 """Turns [rad] by which the worst axis is then looked for nearby."""
 
 
-def impossible_inertial(link: Link) -> tuple[str, ...]:
-    """Why no body has the link's inertial; empty when one has."""
+def impossible_inertial(link: Link) -> str:
+    """Why no body has the link's inertial; "" when one has."""
     remedy = "" if np.any(link.inertia) else "; a link that only marks a frame needs no inertial"
     if not 0.0 < link.mass < math.inf:
-        return (f"mass {link.mass:g}, which isn't a positive number{remedy}",)
+        return f"mass {link.mass:g}, which isn't a positive number{remedy}"
     if not np.all(np.isfinite(link.center_of_mass)):
-        return ("a COM that isn't finite",)
+        return "a COM that isn't finite"
     try:
         check_tensor(link.inertia)
     except InputError as error:
-        return (f"no rigid body has this tensor: {error}{remedy}",)
-    return ()
+        return f"no rigid body has this tensor: {error}{remedy}"
+    return ""
 
 
 def beyond_shapes(link: Link, points: np.ndarray) -> str:

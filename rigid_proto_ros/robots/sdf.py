@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""SDF: links with visuals, collisions and inertials, their frames, and the joints between them."""
+"""SDF: links with visuals, collisions and inertials, and their frames."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from xml.etree.ElementTree import Element
 
@@ -13,11 +12,8 @@ from ..base.errors import InputError
 from .model import (
     COLLISION,
     HERE,
-    OTHER,
     VISUAL,
     WATER,
-    Connection,
-    Joint,
     Link,
     Pose,
     Robot,
@@ -27,7 +23,7 @@ from .model import (
     printed_link,
     rotation_from_rpy,
 )
-from .urdf import KINDS, SIX, SIZES, end_of, sized
+from .urdf import SIX, SIZES, sized
 
 
 def _pose(element: Element) -> Pose:
@@ -37,10 +33,6 @@ def _pose(element: Element) -> Pose:
     if pose is not None and pose.get("degrees", "false") in ("true", "1"):
         values[3:] = np.radians(values[3:])
     return Pose(rotation_from_rpy(*values[3:]), values[:3])
-
-
-def _is_true(text: str | None) -> bool:
-    return (text or "").strip() in ("true", "1")
 
 
 def _shape(role: str, element: Element, link: str, density: float) -> Shape | None:
@@ -67,7 +59,7 @@ def _link(link: Element) -> Link:
     if inertial is None:
         return bare
     tensor, mass = inertial.find("inertia"), inertial.findtext("mass")
-    if _is_true(inertial.get("auto")):
+    if inertial.get("auto", "false") in ("true", "1"):
         computed = replace(bare, problem="the simulator computes its inertial (auto='true')", computed=True)
         return computed if mass is None else replace(computed, mass=float(mass))
     if tensor is None or mass is None:
@@ -77,72 +69,34 @@ def _link(link: Element) -> Link:
     return printed_link(bare, mass, center, six, _pose(inertial).rotation, inertial)
 
 
-def _frames(model: Element) -> dict[str, Pose]:
-    """Poses of links, joints and frames of a model in its frame while all joints are at 0."""
-    elements = {
-        element.get("name", "?"): element for tag in ("link", "joint", "frame") for element in model.findall(tag)
-    }
-    found = {"": HERE, "__model__": HERE, "world": HERE}
-    open_ones: list[str] = []
-
-    def pose_of(name: str) -> Pose:
-        if name in found:
-            return found[name]
-        if name not in elements or name in open_ones:
-            raise InputError("lump", f"frame {name!r}", "poses relative to links, joints and frames of the model")
-        open_ones.append(name)
-        element = elements[name]
-        pose = element.find("pose")
-        base = "" if pose is None else pose.get("relative_to", "")
-        if not base and element.tag == "joint":
-            base = end_of(element, "child")
-        if not base and element.tag == "frame":
-            base = element.get("attached_to", "")
-        found[name] = pose_of(base) @ _pose(element)
-        open_ones.pop()
-        return found[name]
-
-    for name in elements:
-        pose_of(name)
-    return found
-
-
-def _axis(joint: Element, frame: Pose, zero: dict[str, Pose]) -> np.ndarray:
-    """The joint's axis (3,) in its own frame."""
-    xyz = joint.find("axis/xyz")
-    direction = floats(None if xyz is None else xyz.text, "0 0 1", 3)
-    within = "" if xyz is None else xyz.get("expressed_in", "")
-    if _is_true(joint.findtext("axis/use_parent_model_frame")):
-        within = "__model__"
-    if within and within not in zero:
-        raise InputError("lump", f"frame {within!r}", "axes expressed in links, joints and frames of the model")
-    return frame.rotation.T @ zero[within].rotation @ direction if within else direction
-
-
-def _connections(root: Element) -> Iterator[Connection]:
+def _poses(root: Element) -> dict[str, Pose]:
+    """Poses of the one model's links, joints and frames in its frame."""
     models = list(root.iter("model"))
     if len(models) != 1 or next(root.iter("include"), None) is not None:
         raise InputError("lump", f"{len(models)} models", "an SDF of one model, without <include>")
-    zero = _frames(models[0])
-    joints = models[0].findall("joint")
-    children = {end_of(joint, "child") for joint in joints}
-    for link in models[0].findall("link"):  # each root stands where it was put
-        name = link.get("name", "?")
-        if name not in children:
-            yield Connection(None, name, (zero[name],))
-    for joint in joints:
-        parent, child = end_of(joint, "parent"), end_of(joint, "child")
-        if parent not in zero or child not in zero:
-            raise InputError("lump", f"joint {joint.get('name')!r}", "joints that make trees")
-        frame = zero[joint.get("name", "?")]
-        kind = KINDS.get(joint.get("type", ""), OTHER)
-        moving = Joint(joint.get("name", "?"), kind, _axis(joint, frame, zero))
-        before, after = zero[parent].inverse() @ frame, frame.inverse() @ zero[child]
-        yield Connection(None if parent == "world" else parent, child, (before, moving, after))
+    elements = {
+        element.get("name", "?"): element for tag in ("link", "joint", "frame") for element in models[0].findall(tag)
+    }
+    found = {"": HERE, "__model__": HERE, "world": HERE}
+
+    def pose_of(name: str, below: tuple[str, ...] = ()) -> Pose:
+        if name not in found:
+            if name not in elements or name in below:
+                raise InputError("lump", f"frame {name!r}", "poses relative to links, joints and frames of the model")
+            element = elements[name]
+            pose = element.find("pose")
+            base = "" if pose is None else pose.get("relative_to", "")
+            if element.tag == "joint":
+                base = base or (element.findtext("child") or "").strip()
+            if element.tag == "frame":
+                base = base or element.get("attached_to", "")
+            found[name] = pose_of(base, (*below, name)) @ _pose(element)
+        return found[name]
+
+    return {name: pose_of(name) for name in elements}
 
 
 def read_sdf(root: Element) -> Robot:
-    """The links below an <sdf>, and the joints of its one model; raises ValueError for what are no numbers."""
+    """The links below an <sdf>; raises ValueError for what are no numbers."""
     links = [_link(link) for link in root.iter("link")]
-    names = [link.get("name", "?") for model in root.iter("model") for link in model.findall("link")]
-    return Robot([link for link in links if link.shapes or not link.problem], names, lambda: _connections(root))
+    return Robot([link for link in links if link.shapes or not link.problem], lambda: _poses(root))

@@ -1,34 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""URDF: links with visuals, collisions and inertials, and the joints between them."""
+"""URDF: links with visuals, collisions and inertials, and the joints that place them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from xml.etree.ElementTree import Element
 
 from ..base.errors import InputError
-from .model import (
-    COLLISION,
-    FIXED,
-    OTHER,
-    SLIDES,
-    TURNS,
-    VISUAL,
-    Connection,
-    Joint,
-    Link,
-    Pose,
-    Robot,
-    Shape,
-    bare_link,
-    floats,
-    printed_link,
-    rotation_from_rpy,
-)
+from .model import COLLISION, HERE, VISUAL, Link, Pose, Robot, Shape, bare_link, floats, printed_link, rotation_from_rpy
 
 SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-KINDS = {"revolute": TURNS, "continuous": TURNS, "prismatic": SLIDES, "fixed": FIXED}
 SIZES = {
     "box": [("size", 3)],
     "cylinder": [("radius", 1), ("length", 1)],
@@ -87,37 +69,29 @@ def _link(link: Element) -> Link:
     return printed_link(bare, mass.get("value", ""), center, six, _pose(origin).rotation, inertial)
 
 
-def end_of(joint: Element, tag: str) -> str:
-    """The link that a joint names as parent or child, in an attribute (URDF) or as text (SDF)."""
-    found = joint.find(tag)
-    name = None if found is None else found.get("link") or (found.text or "").strip()
-    if not name:
-        raise InputError("lump", f"joint {joint.get('name')!r} without a {tag}")
-    return name
-
-
-def _mimic(mimic: Element) -> tuple[str, float, float]:
-    """The joint that one follows, with factor and offset."""
-    return mimic.get("joint", ""), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))
-
-
-def _connections(root: Element) -> Iterator[Connection]:
+def _poses(root: Element) -> dict[str, Pose]:
+    """Poses of the links in the frame of the root link."""
+    above: dict[str, tuple[str, Pose]] = {}
     for joint in root.findall("joint"):
-        mimic, axis = joint.find("mimic"), joint.find("axis")
-        moving = Joint(
-            joint.get("name", "?"),
-            KINDS.get(joint.get("type", ""), OTHER),
-            floats(_get(axis, "xyz"), "1 0 0", 3),
-            mimic=None if mimic is None else _mimic(mimic),
-        )
-        yield Connection(end_of(joint, "parent"), end_of(joint, "child"), (_pose(joint.find("origin")), moving))
+        parent, child = (_get(joint.find(tag), "link") for tag in ("parent", "child"))
+        if not parent or not child:
+            raise InputError("lump", f"joint {joint.get('name')!r} without a parent or a child")
+        if child in above:
+            accepted = "joints that make a tree"
+            raise InputError("lump", f"link {child!r} is the child of two joints; accepted: {accepted}")
+        above[child] = parent, _pose(joint.find("origin"))
+    roots = [link.get("name", "?") for link in root.findall("link") if link.get("name", "?") not in above]
+    if len(roots) != 1:
+        raise InputError("lump", f"{len(roots)} root links ({', '.join(roots[:4])}); accepted: one tree of links")
+    poses = {roots[0]: HERE}
+    while placed := [child for child, (parent, _) in above.items() if parent in poses]:
+        for child in placed:
+            parent, pose = above.pop(child)
+            poses[child] = poses[parent] @ pose
+    return poses
 
 
 def read_urdf(root: Element) -> Robot:
     """The robot below a <robot>; raises ValueError for what are no numbers."""
     links = [_link(link) for link in root.iter("link")]
-    return Robot(
-        [link for link in links if link.shapes or not link.problem],
-        [link.get("name", "?") for link in root.findall("link")],
-        lambda: _connections(root),
-    )
+    return Robot([link for link in links if link.shapes or not link.problem], lambda: _poses(root))

@@ -74,13 +74,12 @@ def test_numbers_keep_full_precision(capsys, meshes):
     assert np.array(found["inertia"]) == pytest.approx(np.array(truth["inertia_unit_density_about_com"]), rel=1e-12)
 
 
-def test_scale_mirrors_stretches_and_may_stand_before_the_mesh(capsys):
+def test_scale_mirrors_and_stretches(capsys):
     plain = report(capsys, "hammer")
-    for words in (("hammer", "--scale", "-2", "1", "1e-1"), ("--scale", "-2", "1", "1e-1", "hammer")):
-        scaled = report(capsys, *words)
-        assert scaled["volume"] == pytest.approx(0.2 * plain["volume"], rel=1e-14)
-        assert scaled["center_of_mass"][0] == pytest.approx(-2 * plain["center_of_mass"][0], rel=1e-13)
-        assert scaled["bounding_box"]["max"][0] == pytest.approx(-2 * plain["bounding_box"]["min"][0], rel=1e-14)
+    scaled = report(capsys, "hammer", "--scale", "-2", "1", "1e-1")
+    assert scaled["volume"] == pytest.approx(0.2 * plain["volume"], rel=1e-14)
+    assert scaled["center_of_mass"][0] == pytest.approx(-2 * plain["center_of_mass"][0], rel=1e-13)
+    assert scaled["bounding_box"]["max"][0] == pytest.approx(-2 * plain["bounding_box"]["min"][0], rel=1e-14)
     assert report(capsys, "hammer", "--scale", "0.5")["area"] == pytest.approx(0.25 * plain["area"], rel=1e-14)
     assert report(capsys, "hammer", "--scale", "-.5e0", "1", "1")["volume"] == pytest.approx(0.5 * plain["volume"])
 
@@ -165,16 +164,14 @@ def test_millimetres_are_suspected(capsys, meshes):
         (("book", "--scale", "0"), "1e-9 <= |s|"),
         (("book", "--scale", "1", "2"), "one or three"),
         (("book", "--scale", "nan"), "1e-9 <= |s|"),
-        (("book", "--scale", "two"), "one or three"),
         (("book", "--mass", "-1"), "> 0"),
         (("book", "--mass", "inf"), "> 0"),
         (("book", "--mass", "nan"), "> 0"),
         (("book", "--density", "0"), "> 0"),
         (("book", "--mass", "1", "--density", "2"), "not both"),
         (("book", "--ballast", "-1", "0", "0", "0"), "mass >= 0"),
-        (("book", "--max-triangles", "0"), ">= 1"),
-        (("--lump", "robot.urdf", "--scale", "2"), "the robot's own inertials"),
-        (("--lump", "robot.urdf", "--model", "shell"), "the robot's own inertials"),
+        (("--lump", "robot.urdf", "--scale", "2"), "the robot's file says"),
+        (("--lump", "robot.urdf", "--model", "shell"), "the robot's file says"),
         ((), "--compare"),
     ],
 )
@@ -184,7 +181,7 @@ def test_what_is_refused_says_what_would_be_accepted(capsys, arguments, words):
 
 @pytest.mark.parametrize(
     "arguments",
-    [("book", "--mass", "heavy"), ("book", "--model", "cuboid"), ("book", "--json", "--urdf"), ("book", "--colour"), ("book", "--model", "explicit")],
+    [("book", "--mass", "heavy"), ("book", "--scale", "two"), ("book", "hammer"), ("book", "--model", "cuboid"), ("book", "--json", "--urdf"), ("book", "--colour"), ("book", "--model", "explicit")],
 )  # fmt: skip
 def test_wrong_usage_exits_2_with_one_line(capsys, arguments):
     with pytest.raises(SystemExit) as ended:
@@ -203,7 +200,6 @@ def test_the_printed_report_names_every_model_and_remark(capsys, tmp_path):
         "points",
         "bounding_box",
         "inward",
-        "1 and 2 and 2 and 3 are equal",
         "1000 kg",
         "exact rational",
     ):
@@ -225,21 +221,3 @@ def test_trimesh_and_rerun_are_not_imported_for_an_obj():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-
-
-def test_several_meshes_are_inspected_in_turn_and_the_worst_status_counts(tmp_path, capsys):
-    (tmp_path / "open.obj").write_bytes(obj(faces=CUBE_TRIANGLES[:-1]))
-    broken = str(tmp_path / "open.obj")
-    status, out, err = inspect(capsys, "hammer", "book", "--mass", "1")
-    assert status == 0 and out.count("principal axis 1") == 2 and not err
-    status, out, err = inspect(capsys, "--mass", "1", "--scale", "2", "hammer", broken, "nothing.obj", "book")
-    assert status == 2 and out.count("principal axis 1") == 2 and err.count("\n") == 2
-    status, out, _ = inspect(capsys, "hammer", broken, "nothing.obj", "--mass", "1", "--json")
-    first, second, third = json.loads(out)["meshes"]
-    assert status == 2 and first["mass"] == 1.0
-    assert [one["name"] for one in (first, second, third)] == ["hammer", broken, "nothing.obj"]
-    assert second["mass"] is None and second["verdict"][0]["code"] == "open"
-    assert third["mass"] is None and "nothing.obj" in third["verdict"][0]["message"]
-    status, out, _ = inspect(capsys, "--repair", broken, "hammer", "--json")
-    assert status == 0 and [one["watertight"] for one in json.loads(out)["meshes"]] == [True, True]
-    assert inspect(capsys, "hammer", "book", "--compare", broken)[0] == 2

@@ -12,7 +12,7 @@ from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj, stl
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.robots.diagnosis import WRONG, Options, compare_robot
+from rigid_proto_ros.robots.diagnosis import WRONG, compare_robot
 from rigid_proto_ros.robots.fix import fix_robot
 from rigid_proto_ros.robots.reading import read_robot
 
@@ -47,7 +47,7 @@ URDF = (
 
 def fixed(path: Path, **options):
     """Bytes and the links by name."""
-    data, links = fix_robot(path, Options(**options))
+    data, links = fix_robot(path, **options)
     return data, {link.before.link: link for link in links}
 
 
@@ -67,7 +67,7 @@ def test_only_the_inertials_of_a_urdf_change(parts):
         ("arm", "impossible for its shape", "uniform", True), ("bare", "unknown", "unknown", False),
         ("open", "unknown", "unknown", False), ("one", "impossible", "uniform", True)
     ]  # fmt: skip
-    assert "--mass M" in links["bare"].left and "open surface" in links["open"].left
+    assert "no <inertial>" in links["bare"].left and "open surface" in links["open"].left
     assert b"\t\t<inertial>\r\n\t\t  <origin" in data and b"/>\r\n\t\t</inertial>\r\n\t</link>" in data
     (arm, _, _, one) = read_robot(_written(path, data)).links
     assert arm.mass == 2.5 and arm.center_of_mass == pytest.approx([0.05, 0.0, 0.0], abs=1e-15)
@@ -78,17 +78,6 @@ def test_only_the_inertials_of_a_urdf_change(parts):
 def _written(path: Path, data: bytes) -> Path:
     path.write_bytes(data)
     return path
-
-
-def test_a_density_writes_what_was_missing(parts):
-    path = parts / "robot.urdf"
-    path.write_bytes(URDF.encode())
-    data, links = fixed(path, density=2000.0)
-    by_name = {link.name: link for link in read_robot(_written(path, data)).links}
-    assert by_name["bare"].mass == by_name["one"].mass == pytest.approx(12.0, rel=1e-12)
-    assert by_name["bare"].inertia == pytest.approx(np.diag([0.13, 0.1, 0.05]), rel=1e-12)
-    assert links["bare"].before.status == "unknown" and links["bare"].after.status == "uniform"
-    assert_finds_nothing(path, data, "open")
 
 
 SDF = """<sdf version="1.9"><model name="m"><!-- a --><link name="l">
@@ -150,43 +139,23 @@ def test_an_mjcfs_inertials_are_replaced_and_mujoco_reads_them(parts):
 def test_the_command_writes_tells_and_leaves(parts, capsys):
     path, out = parts / "robot.urdf", parts / "fixed.urdf"
     path.write_bytes(URDF.encode())
-    assert main(["inspect", "--compare", str(path), "--fix", str(out), "--mass", "0.5"]) == 0
+    assert main(["inspect", "--compare", str(path), "--fix", str(out)]) == 0
     told = capsys.readouterr().out
-    assert (
-        "impossible for its shape -> uniform" in told
-        and "left: open" in told
-        and "3 of 4 inertials rewritten, 1 left" in told
-    )
-    assert "- -> 0.5" in told and "2.5 -> 0.5" in told and "nan" not in told
+    assert "arm: impossible for its shape -> uniform" in told and "open: unknown; left: open" in told
+    assert "2 of 4 inertials rewritten, 2 left" in told
     assert path.read_bytes() == URDF.encode()
     assert main(["inspect", "--compare", str(out), "--fix", str(out), "--json"]) == 0
     links = {link["link"]: link for link in json.loads(capsys.readouterr().out)["links"]}
     assert [links[name]["after"]["status"] for name in ("arm", "bare", "open", "one")] == [
-        "uniform", "uniform", "unknown", "uniform"
+        "uniform", "unknown", "unknown", "uniform"
     ]  # fmt: skip
     assert not any(link["written"] for link in links.values())
-
-
-def test_a_check_prints_one_line_a_link_and_fails_beyond_the_tolerance(parts, capsys):
-    path, out = parts / "robot.urdf", parts / "fixed.urdf"
-    path.write_bytes(URDF.encode())
-    check = ["inspect", "--tolerance", "0.01", "--compare"]
-    assert main([*check, str(path)]) == 1
-    assert capsys.readouterr().out.count("\n") == 4
-    assert main(["inspect", "--compare", str(path), "--fix", str(out)]) == 0
-    capsys.readouterr()
-    assert main([*check, str(out)]) == 0
-    told = capsys.readouterr().out
-    assert "arm: uniform: inertia" in told and "bare: unknown: no <inertial>" in told
     # A difference of 0.4 % is beyond 0.1 %, and within 1 %.
     text = out.read_text()
     ixx = re.search(r'ixx="([^"]+)"', text).group(1)
     out.write_text(text.replace(ixx, repr(1.004 * float(ixx))))
-    assert main([*check, str(out)]) == 0
-    assert main(["inspect", "--compare", str(out), "--link", "arm"]) == 0
-    assert main(["inspect", "--compare", str(out), "--link", "arm", "--tolerance", "0.001"]) == 1
-    # Where nothing can be judged nothing is right.
-    assert main([*check, str(path), "--link", "open"]) == 1
+    check = ["inspect", "--compare", str(out)]
+    assert [main(check), main([*check, "--tolerance", "0.01"]), main([*check, "--tolerance", "0.001"])] == [0, 0, 1]
 
 
 def test_what_a_body_of_the_shapes_can_have_stays_unless_all_is_asked_for(parts, capsys):
@@ -202,24 +171,6 @@ def test_what_a_body_of_the_shapes_can_have_stays_unless_all_is_asked_for(parts,
     assert main(["inspect", "--compare", str(path), "--fix", str(out), "--all"]) == 0
     assert "not uniform -> uniform" in capsys.readouterr().out
     assert main(["inspect", "--compare", str(out), "--tolerance", "1e-9"]) == 0
-    assert main(["inspect", "--compare", str(path), "--all"]) == 2
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--mass", "-1"], "> 0"),
-        (["--tolerance", "0"], "> 0"),
-        (["hammer", "--fix", "OUT"], "without a MESH"),
-    ],
-)
-def test_what_makes_no_sense_is_refused_in_one_line(parts, capsys, arguments, words):
-    path = parts / "robot.urdf"
-    path.write_bytes(URDF.encode())
-    assert main(["inspect", *arguments, "--compare", str(path)]) == 2
-    refusal = capsys.readouterr().err
-    assert refusal.count("\n") == 1 and words in refusal
-    assert not Path("OUT").exists()
 
 
 @pytest.mark.parametrize("option", [["--fix", "OUT"], ["--tolerance", "0.1"], ["--package-path", "."]])
@@ -266,7 +217,7 @@ def test_every_real_robot_is_mended_outside_nothing_changed_and_inside_all_right
     mended = 0
     for path in files:
         try:
-            compare_robot(path, Options(folders=folders))
+            compare_robot(path, folders=folders)
         except InputError:
             continue
         data, links = fixed(path, folders=folders)

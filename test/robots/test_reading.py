@@ -9,7 +9,7 @@ from test_composite_inertia import as_one_body, assert_same
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.robots.composite_inertia import lump_robot
-from rigid_proto_ros.robots.diagnosis import Options, compare_robot
+from rigid_proto_ros.robots.diagnosis import compare_robot
 
 SIX_KG = '<inertial pos="0.1 0 0" mass="6" diaginertia="0.2 0.3 0.4" euler="0 0 30"/>'
 CHILD = f"""<mujoco model="child"><compiler angle="radian"/><default><geom type="capsule" size="0.1 0.2"/></default>
@@ -38,8 +38,7 @@ def test_an_mjcf_weighs_what_it_weighs_in_mujoco(tmp_path, name, monkeypatch):
     path = tmp_path / "model.xml"
     path.write_text(MODELS[name])
     monkeypatch.chdir(tmp_path)
-    values = {"x_turn": 0.4} if name == "attach" else {}
-    assert_same(lump_robot(path, values), as_one_body(mujoco.MjModel.from_xml_path("model.xml"), values))
+    assert_same(lump_robot(path), as_one_body(mujoco.MjModel.from_xml_path("model.xml")))
 
 
 def test_a_file_included_twice_and_meshes_that_mujoco_cannot_load(tmp_path):
@@ -51,8 +50,8 @@ def test_a_file_included_twice_and_meshes_that_mujoco_cannot_load(tmp_path):
     asset = '<asset><mesh name="m" file="lost.dae"/><texture name="t" type="2d" file="lost.png"/></asset>'
     path = tmp_path / "model.xml"
     path.write_text(f"<mujoco>{asset}<worldbody>{body % ('a', lost)}{body % ('b', '')}</worldbody></mujoco>")
-    assert {d.link: d.status for d in compare_robot(path, Options())} == {"a": "uniform", "b": "uniform"}
-    assert lump_robot(path, {}).properties.mass == 24.0
+    assert {d.link: d.status for d in compare_robot(path)} == {"a": "uniform", "b": "uniform"}
+    assert lump_robot(path).properties.mass == 24.0
 
 
 def test_an_mjcf_with_an_inertial_that_mujoco_refuses_is_judged(tmp_path, capsys):
@@ -62,11 +61,11 @@ def test_an_mjcf_with_an_inertial_that_mujoco_refuses_is_judged(tmp_path, capsys
         '<mujoco><worldbody><body name="a"><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 5"/>'
         '<geom size="1"/></body></worldbody></mujoco>'
     )
-    (link,) = compare_robot(path, Options())
+    (link,) = compare_robot(path)
     assert link.status == "impossible"
     # As one body it is what MuJoCo makes of it, which is nothing.
     with pytest.raises(InputError, match=r"A \+ B"):
-        lump_robot(path, {})
+        lump_robot(path)
     assert main(["inspect", "--compare", str(path)]) == 1
 
 
@@ -75,7 +74,7 @@ def test_without_mujoco_an_mjcf_is_refused_with_the_extra_that_reads_it(tmp_path
     path.write_text("<mujoco/>")
     monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
     with pytest.raises(InputError, match=r"rigid_proto_ros\[robots\]"):
-        compare_robot(path, Options())
+        compare_robot(path)
 
 
 def sdf(folder, links: str):
@@ -97,7 +96,7 @@ def test_prefixes_that_an_sdf_does_not_declare_are_names_like_others(tmp_path):
     path = sdf(
         tmp_path, f'<link name="a"><inertial><mass>6.0000</mass>{inertia}</inertial>{BOX.format("c", 0, "")}</link>'
     )
-    (link,) = compare_robot(path, Options())
+    (link,) = compare_robot(path)
     assert link.status == "uniform"
 
 
@@ -105,19 +104,19 @@ def test_an_inertial_that_gazebo_computes_counts_as_its_collision_shapes(tmp_pat
     light, heavy = (f"<density>{value}</density>" for value in (100, 300))
     shapes = BOX.format("c1", -1, light) + BOX.format("c2", 1, heavy)
     path = sdf(tmp_path, f'<link name="a"><inertial auto="true"/>{shapes}</link>')
-    (link,) = compare_robot(path, Options())
+    (link,) = compare_robot(path)
     assert link.status == "unknown" and "auto" in link.note
-    properties = lump_robot(path, {}).properties
+    properties = lump_robot(path).properties
     # 100 kg at x = -1, 300 kg at x = 1; a cube of side 1 has m/6 about each axis.
     assert properties.mass == pytest.approx(400.0, rel=1e-14)
     assert properties.center_of_mass == pytest.approx([0.5, 0.0, 0.0], abs=1e-14)
     across = 400.0 / 6.0 + 100.0 * 1.5**2 + 300.0 * 0.5**2
     assert properties.inertia == pytest.approx(np.diag([400.0 / 6.0, across, across]), rel=1e-13, abs=1e-12)
     path = sdf(tmp_path, f'<link name="a"><inertial auto="true"><mass>4</mass></inertial>{shapes}</link>')
-    assert lump_robot(path, {}).properties.inertia == pytest.approx(properties.inertia / 100.0, rel=1e-13, abs=1e-14)
+    assert lump_robot(path).properties.inertia == pytest.approx(properties.inertia / 100.0, rel=1e-13, abs=1e-14)
     density = "<inertial auto='true'><density>50</density></inertial>"
     path = sdf(tmp_path, f'<link name="a">{density}{BOX.format("c", 0, "")}</link>')
-    assert lump_robot(path, {}).properties.mass == pytest.approx(50.0, rel=1e-14)
+    assert lump_robot(path).properties.mass == pytest.approx(50.0, rel=1e-14)
 
 
 def test_a_robot_without_shapes_is_judged_and_may_be_right(tmp_path, capsys):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj
 
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.robots.diagnosis import Options, compare_robot
+from rigid_proto_ros.robots.diagnosis import compare_robot
 from rigid_proto_ros.robots.link_shapes import primitive_surface
 from rigid_proto_ros.robots.model import Link, rotation_from_rpy
 from rigid_proto_ros.robots.realizable import MARGIN, beyond_shapes
@@ -32,7 +32,7 @@ def urdf(folder, *links):
 
 
 def verdicts(path) -> dict:
-    return {d.link: d.status for d in compare_robot(path, Options())}
+    return {d.link: d.status for d in compare_robot(path)}
 
 
 @pytest.mark.parametrize("shapes", ["", BOX, '<visual><geometry><mesh filename="gone.stl"/></geometry></visual>'])
@@ -59,8 +59,7 @@ def test_what_no_body_has_is_impossible_with_and_without_shapes(tmp_path, capsys
 def test_each_verdict_and_its_exit_status(tmp_path, capsys):
     # The uniform box's moments are 13/12, 10/12 and 5/12 of its mass; all mass at its corners gives three times that.
     lost = '<visual><geometry><mesh filename="gone.stl"/></geometry></visual>'
-    path = urdf(
-        tmp_path,
+    links = [
         (BOX, "1.00000", "0 0 1.60000", (1, 0, 0, 1, 0, 1)),
         (BOX, "1.00000", "0 0 0", ("3.30000", 0, 0, "2.60000", 0, "1.30000")),
         (BOX, "1.00000", "0 0 0", (10833.33333, 0, 0, 8333.33333, 0, 4166.66667)),
@@ -71,19 +70,17 @@ def test_each_verdict_and_its_exit_status(tmp_path, capsys):
         (lost, "1.00000", "0 0 0", (1, 0, 0, 1, 0, 1)),
         ("", "1.00000", "0 0 0", (1, 0, 0, 1, 0, 1)),
         (BOX, None, "", (0, 0, 0, 0, 0, 0)),
-    )
+    ]
     beyond = "impossible for its shape"
     expected = [beyond, beyond, beyond, "impossible", "not uniform", "uniform", "not uniform"] + ["unknown"] * 3
-    assert verdicts(path) == {f"l{k}": word for k, word in enumerate(expected)}
+    assert verdicts(urdf(tmp_path, *links)) == {f"l{k}": word for k, word in enumerate(expected)}
 
-    def status(link: int, *arguments: str) -> int:
-        return main(["inspect", "--compare", str(path), "--link", f"l{link}", *arguments])
-
-    assert [status(k) for k in range(10)] == [1, 1, 1, 1, 0, 0, 0, 0, 0, 0]
-    assert [status(k, "--tolerance", "0.01") for k in (4, 5, 6)] == [1, 0, 1]
-    assert status(6, "--tolerance", "0.2") == 0
-    # With a tolerance, a link whose shapes can't be read wasn't compared; one without shapes has none to compare.
-    assert (status(7, "--tolerance", "0.01"), status(8, "--tolerance", "0.01")) == (1, 0)
+    for k, (status, strict) in enumerate(zip([1, 1, 1, 1] + [0] * 6, [1, 1, 1, 1, 1, 0, 1, 1, 0, 1], strict=True)):
+        # With a tolerance, a link whose shapes can't be read wasn't compared; one without shapes has none to compare.
+        path = urdf(tmp_path, links[k])
+        assert main(["inspect", "--compare", str(path)]) == status
+        assert main(["inspect", "--compare", str(path), "--tolerance", "0.01"]) == strict
+    assert main(["inspect", "--compare", str(urdf(tmp_path, links[6])), "--tolerance", "0.2"]) == 0
     told = capsys.readouterr().out
     assert "outside the hull" in told and "kg cm²" in told and "times as large" in told
 
