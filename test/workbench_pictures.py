@@ -37,7 +37,9 @@ def main() -> None:
     args.folder.mkdir(parents=True, exist_ok=True)
     flown = Flown("t_handle", port=any_free_port())
     shown = flown.page
-    shown._words = lambda: motion_words(shown._scenario, {**shown._tracks, "motion": ""}, len(shown._loads))
+    shown._words = lambda: motion_words(
+        shown._scenario, len(shown._loads), flown.live.loop.simulation.string is not None, False, False
+    )
     try:
         with chromium(SOFTWARE_GL) as started:
             if args.lessons:

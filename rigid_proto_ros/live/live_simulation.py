@@ -75,7 +75,7 @@ class LiveSimulation:
     def stop(self) -> None:
         """End the motion, then the observers: what they hold goes out."""
         self._thread.stop()
-        self.loop.simulation.notify_end()
+        self.loop.simulation.notify_floor(at_end=True)
         self.loop.observer.close()
 
     def call(self, function: Callable[[], Any], timeout_s: float = 10.0) -> Any:
@@ -265,7 +265,7 @@ class LiveSimulation:
         waits for.
         """
         finished = self._recorder
-        self.loop.simulation.notify_end()
+        self.loop.simulation.notify_floor(at_end=True)
         self._recording_error = getattr(finished, "error", "") if recorder is None else ""
         self._recorder = recorder
         self._watch()

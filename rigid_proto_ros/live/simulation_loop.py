@@ -140,7 +140,7 @@ class SimulationLoop(ScenarioRun):
             self.timekeeping.paused = paused
             self._end_steps()
             self.simulation.log("pause", {"data": paused})
-            self.simulation.notify_status(paused)
+            self.simulation.notify_floor()
             self._anchor(stamps_stay=paused)
 
     def take_commands(self) -> None:
@@ -318,7 +318,7 @@ class SimulationLoop(ScenarioRun):
         state = self.simulation.state
         self._publications.made()
         self.observer.on(Published(state.time_ns, state.row))
-        self.simulation.notify_status()
+        self.simulation.notify_floor()
         if self.ghost is not None:
             self.ghost.advance(state.time_ns)
         self.endpoints.publish(state)

@@ -106,7 +106,7 @@ class OfflineRun(ScenarioRun):
                 if self.simulation.failure:
                     return False
                 self.observer.on(Published(next_ns, state.row))
-                self.simulation.notify_status()
+                self.simulation.notify_floor()
                 if self.ghost is not None:
                     self.ghost.advance(next_ns)
                 self._next_publication += 1
@@ -114,9 +114,9 @@ class OfflineRun(ScenarioRun):
         return not self.simulation.failure
 
     def end(self) -> None:
-        """Tell the observer what the flight has cost up to here, which is told from time to time alone before."""
+        """Tell the observer what has held the flight to less than its accuracy."""
         if self._is_observed:
-            self.simulation.notify_end()
+            self.simulation.notify_floor(at_end=True)
 
 
 def run_with_progress(run: OfflineRun, duration_ns: int) -> float:

@@ -103,7 +103,7 @@ def ghost_of(scenario: Scenario, simulation: Simulation, observer: Observer | No
     if scenario.ghost is None or observer is None:
         return None
     ghost = Ghost(scenario.ghost, observer)
-    simulation.follower = ghost
+    simulation.follower = ghost.submit
     ghost.announce()
     return ghost
 

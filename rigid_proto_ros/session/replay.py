@@ -18,8 +18,7 @@ from ..scene.scenario_run import ScenarioRun
 from ..scene.scene_file import read_scene_text
 from ..scene.sensor_noise import sensor_noise
 from ..simulation.commands import Change, Command
-from ..simulation.notifier import snapshot
-from ..simulation.observer import BodyChanged, Observer, Published
+from ..simulation.observer import BodyChanged, Observer, Published, snapshot
 from ..simulation.setup import Setup
 from .messages import PROJECTIONS
 from .recorded_session import RecordedSession, find_mesh
@@ -181,7 +180,7 @@ def play(
             # A command that is refused here: from now on only the recorded states are shown.
             computed = row
         observer.on(Published(time_ns, computed if _published_alike(session, computed, row) else row))
-        again.simulation.notify_status()
+        again.simulation.notify_floor()
         if again.ghost is not None:
             again.ghost.advance(time_ns)
 

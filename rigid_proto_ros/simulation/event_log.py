@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
 from .commands import Command
 
@@ -17,16 +18,9 @@ MOST_NOTED = 10_000
 """Events that may wait to be chained: some megabytes."""
 
 
-class OtherEvent(NamedTuple):
-    """An event that is no command, or not any more."""
-
-    kind: str
-    content: dict[str, Any]
-
-
 class EventLog:
-    """Counts and chains the events of one run. Those that nobody reads as they happen are chained when
-    somebody asks.
+    """Counts and chains the events of one run. Those that nobody reads as they happen are chained when somebody
+    asks.
     """
 
     def __init__(self) -> None:
@@ -36,7 +30,7 @@ class EventLog:
         """Start a new chain."""
         self.count = 0
         self._hash = hashlib.sha256()
-        self._noted: list[tuple[int, Command | OtherEvent]] = []
+        self._noted: list[tuple[int, Command]] = []
 
     @property
     def sha256(self) -> str:
@@ -44,23 +38,26 @@ class EventLog:
         self._chain_noted()
         return self._hash.hexdigest()
 
-    def append(self, time_ns: int, kind: str, content: dict[str, Any]) -> str:
+    def append(self, time_ns: int, kind: str, content: Mapping[str, Any]) -> str:
         """Add an event and return its line."""
         self._chain_noted()
-        line = json.dumps({"time_ns": time_ns, "kind": kind, "content": content})
-        self._hash.update((line + "\n").encode())
         self.count += 1
+        line = self._chain(time_ns, kind, content)
         return f'{line[:-1]}, "sha256": "{self._hash.hexdigest()}"}}'
 
-    def note(self, time_ns: int, event: Command | OtherEvent) -> None:
-        """Add an event whose line nobody wants now."""
-        self._noted.append((time_ns, event))
+    def note(self, time_ns: int, command: Command) -> None:
+        """Add a command that has acted, whose line nobody wants now."""
+        self._noted.append((time_ns, command))
         self.count += 1
         if len(self._noted) >= MOST_NOTED:
             self._chain_noted()
 
     def _chain_noted(self) -> None:
         noted, self._noted = self._noted, []
-        for time_ns, event in noted:
-            line = json.dumps({"time_ns": time_ns, "kind": event.kind, "content": event.content})
-            self._hash.update((line + "\n").encode())
+        for time_ns, command in noted:
+            self._chain(time_ns, command.kind, command.content)
+
+    def _chain(self, time_ns: int, kind: str, content: Mapping[str, Any]) -> str:
+        line = json.dumps({"time_ns": time_ns, "kind": kind, "content": content})
+        self._hash.update((line + "\n").encode())
+        return line

@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numba import int64
+from numba import float64, from_dtype, int64, types
 
 from ..base.compilation import njit
-from ..base.function_pointers import address_of_array, array_at, doubles_at, entry_of
-from ..base.records import place_of, record_type
+from ..base.function_pointers import entry_of
+from ..base.records import place_of
 from ..base.simd import aligned
 from ..motion.integrators.stepping import METHOD, provide_kernel
 from ..motion.loads import Load, load_of_row
@@ -22,44 +22,23 @@ from ..motion.string import StringState
 from . import flight as fl
 from .commands import HELD_WRENCH, NO_SLOT, Pending
 from .flight import EVENT, FLIGHT, LOAD_ROW
-from .setup import FlightStart, Setup
+from .setup import Setup
 
 FIRST_ROWS = 8
 """Of the tables at first; they double as needed."""
 
-HELD = record_type(
-    [
-        ("flight", FLIGHT),
-        # Where the tables, of loads, of events and of methods, and the workspace are, and of what size.
-        ("loads_at", np.int64),
-        ("events_at", np.int64),
-        ("rows", np.int64),
-        ("methods_at", np.int64),
-        ("methods", np.int64),
-        ("room_at", np.int64),
-        ("room", np.int64),
-    ]
-)
-"""A flight with the addresses of what it works with, so that a compiled function finds all by one number."""
-
-_held_at, _loads_at, _events_at, _methods_at = map(array_at, (HELD, LOAD_ROW, EVENT, METHOD))
-
 _ROW_BYTES, _pack = LOAD_ROW.itemsize, struct.Struct("=6q").pack_into
 _LOAD_AT = place_of(LOAD_ROW, "load")
-_ROW_NUMBERS, _EVENT_NUMBERS, _ATTITUDE = LOAD_ROW.itemsize // 8, EVENT.itemsize // 8, place_of(EVENT, "attitude") // 8
 
 
-# Where integers that are looked up at every advance or reset stand in the memory of what is held: Python reads and
-# writes single numbers fastest so, and arrays of integers are made in a tenth of the time that those of records take.
-def _numbers(kind: np.dtype, *names: str) -> list[int]:
-    return [place_of(kind, name) // 8 for name in names]
+# Where integers that are looked up at every advance or reset stand in the flight's memory: Python reads and writes
+# single numbers fastest so.
+def _numbers(*names: str) -> list[int]:
+    return [place_of(FLIGHT, name) // 8 for name in names]
 
 
-_NOW_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers(FLIGHT, "now_ns", "acting", "due", "due_end", "events")
-TIMEOUTS, _LOAD_IDS = _numbers(FLIGHT, "timeouts", "load_ids")
-_LOADS_AT, _EVENTS_AT, _ROWS = _numbers(HELD, "loads_at", "events_at", "rows")
-_METHODS_AT, _METHODS, _ROOM_AT, _ROOM = _numbers(HELD, "methods_at", "methods", "room_at", "room")
-_NUMBERS = FLIGHT.itemsize // 8
+_NOW_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers("now_ns", "acting", "due", "due_end", "events")
+TIMEOUTS, _LOAD_IDS = _numbers("timeouts", "load_ids")
 _REACHED = fl.REACHED
 
 
@@ -84,29 +63,21 @@ class ActingLoad(NamedTuple):
         return "thruster" if self.thruster >= 0 else "wrench" if self.kind == HELD_WRENCH else "poke"
 
 
-@njit(cache=True, error_model="numpy")
-def _arrays(at: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """What is held (1,) at this address, and its loads, events, methods and workspace."""
-    whole = _held_at(at, (1,))
-    held = whole[0]
-    loads, events = _loads_at(held.loads_at, (held.rows,)), _events_at(held.events_at, (4 * held.rows + 4,))
-    return (
-        whole,
-        loads,
-        events,
-        _methods_at(held.methods_at, (held.methods,)),
-        doubles_at(held.room_at, (held.room,)),
-    )
-
-
 _FLY, _BEGIN, _APPLY, _CUT, _FINISH, _END_DUE, _END_ALL, _TAKE_BODY = range(8)
 
 
-@njit(cache=True, error_model="numpy")
-def _call_at(at: int, what: int, until_ns: int) -> int:
-    """One of these on the flight that is held at this address; how it came back."""
-    held, loads, events, methods, room = _arrays(at)
-    flight = held[0].flight
+@njit(cache=True, error_model="numpy", allocates=False)
+def _call(
+    flights: np.ndarray,
+    loads: np.ndarray,
+    events: np.ndarray,
+    methods: np.ndarray,
+    room: np.ndarray,
+    what: int,
+    until_ns: int,
+) -> int:
+    """One of these on the flight; how it came back."""
+    flight = flights[0]
     if what == _FLY:
         return fl.fly(flight, loads, events, methods, room, until_ns)
     if what == _BEGIN:
@@ -134,8 +105,9 @@ def _call_at(at: int, what: int, until_ns: int) -> int:
 
 
 @functools.cache
-def _entry() -> Callable[[int, int, int], int]:
-    return entry_of(_call_at, int64(int64, int64, int64))
+def _entry() -> Callable[..., int]:
+    records = [types.Array(from_dtype(kind), 1, "C") for kind in (FLIGHT, LOAD_ROW, EVENT, METHOD)]
+    return entry_of(_call, int64(*records, float64[::1], int64, int64))
 
 
 class FlightArrays:
@@ -145,51 +117,49 @@ class FlightArrays:
 
     def __init__(self, setup: Setup) -> None:
         self.first_due = 0
-        self._loads: np.ndarray
         self._call = _entry()
-        self._memory = np.zeros(HELD.itemsize // 8, np.int64)
-        self._at = address_of_array(self._memory)
-        self.integers = self._memory.data
-        self.row = np.ndarray(13, np.float64, self._memory, place_of(FLIGHT, "row"))
+        self._flights = np.zeros(1, FLIGHT)
+        self.integers = self._flights.view(np.uint8).view(np.int64).data
+        self.row = np.ndarray(13, np.float64, self._flights, place_of(FLIGHT, "row"))
+        self._loads = np.zeros(0, LOAD_ROW)
         self._make_tables(FIRST_ROWS)
-        self._take_methods(setup, setup.flight_start)
+        self.room = np.zeros(0)
+        self._take_methods(setup)
 
     @functools.cached_property
     def flight(self) -> np.record:
         """The record (simulation/flight.py)."""
-        found: np.record = np.ndarray(1, HELD, self._memory)[0].flight
+        found: np.record = self._flights[0]
         return found
 
-    def _take_methods(self, setup: Setup, start: FlightStart) -> None:
+    def _take_methods(self, setup: Setup) -> None:
+        start = setup.flight_start
         self.integrator, self.methods = setup.integrator, start.methods
-        numbers = self.integers
-        if numbers[_ROOM] < max(start.room, 1):
+        if len(self.room) < max(start.room, 1):
             # The workspace begins a line of the processor's cache.
             self.room = aligned((1, max(start.room, 1)))[0]
-            numbers[_ROOM_AT], numbers[_ROOM] = address_of_array(self.room), len(self.room)
-        numbers[_METHODS_AT], numbers[_METHODS] = start.methods_at, len(start.methods)
 
     def take(self, setup: Setup) -> None:
         """Body, settings and integrator are those of a setup from now on; the segment in hand stays as it is."""
-        start, flight = setup.flight_start, self.flight
-        self._take_methods(setup, start)
+        flight = self.flight
+        self._take_methods(setup)
         self.room[:] = 0.0
-        new = start.flight[0]
+        new = setup.flight_start.flight[0]
         flight.body[:], flight.common = new.body, new.common
         flight.accuracy, flight.degree, flight.chooses = new.accuracy, new.degree, new.chooses
         flight.step_ns, flight.timeout_ns, flight.poke_ns = new.step_ns, new.timeout_ns, new.poke_ns
-        self._call(self._at, _TAKE_BODY, 0)
+        self._do(_TAKE_BODY)
 
     def start_over(self, setup: Setup, tied: StringState | None) -> None:
         """Time 0, the initial state, and nothing that acts but a string."""
-        start, numbers = setup.flight_start, self.integers
+        numbers = self.integers
         load_ids = numbers[_LOAD_IDS]
-        self._take_methods(setup, start)
-        numbers[:_NUMBERS] = start.integers
+        self._take_methods(setup)
+        numbers[:] = setup.flight_start.integers
         numbers[_LOAD_IDS] = load_ids
         if tied is not None:
             self.tie(tied)
-        self._call(self._at, _BEGIN, 0)
+        self._do(_BEGIN)
 
     def tie(self, tied: StringState | None) -> None:
         """The string is tied like this, or not at all, from the next segment on."""
@@ -206,7 +176,7 @@ class FlightArrays:
         numbers = self.integers
         first = self.first_due = numbers[_ACTING]
         last = first + len(due)
-        if last > numbers[_ROWS]:
+        if last > len(self._loads):
             self._make_tables(2 * last)
         table, at = self._table_bytes, _ROW_BYTES * first
         for pending in due:
@@ -221,9 +191,12 @@ class FlightArrays:
         """How many of the commands put last haven't acted yet."""
         return self.integers[_DUE_END] - self.integers[_DUE]
 
+    def _do(self, what: int, until_ns: int = 0) -> int:
+        return self._call(self._flights, self._loads, self._events, self.methods, self.room, what, until_ns)
+
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; False when the motion failed."""
-        while (came := self._call(self._at, _FLY, until_ns)) != _REACHED:
+        while (came := self._do(_FLY, until_ns)) != _REACHED:
             if came == fl.FAILED:
                 return False
             provide_kernel(self.integrator, self.methods, int(self.flight.method))
@@ -231,34 +204,35 @@ class FlightArrays:
 
     def apply(self) -> None:
         """Apply the commands put last, at the time of the flight."""
-        self._call(self._at, _APPLY, 0)
+        self._do(_APPLY)
 
     def end_due(self) -> bool:
         """End what ends at the time of the flight; whether anything did."""
-        return bool(self._call(self._at, _END_DUE, 0))
+        return bool(self._do(_END_DUE))
 
     def end_all(self) -> None:
         """End the held wrench and the pulses."""
-        self._call(self._at, _END_ALL, 0)
+        self._do(_END_ALL)
 
-    def last_events(self) -> list[list[int]]:
+    def last_events(self) -> list[tuple[int, ...]]:
         """What the last call began and ended: time_ns, what, load_id and row of each."""
-        events: list[list[int]] = self._events[: self.integers[_EVENTS], :4].tolist()
-        return events
+        events = self._events[: self.integers[_EVENTS]]
+        return list(zip(*(events[name].tolist() for name in ("time_ns", "what", "load_id", "row")), strict=True))
 
     def attitude_at(self, number: int) -> np.ndarray:
         """The body's attitude (4,) xyzw when a command acted, by the number of its event among the last."""
-        return self._events[number, _ATTITUDE : _ATTITUDE + 4].view(np.float64).copy()
+        attitude: np.ndarray = self._events["attitude"][number].copy()
+        return attitude
 
     # Segments
 
     def cut_segment(self) -> None:
         """End the segment at the time of the flight by the step that sampling there took, and begin another."""
-        self._call(self._at, _CUT, 0)
+        self._do(_CUT)
 
     def finish_segment(self) -> None:
         """Keep the segment's counts and begin another from the present state."""
-        self._call(self._at, _FINISH, 0)
+        self._do(_FINISH)
 
     # Observables
 
@@ -279,20 +253,13 @@ class FlightArrays:
 
     def acting(self) -> Iterator[ActingLoad]:
         """The loads that act, in the order in which they began."""
-        for row in np.ndarray(self.integers[_ACTING], LOAD_ROW, self._loads):
+        for row in self._loads[: self.integers[_ACTING]]:
             load = load_of_row(row.load)
             yield ActingLoad(load, int(row.at_ns), int(row.end_ns), int(row.id), int(row.kind), int(row.slot))
 
-    # Memory
-
     def _make_tables(self, rows: int) -> None:
         """Tables of so many rows; what acts goes on."""
-        numbers = self.integers
-        loads = np.zeros(rows * _ROW_NUMBERS, np.int64)
-        kept = numbers[_ACTING] * _ROW_NUMBERS
-        if kept:
-            loads[:kept] = self._loads[:kept]
-        self._loads, self._events = loads, np.zeros((4 * rows + 4, _EVENT_NUMBERS), np.int64)
-        self._table_bytes = loads.data.cast("B")
-        numbers[_LOADS_AT], numbers[_EVENTS_AT] = address_of_array(loads), address_of_array(self._events)
-        numbers[_ROWS] = rows
+        loads, acting = np.zeros(rows, LOAD_ROW), self.integers[_ACTING]
+        loads[:acting] = self._loads[:acting]
+        self._loads, self._events = loads, np.zeros(4 * rows + 4, EVENT)
+        self._table_bytes = loads.view(np.uint8).data

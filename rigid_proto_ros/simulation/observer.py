@@ -15,7 +15,9 @@ import numpy as np
 if TYPE_CHECKING:
     from ..motion.body import Body
     from ..motion.loads import Load
+    from ..motion.string import StringState
     from .commands import WrenchCommand
+    from .setup import Setup
 
 STATE_FIELDS = (
     *("position.x", "position.y", "position.z"),
@@ -83,6 +85,36 @@ class ShownString:
         done = np.clip((times_ns - self.begin_ns) / lasts_ns, 0.0, 1.0) if lasts_ns > 0 else np.ones(len(times_ns))
         places: np.ndarray = self.origin + done[:, np.newaxis] * (np.asarray(self.target, dtype=float) - self.origin)
         return places
+
+
+def snapshot(setup: Setup) -> BodySnapshot:
+    """The body of a setup as observers are told of it."""
+    body = setup.body
+    return BodySnapshot(
+        body.mass,
+        body.center_of_mass,
+        body.inertia,
+        body.scale,
+        setup.gravity,
+        setup.inertia_model,
+        setup.integrator.name,
+        setup.gyroscopic,
+    )
+
+
+def shown_load(kind: str, load: Load, body: Body) -> ShownLoad:
+    """A load as observers are told of it."""
+    axes = "world" if load.axes == "world" else "body"
+    force = np.asarray(load.force) if axes == "world" else load.own_force(body)
+    return ShownLoad(kind, axes, load.arm(body), force, np.asarray(load.torque))
+
+
+def shown_string(tied: StringState | None, body: Body) -> ShownString | None:
+    """A string as observers are told of it."""
+    if tied is None:
+        return None
+    ends = (tied.origin, tied.target, tied.begin_ns, tied.end_ns)
+    return ShownString(tied.arm(body), *ends, tied.stiffness, tied.damping, tied.rest_length, tied.bilateral)
 
 
 class Started(NamedTuple):
@@ -180,27 +212,11 @@ class Refused(NamedTuple):
     message: str
 
 
-class StatusChanged(NamedTuple):
-    """From ``time_ns`` on ``track`` is ``value``, such as motion: flying, sleeping, paused; string: taut, slack."""
-
-    time_ns: int
-    track: str
-    value: str
-
-
 class AccuracyFloor(NamedTuple):
     """Why, since start or reset, the motion is held to less than its accuracy; empty while it isn't."""
 
     time_ns: int
     floor: str
-
-
-class Effort(NamedTuple):
-    """What the motion has cost since start or reset; comes some times a simulated second."""
-
-    time_ns: int
-    steps: int
-    force_evaluations: int
 
 
 class GhostChanged(NamedTuple):
@@ -230,9 +246,7 @@ Event = (
     | StringChanged
     | Logged
     | Refused
-    | StatusChanged
     | AccuracyFloor
-    | Effort
     | GhostChanged
     | GhostPublished
 )

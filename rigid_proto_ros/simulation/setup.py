@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.function_pointers import address_of_array
 from ..base.records import new_record
 from ..base.rotation import length
 from ..motion.body import LENGTH, Body
@@ -26,14 +25,13 @@ from .thrusters import Thruster
 
 
 class FlightStart(NamedTuple):
-    """flight (1,): a record FLIGHT (simulation/flight.py), and its memory as integers. methods: the integrator's table,
-    and its address. room: of the largest workspace [doubles].
+    """flight (1,): a record FLIGHT (simulation/flight.py), and its memory as integers. methods: the integrator's table.
+    room: of the largest workspace [doubles].
     """
 
     flight: np.ndarray
     integers: memoryview
     methods: np.ndarray
-    methods_at: int
     room: int
 
 
@@ -93,7 +91,7 @@ class Setup(Environment):
         flight.method = -1
         methods = method_table(self.integrator, degree)
         integers = start.view(np.uint8).view(np.int64).data
-        return FlightStart(start, integers, methods, address_of_array(methods), workspace_size(methods))
+        return FlightStart(start, integers, methods, workspace_size(methods))
 
     @cached_property
     def light_amount(self) -> float:

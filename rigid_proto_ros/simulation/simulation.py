@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
-from typing import Any, Protocol
+from typing import Any
 
 from ..base.errors import CommandRefused, InputError
 from ..motion.integrators import check_supported
 from ..motion.integrators.integrator import STRING
 from ..motion.loads import Load, load_of_bytes
 from ..motion.state import State, shift_com
+from ..motion.string import StringState
 from ..motion.variables import MAX_SPEED
 from . import flight as fl
 from .checks import check_command, check_load_supported, check_rates, check_start, check_thrust, load_row, needs_of
@@ -39,11 +40,26 @@ from .commands import (
     order_of,
     slot_name,
 )
-from .event_log import EventLog, OtherEvent
+from .event_log import EventLog
 from .flight_arrays import TIMEOUTS, FlightArrays
-from .notifier import EventNotifier, snapshot
 from .observables import Observables
-from .observer import Applied, BodySnapshot, LoadEnded, Logged, MeshChanged, Observer, Refused, Reset
+from .observer import (
+    AccuracyFloor,
+    Applied,
+    BodyChanged,
+    BodySnapshot,
+    LoadBegan,
+    LoadEnded,
+    Logged,
+    MeshChanged,
+    Observer,
+    Refused,
+    Reset,
+    StringChanged,
+    shown_load,
+    shown_string,
+    snapshot,
+)
 from .setup import Setup
 from .string_control import StringControl
 from .thrusters import ThrusterControl
@@ -51,11 +67,8 @@ from .thrusters import ThrusterControl
 _UNTIL_REPLACED_NS = fl.NEVER >> 1
 
 
-class Follower(Protocol):
-    """Whoever takes the same commands at the same times, such as a ghost."""
-
-    def submit(self, command: Command, when_ns: int, listed: Listed | None = None) -> None:
-        """Take a command that acts at ``when_ns``."""
+FLOOR_PERIOD_NS = 50_000_000
+"""[ns, simulated] How often observers are told how far the motion is held to its accuracy."""
 
 
 class Simulation(Observables):
@@ -69,9 +82,7 @@ class Simulation(Observables):
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
         self.setup = setup
-        self.observer = observer or Observer()
-        self._notifier = EventNotifier(self.observer)
-        self.follower: Follower | None = None
+        self.follower: Callable[[Command, int, Listed | None], None] | None = None
         self.events = EventLog()
         self.refused: Counter[str] = Counter()
         self._arrivals = 0
@@ -80,6 +91,8 @@ class Simulation(Observables):
         self.setup_of: Callable[[Change], Setup] = _no_change
         check_start(setup)
         self._arrays = FlightArrays(setup)
+        self._told_string: StringState | None = None
+        self.watch(observer or Observer())
         self._start_over()
 
     # Who watches
@@ -87,25 +100,45 @@ class Simulation(Observables):
     def watch(self, observer: Observer) -> None:
         """Tell this observer from now on, and no other."""
         self.observer = observer
-        self._notifier.watch_for(observer)
+        self._wants_loads = not observer.takes.isdisjoint((Applied, LoadBegan, LoadEnded))
+        self._told_floor, self._next_floor_ns = "", 0
 
     def introduce(self, observer: Observer) -> None:
         """Tell an observer that comes in flight about the body, what acts on it and the string."""
-        EventNotifier(observer).introduce(self)
+        observer.on(BodyChanged(self.time_ns, self.snapshot()))
+        for acting in self.acting:
+            shown = shown_load(acting.shown_kind, acting.load, self.setup.body)
+            observer.on(LoadBegan(self.time_ns, acting.load_id, shown))
+        observer.on(StringChanged(self.time_ns, shown_string(self.string, self.setup.body)))
 
     def announce(self) -> None:
         """Tell the observer about the body as it is now."""
-        self._notifier.body(self)
+        self.observer.on(BodyChanged(self.time_ns, self.snapshot()))
 
-    def notify_status(self, paused: bool = False) -> None:
-        """Tell the observer what the body is doing, where that changed since it was last told."""
-        self._notifier.status(self, paused)
-
-    def notify_end(self) -> None:
-        """Tell the observer, at the end of a run or of its watch, what the run has cost and how far it was held to its
-        accuracy; in flight that is told from time to time alone.
+    def notify_floor(self, at_end: bool = False) -> None:
+        """Tell the observer what holds the motion to less than its accuracy, where that changed: from time to time, and
+        at the end of a run or of its watch.
         """
-        self._notifier.cost(self)
+        due = at_end or self.time_ns >= self._next_floor_ns
+        if not due or AccuracyFloor not in self.observer.takes:
+            return
+        self._next_floor_ns = self.time_ns + FLOOR_PERIOD_NS
+        floor = self.accuracy_floor
+        if floor != self._told_floor:
+            self._told_floor = floor
+            self.observer.on(AccuracyFloor(self.time_ns, floor))
+
+    def _notify_load(self, load_id: int, kind: str, load: Load) -> None:
+        if LoadBegan in self.observer.takes:
+            self.observer.on(LoadBegan(self.time_ns, load_id, shown_load(kind, load, self.setup.body)))
+
+    def _notify_string(self) -> None:
+        """Tell the observer about the string, where it changed since it was last told."""
+        if self.string is self._told_string:
+            return
+        self._told_string = self.string
+        if StringChanged in self.observer.takes:
+            self.observer.on(StringChanged(self.time_ns, shown_string(self.string, self.setup.body)))
 
     def snapshot(self, setup: Setup | None = None) -> BodySnapshot:
         """The body as an observer is told of it; of another setup, when one is given."""
@@ -113,10 +146,9 @@ class Simulation(Observables):
 
     def log(self, kind: str, content: dict[str, Any]) -> None:
         """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever causes it."""
+        line = self.events.append(self.time_ns, kind, content)
         if self.observer.wants(Logged):
-            self.observer.on(Logged(self.time_ns, self.events.append(self.time_ns, kind, content)))
-        else:
-            self.events.note(self.time_ns, OtherEvent(kind, content))
+            self.observer.on(Logged(self.time_ns, line))
 
     # The way of a command
 
@@ -141,7 +173,7 @@ class Simulation(Observables):
             pending.set_load(command, row, setup)
         self._push(pending)
         if self.follower is not None:
-            self.follower.submit(command, when_ns, listed)
+            self.follower(command, when_ns, listed)
         return when_ns
 
     def _push(self, pending: Pending) -> None:
@@ -166,7 +198,7 @@ class Simulation(Observables):
         """
         self._arrays.end_all()
         self._notify([])
-        self.notify_end()
+        self.notify_floor(at_end=True)
         self.observer.on(Reset())
         self.events.reset()
         before = self.setup
@@ -193,7 +225,7 @@ class Simulation(Observables):
             # 2. From event to event, up to the time asked for or to an event that takes more than arithmetic.
             if not arrays.fly(event_ns):
                 return self._stop_in_last_good_state(due)
-            if due or self._notifier.wants_loads or arrays.integers[TIMEOUTS]:
+            if due or self._wants_loads or arrays.integers[TIMEOUTS]:
                 self._notify(due)
             self.time_ns = event_ns
             self.state = state = State(event_ns, arrays.row.copy())
@@ -241,9 +273,8 @@ class Simulation(Observables):
 
     def _notify(self, due: Sequence[Pending]) -> None:
         """Log the commands that acted, and tell the observer what began and ended."""
-        observer, notifier, arrays = self.observer, self._notifier, self._arrays
-        ignored = notifier.ignores_commands or not (notifier.wants_loads or observer.wants(Logged))
-        if ignored and not arrays.integers[TIMEOUTS]:
+        observer, arrays = self.observer, self._arrays
+        if not (self._wants_loads or observer.wants(Logged) or arrays.integers[TIMEOUTS]):
             for pending in due:
                 self.events.note(pending.time_ns, pending.command)
             return
@@ -267,7 +298,7 @@ class Simulation(Observables):
                 observer.on(Applied(now_ns, command, load, self.setup.body, arrays.attitude_at(number)))
             else:
                 kind = "impulse" if pending.kind == IMPULSE else command.kind
-                notifier.load_began(self, load_id, kind, load)
+                self._notify_load(load_id, kind, load)
 
     def _log_command(self, command: Command) -> None:
         # A change that waited in a queue would keep its whole setup, mesh included.
@@ -304,7 +335,7 @@ class Simulation(Observables):
         if changed:
             arrays.tie(self._string.tied)
             arrays.cut_segment()
-            self._notifier.string(self)
+            self._notify_string()
 
     def _apply(self, pending: Pending) -> None:
         command = pending.command
@@ -344,13 +375,13 @@ class Simulation(Observables):
             rows.append(row)
         arrays.put(rows)
         arrays.apply()
-        if not self._notifier.wants_loads:
+        if not self._wants_loads:
             return
         for now_ns, what, load_id, row_number in arrays.last_events():
             if what == fl.ENDED:
                 self.observer.on(LoadEnded(now_ns, load_id))
             elif what == fl.BEGAN:
-                self._notifier.load_began(self, load_id, "thruster", loads[row_number - arrays.first_due][1])
+                self._notify_load(load_id, "thruster", loads[row_number - arrays.first_due][1])
 
     def _still_holds(self, pending: Pending, command: WrenchCommand) -> bool:
         """Whether the load resolved at submission holds now: it doesn't if it was a ray, or the mesh has changed since.
@@ -402,9 +433,9 @@ class Simulation(Observables):
         self._string = StringControl(self.setup, self.state)
         self.thrusters = ThrusterControl(self.setup.thrusters)
         self._arrays.start_over(self.setup, self._string.tied)
-        self._notifier.start_over()
-        self._notifier.loads(self)
-        self._notifier.string(self)
+        self._told_string = None
+        self._told_floor, self._next_floor_ns = "", 0
+        self._notify_string()
 
     def _stop_in_last_good_state(self, due: Sequence[Pending]) -> State:
         """The motion failed on the way; of these commands those that hadn't acted yet go on waiting."""

@@ -38,7 +38,6 @@ from ..simulation.observer import (
     ShownLoad,
     ShownString,
     Started,
-    StatusChanged,
     StringChanged,
 )
 from ..simulation.simulation import Simulation
@@ -92,7 +91,7 @@ class Told(Observer):
     takes = frozenset(
         {
             *(Started, MeshChanged, BodyChanged, GhostChanged, SceneChanged, Reset, Published, GhostPublished),
-            *(LoadBegan, LoadEnded, StringChanged, Refused, StatusChanged),
+            *(LoadBegan, LoadEnded, StringChanged, Refused),
         }
     )
 
@@ -146,7 +145,6 @@ class Page:
         # What is known of the motion.
         self.state = live.state
         self._scenario = live.scenario
-        self._tracks: dict[str, str] = {}
         self._loads: dict[int, tuple[int, ShownLoad]] = {}
         self._strings: list[tuple[int, ShownString | None]] = []
         self._ghost_row: np.ndarray | None = None
@@ -262,8 +260,9 @@ class Page:
         self.session_tab.draw()
 
     def _words(self) -> str:
-        tracks = {**self._tracks, "motion": "paused"} if self.live.paused else self._tracks
-        return motion_words(self._scenario, tracks, len(self._loads))
+        simulation = self.live.loop.simulation
+        tied = simulation.string is not None
+        return motion_words(self._scenario, len(self._loads), tied, simulation.at_rest, self.live.paused)
 
     def _take(self) -> None:
         times: list[int] = []
@@ -317,8 +316,6 @@ class Page:
             case Refused(message=message):
                 self.announcements.say(f"Refused: {message}")
                 self.controls.show_again()
-            case StatusChanged(_, track, value):
-                self._tracks[track] = value
 
     def _body_changed(self) -> None:
         unit = self.backend.unit
@@ -373,7 +370,6 @@ class Page:
         self.readings.restart()
         self._loads.clear()
         self._strings.clear()
-        self._tracks.clear()
         self._centre()
         self.lessons.did("reset")
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import viser
@@ -86,17 +86,16 @@ class TimeBar:
             self._line.content = content
 
 
-def motion_words(scenario: Scenario, tracks: Mapping[str, str], loads: int) -> str:
-    """What the body does: tracks: the last status of each, as observers hear them; loads: how many act."""
+def motion_words(scenario: Scenario, loads: int, tied: bool, at_rest: bool, paused: bool) -> str:
+    """What the body does. loads: how many act; tied: to a string."""
     setup = scenario.setup
-    motion, string = tracks.get("motion", ""), tracks.get("string", "")
-    if motion == "paused":
+    if paused:
         return "paused"
     if loads:
         words = "a force acts" if loads == 1 else f"{loads} forces act"
-    elif string in ("taut", "slack"):
+    elif tied:
         words = "string attached"
-    elif motion == "sleeping":
+    elif at_rest:
         words = "at rest"
     elif setup.gravity.any():
         words = "free fall"

@@ -64,12 +64,6 @@ def test_energy_and_momentum_walk_at_random_over_a_million_steps(name, h):
     check_random_walk(name, h, SPINS, np.unique(np.logspace(3, 6, 13).astype(int)), 1e-12)
 
 
-@pytest.mark.stress
-@pytest.mark.parametrize("name", ["free_body", "lie_midpoint"])
-def test_energy_and_momentum_walk_at_random_over_a_hundred_million_steps(name):
-    check_random_walk(name, 0.01, SPINS[:3], np.unique(np.logspace(4, 8, 17).astype(int)), 1e-11)
-
-
 @pytest.mark.parametrize("name", STEPPED)
 def test_attitude_stays_a_rotation_for_a_million_steps(name):
     problem, y = free_problem(SPINS[0])

@@ -47,21 +47,6 @@ def test_a_wrench_that_the_integrator_cannot_carry_is_refused_and_the_flight_goe
     assert simulation.advance(2 * SECOND).sha256() == untouched.sha256()
 
 
-@pytest.mark.parametrize(
-    ("name", "frame", "force"),
-    [
-        ("free_body", "world", (1.0, 0.0, 0.0)),
-        ("taylor", "world", (1.0, 0.0, 0.0)),
-        ("taylor", "body", (1.0, 0.0, 0.0)),
-    ],
-)
-def test_what_it_can_carry_is_taken(name, frame, force):
-    simulation = flight(BODY, integrator=name, initial=SPIN)
-    simulation.submit(wrench(frame, force), 0)
-    simulation.advance(SECOND)
-    assert np.linalg.norm(simulation.state.linear_velocity) > 0.5
-
-
 def test_impulses_are_for_all_because_no_integrator_sees_them():
     simulation = flight(BODY, integrator="free_body", initial=SPIN)
     simulation.submit(wrench("body@point/.1,.2,.3;impulse", (1.0, 0.0, 0.0), held=False), SECOND)
@@ -110,9 +95,3 @@ def test_a_command_scheduled_before_the_change_is_judged_again_when_it_acts():
 def test_a_step_too_long_for_its_integrator_is_told(name, step_s, spin, coarse):
     simulation = flight(BODY, integrator=name, step_s=step_s, initial=spinning((0.0, 0.0, spin)))
     assert bool(simulation.too_coarse) == coarse
-
-
-def test_a_step_too_long_for_a_string_is_told_unless_auto_chooses_it():
-    string = StringSettings(attached=True, target=(0.0, 0.0, 1.0), frequency=1e4, rest_length=1.0)
-    for name, coarse in (("rk4", True), ("auto", False)):
-        assert bool(flight(BODY, integrator=name, initial=SPIN, string=string).too_coarse) == coarse

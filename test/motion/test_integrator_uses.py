@@ -2,11 +2,9 @@
 """What docs/physics.md says that the integrators which auto takes seldom or never are good for."""
 
 import numpy as np
-import pytest
 from one_segment import new_control
 
 from rigid_proto_ros.base.records import new_record
-from rigid_proto_ros.base.rotation import multiply
 from rigid_proto_ros.motion.integrators import INTEGRATORS, series_steps
 from rigid_proto_ros.motion.integrators.series_steps import MAX_DEGREE
 from rigid_proto_ros.motion.problem import PROBLEM
@@ -69,14 +67,3 @@ def test_the_splitting_needs_fewer_evaluations_than_dop853_under_moderate_loads(
     # Evaluations: 100 and 1200. Measured 1.3e-5 and 3.1e-5.
     assert INTEGRATORS["dop853"].evaluations == 12
     assert error("free_body_strang", 1e-2) < 0.6 * error("dop853", 1e-2)
-
-
-@pytest.mark.parametrize("name", ["rk4", "dop853"])
-def test_a_start_turned_in_the_world_gives_the_same_motion_turned(name):
-    p, y = segment(10.0, (0.0, 0.0, 0.0))
-    turn = np.array((0.2, -0.4, 0.4, 0.8))
-    turned = y.copy()
-    turned[:4] = turn
-    after, turned_after = flown(name, p, y, 0.05, 10.0), flown(name, p, turned, 0.05, 10.0)
-    assert angle(turned_after, np.array(multiply(*turn, *after[:4]))) < 1e-12
-    assert np.array_equal(turned_after[4:7], after[4:7])

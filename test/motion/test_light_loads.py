@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from flights import flight, wrench
 
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.body import make_body
@@ -49,6 +50,10 @@ def test_what_is_not_finite_is_never_light(bad, place):
         resolve_load(frame, numbers[:3], numbers[3:], body, None, {}, None)
 
 
-@pytest.mark.parametrize("point", ["origin", "ray/0,0,5/0,0,-1", "vertex/0"])
-def test_a_point_that_takes_more_than_its_numbers_is_resolved_the_long_way(point):
-    assert light_row(parse_frame(f"body@{point}"), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1e9) == b""
+@pytest.mark.parametrize("frame", ["world@com", "body@point/.3,-.2,.1", "world;impulse"])
+def test_a_load_of_more_than_1e15_is_refused_and_one_of_less_is_taken(frame):
+    simulation = flight(make_body(2.0, np.zeros(3), np.eye(3)), integrator="auto")
+    simulation.submit(wrench(frame, (1e15, 0.0, 0.0), held=False))
+    with pytest.raises(CommandRefused) as refusal:
+        simulation.submit(wrench(frame, (3e15, 0.0, 0.0), held=False))
+    assert refusal.value.reason == "magnitude"

@@ -7,7 +7,6 @@ from flights import SECOND, flight, wrench
 
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.simulation import event_log
-from rigid_proto_ros.simulation.event_log import EventLog
 from rigid_proto_ros.simulation.observer import Logged, Observer, Observers
 
 BODY = make_body(2.0, (0.0, 0.0, 0.0), ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9)))
@@ -54,13 +53,3 @@ def test_events_chained_later_give_the_hash_of_those_chained_at_once(monkeypatch
     # Lines that were read carry the whole chain, those that nobody read included.
     assert fickle.lines == [line for line in reader.lines if line in fickle.lines]
     assert 0 < len(fickle.lines) < 50
-
-
-def test_no_line_is_written_for_nobody(monkeypatch):
-    def written(*_):
-        raise AssertionError("a line was written")
-
-    monkeypatch.setattr(EventLog, "append", written)
-    simulation = commanded(20)
-    simulation.advance(SECOND)
-    assert simulation.events.count == 20

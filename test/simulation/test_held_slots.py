@@ -6,9 +6,8 @@ import json
 import pytest
 from flights import SECOND, EventLines
 
-from rigid_proto_ros.base.errors import CommandRefused, InputError
+from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.scene.command_codec import entry_of
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import parse_script
@@ -83,14 +82,6 @@ def test_slots_have_a_number_each() -> None:
 def test_what_is_no_slot_is_refused(frame: str) -> None:
     with pytest.raises(CommandRefused, match="slot"):
         parse_frame(frame)
-
-
-def test_an_entry_keeps_its_slot_and_a_wrong_one_is_named() -> None:
-    (command,) = parse_script("[{t: 0, wrench: {force: [0, 0, 1], slot: left}}]")
-    assert command.frame_id == "world@com;slot=left"
-    assert entry_of(command) == {"wrench": {"at": "com", "force": [0.0, 0.0, 1.0], "slot": "left"}}
-    with pytest.raises(InputError, match="slot"):
-        parse_script("[{t: 0, wrench: {force: [0, 0, 1], slot: 3}}]")
 
 
 @pytest.mark.parametrize("timeout", [0.0, 0.4, 1.5])

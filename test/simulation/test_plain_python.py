@@ -15,7 +15,6 @@ from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import parse_script
 
 TESTS = Path(__file__).parents[1]
-SELECTION = ("motion/test_light_loads.py", "base/test_series_in_registers.py", "simulation/test_event_log.py")
 BODY = {
     "mesh": "t_handle",
     "initial.angular_velocity": [0.1, 5.0, 0.2],
@@ -75,8 +74,3 @@ def test_simulate_prints_its_json_in_plain_python() -> None:
     code = "from rigid_proto_ros.cli.main import main; main()"
     told = in_plain_python("-c", code, "simulate", "t_handle", "--duration", "0.02", "--json")
     assert json.loads(told)["time_ns"] == 20_000_000
-
-
-def test_a_selection_of_tests_passes_in_plain_python() -> None:
-    said = in_plain_python("-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *SELECTION)
-    assert " passed" in said

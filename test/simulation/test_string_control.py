@@ -9,10 +9,8 @@ import trimesh
 from flights import SECOND
 
 from rigid_proto_ros.base.errors import CommandRefused
-from rigid_proto_ros.base.rotation import rotate
-from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.motion.string import StringSettings, free_end_at, tie
+from rigid_proto_ros.motion.string import free_end_at
 from rigid_proto_ros.scene.command_codec import string_attach, string_target
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, MoveString, ReleaseString, TieString
@@ -101,19 +99,6 @@ def test_timeout_zero_never_lets_go_an_attached_string_needs_no_target_and_clear
     simulation.submit(ClearWrench())
     simulation.advance(10 * SECOND)
     assert simulation.string is not None
-
-
-@pytest.mark.parametrize("command", [ReleaseString(), None], ids=["released", "detached by parameter"])
-def test_a_released_string_pulls_no_more_and_ties_again_at_the_next_target(command):
-    simulation, scenario = simulated(string__attached=True, string__target=[0.0, 0.0, 1.0])
-    if command is None:
-        command = Change({}, lambda: scenario.with_changes({"string.attached": False}).setup)
-    simulation.submit(command, 100 * MS)
-    simulation.advance(101 * MS)
-    assert simulation.string is None
-    simulation.submit(MoveString((0.5, 0.0, 0.0)), 200 * MS)
-    simulation.advance(201 * MS)
-    assert simulation.string.free_end(201 * MS).tolist() == [0.5, 0.0, 0.0]
 
 
 def test_a_string_that_a_reset_ties_again_counts_for_the_integrator_though_it_was_let_go():
@@ -219,23 +204,6 @@ def test_a_string_pulls_when_stretched_and_pushes_only_when_bilateral(bilateral)
         assert gained == pytest.approx([0.0, 0.0, tension * 1e-3], abs=1e-3 * abs(tension) * 1e-3 + 1e-18)
 
 
-@pytest.mark.parametrize("rest_length", [0.0, 0.5])
-def test_a_knot_at_the_very_place_of_the_free_end_is_no_singularity(rest_length):
-    simulation, _ = simulated(
-        mesh="",
-        inertia_model="explicit",
-        string__attached=True,
-        string__target=[0.2, -0.1, 0.3],
-        string__rest_length=rest_length,
-        string__bilateral=True,
-    )
-    simulation.advance(MS)
-    assert np.isfinite(simulation.state.row).all()
-    assert np.isfinite([simulation.potential_energy, simulation.hand_work, simulation.string_heat]).all()
-    if rest_length == 0.0:
-        assert simulation.state.linear_velocity.tolist() == [0.0, 0.0, 0.0]
-
-
 def test_reset_ties_the_string_as_its_parameters_say():
     for attached in (False, True):
         simulation, _ = simulated(string__attached=attached, string__target=[0.0, 0.0, 1.0])
@@ -275,16 +243,3 @@ def test_a_target_that_would_pull_beyond_every_measure_is_refused_when_it_takes_
     assert simulation.refused == {"magnitude": 1}
     untouched, _ = simulated()
     assert (end.row == untouched.advance(SECOND).row).all()
-
-
-def test_a_span_that_is_rounding_alone_gives_the_effective_mass_no_direction():
-    body, arm = make_body(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.04])), np.array([0.1, 0.15, 0.2])
-    inverse = sum(1.0 / effective_mass(body, arm, n) for n in np.eye(3)) / 3.0
-    rng = np.random.default_rng(4)
-    for far in (0.0, 1.0, 1e3):
-        for _ in range(20):
-            q, target = rng.normal(size=4), far * rng.normal(size=3)
-            q /= np.linalg.norm(q)
-            state = State(0, np.array([*(target - rotate(*q, *arm)), *q, *np.zeros(6)]))
-            string = tie(StringSettings(attached=True), arm, target, body, state, 0)
-            assert string.effective_mass == pytest.approx(1.0 / inverse, rel=1e-12)

@@ -7,11 +7,9 @@ import pytest
 from flights import SECOND
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
-from rigid_proto_ros.scene.command_codec import entry_of, of_event
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import parse_script
-from rigid_proto_ros.scene.yaml_text import yaml_value
 from rigid_proto_ros.session.replay import Resimulation
 from rigid_proto_ros.simulation.observer import LoadBegan, LoadEnded, Logged, Observer
 
@@ -136,12 +134,3 @@ def test_the_wrong_number_of_forces_is_refused_with_the_names() -> None:
         flown("[{t: 0, thrusters: [1, 2]}]", 1.0, **{"thrusters.a": [0, 0, 0, 1, 0, 0]})
     with pytest.raises(InputError, match="none is declared"):
         flown("[{t: 0, thrusters: [1]}]", 1.0)
-
-
-def test_a_scene_keeps_its_thrusters_and_a_command_its_forces() -> None:
-    numbers = [0.0, 0.1, 0.2, 1.0, 0.0, 0.0, 5.0]
-    scenario = make_scenario({**BODY, "thrusters.tail": numbers})
-    assert f"thrusters.tail: {yaml_value(numbers)}" in scenario.text
-    (command,) = parse_script("[{t: 0.5, thrusters: [1, -2.5]}]")
-    assert entry_of(command) == {"thrusters": [1.0, -2.5]}
-    assert of_event("thrusters", {"forces": [1.0, -2.5]}).forces == command.forces
