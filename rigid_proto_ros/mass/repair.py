@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.compilation import njit
-from ..base.errors import MeshError
 from ..base.rotation import length, times
 from ..mesh.intersection import component_nesting
 from ..mesh.topology import (
@@ -22,12 +21,8 @@ from ..mesh.topology import (
     rims,
     surplus_copies,
 )
-from ..mesh.union import counted_once, united_surface
 from .verdict import MAX_NESTED_COMPONENTS, counted
 
-CRACK = 1e-12
-"""Rim vertices closer than this part of the diagonal are one even where no repair is asked for: rounding put them
-apart."""
 WELD = 1e-5
 """Rim vertices closer than this part of the diagonal are one: files with six digits round by up to that."""
 
@@ -71,16 +66,12 @@ class RepairedSurface:
 
 
 def repair_surface(
-    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None, *, cavities: bool = True
+    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray | None, tuple[str, ...]]:
-    """Repaired triangles (k, 3), their polygon starts, and what was done, one phrase a step; empty when nothing was.
-
-    cavities: components that lie inside another become cavities of it; otherwise they stay as they are wound.
-    """
+    """Repaired triangles (k, 3), their polygon starts, and what was done, one phrase a step; empty when nothing was."""
     surface = RepairedSurface(vertices, triangles, polygon_starts)
     done = [*_drop_copies(surface), *_weld_rims(surface), *_orient(surface), *_cap_holes(surface)]
-    if cavities:
-        done += _turn_outward(surface)
+    done += _turn_outward(surface)
     return surface.triangles, surface.polygon_starts, tuple(done)
 
 
@@ -125,24 +116,15 @@ def _near_pairs(points: np.ndarray, order: np.ndarray, tolerance: float, target:
                 target[b] = a
 
 
-def weld_cracks(
-    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray | None, str]:
-    """Triangles with rim vertices that only rounding put apart as one, polygon starts, and what was done or ""."""
-    surface = RepairedSurface(vertices, triangles, polygon_starts)
-    done = _weld_rims(surface, CRACK)
-    return surface.triangles, surface.polygon_starts, "".join(done)
-
-
-def _weld_rims(surface: RepairedSurface, part: float = WELD) -> list[str]:
-    """Let triangles use one number for rim vertices closer than ``part`` of the diagonal."""
+def _weld_rims(surface: RepairedSurface) -> list[str]:
+    """Let triangles use one number for rim vertices closer than WELD of the diagonal."""
     topology = surface.topology()
     rim = np.unique(topology.boundary[:, :2])
     if not len(rim):
         return []
     points = surface.vertices[rim]
     used = surface.vertices[surface.triangles.ravel()]
-    tolerance = part * length(used.max(axis=0) - used.min(axis=0))
+    tolerance = WELD * length(used.max(axis=0) - used.min(axis=0))
     target = np.arange(len(rim))
     _near_pairs(points, np.argsort(times(points, _SWEEP), kind="stable"), tolerance, target)
     moved = int(np.count_nonzero(target != np.arange(len(rim))))
@@ -157,35 +139,6 @@ def _weld_rims(surface: RepairedSurface, part: float = WELD) -> list[str]:
     flat = np.where(moves, surface.triangles, topology.corners)
     surface.drop((flat[:, 0] == flat[:, 1]) | (flat[:, 1] == flat[:, 2]) | (flat[:, 2] == flat[:, 0]))
     return [f"welded {moved} rim vertices, the farthest by {far:.2g}"]
-
-
-def unite_components(
-    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, str]:
-    """Vertices, triangles and polygon starts of the closed components as one solid, and what was done or "".
-
-    The file's vertices keep their numbers; those of an intersection follow them.
-    """
-    surface = RepairedSurface(vertices, triangles, polygon_starts)
-    topology = surface.topology()
-    nothing = vertices, triangles, polygon_starts, ""
-    if topology.unbalanced or not 1 < topology.components <= MAX_NESTED_COMPONENTS:
-        return nothing
-    sums = component_sums(vertices, triangles, topology)
-    nesting = component_nesting(vertices, triangles, topology.component, sums.lower, sums.upper)
-    if not nesting.complete:
-        raise MeshError("mesh_repair", "union: too many faces to say how the components lie to each other")
-    if nesting.crossing:
-        solid = united_surface(vertices, topology.corners, topology.component, sums.volume, nesting.depth)
-        joined = np.concatenate([vertices, solid[0]])
-        done = f"united {topology.components} components, of which {counted(len(nesting.crossing), 'pair')} overlapped"
-        return joined, solid[1] + len(vertices), None, done
-    spare = counted_once(sums.volume, nesting.inside) == 0.0
-    if not spare.any():
-        return nothing
-    surface.drop(spare[topology.component])
-    done = f"removed {counted(int(np.count_nonzero(spare)), 'component')} inside others"
-    return vertices, surface.triangles, surface.polygon_starts, done
 
 
 def _turns(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, bool]:
@@ -223,8 +176,7 @@ def close_surface(
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """Triangles and polygon starts with a cap over whatever keeps the surface open or its edges unbalanced."""
     surface = RepairedSurface(vertices, triangles, polygon_starts)
-    edges = surface.topology().edges
-    for walk in rims(edges[edges[:, 2] != edges[:, 3]]):
+    for walk in rims(surface.topology().unbalanced):
         surface.add_polygon(walk)
     return surface.triangles, surface.polygon_starts
 
@@ -245,14 +197,14 @@ def _cap_holes(surface: RepairedSurface) -> list[str]:
 def _turn_outward(surface: RepairedSurface) -> list[str]:
     """Outermost components outward, those inside one of them inward, and so on by parity."""
     topology = surface.topology()
-    if topology.unbalanced or not 0 < topology.components <= MAX_NESTED_COMPONENTS:
+    if len(topology.unbalanced) or not 0 < topology.components <= MAX_NESTED_COMPONENTS:
         return []
-    sums = component_sums(surface.vertices, surface.triangles, topology)
+    sums = component_sums(surface.vertices, topology)
     wrong = sums.volume < 0.0
     if topology.components > 1:
-        nesting = component_nesting(surface.vertices, surface.triangles, topology.component, sums.lower, sums.upper)
-        # A component of which it is unknown where it lies stays as it is.
-        wrong = (np.sign(sums.volume) == np.where(nesting.depth % 2 == 0, -1.0, 1.0)) & nesting.decided
+        nesting = component_nesting(surface.vertices, topology, sums)
+        # Where it is unknown how they lie they stay as they are.
+        wrong = (np.sign(sums.volume) == np.where(nesting.depth % 2 == 0, -1.0, 1.0)) & nesting.complete
     if not wrong.any():
         return []
     surface.turn(wrong[topology.component])

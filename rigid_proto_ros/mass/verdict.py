@@ -9,29 +9,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import MeshError
-from ..mesh.intersection import Nesting, component_nesting, self_crossings
-from ..mesh.topology import (
-    Components,
-    Topology,
-    component_sums,
-    fan,
-    mesh_topology,
-    referenced_extent,
-    rims,
-    surplus_copies,
-)
-from ..mesh.union import can_unite, counted_once, united_volume
-from .moments import solid_moments
+from ..mesh.intersection import Nesting, component_nesting
+from ..mesh.topology import Components, Topology, component_sums, fan, mesh_topology, rims, surplus_copies
+from ..mesh.union import can_unite, united
+from .moments import referenced_vertices, solid_moments
 
 INFO, WARNING, ERROR = "info", "warning", "error"
-UNREFERENCED = "unreferenced_vertices"
-OVERLAPPING, NESTED, SELF_CROSSING = "overlapping_components", "nested_components", "self_crossing"
+NESTED = "nested_components"
 NO_OVERLAP = 1e-6
 """Part of the volume below which an overlap is a remark, no warning."""
 MAX_NESTED_COMPONENTS = 2000
 """Above this many components their mutual position isn't examined: the tables grow with the square."""
-THIN = 1e-6
-"""V/diagonal³ below which a body is called thin: a 1 x 1 x 1e-5 plate has 4e-6, a needle less."""
 NO_VOLUME = 1e-14
 """V/(area·diagonal) below which the surface encloses nothing: both sides coincide to rounding."""
 SIZE_RANGE = 1e-60, 1e60
@@ -40,9 +28,11 @@ SMALL_HOLES = 0.1
 """Largest effect of holes that is said together with the option that accepts it."""
 MAX_RIM = 20_000
 """Unbalanced edges up to which caps are tried; walking along more takes long."""
-LARGE_M, SMALL_M = 5.0, 1e-3
-"""Longest sides [m] outside which another unit is suspected: few bodies that one pokes are longer, and every part of
-5 mm to 5 m drawn in millimetres is."""
+LARGE_M = 5.0
+"""Longest side [m] beyond which another unit is suspected: few bodies that one pokes are longer, and every part of more
+than 5 mm drawn in millimetres is."""
+MAX_SELF_CROSSING = 20_000
+"""Triangles above which a single component isn't examined for passing through itself."""
 
 
 @dataclass(frozen=True)
@@ -91,10 +81,6 @@ def unit_suspicion(longest_side: float) -> Finding | None:
         units = f"{longest_side:.4g} mm if the file is in millimetres (--scale 0.001)"
         message = f"the body is {longest_side:.4g} m across; it would be {units} (scale)"
         return Finding("unit_suspicion", WARNING, message)
-    if longest_side < SMALL_M:
-        larger = f"it would be {1000.0 * longest_side:.4g} m if its lengths were divided by 1000 once too often"
-        message = f"the body is {longest_side:.4g} m across; {larger} (--scale 1000) (scale)"
-        return Finding("unit_suspicion", WARNING, message)
     return None
 
 
@@ -111,86 +97,54 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _check_edges(
-    verdict: Verdict, topology: Topology, sums: Components, vertices: np.ndarray, half: np.ndarray
-) -> None:
-    """Open, inconsistently wound, duplicated: each with what is known of the volume."""
+def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray, degenerate: int) -> None:
+    """Open, inconsistently wound, duplicated, and how much depends on how holes are closed."""
     verdict.watertight = topology.watertight
     verdict.winding_consistent = topology.flipped == 0
     surplus = int(np.count_nonzero(surplus_copies(topology)))
     if surplus:
         message = f"{counted(surplus, 'duplicate face')}, which would count twice"
         verdict.add("duplicate_faces", ERROR, message, "--repair (mesh_repair) removes the copies")
-    if topology.duplicates.any() and not surplus:
+    elif topology.duplicates.any():
         message = f"{counted(int(np.count_nonzero(topology.duplicates)), 'duplicate face')} that close the surface"
         verdict.add("duplicate_faces", INFO, message)
-    caps = _caps(topology)
-    accepting = ""
-    if caps is not None:
-        verdict.hole_effect = _hole_effect(topology, vertices, caps)
-        if verdict.hole_effect is not None and verdict.hole_effect < SMALL_HOLES:
-            known_to = f"whatever closes it changes volume and tensor by at most {100.0 * verdict.hole_effect:.2g} %"
-            accepting = f"; {known_to}, which --accept-open {_rounded_up(verdict.hole_effect)} accepts"
-    if topology.unbalanced and not topology.watertight:
+    verdict.hole_effect = _hole_effect(topology, vertices)
+    known = ""
+    if verdict.hole_effect is not None and verdict.hole_effect < SMALL_HOLES:
+        known = f"; whatever closes it changes volume and tensor by at most {100.0 * verdict.hole_effect:.2g} %"
+        known += f", which --accept-open {_rounded_up(verdict.hole_effect)} accepts"
+    if not topology.watertight:
         rim = len(topology.boundary)
         edges = counted(rim, "boundary edge")
         if topology.odd > rim:
             edges += f" and {counted(topology.odd - rim, 'edge')} of 3 or more faces"
-        known = _known_volume(sums, half, "how holes are closed")
-        if caps is not None:
-            known += f"; flat caps over the holes give {_capped_volume(sums, vertices, caps):.3g}"
         remedy = "--repair (mesh_repair) welds edges and caps holes"
-        verdict.add("open", ERROR, f"open surface with {edges}; {known}{accepting}", remedy)
-        accepting = ""
+        verdict.add("open", ERROR, f"open surface with {edges}{known}", remedy)
+        known = ""
     if topology.flipped:
         edges = f"{counted(topology.flipped, 'edge')} used twice in the same direction"
-        known = _known_volume(sums, half, "how faces are turned")
         remedy = "--repair (mesh_repair) turns faces"
-        verdict.add("inconsistent_winding", ERROR, f"inconsistent winding: {edges}; {known}{accepting}", remedy)
-    if topology.nonmanifold and not topology.unbalanced and not surplus:
+        verdict.add("inconsistent_winding", ERROR, f"inconsistent winding: {edges}{known}", remedy)
+    if topology.nonmanifold and not len(topology.unbalanced) and not surplus:
         message = f"{counted(topology.nonmanifold, 'edge')} shared by more than two faces, which are wound consistently"
         verdict.add("non_manifold", INFO, message)
     if topology.opposites:
         message = f"{counted(topology.opposites, 'face')} coinciding with another one that is wound the other way"
         verdict.add("opposite_faces", WARNING, message)
-    if topology.degenerate:
-        message = f"{counted(topology.degenerate, 'triangle')} without area, which have no effect"
-        verdict.add("degenerate_faces", INFO, message)
+    if degenerate:
+        verdict.add("degenerate_faces", INFO, f"{counted(degenerate, 'triangle')} without area, which have no effect")
 
 
-def _known_volume(sums: Components, half: np.ndarray, choice: str) -> str:
-    """What can be said of the volume of a surface that bounds none: half (3,) is half its box.
-
-    The faces' sum moves with the origin by a third of the surface's vector area times the distance.
-    """
-    volume = float(np.sum(sums.volume))
-    swing = float(np.sum(np.abs(sums.area.sum(axis=0)) * half)) / 3.0
-    low, high = f"{volume - swing:.3g}", f"{volume + swing:.3g}"
-    if low == high:
-        return f"volume unknown: it depends on {choice}, and the faces' own sum of {low} leaves that out"
-    return f"volume ambiguous: {low} to {high}, depending on {choice}"
-
-
-def _caps(topology: Topology) -> np.ndarray | None:
-    """Triangles (k, 3) over welded vertices that close the surface; None where it is closed or its rims are long."""
-    unbalanced = topology.edges[topology.edges[:, 2] != topology.edges[:, 3]]
-    if not 0 < len(unbalanced) <= MAX_RIM:
-        return None
-    return np.concatenate([fan(walk) for walk in rims(unbalanced)])
-
-
-def _capped_volume(sums: Components, vertices: np.ndarray, caps: np.ndarray) -> float:
-    a, b, c = (vertices[caps[:, k]] - sums.middle for k in range(3))
-    return float(np.sum(sums.volume) + np.sum(np.einsum("ij,ij->i", a, np.cross(b, c))) / 6.0)
-
-
-def _hole_effect(topology: Topology, vertices: np.ndarray, caps: np.ndarray) -> float | None:
-    """As ``Verdict.hole_effect``, of a surface that ``caps`` (k, 3) close: the largest that any surface over the holes
-    can do that has the caps' area and lies no farther from the centre of mass. None for one without a volume.
+def _hole_effect(topology: Topology, vertices: np.ndarray) -> float | None:
+    """As ``Verdict.hole_effect``, of a surface that flat caps close: the largest that any surface over the holes can do
+    that has the caps' area and lies no farther from the centre of mass. None for one without a volume.
 
     Seen from there, an element dA at the distance r adds at most r dA/3 to the volume, r² dA/4 to the first and r³ dA/5
     to the second moments.
     """
+    if not 0 < len(topology.unbalanced) <= MAX_RIM:
+        return None
+    caps = np.concatenate([fan(walk) for walk in rims(topology.unbalanced)])
     try:
         moments = solid_moments(vertices, np.concatenate([topology.corners, caps]))
     except MeshError:
@@ -213,61 +167,51 @@ def _rounded_up(value: float) -> str:
     return f"{step * math.ceil(value / step + 1e-9):.2g}"
 
 
-def _check_components(
-    verdict: Verdict, topology: Topology, sums: Components, vertices: np.ndarray, triangles: np.ndarray
-) -> None:
-    """Outward or inward, cavities, parts that count twice; for a surface whose edges are balanced."""
+def _check_components(verdict: Verdict, topology: Topology, sums: Components, vertices: np.ndarray) -> None:
+    """Outward or inward, cavities, parts that count twice or pass through themselves; for balanced edges."""
     count, volume = topology.components, sums.volume
-    if count == 1:
-        verdict.inward = bool(volume[0] < 0.0)
-    elif count > MAX_NESTED_COMPONENTS:
-        verdict.inward = bool(np.sum(volume) < 0.0)
+    whole = float(np.sum(volume))
+    verdict.inward = whole < 0.0
+    if count > MAX_NESTED_COMPONENTS:
         message = f"{count} components are too many to check whether some overlap or lie inside others"
         verdict.add("components_unchecked", WARNING, message)
-    else:
-        nesting = component_nesting(vertices, triangles, topology.component, sums.lower, sums.upper)
-        _check_nesting(verdict, nesting, volume)
+    elif count > 1 or len(topology.corners) <= MAX_SELF_CROSSING:
+        nesting = component_nesting(vertices, topology, sums)
+        if nesting.complete:
+            _check_nesting(verdict, nesting, volume)
+        else:
+            verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
         if nesting.crossing:
-            closed = verdict.closed and not verdict.inward
             lie = topology.corners, topology.component, volume, nesting.depth
-            whole = united_volume(vertices, *lie) if closed else None
-            verdict.united = whole is not None and abs(float(np.sum(volume))) > (1.0 + NO_OVERLAP) * whole > 0.0
-            _check_overlap(verdict, len(nesting.crossing), float(np.sum(volume)), whole)
+            solid = united(vertices, *lie) if verdict.closed and not verdict.inward else None
+            _check_overlap(verdict, len(nesting.crossing), whole, None if solid is None else float(solid[0].volume()))
+        if nesting.within:
+            message = f"the surface passes through itself ({counted(nesting.within, 'pair')} of triangles)"
+            verdict.add("self_crossing", WARNING, f"{message}; what it encloses twice counts twice")
     if verdict.inward:
         verdict.add("inward", WARNING, "all faces were wound inward and have been turned outward")
 
 
 def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> None:
-    """Which of the components, of signed volume (k,), count with the wrong sign, and which overlap."""
-    count = len(volume)
+    """Which of the components, of signed volume (k,), count with the wrong sign."""
     expected = np.where(nesting.depth % 2 == 0, 1.0, -1.0)
-    # What is undecided accuses no component.
-    matters = (volume != 0.0) & nesting.decided
+    matters = volume != 0.0
     wrong = matters & (np.sign(volume) != expected)
-    verdict.inward = bool(np.all(wrong[matters]) and matters.any() and nesting.decided.all())
-    cavities = int(np.count_nonzero((expected < 0.0) & (~wrong | verdict.inward)))
+    verdict.inward = bool(np.all(wrong[matters]) and matters.any())
     if not verdict.inward:
         disjoint = int(np.count_nonzero(wrong & (expected > 0.0)))
         nested = int(np.count_nonzero(wrong & (expected < 0.0)))
         if disjoint:
             verdict.winding_consistent = False
-            subtract = f"{disjoint} of {count} components wound inward, so that they would subtract"
+            subtract = f"{disjoint} of {len(volume)} components wound inward, so that they would subtract"
             message = f"inconsistent winding: {subtract}"
             verdict.add("component_inward", ERROR, message, "--repair (mesh_repair) turns them")
         if nested:
             message = f"{counted(nested, 'component')} inside another and wound outward: their volume counts twice"
-            if not nesting.crossing:
-                hollow = float(np.sum(expected * np.abs(volume)))
-                once = float(np.sum(counted_once(volume, nesting.inside) * np.abs(volume)))
-                message += (
-                    f"; the volume is {np.sum(volume):.4g} so, {hollow:.4g} with cavities, {once:.4g} as one solid"
-                )
-            remedy = "--repair (mesh_repair) makes cavities of them, --repair union one solid"
-            verdict.add(NESTED, WARNING, message, remedy)
+            verdict.add(NESTED, WARNING, message, "--repair (mesh_repair) makes cavities of them")
+    cavities = int(np.count_nonzero((expected < 0.0) & (~wrong | verdict.inward)))
     if cavities:
         verdict.add("cavities", INFO, f"{counted(cavities, 'closed inner surface')} wound inward, taken as cavities")
-    if not nesting.complete:
-        verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
 
 
 def _check_overlap(verdict: Verdict, pairs: int, volume: float, whole: float | None) -> None:
@@ -275,15 +219,16 @@ def _check_overlap(verdict: Verdict, pairs: int, volume: float, whole: float | N
     overlap = f"{counted(pairs, 'pair')} of components overlap"
     if whole is None or not whole > 0.0:
         measure = "" if can_unite() else " (the extra [meshes] measures by how much)"
-        verdict.add(OVERLAPPING, WARNING, f"{overlap}; the volume that they share counts twice{measure}")
+        verdict.add("overlapping_components", WARNING, f"{overlap}; what they share counts twice{measure}")
         return
     over = abs(volume) / whole - 1.0
-    if over <= NO_OVERLAP:
-        verdict.add(OVERLAPPING, INFO, f"{overlap}, by less than {NO_OVERLAP:g} of the volume")
+    verdict.united = over > NO_OVERLAP
+    if not verdict.united:
+        verdict.add("overlapping_components", INFO, f"{overlap}, by less than {NO_OVERLAP:g} of the volume")
         return
     sum_of_parts = f"their volumes' sum of {abs(volume):.4g} would overcount {100.0 * over:.3g} %"
-    remedy = "--repair union (mesh_repair) makes one surface of them, too"
-    verdict.add(OVERLAPPING, WARNING, f"{overlap}; the solid is their union of {whole:.4g}: {sum_of_parts}", remedy)
+    message = f"{overlap}; the solid is their union of {whole:.4g}: {sum_of_parts}"
+    verdict.add("overlapping_components", WARNING, message)
 
 
 def _check_size(verdict: Verdict, side: float) -> None:
@@ -296,46 +241,38 @@ def _check_size(verdict: Verdict, side: float) -> None:
         verdict.add("size", ERROR, f"the mesh is {side:.3g} across; moments are finite for sizes {sizes}")
 
 
-def check_surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[Verdict, Topology | None]:
-    """The verdict on triangles (m, 3) over vertices (n, 3), and the topology it rests on (None when unusable)."""
+def check_surface(vertices: np.ndarray, triangles: np.ndarray) -> Verdict:
+    """The verdict on triangles (m, 3) over vertices (n, 3)."""
     verdict = Verdict()
-    extent = referenced_extent(vertices, triangles)
-    if len(triangles) == 0 or extent.not_finite:
+    bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(triangles) == 0 or len(bad):
         verdict.usable = verdict.watertight = verdict.winding_consistent = False
-        if extent.not_finite:
-            rows = f"{extent.not_finite} of {len(vertices)} vertices are not finite"
-            verdict.add("nonfinite", ERROR, f"{rows}; the first is vertex {extent.first_not_finite}")
+        if len(bad):
+            rows = f"{len(bad)} of {len(vertices)} vertices are not finite"
+            verdict.add("nonfinite", ERROR, f"{rows}; the first is vertex {bad[0]}")
         else:
             verdict.add("no_faces", ERROR, "the mesh has no faces")
-        return verdict, None
+        return verdict
+    points = referenced_vertices(vertices, triangles)
+    if len(points) < len(vertices):
+        message = f"vertices that belong to no face carry no mass: {len(vertices) - len(points)}"
+        verdict.add("unreferenced_vertices", INFO, message)
+    sides = points.max(axis=0) - points.min(axis=0)
     topology = mesh_topology(vertices, triangles)
     verdict.components = topology.components
-    half = 0.5 * extent.upper - 0.5 * extent.lower
-    if extent.unused:
-        message = f"vertices that belong to no face carry no mass: {extent.unused}"
-        if not np.isfinite(vertices).all():
-            message += "; what is not finite is taken to lie at the first face's first corner"
-        verdict.add(UNREFERENCED, INFO, message)
-    _check_size(verdict, 2.0 * float(half.max()))
+    _check_size(verdict, float(sides.max()))
     if not verdict.usable:
-        return verdict, topology
-    diagonal = 2.0 * float(np.linalg.norm(half))
-    sums = component_sums(vertices, triangles, topology)
-    _check_edges(verdict, topology, sums, vertices, half)
-    if topology.unbalanced == 0:
-        volume = float(np.sum(sums.volume))
-        empty = abs(volume) <= NO_VOLUME * diagonal**3 and _no_volume(vertices, triangles, diagonal)
+        return verdict
+    diagonal = float(np.linalg.norm(sides))
+    sums = component_sums(vertices, topology)
+    _check_edges(verdict, topology, vertices, sums.degenerate)
+    if not len(topology.unbalanced):
+        empty = abs(float(np.sum(sums.volume))) <= NO_VOLUME * diagonal**3 and _no_volume(vertices, triangles, diagonal)
         if topology.components > 1 or not empty:
-            _check_components(verdict, topology, sums, vertices, triangles)
+            _check_components(verdict, topology, sums, vertices)
         if empty and verdict.closed:
             verdict.add("zero_volume", ERROR, "the surface encloses no volume: it is flat, or folded onto itself")
-        elif not empty and abs(volume) < THIN * diagonal**3:
-            verdict.add("thin", INFO, f"thin body: its volume is {abs(volume) / diagonal**3:.1e} of its diagonal cubed")
-        crossings = self_crossings(vertices, topology.corners, topology.component)
-        if crossings:
-            message = f"the surface passes through itself ({counted(crossings, 'pair')} of triangles)"
-            verdict.add(SELF_CROSSING, WARNING, f"{message}; what it encloses twice counts twice")
-    return verdict, topology
+    return verdict
 
 
 def _no_volume(vertices: np.ndarray, triangles: np.ndarray, diagonal: float) -> bool:

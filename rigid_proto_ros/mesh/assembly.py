@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Scenes of placed parts as one surface, and those that a library reads: COLLADA through pycollada, without looks,
-lights and motion, and formats that have no reader here through trimesh.
-"""
+"""Scenes of placed parts as one surface, and those of COLLADA, through pycollada, without looks, lights and motion."""
 
 from __future__ import annotations
 
 import io
 import xml.etree.ElementTree as ElementTree
-from typing import Any
 
 import numpy as np
 
@@ -16,34 +13,31 @@ from ..base.errors import MeshError, is_missing
 _LIBRARIES = ("images", "effects", "materials", "cameras", "lights", "animations", "animation_clips", "controllers")
 _UNUSED = (*(f"library_{kind}" for kind in _LIBRARIES), "bind_material", "instance_camera", "instance_light", "extra")
 """Elements that no triangle depends on. pycollada drops a geometry whose material it can't read."""
-_ARCHIVES = ("zip", "bz2", "tar.bz2", "tar.gz", "zae")
+MAX_TRIANGLES = 20_000_000
+"""A mesh of more is refused: this many take about 1.5 GB."""
 
 
 class Assembly:
-    """Collects the placed parts of the file ``name``; raises MeshError beyond ``max_triangles``."""
+    """Collects the placed parts of the file ``name``."""
 
-    def __init__(self, name: str, max_triangles: int) -> None:
+    def __init__(self, name: str) -> None:
         self.name = name
-        self.max_triangles = max_triangles
-        self._vertices: list[np.ndarray] = []
-        self._triangles: list[np.ndarray] = []
-        self._count = 0
-        self._room = max_triangles
+        self._vertices: list[np.ndarray] = [np.empty((0, 3))]
+        self._triangles: list[np.ndarray] = [np.empty((0, 3), np.int64)]
+        self._count = self._held = 0
 
     def add(self, vertices: np.ndarray, triangles: np.ndarray, matrix: np.ndarray, part: str) -> None:
         """Append ``part``: vertices (n, 3) as matrix (4, 4) places them, and triangles (m, 3), turned where it mirrors.
 
-        Raises MeshError for a triangle that names a vertex that the part doesn't have.
+        Raises MeshError for a triangle that names a vertex that the part doesn't have, and beyond MAX_TRIANGLES.
         """
         triangles = np.asarray(triangles, dtype=np.int64).reshape(-1, 3)
         wrong = triangles[(triangles < 0) | (triangles >= len(vertices))]
         if len(wrong):
             raise MeshError(self.name, f"{part} uses vertex {wrong[0]}, but it has only {len(vertices)}")
-        self._room -= len(triangles)
-        if self._room < 0 or self._count + len(vertices) > 3 * self.max_triangles + 3:
-            raise MeshError(
-                self.name, f"it has more than {self.max_triangles} triangles; --max-triangles raises the limit"
-            )
+        self._held += len(triangles)
+        if max(self._held, (self._count + len(vertices)) // 3) > MAX_TRIANGLES:
+            raise MeshError(self.name, f"it has more than {MAX_TRIANGLES} triangles", "a smaller mesh")
         linear, shift = matrix[:3, :3], matrix[:3, 3]
         with np.errstate(all="ignore"):  # the verdict refuses what isn't finite
             x, y, z = np.asarray(vertices, dtype=np.float64).T[:, :, None]
@@ -56,8 +50,6 @@ class Assembly:
 
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (n, 3) and triangles (m, 3) of all parts, in the order in which they were added."""
-        if not self._vertices:
-            return np.empty((0, 3)), np.empty((0, 3), np.int64)
         return np.concatenate(self._vertices), np.concatenate(self._triangles)
 
 
@@ -98,29 +90,3 @@ def add_collada(data: bytes, assembly: Assembly) -> float:
             if isinstance(primitive, collada.triangleset.TriangleSet) and primitive.vertex is not None:
                 assembly.add(primitive.vertex, primitive.vertex_index, bound.matrix, f"geometry {bound.original.id}")
     return 1.0 if document.assetInfo.unitmeter is None else float(document.assetInfo.unitmeter)
-
-
-def other_formats() -> tuple[str, ...]:
-    """Endings that trimesh, as it is installed, reads."""
-    import trimesh
-
-    return tuple(sorted(set(trimesh.available_formats()) - set(_ARCHIVES)))
-
-
-def add_by_trimesh(data: bytes, suffix: str, assembly: Assembly) -> float:
-    """Add what trimesh reads of a file's bytes; returns the metres in its unit, 1 if it says none.
-
-    Vertices stay as the file has them: nothing is merged or sorted. Raises MeshError for a file that shows something
-    else than triangles, for which the rest would stand in silence, and trimesh's errors.
-    """
-    import trimesh
-
-    load: Any = trimesh.load_scene
-    scene = load(io.BytesIO(data), file_type=suffix, process=False, maintain_order=True, skip_materials=True)
-    for node in scene.graph.nodes_geometry:
-        matrix, name = scene.graph[node]
-        part = scene.geometry[name]
-        if not isinstance(part, trimesh.Trimesh):
-            raise MeshError(assembly.name, f"{name} is a {type(part).__name__}", "triangles alone")
-        assembly.add(np.asarray(part.vertices), np.asarray(part.faces), np.asarray(matrix), name)
-    return 1.0 if scene.units is None else float(trimesh.units.unit_conversion(scene.units, "meters"))

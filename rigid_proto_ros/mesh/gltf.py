@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """glTF 2.0 (.gltf, .glb), as the Khronos specification has it: the triangles of the default scene.
 
-Read besides the core: KHR_mesh_quantization. Instances, sparse accessors and Draco's compression are refused by name.
+Strips, fans, normalized integers, sparse accessors, instances and Draco's compression are refused by name.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..base.errors import MeshError
 from ..base.rotation import matrix_from_quaternion, normalize
 from .assembly import Assembly
 
-TRIANGLES, STRIP, FAN = 4, 5, 6
+TRIANGLES = 4
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _READ = "KHR_mesh_quantization"
@@ -47,11 +47,10 @@ def _chunks(data: bytes, name: str) -> tuple[dict, bytes]:
 class _Document:
     """A file's JSON object, and the numbers that its accessors stand for."""
 
-    def __init__(self, data: bytes, name: str, beside: Callable[[str], bytes], limit: int) -> None:
+    def __init__(self, data: bytes, name: str, beside: Callable[[str], bytes]) -> None:
         self.name = name
         self.json, self._blob = _chunks(data, name)
         self._beside = beside
-        self._limit = limit
         self._buffers: dict[int, bytes] = {}
 
     def item(self, kind: str, number: int) -> Any:
@@ -80,32 +79,18 @@ class _Document:
         return content[start : start + view["byteLength"]]
 
     def numbers(self, accessor_number: int) -> np.ndarray:
-        """The rows (n, k) of an accessor, normalized integers as fractions."""
+        """The rows (n, k) of an accessor."""
         accessor = self.item("accessors", accessor_number)
-        if "sparse" in accessor or "bufferView" not in accessor:
-            kind = "is sparse" if "sparse" in accessor else "has no bufferView"
-            raise MeshError(
-                self.name, f"accessor {accessor_number} {kind}", "a file whose numbers are all in it, exported anew"
-            )
+        for key, kind in (("sparse", "is sparse"), ("normalized", "is of normalized integers")):
+            if accessor.get(key):
+                raise MeshError(self.name, f"accessor {accessor_number} {kind}", "a file exported without compression")
         dtype, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
         count, start = accessor["count"], accessor.get("byteOffset", 0)
-        if not 0 <= count <= self._limit:
-            raise MeshError(self.name, f"an accessor of {count} entries; --max-triangles raises the limit")
         content = self.view(accessor["bufferView"])
         stride = self.item("bufferViews", accessor["bufferView"]).get("byteStride") or dtype.itemsize * width
-        if count and (start < 0 or start + stride * (count - 1) + dtype.itemsize * width > len(content)):
+        if count < 0 or count and (start < 0 or start + stride * (count - 1) + dtype.itemsize * width > len(content)):
             raise MeshError(self.name, f"an accessor reads beyond bufferView {accessor['bufferView']}")
-        rows = np.ndarray((count, width), dtype, content if count else None, start, (stride, dtype.itemsize))
-        if accessor.get("normalized") and dtype.kind != "f":
-            return np.maximum(rows.astype(np.float64) / np.iinfo(dtype).max, -1.0)
-        return rows
-
-
-def _check_extensions(document: _Document) -> None:
-    """Refuse an extension that the file requires and that isn't read here."""
-    for extension in document.json.get("extensionsRequired", []):
-        if extension != _READ and not extension.startswith(_LOOKS):
-            raise MeshError(document.name, f"it requires the extension {extension}", f"no other than {_READ}")
+        return np.ndarray((count, width), dtype, content if count else None, start, (stride, dtype.itemsize))
 
 
 def _node_matrix(node: dict) -> np.ndarray:
@@ -131,17 +116,11 @@ def _triangles(document: _Document, primitive: dict) -> tuple[np.ndarray, np.nda
         corners = document.numbers(primitive["indices"])[:, 0].astype(np.int64)
     else:
         corners = np.arange(len(vertices))
-    if mode == TRIANGLES:
-        if len(corners) % 3:
-            raise MeshError(document.name, f"{len(corners)} corners of triangles, which is no multiple of 3")
-        return vertices, corners.reshape(-1, 3)
-    if mode == STRIP:
-        triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
-        triangles[1::2] = triangles[1::2, [1, 0, 2]]
-        return vertices, triangles
-    if mode == FAN:
-        return vertices, np.stack([np.full(len(corners) - 2, corners[0]), corners[1:-1], corners[2:]], axis=1)
-    raise MeshError(document.name, f"a primitive of mode {mode}", "modes 0 to 6")
+    if mode != TRIANGLES:
+        raise MeshError(document.name, "it has strips or fans", "a file exported as triangles")
+    if len(corners) % 3:
+        raise MeshError(document.name, f"{len(corners)} corners of triangles, which is no multiple of 3")
+    return vertices, corners.reshape(-1, 3)
 
 
 def _add_node(document: _Document, number: int, above: np.ndarray, seen: set[int], assembly: Assembly) -> None:
@@ -171,8 +150,10 @@ def add_gltf(data: bytes, beside: Callable[[str], bytes], assembly: Assembly) ->
     ``beside`` gives the bytes of the file that a buffer's URI names. Raises MeshError, or other errors where the file
     isn't built as glTF says.
     """
-    document = _Document(data, assembly.name, beside, 3 * assembly.max_triangles + 3)
-    _check_extensions(document)
+    document = _Document(data, assembly.name, beside)
+    for extension in document.json.get("extensionsRequired", []):
+        if extension != _READ and not extension.startswith(_LOOKS):
+            raise MeshError(document.name, f"it requires the extension {extension}", f"no other than {_READ}")
     if document.json.get("scenes"):
         roots = document.item("scenes", document.json.get("scene", 0)).get("nodes", [])
     else:

@@ -66,7 +66,7 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
             inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
             triangles[inward] = triangles[inward][:, [0, 2, 1]]
             topology = mesh_topology(shape, triangles)
-            if not topology.unbalanced and not topology.nonmanifold:
+            if not len(topology.unbalanced) and not topology.nonmanifold:
                 return triangles
     except QhullError:
         pass

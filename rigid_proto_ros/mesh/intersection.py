@@ -9,10 +9,8 @@ leaves − 1 + l.
 Two triangles cross where each lies on both sides of the other's plane and the pieces that they cut from the planes'
 common line overlap (Möller, Journal of Graphics Tools 2, 1997). Touching and coplanar triangles don't.
 
-A point lies inside a closed component when a ray from it leaves the component more often than it enters it. The ray's
-hits are found with the watertight test of Woop, Benthin and Wald (Journal of Computer Graphics Techniques 2, 2013); one
-that comes too near an edge to be sure is shot again in another direction, and a point on the other surface decides
-nothing.
+A point lies inside a closed component when a ray from it leaves the component more often than it enters it. A ray that
+comes too near an edge to be sure is shot again in another direction, and a point on the other surface decides nothing.
 """
 
 from __future__ import annotations
@@ -23,16 +21,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.compilation import njit
+from .topology import Components, Topology
 
 LEAF = 8
 """Triangles in a leaf: fewer cost more boxes, more cost tests in vain."""
-MAX_TRIANGLES = 20_000
-"""Above this many triangles a surface isn't examined for crossing itself."""
-PAIR_LIMIT = 10_000_000
-"""Pairs of nodes after which the search between components ends undecided: about a second. A surface of MAX_TRIANGLES
-has fewer."""
 WORK_LIMIT = 100_000_000
-"""Boxes and triangles visited by rays after which nesting is left undecided and said to be so: about a second."""
+"""Boxes visited after which the question is left undecided and said to be so: about a second."""
+TEST = 10
+"""Boxes that cost as much as a test of two triangles."""
 TOUCHING = 1e-9
 """Part of the triangles' size up to which a distance or an overlap is taken for rounding."""
 SAMPLES = 24
@@ -43,9 +39,42 @@ trusted."""
 _CELLS = 1 << 20  # places along each axis that the curve tells apart
 
 # Directions that no mesh is aligned with; the first alone is used unless a ray meets an edge.
-_DIRECTIONS = np.array([(0.8163, 0.3719, 0.4421), (-0.2917, 0.9013, -0.3204), (0.1373, -0.5381, 0.8316)])
+_DIRECTIONS = ((0.8163, 0.3719, 0.4421), (-0.2917, 0.9013, -0.3204), (0.1373, -0.5381, 0.8316))
 # Barycentric coordinates of the sample in its triangle: not on any of its symmetry lines.
-_SAMPLE = np.array([0.4479, 0.3413, 0.2108])
+_SAMPLE = (0.4479, 0.3413, 0.2108)
+
+_Vector = tuple[float, float, float]
+_Triangle = tuple[_Vector, _Vector, _Vector]
+
+
+@njit(cache=True, nogil=True)
+def _corner(vertices: np.ndarray, i: int) -> _Vector:
+    return vertices[i, 0], vertices[i, 1], vertices[i, 2]
+
+
+@njit(cache=True, nogil=True)
+def _triangle(vertices: np.ndarray, corners: np.ndarray, i: int) -> _Triangle:
+    return _corner(vertices, corners[i, 0]), _corner(vertices, corners[i, 1]), _corner(vertices, corners[i, 2])
+
+
+@njit(cache=True, nogil=True)
+def _minus(a: _Vector, b: _Vector) -> _Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit(cache=True, nogil=True)
+def _cross(a: _Vector, b: _Vector) -> _Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, nogil=True)
+def _dot(a: _Vector, b: _Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, nogil=True)
+def _largest(a: _Vector) -> float:
+    return max(abs(a[0]), abs(a[1]), abs(a[2]))
 
 
 @njit(cache=True, nogil=True)
@@ -60,30 +89,25 @@ def _spread(cell: int | np.int64) -> int | np.int64:
 
 
 @njit(cache=True, nogil=True)
-def _hierarchy(
-    vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The hierarchy of the triangles numbered ``chosen`` (k,).
-
-    Returns their order (k,), leaf after leaf; their boxes (k, 6), lower and upper corner, in that order; and the nodes'
-    boxes (2·leaves − 1, 6). An empty node's lower corner lies above its upper one.
+def _hierarchy(vertices: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The hierarchy of triangles (m, 3): their order (m,), leaf after leaf; their boxes (m, 6), lower and upper corner,
+    in that order; and the nodes' boxes (2·leaves − 1, 6). An empty node's lower corner lies above its upper one.
     """
-    own, lower, upper = np.empty((len(chosen), 6)), np.full(3, np.inf), np.full(3, -np.inf)
-    for i in range(len(chosen)):
-        a, b, c = triangles[chosen[i], 0], triangles[chosen[i], 1], triangles[chosen[i], 2]
+    own, lower, upper = np.empty((len(corners), 6)), np.full(3, np.inf), np.full(3, -np.inf)
+    for i in range(len(corners)):
+        a, b, c = _triangle(vertices, corners, i)
         for k in range(3):
-            own[i, k] = min(vertices[a, k], vertices[b, k], vertices[c, k])
-            own[i, 3 + k] = max(vertices[a, k], vertices[b, k], vertices[c, k])
+            own[i, k], own[i, 3 + k] = min(a[k], b[k], c[k]), max(a[k], b[k], c[k])
             lower[k], upper[k] = min(lower[k], own[i, k]), max(upper[k], own[i, 3 + k])
-    places = np.zeros(len(chosen), np.int64)
+    places = np.zeros(len(corners), np.int64)
     for k in range(3):
         side = upper[k] - lower[k]
         scale = (_CELLS - 1) / side if side > 1e-290 else 0.0  # one cell where the quotient would overflow
-        for i in range(len(chosen)):
+        for i in range(len(corners)):
             middle = 0.5 * own[i, k] + 0.5 * own[i, 3 + k]
             places[i] |= _spread(np.int64((middle - lower[k]) * scale)) << k
-    along = np.argsort(places, kind="mergesort")
-    own, order = own[along], chosen[along]
+    order = np.argsort(places, kind="mergesort")
+    own = own[order]
     leaves = 1
     while leaves * LEAF < len(order):
         leaves *= 2
@@ -105,54 +129,36 @@ def _extend(boxes: np.ndarray, i: int, others: np.ndarray, j: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _boxes_meet(boxes: np.ndarray, i: int, j: int) -> bool:
-    """Whether boxes i and j have a point in common."""
-    x = (boxes[i, 0] <= boxes[j, 3]) & (boxes[j, 0] <= boxes[i, 3])
-    y = (boxes[i, 1] <= boxes[j, 4]) & (boxes[j, 1] <= boxes[i, 4])
-    return bool(x & y & (boxes[i, 2] <= boxes[j, 5]) & (boxes[j, 2] <= boxes[i, 5]))
-
-
-_Plane = tuple[float, float, float, float]
+def _boxes_meet(boxes: np.ndarray, i: int, others: np.ndarray, j: int) -> bool:
+    """Whether box i and box j of ``others`` have a point in common."""
+    x = (boxes[i, 0] <= others[j, 3]) & (others[j, 0] <= boxes[i, 3])
+    y = (boxes[i, 1] <= others[j, 4]) & (others[j, 1] <= boxes[i, 4])
+    return bool(x & y & (boxes[i, 2] <= others[j, 5]) & (others[j, 2] <= boxes[i, 5]))
 
 
 @njit(cache=True, nogil=True)
-def _plane(vertices: np.ndarray, corners: np.ndarray, i: int) -> _Plane:
-    """Normal of triangle i, as long as twice its area, and the product with it that counts as zero."""
-    a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
-    x, y, z = vertices[a, 0], vertices[a, 1], vertices[a, 2]
-    ux, uy, uz = vertices[b, 0] - x, vertices[b, 1] - y, vertices[b, 2] - z
-    wx, wy, wz = vertices[c, 0] - x, vertices[c, 1] - y, vertices[c, 2] - z
-    nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-    size = math.sqrt(nx * nx + ny * ny + nz * nz)
-    return nx, ny, nz, TOUCHING * size * (abs(ux) + abs(uy) + abs(uz) + abs(wx) + abs(wy) + abs(wz))
+def _heights(triangle: _Triangle, other: _Triangle) -> tuple[_Vector, _Vector]:
+    """Normal of a triangle, as long as twice its area, and its products with the corners of the other one from its
+    first corner; 0 for those in its plane to rounding.
+    """
+    u, w = _minus(triangle[1], triangle[0]), _minus(triangle[2], triangle[0])
+    normal = _cross(u, w)
+    margin = TOUCHING * math.sqrt(_dot(normal, normal)) * 2.0 * (_largest(u) + _largest(w))
+    d, e, f = (_dot(_minus(other[0], triangle[0]), normal), _dot(_minus(other[1], triangle[0]), normal),
+               _dot(_minus(other[2], triangle[0]), normal))  # fmt: skip
+    return normal, (d if abs(d) > margin else 0.0, e if abs(e) > margin else 0.0, f if abs(f) > margin else 0.0)
 
 
 @njit(cache=True, nogil=True)
-def _heights(vertices: np.ndarray, corners: np.ndarray, i: int, plane: _Plane, j: int) -> tuple[float, float, float]:
-    """Products of the normal of triangle i with the corners of triangle j from i's first one; 0 for those in its
-    plane."""
-    nx, ny, nz, margin = plane
-    a = corners[i, 0]
-    x, y, z = vertices[a, 0], vertices[a, 1], vertices[a, 2]
-    p, q, r = corners[j, 0], corners[j, 1], corners[j, 2]
-    d = (vertices[p, 0] - x) * nx + (vertices[p, 1] - y) * ny + (vertices[p, 2] - z) * nz
-    e = (vertices[q, 0] - x) * nx + (vertices[q, 1] - y) * ny + (vertices[q, 2] - z) * nz
-    f = (vertices[r, 0] - x) * nx + (vertices[r, 1] - y) * ny + (vertices[r, 2] - z) * nz
-    return d if abs(d) > margin else 0.0, e if abs(e) > margin else 0.0, f if abs(f) > margin else 0.0
-
-
-@njit(cache=True, nogil=True)
-def _piece(
-    vertices: np.ndarray, corners: np.ndarray, j: int, heights: tuple[float, float, float], axis: int, origin: float
-) -> tuple[float, float]:
-    """Where, along ``axis`` from ``origin``, triangle j begins and ends in the plane over which its corners have
+def _piece(triangle: _Triangle, heights: _Vector, axis: int, origin: float) -> tuple[float, float]:
+    """Where, along ``axis`` from ``origin``, a triangle begins and ends in the plane over which its corners have
     ``heights``."""
     low, high = math.inf, -math.inf
     for k in range(3):
         end = (k + 1) % 3
         d, e = heights[k], heights[end]
         if d == 0.0 or d * e < 0.0:
-            x, y = vertices[corners[j, k], axis] - origin, vertices[corners[j, end], axis] - origin
+            x, y = triangle[k][axis] - origin, triangle[end][axis] - origin
             place = x + (y - x) * (d / (d - e)) if d != 0.0 else x
             low, high = min(low, place), max(high, place)
     return low, high
@@ -161,20 +167,18 @@ def _piece(
 @njit(cache=True, nogil=True)
 def triangles_cross(vertices: np.ndarray, corners: np.ndarray, i: int, j: int) -> bool:
     """Whether triangles i and j of ``corners`` (m, 3) over vertices (n, 3) pass properly through each other."""
-    one = _plane(vertices, corners, i)
-    above = _heights(vertices, corners, i, one, j)
+    one, other = _triangle(vertices, corners, i), _triangle(vertices, corners, j)
+    normal, above = _heights(one, other)
     if not (min(above) < 0.0 < max(above)):
         return False
-    other = _plane(vertices, corners, j)
-    heights = _heights(vertices, corners, j, other, i)
+    across, heights = _heights(other, one)
     if not (min(heights) < 0.0 < max(heights)):
         return False
-    dx, dy = abs(one[1] * other[2] - one[2] * other[1]), abs(one[2] * other[0] - one[0] * other[2])
-    dz = abs(one[0] * other[1] - one[1] * other[0])
-    axis = 0 if dx >= max(dy, dz) else (1 if dy >= dz else 2)
-    origin = vertices[corners[i, 0], axis]
-    low, high = _piece(vertices, corners, i, heights, axis, origin)
-    lower, higher = _piece(vertices, corners, j, above, axis, origin)
+    dx, dy, dz = _cross(normal, across)
+    axis = 0 if abs(dx) >= max(abs(dy), abs(dz)) else (1 if abs(dy) >= abs(dz) else 2)
+    origin = one[0][axis]
+    low, high = _piece(one, heights, axis, origin)
+    lower, higher = _piece(other, above, axis, origin)
     return min(high, higher) - max(low, lower) > TOUCHING * (max(high, higher) - min(low, lower))
 
 
@@ -187,136 +191,79 @@ def _share_a_corner(corners: np.ndarray, i: int, j: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _in_leaves(
-    vertices: np.ndarray,
-    corners: np.ndarray,
-    component: np.ndarray,
-    order: np.ndarray,
-    own: np.ndarray,
-    first: int,
-    second: int,
-    asked: np.ndarray,
-) -> int:
-    """Crossings between the triangles of two leaves, which may be one, as ``_crossings`` has it."""
-    found = 0
-    for i in range(first * LEAF, min((first + 1) * LEAF, len(order))):
-        for j in range(i + 1 if first == second else second * LEAF, min((second + 1) * LEAF, len(order))):
-            s, t = order[i], order[j]
-            c, d = component[s], component[t]
-            if not (c == d if len(asked) == 0 else asked[c, d]) or not _boxes_meet(own, i, j):
+def crossings(
+    vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, count: int, limit: int
+) -> tuple[int, np.ndarray, bool]:
+    """Pairs of triangles of one component that cross without sharing a corner; which of ``count`` components cross each
+    other, (k, k); and whether ``limit`` visits sufficed. corners (m, 3): over welded vertices; component (m,).
+    """
+    order, own, boxes = _hierarchy(vertices, corners)
+    inner = len(boxes) // 2
+    crossing = np.zeros((count, count), np.bool_)
+    within, visits = 0, 0
+    stack = np.zeros(64, np.int64)
+    for i in range(len(order)):
+        s = order[i]
+        stack[0] = 0
+        top = 1
+        while top > 0:
+            top -= 1
+            node = stack[top]
+            visits += 1
+            if not _boxes_meet(boxes, node, own, i):
                 continue
-            if (c != d or not _share_a_corner(corners, s, t)) and triangles_cross(vertices, corners, s, t):
-                found += 1
-                if len(asked) > 0:
-                    asked[c, d] = asked[d, c] = False
-    return found
+            if node < inner:
+                stack[top], stack[top + 1] = 2 * node + 1, 2 * node + 2
+                top += 2
+                continue
+            for j in range(max(i + 1, (node - inner) * LEAF), min((node - inner + 1) * LEAF, len(order))):
+                t = order[j]
+                c, d = component[s], component[t]
+                if crossing[c, d] or not _boxes_meet(own, i, own, j) or (c == d and _share_a_corner(corners, s, t)):
+                    continue
+                visits += TEST
+                if triangles_cross(vertices, corners, s, t):
+                    within += c == d
+                    crossing[c, d] = crossing[d, c] = c != d
+        if visits > limit:
+            return within, crossing, False
+    return within, crossing, True
 
 
 @njit(cache=True, nogil=True)
-def _crossings(vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, asked: np.ndarray) -> tuple[int, bool]:
-    """Pairs of triangles of ``corners`` (m, 3) that cross, and whether PAIR_LIMIT comparisons sufficed.
-
-    asked (k, k) bool: pairs of components to look at; the first crossing of two clears their mark. Of shape (0, 0) it
-    stands for triangles of one component, of which those that share a corner don't count.
-    """
-    order, own, boxes = _hierarchy(vertices, corners, np.arange(len(corners)))
-    inner = (len(boxes) - 1) // 2
-    stack = np.empty((256, 2), np.int64)
-    stack[0, 0] = stack[0, 1] = 0
-    top, found = 1, 0
-    for _ in range(PAIR_LIMIT):
-        if top == 0:
-            return found, True
-        top -= 1
-        a, b = stack[top, 0], stack[top, 1]
-        if a != b and not _boxes_meet(boxes, a, b):
-            continue
-        if a >= inner and b >= inner:
-            found += _in_leaves(vertices, corners, component, order, own, a - inner, b - inner, asked)
-        elif a == b:
-            for one, other in ((2 * a + 1, 2 * a + 1), (2 * a + 2, 2 * a + 2), (2 * a + 1, 2 * a + 2)):
-                stack[top, 0], stack[top, 1] = one, other
-                top += 1
-        else:
-            # Both are of one depth, or b one below a.
-            for child in (1, 2):
-                stack[top, 0], stack[top, 1] = (2 * a + child, b) if a < b and a < inner else (a, 2 * b + child)
-                top += 1
-    return found, False
-
-
-def self_crossings(vertices: np.ndarray, corners: np.ndarray, component: np.ndarray) -> int:
-    """Pairs of triangles of one component that cross without sharing a corner; corners (m, 3) over welded vertices,
-    component (m,). 0 also for surfaces of more than MAX_TRIANGLES.
-    """
-    if len(corners) > MAX_TRIANGLES:
-        return 0
-    return int(_crossings(vertices, corners, component, np.zeros((0, 0), dtype=bool))[0])
-
-
-def crossing_components(
-    vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, asked: np.ndarray
-) -> tuple[np.ndarray, bool]:
-    """Which of the pairs of components marked in ``asked`` (k, k) have triangles that cross, (k, k), and whether
-    PAIR_LIMIT comparisons sufficed.
-    """
-    wanted = np.nonzero(np.isin(component, np.nonzero(asked)[0]))[0]
-    if not len(wanted):
-        return np.zeros_like(asked), True
-    left = asked.copy()
-    complete = _crossings(vertices, triangles[wanted], component[wanted], left)[1]
-    return asked & ~left, bool(complete)
-
-
-@njit(cache=True, nogil=True)
-def _hit(
-    vertices: np.ndarray,
-    triangle: np.ndarray,
-    origin: np.ndarray,
-    direction: np.ndarray,
-    kx: int,
-    ky: int,
-    kz: int,
-    reach: float,
-) -> tuple[int, bool]:
+def _hit(triangle: _Triangle, origin: _Vector, direction: _Vector, reach: float) -> tuple[int, bool]:
     """(sign, sure): +1 where the ray leaves through the triangle, −1 where it enters, 0 for a miss; sure: not near an
     edge or within ``reach`` of the origin.
+
+    The ray's sides of the three edges are triple products; they weigh the corners to the point that is hit.
     """
-    sx, sy = direction[kx] / direction[kz], direction[ky] / direction[kz]
-    a, b, c = vertices[triangle[0]], vertices[triangle[1]], vertices[triangle[2]]
-    az, bz, cz = a[kz] - origin[kz], b[kz] - origin[kz], c[kz] - origin[kz]
-    ax, ay = a[kx] - origin[kx] - sx * az, a[ky] - origin[ky] - sy * az
-    bx, by = b[kx] - origin[kx] - sx * bz, b[ky] - origin[ky] - sy * bz
-    cx, cy = c[kx] - origin[kx] - sx * cz, c[ky] - origin[ky] - sy * cz
-    u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
-    edges = max(abs(bx - ax), abs(cx - ax), abs(cx - bx)) * max(abs(by - ay), abs(cy - ay), abs(cy - by))
-    corners = max(abs(ax), abs(bx), abs(cx)) * max(abs(ay), abs(by), abs(cy))
-    margin = NEAR * edges + 1e-15 * corners
+    a, b, c = _minus(triangle[0], origin), _minus(triangle[1], origin), _minus(triangle[2], origin)
+    u, v, w = _dot(direction, _cross(b, c)), _dot(direction, _cross(c, a)), _dot(direction, _cross(a, b))
+    size = max(_largest(_minus(b, a)), _largest(_minus(c, a)), _largest(_minus(c, b)))
+    far = max(_largest(a), _largest(b), _largest(c))
+    margin = NEAR * size * size + 1e-15 * far * far
     if (u < -margin or v < -margin or w < -margin) and (u > margin or v > margin or w > margin):
         return 0, True
-    total = u + v + w
     if abs(u) <= margin or abs(v) <= margin or abs(w) <= margin:
         return 0, False
-    distance = (u * az + v * bz + w * cz) / total / direction[kz]
+    distance = (u * _dot(a, direction) + v * _dot(b, direction) + w * _dot(c, direction)) / (u + v + w)
     if abs(distance) <= reach:
         return 0, False
     if distance < 0.0:
         return 0, True
-    # The projected triangle runs one way round seen from behind, the other way seen from in front.
-    front = total * direction[kz] > 0.0
-    return (-1 if front else 1), True
+    return (1 if u + v + w > 0.0 else -1), True
 
 
 @njit(cache=True, nogil=True)
 def _shoot(
     vertices: np.ndarray,
-    triangles: np.ndarray,
+    corners: np.ndarray,
     component: np.ndarray,
     order: np.ndarray,
     boxes: np.ndarray,
     own: int,
-    origin: np.ndarray,
-    direction: np.ndarray,
+    origin: _Vector,
+    direction: _Vector,
     reach: float,
     winding: np.ndarray,
     sure: np.ndarray,
@@ -324,11 +271,9 @@ def _shoot(
     """Put the signed hits of all components but ``own`` into winding (k,), and into sure (k,) whether they are certain;
     returns the boxes visited.
     """
-    kz = int(np.argmax(np.abs(direction)))
-    kx, ky = (kz + 1) % 3, (kz + 2) % 3
     winding[:] = 0
     sure[:] = True
-    inner = (len(boxes) - 1) // 2
+    inner = len(boxes) // 2
     stack = np.zeros(64, np.int64)
     top, visits = 1, 0
     while top > 0:
@@ -349,7 +294,7 @@ def _shoot(
         for i in range((node - inner) * LEAF, min((node - inner + 1) * LEAF, len(order))):
             other = component[order[i]]
             if other != own:
-                sign, certain = _hit(vertices, triangles[order[i]], origin, direction, kx, ky, kz, reach)
+                sign, certain = _hit(_triangle(vertices, corners, order[i]), origin, direction, reach)
                 winding[other] += sign
                 sure[other] &= certain
     return visits
@@ -358,72 +303,52 @@ def _shoot(
 @njit(cache=True, nogil=True)
 def _sides(
     vertices: np.ndarray,
-    triangles: np.ndarray,
+    corners: np.ndarray,
     component: np.ndarray,
-    chosen: np.ndarray,
     samples: np.ndarray,
     near: np.ndarray,
     reach: float,
     limit: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """How many of each component's samples are outside and inside each other one, (k, k) each, and the components left
-    undecided (k,) when ``limit`` visits didn't suffice.
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """How many of each component's samples are outside and inside each other one, (k, k) each, and whether ``limit``
+    visits sufficed.
 
-    chosen (c,): triangles of the components in question; samples (s,): those in whose middle a ray begins; near (k, k):
-    pairs whose boxes overlap.
+    samples (s,): triangles in whose middle a ray begins; near (k, k): pairs whose boxes overlap.
     """
-    order, _, boxes = _hierarchy(vertices, triangles, chosen)
+    order, _, boxes = _hierarchy(vertices, corners)
     count = near.shape[0]
     outside, inside = np.zeros((count, count), np.int32), np.zeros((count, count), np.int32)
-    undecided = np.zeros(count, np.bool_)
     winding, sure = np.zeros(count, np.int64), np.ones(count, np.bool_)
-    origin = np.empty(3)
     visits = 0
     for sample in samples:
         own = component[sample]
-        for k in range(3):
-            origin[k] = 0.0
-            for corner in range(3):
-                origin[k] += _SAMPLE[corner] * vertices[triangles[sample, corner], k]
+        a, b, c = _triangle(vertices, corners, sample)
+        origin = (
+            _dot(_SAMPLE, (a[0], b[0], c[0])),
+            _dot(_SAMPLE, (a[1], b[1], c[1])),
+            _dot(_SAMPLE, (a[2], b[2], c[2])),
+        )
         asked = near[own].copy()
-        for attempt in range(len(_DIRECTIONS)):
-            if visits >= limit:
-                undecided[own] = True
-                break
-            direction = _DIRECTIONS[attempt]
-            visits += _shoot(vertices, triangles, component, order, boxes, own, origin, direction, reach, winding, sure)
-            for other in range(count):
-                if asked[other] and sure[other]:
-                    asked[other] = False
-                    inside[own, other] += winding[other] != 0
-                    outside[own, other] += winding[other] == 0
+        for direction in _DIRECTIONS:
+            visits += _shoot(vertices, corners, component, order, boxes, own, origin, direction, reach, winding, sure)
+            inside[own] += asked & sure & (winding != 0)
+            outside[own] += asked & sure & (winding == 0)
+            asked &= ~sure
             if not asked.any():
                 break
-    return outside, inside, undecided
-
-
-def _samples(component: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Up to SAMPLES triangles (s,), evenly picked, of each of the components marked in ``wanted`` (k,)."""
-    of_each = np.split(np.argsort(component, kind="stable"), np.cumsum(np.bincount(component))[:-1])
-    return np.concatenate(
-        [
-            own[np.arange(min(SAMPLES, len(own))) * len(own) // min(SAMPLES, len(own))]
-            for own, asked in zip(of_each, wanted, strict=True)
-            if asked
-        ]
-    )
+        if visits > limit:
+            return outside, inside, False
+    return outside, inside, True
 
 
 @dataclass(frozen=True)
 class Nesting:
-    """inside (k, k) bool: component i lies in component j. crossing: pairs (i, j) whose surfaces cross. decided (k,)
-    bool: False for a component of which the work limit left open where it lies. complete: False when anything was left
-    open.
-    """
+    """inside (k, k) bool: component i lies in component j. crossing: pairs (i, j) whose surfaces cross. within: pairs
+    of triangles of one component that cross. complete: False when the work limit left this open."""
 
     inside: np.ndarray
     crossing: tuple[tuple[int, int], ...]
-    decided: np.ndarray
+    within: int
     complete: bool
 
     @property
@@ -432,23 +357,24 @@ class Nesting:
         return np.count_nonzero(self.inside, axis=1)
 
 
-def component_nesting(
-    vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, lower: np.ndarray, upper: np.ndarray
-) -> Nesting:
-    """How closed components lie to each other; component (m,) numbers them, lower and upper (k, 3) are their boxes."""
-    count = len(lower)
-    near = np.all((lower[:, None] <= upper[None]) & (lower[None] <= upper[:, None]), axis=2)
+def component_nesting(vertices: np.ndarray, topology: Topology, sums: Components) -> Nesting:
+    """How closed components lie to each other, and whether they pass through themselves."""
+    component, count = topology.component, topology.components
+    within, found, complete = crossings(vertices, topology.corners, component, count, WORK_LIMIT)
+    near = np.all((sums.lower[:, None] <= sums.upper[None]) & (sums.lower[None] <= sums.upper[:, None]), axis=2)
     np.fill_diagonal(near, False)
-    if not near.any():
-        return Nesting(np.zeros((count, count), dtype=bool), (), np.ones(count, dtype=bool), True)
-    wanted = near.any(axis=1)
-    chosen, samples = np.nonzero(wanted[component])[0], _samples(component, wanted)
-    reach = NEAR * float(np.linalg.norm(upper.max(axis=0) - lower.min(axis=0)))
-    outside, within, undecided = _sides(vertices, triangles, component, chosen, samples, near, reach, WORK_LIMIT)
-    found = (outside > 0) & (within > 0)
-    found |= found.T
-    crossing, complete = crossing_components(vertices, triangles, component, near & ~found)
-    found |= crossing
-    inside = (within > 0) & (outside == 0) & ~found & ~undecided[:, None]
+    inside = np.zeros((count, count), dtype=bool)
+    if near.any():
+        of_each = np.split(np.argsort(component, kind="stable"), np.cumsum(np.bincount(component))[:-1])
+        samples = [
+            own[:: -(-len(own) // SAMPLES)] for own, asked in zip(of_each, near.any(axis=1), strict=True) if asked
+        ]
+        reach = NEAR * float(np.linalg.norm(sums.upper.max(axis=0) - sums.lower.min(axis=0)))
+        chosen = np.concatenate(samples)
+        outside, inner, decided = _sides(vertices, topology.corners, component, chosen, near, reach, WORK_LIMIT)
+        on_both_sides = (outside > 0) & (inner > 0)
+        found = found | on_both_sides | on_both_sides.T
+        inside = (inner > 0) & (outside == 0) & ~found
+        complete = complete and decided
     pairs = tuple((int(i), int(j)) for i, j in np.argwhere(np.triu(found)))
-    return Nesting(inside, pairs, ~undecided, bool(complete and not undecided.any()))
+    return Nesting(inside, pairs, int(within), bool(complete))

@@ -43,7 +43,7 @@ def is_ascii_stl(data: bytes) -> bool:
     return head.startswith(b"solid") and (b"facet" in head or b"endsolid" in head) and b"\0" not in head
 
 
-def read_stl(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np.ndarray]:
+def read_stl(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) float64 and triangles (m, 3) int64; raises MeshError for a file cut short or not STL."""
     if is_ascii_stl(data):
         return _merge(_ascii_points(data.removeprefix(codecs.BOM_UTF8), name))
@@ -64,8 +64,6 @@ def read_stl(data: bytes, name: str, max_triangles: int) -> tuple[np.ndarray, np
         raise MeshError(
             name, f"{extra} bytes follow the {count} facets that the header announces; the file may be damaged"
         )
-    if count > max_triangles:
-        raise MeshError(name, f"{count} triangles are more than {max_triangles}; --max-triangles raises the limit")
     facets = np.frombuffer(data, _FACET, count=count, offset=84)
     return _merge(facets["corners"].reshape(-1, 3).astype(np.float64))
 

@@ -129,8 +129,7 @@ def add_threemf(data: bytes, assembly: Assembly, max_bytes: int) -> float:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         size = sum(entry.file_size for entry in archive.infolist())
         if size > max_bytes:
-            limit = f"{size} bytes unpacked are more than {max_bytes}; --max-triangles raises the limit"
-            raise MeshError(assembly.name, limit)
+            raise MeshError(assembly.name, f"{size} bytes unpacked", f"at most {max_bytes}")
         package = _Package(archive, assembly)
         root = package.root()
         unit = package.unit(root)

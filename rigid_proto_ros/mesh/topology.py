@@ -77,108 +77,34 @@ def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray
     return parent
 
 
-@njit(cache=True, nogil=True)
-def _half_edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The triangles' sides by their lower vertex: those of vertex v are keys[starts[v]:starts[v + 1]].
-
-    A key is (higher vertex, triangle, 1 when it runs from high to low), from the highest bits on: sorted keys of one
-    vertex stand edge by edge. Sides from a vertex to itself are left out.
+def _edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Edges (e, 6) of ``corners`` (m, 3) as Topology has them, and for each triangle (m,) the first one of its
+    component: triangles that share an edge are of one.
     """
-    starts = np.zeros(vertex_count + 1, np.int64)
-    for t in range(corners.shape[0]):
-        for k in range(3):
-            u, v = corners[t, k], corners[t, (k + 1) % 3]
-            if u != v:
-                starts[min(u, v) + 1] += 1
-    for i in range(vertex_count):
-        starts[i + 1] += starts[i]
-    fill = starts[:-1].copy()
-    keys = np.empty(starts[vertex_count], np.int64)
-    for t in range(corners.shape[0]):
-        for k in range(3):
-            u, v = np.int64(corners[t, k]), np.int64(corners[t, (k + 1) % 3])
-            if u != v:
-                low = min(u, v)
-                keys[fill[low]] = (max(u, v) << 32) | (t << 1) | (u > v)
-                fill[low] += 1
-    return starts, keys
-
-
-@njit(cache=True, nogil=True)
-def _sort(keys: np.ndarray, first: int, last: int) -> None:
-    """Sort keys[first:last], mostly some six of them, in place."""
-    if last - first > 24:
-        keys[first:last] = np.sort(keys[first:last])
-        return
-    for i in range(first + 1, last):
-        key = keys[i]
-        j = i
-        while j > first and keys[j - 1] > key:
-            keys[j] = keys[j - 1]
-            j -= 1
-        keys[j] = key
-
-
-@njit(cache=True, nogil=True)
-def _edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray, int, bool]:
-    """Match the sides of ``corners`` (m, 3) edge by edge, and join triangles that share one.
-
-    Returns edge arrays (low vertex, high vertex, uses low→high, uses high→low, first and second triangle), each
-    triangle's component (m,), their number, and whether a triangle may repeat another one: two at one edge then have
-    the same third corner.
-    """
-    starts, keys = _half_edges(corners, vertex_count)
-    parent = np.arange(corners.shape[0])
-    table = np.empty((len(keys), 6), np.int32)
-    count = 0
-    repeats = False
-    for low in range(vertex_count):
-        last = starts[low + 1]
-        _sort(keys, starts[low], last)
-        i = starts[low]
-        while i < last:
-            high = keys[i] >> 32
-            t = (keys[i] & 0xFFFFFFFF) >> 1
-            table[count, 0], table[count, 1], table[count, 2], table[count, 3] = low, high, 0, 0
-            table[count, 4], table[count, 5] = t, -1
-            third = corners[t, 0] + corners[t, 1] + corners[t, 2]
-            first = i
-            while i < last and keys[i] >> 32 == high:
-                table[count, 2 + (keys[i] & 1)] += 1
-                other = (keys[i] & 0xFFFFFFFF) >> 1
-                if i == first + 1:
-                    table[count, 5] = other
-                if i > first:
-                    _join(parent, t, other)
-                    # Of more than two triangles only some pairs are compared.
-                    same = corners[other, 0] + corners[other, 1] + corners[other, 2] == third
-                    repeats = repeats or i > first + 1 or same
-                i += 1
-            count += 1
-    component = np.empty(len(parent), np.int64)
-    components = 0
-    for t in range(len(parent)):
-        root = _root(parent, t)
-        if root == t:  # it stands before the others of its component
-            component[t] = components
-            components += 1
-        else:
-            component[t] = component[root]
-    return table[:count], component, components, repeats
+    tails, heads = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    owner = np.repeat(np.arange(len(corners)), 3)
+    real = tails != heads
+    tails, heads, owner = tails[real], heads[real], owner[real]
+    key = np.minimum(tails, heads) * vertex_count + np.maximum(tails, heads)
+    order = np.argsort(key, kind="stable")
+    key, owner, upward = key[order], owner[order], (tails < heads)[order]
+    first = np.flatnonzero(np.diff(key, prepend=-1))
+    uses = np.diff(np.append(first, len(key)))
+    forward = np.add.reduceat(upward, first, dtype=np.int64)
+    second = np.where(uses > 1, owner[np.minimum(first + 1, len(key) - 1)], -1)
+    low, high = np.divmod(key[first], vertex_count)
+    edges = np.stack([low, high, forward, uses - forward, owner[first], second], axis=1)
+    return edges, joined_sets(np.repeat(owner[first], uses), owner, len(corners))
 
 
 @dataclass(frozen=True)
 class Topology:
     """How the triangles of a mesh hang together.
 
-    corners (m, 3): triangles over welded vertices. edges (e, 6) int32: low vertex, high vertex, uses low→high, uses
-    high→low, first triangle, second triangle or −1. component (m,): number of each triangle's component, counted from
-    0 by first appearance. duplicates (m,): True for a triangle that repeats an earlier one with the same winding.
-    opposites: triangles that repeat an earlier one with the opposite winding. degenerate: triangles without area.
-
-    odd: edges that an odd number of triangles share. unbalanced: edges used more often in one direction than in the
-    other; 0 says that the surface bounds a volume. flipped: the even ones among those. nonmanifold: edges of more than
-    two triangles.
+    corners (m, 3): triangles over welded vertices. edges (e, 6): low vertex, high vertex, uses low→high, uses high→low,
+    first triangle, second triangle or −1. component (m,): number of each triangle's component, counted from 0 by first
+    appearance. duplicates (m,): True for a triangle that repeats an earlier one with the same winding. opposites:
+    triangles that repeat an earlier one with the opposite winding.
     """
 
     corners: np.ndarray
@@ -187,73 +113,59 @@ class Topology:
     components: int
     duplicates: np.ndarray
     opposites: int
-    degenerate: int
-    odd: int
-    unbalanced: int
-    flipped: int
-    nonmanifold: int
 
     @property
     def boundary(self) -> np.ndarray:
         """Edges (k, 6) that one triangle alone uses."""
-        return self.edges[self.edges[:, 2] + self.edges[:, 3] == 1]
+        return self.edges[self._uses == 1]
+
+    @property
+    def unbalanced(self) -> np.ndarray:
+        """Edges (k, 6) used more often in one direction than in the other: none where the surface bounds a volume."""
+        return self.edges[self.edges[:, 2] != self.edges[:, 3]]
+
+    @property
+    def _uses(self) -> np.ndarray:
+        uses: np.ndarray = self.edges[:, 2] + self.edges[:, 3]
+        return uses
+
+    @property
+    def odd(self) -> int:
+        """Number of edges that an odd number of triangles share."""
+        return int(np.count_nonzero(self._uses & 1))
 
     @property
     def watertight(self) -> bool:
         """No edge is used an odd number of times."""
         return self.odd == 0
 
+    @property
+    def flipped(self) -> int:
+        """Number of unbalanced edges that an even number of triangles share."""
+        return len(self.unbalanced) - self.odd
 
-@njit(cache=True, nogil=True)
-def _without_area(vertices: np.ndarray, triangles: np.ndarray) -> int:
-    """Number of triangles whose area is zero to rounding."""
-    count = 0
-    for t in range(triangles.shape[0]):
-        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        ux, uy, uz = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1], vertices[j, 2] - vertices[i, 2]
-        wx, wy, wz = vertices[k, 0] - vertices[i, 0], vertices[k, 1] - vertices[i, 1], vertices[k, 2] - vertices[i, 2]
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        size = max(ux * ux + uy * uy + uz * uz, wx * wx + wy * wy + wz * wz)
-        if nx * nx + ny * ny + nz * nz <= (4e-16 * size) ** 2:
-            count += 1
-    return count
+    @property
+    def nonmanifold(self) -> int:
+        """Number of edges of more than two triangles."""
+        return int(np.count_nonzero(self._uses > 2))
 
 
 def mesh_topology(vertices: np.ndarray, triangles: np.ndarray) -> Topology:
     """The topology of triangles (m, 3) over vertices (n, 3)."""
     first = weld_equal(vertices)
     corners = triangles if np.array_equal(first, np.arange(len(first))) else first[triangles]
-    edges, component, components, repeats = _edges(corners, len(vertices))
-    duplicates, opposites = _repeated(corners) if repeats else (np.zeros(len(corners), dtype=bool), 0)
-    degenerate = int(_without_area(vertices, triangles))
-    uses, unequal = edges[:, 2] + edges[:, 3], edges[:, 2] != edges[:, 3]
-    return Topology(
-        corners,
-        edges,
-        component,
-        components,
-        duplicates,
-        opposites,
-        degenerate,
-        odd=int(np.count_nonzero(uses & 1)),
-        unbalanced=int(np.count_nonzero(unequal)),
-        flipped=int(np.count_nonzero(unequal & (uses & 1 == 0))),
-        nonmanifold=int(np.count_nonzero(uses > 2)),
-    )
-
-
-def _repeated(corners: np.ndarray) -> tuple[np.ndarray, int]:
-    """Whether each of ``corners`` (m, 3) repeats an earlier one with the same winding, (m,), and the number that repeat
-    one with the opposite winding."""
+    edges, root = _edges(corners, len(vertices))
+    _, component = np.unique(root, return_inverse=True)
     ordered = np.sort(corners, axis=1)
     first = first_equal_rows(ordered)
     # A triangle with two corners in one place adds nothing, however often it is there.
     real = (ordered[:, 0] != ordered[:, 1]) & (ordered[:, 1] != ordered[:, 2])
-    again = np.nonzero((first != np.arange(len(first))) & real)[0]
+    again = np.flatnonzero((first != np.arange(len(first))) & real)
     same = _even_permutation(corners[again]) == _even_permutation(corners[first[again]])
-    duplicates = np.zeros(len(first), dtype=bool)
+    duplicates = np.zeros(len(corners), dtype=bool)
     duplicates[again[same]] = True
-    return duplicates, int(np.count_nonzero(~same))
+    components = int(component.max(initial=-1)) + 1
+    return Topology(corners, edges, component, components, duplicates, int(np.count_nonzero(~same)))
 
 
 def _even_permutation(corners: np.ndarray) -> np.ndarray:
@@ -263,37 +175,23 @@ def _even_permutation(corners: np.ndarray) -> np.ndarray:
 
 
 def surplus_copies(topology: Topology) -> np.ndarray:
-    """Which of the ``duplicates`` (m,) bool spoil the surface: without them its edges are balanced better, or what they
-    close by themselves is counted twice. The others it needs to be closed.
-
-    Copies that share an edge are taken or left together.
+    """Which of the ``duplicates`` (m,) bool spoil the surface: those of components whose edges are balanced no worse
+    without them. The others it needs to be closed.
     """
-    surplus = topology.duplicates.copy()
-    copies = np.nonzero(surplus)[0]
-    sides = topology.corners[copies][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    owner = np.repeat(np.arange(len(copies)), 3)
-    # The topology's edges are in the order of their lower, then their higher vertex.
-    span = int(topology.corners.max(initial=0)) + 1
-    known = topology.edges[:, 0].astype(np.int64) * span + topology.edges[:, 1]
-    edge = np.searchsorted(known, sides.min(axis=1) * span + sides.max(axis=1))
-    first = np.full(len(known), -1)
-    first[edge[::-1]] = owner[::-1]
-    patch = joined_sets(first[edge], owner, len(copies))
-    excess = topology.edges[:, 2].astype(np.int64) - topology.edges[:, 3]
-    pairs, number = np.unique(patch[owner] * len(known) + edge, return_inverse=True)
-    taken = np.bincount(number, np.where(sides[:, 0] < sides[:, 1], 1, -1), len(pairs))
-    of, excess = pairs // len(known), excess[pairs % len(known)]
-    change = np.bincount(of, np.abs(excess - taken) - np.abs(excess), len(copies))
-    loose = np.bincount(of, taken != 0, len(copies))
-    surplus[copies] = (change[patch] < 0) | (loose[patch] == 0)
-    return surplus
+    rest = np.flatnonzero(~topology.duplicates)
+    edges, _ = _edges(topology.corners[rest], int(topology.corners.max(initial=0)) + 1)
+    excess = [
+        np.bincount(topology.component[triangle], np.abs(of[:, 2] - of[:, 3]), topology.components)
+        for of, triangle in ((topology.edges, topology.edges[:, 4]), (edges, rest[edges[:, 4]]))
+    ]
+    return topology.duplicates & (excess[1] <= excess[0])[topology.component]
 
 
 @njit(cache=True, nogil=True)
 def _component_sums(
     vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, count: int, middle: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    volume, area = np.zeros(count), np.zeros((count, 3))
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    volume, degenerate = np.zeros(count), 0
     lower, upper = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     for t in range(len(triangles)):
         c = component[t]
@@ -306,52 +204,27 @@ def _component_sums(
         wx, wy, wz = (w[0] - middle[0]) - ax, (w[1] - middle[1]) - ay, (w[2] - middle[2]) - az
         nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
         volume[c] += (ax * nx + ay * ny + az * nz) / 6.0
-        area[c, 0] += 0.5 * nx
-        area[c, 1] += 0.5 * ny
-        area[c, 2] += 0.5 * nz
-    return volume, area, lower, upper
-
-
-@dataclass(frozen=True)
-class Extent:
-    """The box of the vertices that triangles use, lower and upper (3,); how many vertices are used by none, how many of
-    the used ones aren't finite, and the first of those or −1."""
-
-    lower: np.ndarray
-    upper: np.ndarray
-    unused: int
-    not_finite: int
-    first_not_finite: int
-
-
-def referenced_extent(vertices: np.ndarray, triangles: np.ndarray) -> Extent:
-    """The extent of the vertices (n, 3) that triangles (m, 3) use; its box means nothing where one isn't finite."""
-    used = np.zeros(len(vertices), dtype=bool)
-    used[triangles.ravel()] = True
-    points = vertices if used.all() else vertices[used]
-    lower, upper = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
-    bad = np.empty(0, np.int64)
-    if not np.isfinite(points).all():
-        bad = np.flatnonzero(used & ~np.isfinite(vertices).all(axis=1))
-    return Extent(lower, upper, len(vertices) - len(points), len(bad), int(bad[0]) if len(bad) else -1)
+        size = max(ux * ux + uy * uy + uz * uz, wx * wx + wy * wy + wz * wz)
+        degenerate += nx * nx + ny * ny + nz * nz <= (4e-16 * size) ** 2
+    return volume, lower, upper, degenerate
 
 
 @dataclass(frozen=True)
 class Components:
-    """Per component: signed volume (k,) from ``middle`` (3,), vector area (k, 3), lower and upper corners (k, 3)."""
+    """Per component: signed volume (k,), lower and upper corners (k, 3). degenerate: triangles whose area is 0 to
+    rounding."""
 
-    middle: np.ndarray
     volume: np.ndarray
-    area: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
+    degenerate: int
 
 
-def component_sums(vertices: np.ndarray, triangles: np.ndarray, topology: Topology) -> Components:
+def component_sums(vertices: np.ndarray, topology: Topology) -> Components:
     """The components' volumes and boxes, from the middle of their triangles' first corners."""
-    corners = vertices[triangles[:, 0]]
+    corners = vertices[topology.corners[:, 0]]
     middle = 0.5 * corners.min(axis=0) + 0.5 * corners.max(axis=0)
-    return Components(middle, *_component_sums(vertices, triangles, topology.component, topology.components, middle))
+    return Components(*_component_sums(vertices, topology.corners, topology.component, topology.components, middle))
 
 
 def rims(edges: np.ndarray) -> list[list[int]]:

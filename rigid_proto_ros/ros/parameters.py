@@ -28,7 +28,6 @@ _TYPES = {
     "string": ParameterType.PARAMETER_STRING,
 }
 _ROS_TYPES = {name: RosParameter.Type(value) for name, value in _TYPES.items()}
-_SEVERAL_TYPES = "bool or string"
 
 
 def descriptor(parameter: Parameter) -> ParameterDescriptor:
@@ -38,8 +37,7 @@ def descriptor(parameter: Parameter) -> ParameterDescriptor:
         when = "Can be changed while the simulation runs."
     result = ParameterDescriptor(
         name=parameter.name,
-        type=_TYPES.get(parameter.type, ParameterType.PARAMETER_NOT_SET),
-        dynamic_typing=parameter.type == _SEVERAL_TYPES,
+        type=_TYPES[parameter.type],
         description=f"{parameter.description} {when}",
         additional_constraints=parameter.accepted,
         read_only=parameter.changes == READ_ONLY,
@@ -68,8 +66,7 @@ def declare_parameters(node: Node, given: Mapping[str, object]) -> dict[str, Any
 
 def ros_parameter(parameter: Parameter, value: object) -> RosParameter:
     """A converted value as rclpy's parameter."""
-    own = "bool" if isinstance(value, bool) else "string"
-    return RosParameter(parameter.name, _ROS_TYPES[own if parameter.type == _SEVERAL_TYPES else parameter.type], value)
+    return RosParameter(parameter.name, _ROS_TYPES[parameter.type], value)
 
 
 def converted(changes: list[RosParameter]) -> list[RosParameter]:

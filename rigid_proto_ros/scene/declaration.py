@@ -54,8 +54,8 @@ def instead_of(name: str) -> str:
 
 @dataclass(frozen=True)
 class Parameter:
-    """type: ``double``, ``doubles``, ``integer``, ``bool``, ``string``, or ``bool or string``, of which the strings are
-    the ``choices``. lower and upper are inclusive unless ``above``: then values must lie above lower. lengths: accepted
+    """type: ``double``, ``doubles``, ``integer``, ``bool`` or ``string``, one of the ``choices``. lower
+    and upper are inclusive unless ``above``: then values must lie above lower. lengths: accepted
     lengths of ``doubles``. changes: LIVE, AT_RESET or READ_ONLY. default: None where the name is the user's choice.
     """
 
@@ -74,8 +74,6 @@ class Parameter:
     @property
     def accepted(self) -> str:
         """What the parameter accepts, in words."""
-        if self.type == "bool or string":
-            return ", ".join(["true", "false", *self.choices])
         if self.choices:
             return ", ".join(repr(c) if c == "" else c for c in self.choices)
         if self.type == "bool":
@@ -159,7 +157,6 @@ _CONVERSIONS: dict[str, Callable[[object], Value | None]] = {
     "integer": _to_integer,
     "bool": lambda value: value if isinstance(value, bool) else None,
     "string": lambda value: value if isinstance(value, str) else None,
-    "bool or string": lambda value: value if isinstance(value, (bool, str)) else None,
 }
 
 
@@ -207,10 +204,9 @@ def numbers(
     return _field(default, declaration)
 
 
-def switch(default: bool, description: str, *, choices: tuple[str, ...] = (), changes: str = LIVE) -> Any:
-    """True or false, or one of the choices."""
-    type_name = "bool or string" if choices else "bool"
-    return _field(default, Parameter("", type_name, default, description, choices=choices, changes=changes))
+def switch(default: bool, description: str, *, changes: str = LIVE) -> Any:
+    """True or false."""
+    return _field(default, Parameter("", "bool", default, description, changes=changes))
 
 
 def text(default: str, description: str, *, choices: tuple[str, ...] = (), changes: str = LIVE) -> Any:

@@ -171,12 +171,7 @@ class Parameters:
         "t_handle",
         "Mesh of the body: a path, a package:// URI or a bundled name; empty only with the explicit inertia model.",
     )
-    mesh_repair: bool | str = switch(
-        False,
-        "Orient, weld and cap a mesh that isn't closed, as with inspect --repair; union also makes one solid of parts "
-        "that overlap.",
-        choices=("union",),
-    )
+    mesh_repair: bool = switch(False, "Orient, weld and cap a mesh that isn't closed, as with inspect --repair.")
     mesh_fallback: str = text(
         "",
         "Fallback shape for a mesh that encloses no volume, as with inspect --fallback.",

@@ -11,7 +11,7 @@ from judged_meshes import body, codes
 from mass_solids import box, sphere
 from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES
 
-from rigid_proto_ros.mesh.intersection import crossing_components, self_crossings, triangles_cross
+from rigid_proto_ros.mesh.intersection import WORK_LIMIT, crossings, triangles_cross
 from rigid_proto_ros.mesh.topology import mesh_topology
 
 
@@ -34,6 +34,11 @@ def exactly_cross(first: np.ndarray, second: np.ndarray) -> bool:
     return any(pierces(s[k], s[(k + 1) % 3], t) for s, t in ((p, q), (q, p)) for k in range(3))
 
 
+def within_one(points: np.ndarray, corners: np.ndarray) -> int:
+    """Pairs of triangles that cross, all being of one component."""
+    return crossings(points, corners, np.zeros(len(corners), np.int64), 1, WORK_LIMIT)[0]
+
+
 def soup(count: int, seed: int) -> np.ndarray:
     """Corners (3 count, 3) of triangles of all sizes, some long and thin, in a unit cube."""
     random = np.random.default_rng(seed)
@@ -49,27 +54,26 @@ def test_crossing_triangles_are_those_that_exact_arithmetic_finds():
     corners = np.arange(3 * count).reshape(-1, 3)
     pairs = [pair for pair in combinations(range(count), 2) if exactly_cross(*points[corners[list(pair)]])]
     assert len(pairs) > 50
-    assert self_crossings(points, corners, np.zeros(count, np.int64)) == len(pairs)
-    # Between components only whether any two cross is asked, and only of those marked.
+    assert within_one(points, corners) == len(pairs)
+    # Between components only whether any two cross is asked.
     component = np.random.default_rng(4).integers(0, 40, count)
-    asked = np.triu(np.random.default_rng(5).uniform(size=(40, 40)) < 0.5, 1)
-    asked |= asked.T
     expected = np.zeros((40, 40), dtype=bool)
     for i, j in pairs:
-        expected[component[i], component[j]] = expected[component[j], component[i]] = True
-    found, complete = crossing_components(points, corners, component, asked)
-    assert complete and np.array_equal(found, expected & asked)
-    assert found.any() and not found.all()
+        expected[component[i], component[j]] = expected[component[j], component[i]] = component[i] != component[j]
+    within, found, complete = crossings(points, corners, component, 40, WORK_LIMIT)
+    assert complete and np.array_equal(found, expected) and found.any() and not found.all()
+    assert within == sum(component[i] == component[j] for i, j in pairs)
+    assert not crossings(points, corners, component, 40, 10)[2]
 
 
 def test_triangles_that_share_a_corner_do_not_cross():
     # The second passes through the first from their common corner's other side: a fold, no crossing.
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0.2, 1.0], [0.4, 0.3, -1.0]], dtype=float)
     corners = np.array([[0, 1, 2], [0, 3, 4]])
-    assert self_crossings(points, corners, np.zeros(2, np.int64)) == 0
+    assert within_one(points, corners) == 0
     apart = np.array([[0, 1, 2], [5, 3, 4]])
     points = np.concatenate([points, [[0.05, 0.05, 0.0]]])
-    assert self_crossings(points, apart, np.zeros(2, np.int64)) == 1
+    assert within_one(points, apart) == 1
 
 
 @given(st.integers(0, 10**6), st.booleans(), st.floats(-2.0, 1.0), st.booleans())
@@ -89,7 +93,7 @@ def test_the_hierarchy_leaves_no_crossing_out(seed, ball, bend, gridded):
         for i, j in combinations(range(len(corners)), 2)
         if not set(corners[i].tolist()) & set(corners[j].tolist()) and triangles_cross(vertices, corners, i, j)
     ]
-    assert self_crossings(vertices, corners, np.zeros(len(corners), np.int64)) == len(pairs)
+    assert within_one(vertices, corners) == len(pairs)
 
 
 def test_a_cube_everted_through_its_own_edges_is_told():
@@ -113,7 +117,6 @@ def test_a_wall_that_dips_into_a_flat_floor_by_little_is_found_and_one_that_stan
     for depth in (0.0, 1e-7):
         wall = np.column_stack([np.full(25, 1.7), 0.4 * y + 0.25, 0.5 * x - depth])
         points, triangles = np.vstack([floor, wall]), np.vstack([sheet, sheet + 25])
-        component = np.zeros(len(triangles), np.int64)
         pairs = sum(exactly_cross(points[one], points[other]) for one, other in combinations(triangles, 2))
-        assert self_crossings(points, mesh_topology(points, triangles).corners, component) == pairs
+        assert within_one(points, mesh_topology(points, triangles).corners) == pairs
         assert (pairs > 0) == (depth > 0.0)

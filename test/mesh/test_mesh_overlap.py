@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Parts that overlap, lie in each other, or a surface that passes through itself: by how much, and as one solid."""
 
-import json
-
 import numpy as np
 import pytest
 from judged_meshes import body, codes, volume
 from mass_solids import box, inward, moved, sphere, together
 from mesh_files import obj
 
-from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.inspection import verify_moments
 from rigid_proto_ros.mesh import union
@@ -30,11 +27,6 @@ def test_the_solid_of_parts_that_overlap_is_their_union_and_the_sum_is_told(shif
     assert f"sum of 2 would overcount {over}" in message(made, "overlapping_components")
     assert len(made.triangles) == 24 and made.moments.moments("shell").measure == pytest.approx(12.0)
     assert max(verify_moments(made, np.ones(3)).values()) <= 1e-13
-    whole = body(two, repair="union")
-    assert volume(whole) == pytest.approx(once, rel=1e-12)
-    assert codes(whole).keys() <= {"repaired", "unreferenced_vertices"}
-    # The vertices of the file keep their numbers.
-    assert np.array_equal(whole.vertices[: len(two[0])], two[0])
 
 
 def test_an_overlap_of_roundings_size_is_no_warning():
@@ -52,31 +44,21 @@ def test_a_part_that_stands_on_another_one_does_not_overlap_it_however_their_hei
         assert body((vertices, triangles)).verdict.findings == []
 
 
-def test_a_solid_in_a_solid_says_what_each_reading_gives():
-    # An edge of 2 around one of 1.
-    nested = together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))
-    made = body(nested)
-    assert "9 so, 7 with cavities, 8 as one solid" in message(made, "nested_components")
-    assert [volume(body(nested, repair=kind)) for kind in (False, True, "union")] == pytest.approx([9.0, 7.0, 8.0])
-
-
 def test_the_union_keeps_a_cavity_and_what_lies_in_it():
+    pytest.importorskip("manifold3d")
     shells = together(
         box((4.0, 4.0, 4.0)), inward(moved(box((2.0, 2.0, 2.0)), (0.5, 0.5, 0.5))), moved(box(), (0.9, 0.9, 0.9))
     )
-    assert volume(body(shells, repair="union")) == pytest.approx(64.0 - 8.0 + 1.0)
     crossing = together(shells, moved(box(), (2.0, 1.0, 1.0)))
-    pytest.importorskip("manifold3d")
-    assert volume(body(crossing, repair="union")) == pytest.approx(64.0 - 8.0 + 1.0 + 0.5, rel=1e-12)
+    assert volume(body(crossing)) == pytest.approx(64.0 - 8.0 + 1.0 + 0.5, rel=1e-12)
 
 
-def test_without_manifold3d_the_overlap_is_told_and_the_union_says_what_is_missing(monkeypatch):
+def test_without_manifold3d_the_overlap_is_told_and_the_sum_is_taken(monkeypatch):
     monkeypatch.setattr(union, "can_unite", lambda: False)
     monkeypatch.setattr("rigid_proto_ros.mass.verdict.can_unite", lambda: False)
-    two = together(box(), moved(box(), (0.5, 0.1, 0.2)))
-    assert "[meshes]" in message(body(two), "overlapping_components")
-    with pytest.raises(MeshError, match="manifold3d"):
-        body(two, repair="union")
+    two = body(together(box(), moved(box(), (0.5, 0.1, 0.2))))
+    assert "[meshes]" in message(two, "overlapping_components")
+    assert volume(two) == pytest.approx(2.0)
 
 
 def tube(pitch: float) -> tuple[np.ndarray, np.ndarray]:
@@ -103,35 +85,7 @@ def test_a_surface_that_passes_through_itself_is_told():
     assert not body(sphere(20)).verdict.findings
 
 
-def test_the_command_takes_the_union_and_gives_the_mesh_back(tmp_path, capsys):
-    (tmp_path / "two.obj").write_bytes(obj(*together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))))
-    for arguments, expected in ((["--repair", "union", "M"], 8.0), (["M", "--repair", "union"], 8.0), (["--repair", "M"], 7.0), (["M", "--repair"], 7.0)):  # fmt: skip
-        words = [str(tmp_path / "two.obj") if word == "M" else word for word in arguments]
-        assert main(["inspect", *words, "--json"]) == 0
-        assert json.loads(capsys.readouterr().out)["volume"] == pytest.approx(expected)
-    assert main(["inspect", "hammer", "--repair", "onion"]) == 2
-    assert "union" in capsys.readouterr().err
-    with pytest.raises(InputError, match="union"):
-        body(box(), repair="onion")
-
-
-def test_a_scene_takes_the_union(tmp_path):
-    from rigid_proto_ros.scene.scenario import make_scenario, scene_text
-    from rigid_proto_ros.scene.scene_file import read_scene_text
-
-    path = tmp_path / "two.obj"
-    path.write_bytes(obj(*together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))))
-    for repair, expected in ((False, 9000.0), (True, 7000.0), ("union", 8000.0)):
-        values = {"mesh": str(path), "mesh_repair": repair}
-        assert make_scenario(values).setup.body.mass == pytest.approx(expected)
-        again = read_scene_text(scene_text(values)).values
-        assert again["mesh_repair"] == repair
-    for wrong in ("onion", "", 1):
-        with pytest.raises(InputError, match="true, false, union"):
-            make_scenario({"mesh": str(path), "mesh_repair": wrong})
-
-
-def test_a_mesh_that_is_united_in_flight_is_drawn_anew_where_it_was(tmp_path):
+def test_a_mesh_that_is_repaired_in_flight_is_drawn_anew_where_it_was(tmp_path):
     from rigid_proto_ros.base.rotation import matrix_from_quaternion
     from rigid_proto_ros.export.flight_record import FlightRecord
     from rigid_proto_ros.rerun_view.session_files import read_runs
@@ -141,7 +95,7 @@ def test_a_mesh_that_is_united_in_flight_is_drawn_anew_where_it_was(tmp_path):
 
     mesh, script, recording = tmp_path / "two.obj", tmp_path / "repair.yaml", tmp_path / "flight.rrd"
     mesh.write_bytes(obj(*together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))))
-    script.write_text("- {t: 0.1, set: {mesh_repair: union}}\n")
+    script.write_text("- {t: 0.1, set: {mesh_repair: true}}\n")
     settings = {"mesh": str(mesh), "initial.angular_velocity": [1.0, 2.0, 3.0], "density": 1000.0}
     arguments = [f"--set={name}={value}" for name, value in settings.items()]
     arguments += ["--script", str(script), "--duration", "0.2", "--record", str(recording)]
@@ -160,6 +114,6 @@ def test_a_mesh_that_is_united_in_flight_is_drawn_anew_where_it_was(tmp_path):
     surface = flight.simulation.setup.surface
     assert [len(event.triangles) for event in drawn] == [24, len(surface.triangles)]
     (_, before), (_, after) = record.bodies(BodyChanged)[-2:]
-    assert after.mass == pytest.approx(8000.0)
+    assert after.mass == pytest.approx(7000.0)
     assert np.abs(places[1] - places[0]).max() < 1e-8
     assert np.linalg.norm(after.center_of_mass - before.center_of_mass) > 0.01

@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""What comes with a mesh's bytes: files that they take, units that they state, cracks of rounding's size."""
+"""What comes with a mesh's bytes: files that they take, units that they state, limits."""
 
 import json
 import struct
 
 import numpy as np
 import pytest
-from judged_meshes import body, codes, load, volume
-from mass_solids import sphere
+from judged_meshes import load, volume
 from mesh_files import (
     CUBE_QUADS,
-    CUBE_TRIANGLES,
     CUBE_VERTICES,
     Gltf,
     collada,
@@ -27,8 +25,8 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.inspection import inspect_mesh
 from rigid_proto_ros.mass.verdict import unit_suspicion
-from rigid_proto_ros.mesh import reading
-from rigid_proto_ros.mesh.reading import Mesh, load_mesh
+from rigid_proto_ros.mesh import assembly, reading
+from rigid_proto_ros.mesh.reading import load_mesh
 
 
 def write_gltf(folder, vertices: np.ndarray) -> None:
@@ -40,11 +38,9 @@ def write_gltf(folder, vertices: np.ndarray) -> None:
     (folder / "model.bin").write_bytes(made.bytes)
 
 
-@pytest.mark.parametrize("size", [1, 10**6])
-def test_every_file_that_was_read_is_in_the_caches_key(tmp_path, monkeypatch, size):
+def test_every_file_that_was_read_is_in_the_caches_key(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
-    monkeypatch.setattr(reading, "CACHED_SIZE", size)
     for name, scale, expected in (("a", 1.0, 1.0), ("b", 2.0, 8.0), ("a", 1.0, 1.0), ("a", 3.0, 27.0)):
         write_gltf(tmp_path / name, scale * CUBE_VERTICES)
         assert volume(load_mesh(str(tmp_path / name / "model.gltf"))) == pytest.approx(expected, rel=1e-12)
@@ -87,67 +83,25 @@ def test_a_unit_that_the_file_states_is_taken_and_said(tmp_path, name, data, uni
 
 
 @pytest.mark.parametrize(
-    ("side", "words"), [(20.0, "20 mm if the file is in millimetres (--scale 0.001)"), (3000.0, "3000 mm"), (5e-5, "0.05 m"), (1.8, None)]
+    ("side", "words"), [(20.0, "20 mm if the file is in millimetres (--scale 0.001)"), (3000.0, "3000 mm"), (1.8, None)]
 )  # fmt: skip
 def test_a_size_that_no_metre_file_has_names_the_unit_that_makes_sense(side, words):
     assert (unit_suspicion(side) is None) if words is None else (words in unit_suspicion(side).message)
 
 
-@pytest.mark.parametrize("name", ["a.stl.gz", "a.obj.bz2", "a.zae"])
-def test_packed_files_are_to_be_unpacked_first(tmp_path, name):
-    with pytest.raises(MeshError, match="unpack it first"):
-        load(tmp_path, name, stl())
-
-
-def test_an_archive_that_is_none_or_would_fill_the_memory_says_so(tmp_path):
+def test_an_archive_that_is_none_or_would_fill_the_memory_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading, "MAX_BYTES", 40_000)
     for data, words in ((b"PK\3\4no archive", "zip file"), (threemf(" " * 10**6), "bytes unpacked")):
-        (tmp_path / "a.3mf").write_bytes(data)
         with pytest.raises(MeshError, match=words):
-            load_mesh(str(tmp_path / "a.3mf"), max_triangles=100)
+            load(tmp_path, "a.3mf", data)
 
 
-def test_cracks_below_1e_12_of_the_diagonal_are_welded_and_said():
-    vertices, triangles = sphere(10)
-    soup = vertices[triangles].reshape(-1, 3)
-    for size, closed in ((1e-13, True), (1e-9, False)):
-        torn = soup + np.random.default_rng(1).uniform(-size, size, soup.shape)
-        welded = body((torn, np.arange(len(torn)).reshape(-1, 3)))
-        assert welded.verdict.closed == closed
-        if closed:
-            assert codes(welded) == {"welded": "info"}
-            assert volume(welded) == pytest.approx(volume(body((vertices, triangles))), rel=1e-12)
-
-
-def test_welded_cracks_come_from_the_cache_alike(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
-    vertices, triangles = sphere(6)
-    soup = vertices[triangles].reshape(-1, 3)
-    torn = soup + np.random.default_rng(1).uniform(-1e-14, 1e-14, soup.shape)
-    mesh = Mesh("made", "/made.obj", torn, np.arange(len(torn)).reshape(-1, 3), None, "made")
-    first, again = (mesh_body(mesh) for _ in range(2))
-    assert again.verdict == first.verdict and np.array_equal(again.triangles, first.triangles)
-    assert again.moments.moments("solid").measure == first.moments.moments("solid").measure
-
-
-def test_an_open_tube_says_what_it_is_with_caps():
-    angles = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
-    ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    vertices = np.concatenate([np.column_stack([ring, np.full(64, z)]) for z in (-0.5, 0.5)])
-    i, j = np.arange(64), (np.arange(64) + 1) % 64
-    tube = np.concatenate([np.stack([i, j, 64 + j], axis=1), np.stack([i, 64 + j, 64 + i], axis=1)])
-    reason = body((vertices, tube)).verdict.reason
-    assert "flat caps over the holes give 3.14" in reason  # 64 sides: 3.137
-    assert "2.09 to 2.09" not in reason and "volume unknown" in reason
-
-
-def test_nan_in_a_vertex_that_no_face_uses_is_no_harm(tmp_path, capsys):
-    (tmp_path / "a.obj").write_bytes(b"v nan 0 inf\n" + obj(faces=CUBE_TRIANGLES + 1))
-    assert main(["inspect", str(tmp_path / "a.obj"), "--json", "--verify"]) == 0
-    report = json.loads(capsys.readouterr().out)
-    assert report["volume"] == 1.0 and report["models"]["points"]["mass"] == 1000.0
-    (finding,) = report["verdict"]
-    assert finding["code"] == "unreferenced_vertices" and "not finite" in finding["message"]
+def test_a_mesh_beyond_the_limit_is_refused(tmp_path, monkeypatch):
+    for module in (reading, assembly):
+        monkeypatch.setattr(module, "MAX_TRIANGLES", 11)
+    for name, data in (("a.obj", obj()), ("a.stl", stl()), ("a.ply", ply()), ("a.glb", Gltf().glb())):
+        with pytest.raises(MeshError, match="11"):
+            load(tmp_path, name, data)
 
 
 def test_a_binary_ply_with_several_lists_and_one_in_big_endian_are_read(tmp_path):
@@ -185,33 +139,3 @@ def test_no_traceback_and_no_raw_bytes_in_a_message(tmp_path, capsys, name, data
     assert main(["inspect", str(tmp_path / name)]) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and all(c.isprintable() or c == "\n" for c in err)
-
-
-def xaml(matrix: str) -> bytes:
-    points = " ".join(f"{x},{y},{z}" for x, y, z in CUBE_VERTICES)
-    corners = " ".join(str(i) for i in CUBE_TRIANGLES.ravel())
-    return (
-        '<ModelVisual3D xmlns="http://schemas.microsoft.com/winfx/2006/xaml/presentation"><ModelVisual3D.Transform>'
-        f'<MatrixTransform3D Matrix="{matrix}"/></ModelVisual3D.Transform><ModelVisual3D.Content><GeometryModel3D>'
-        f'<GeometryModel3D.Geometry><MeshGeometry3D Positions="{points}" Normals="{points}" TriangleIndices="{corners}"/>'
-        "</GeometryModel3D.Geometry></GeometryModel3D></ModelVisual3D.Content></ModelVisual3D>"
-    ).encode()
-
-
-def test_a_format_without_a_reader_here_is_read_by_trimesh(tmp_path):
-    pytest.importorskip("lxml")
-    path = tmp_path / "a.xaml"
-    path.write_bytes(xaml("2 0 0 0 0 2 0 0 0 0 2 0 5 6 7 1"))
-    mesh = load_mesh(str(path))
-    assert mesh.vertices.tolist() == (2.0 * CUBE_VERTICES + [5.0, 6.0, 7.0]).tolist()
-    assert volume(load_mesh(str(path))) == 8.0
-    path.write_bytes(b"<a/>")
-    with pytest.raises(MeshError, match=r"a\.xaml"):
-        load_mesh(str(path))
-
-
-def test_what_is_no_surface_to_trimesh_is_refused(tmp_path):
-    path = tmp_path / "points.xyz"
-    path.write_text("0 0 0\n1 0 0\n0 1 0\n0 0 1\n")
-    with pytest.raises(MeshError, match="PointCloud"):
-        load_mesh(str(path))

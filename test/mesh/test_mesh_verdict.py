@@ -102,17 +102,6 @@ def test_what_is_left_undecided_accuses_no_component_and_turns_none(monkeypatch)
     assert volume(made) == pytest.approx(volume(body(sphere(12))) - 64 * one, rel=1e-12)
 
 
-def test_an_open_surface_says_how_far_its_volume_depends_on_the_origin():
-    vertices, triangles = box((2.0, 2.0, 2.0))
-    made = body((vertices, triangles[:-2]))
-    message = made.verdict.reason
-    assert "4 boundary edges" in message
-    # Without one face of area 4 the sum runs by 4/3·2 between the origins on that face and on the one across.
-    assert "volume ambiguous: 5.33 to 8" in message
-    shifted = solid_moments(vertices + [1.0, 0, 0], triangles[:-2]).measure
-    assert 5.3 <= abs(shifted) <= 8.0
-
-
 @pytest.mark.parametrize("fraction", [0.1, 0.25, 0.5])
 def test_repair_turns_faces_to_agree(fraction):
     vertices, triangles = BALL
@@ -278,17 +267,13 @@ def test_the_hull_is_closed_convex_and_holds_every_point(seed, count, kind, expo
         return
     triangles = convex_hull(points)
     topology = mesh_topology(points, triangles)
-    assert (topology.unbalanced, topology.components) == (0, 1)
+    assert (len(topology.unbalanced), topology.components) == (0, 1)
     assert solid_moments(points, triangles).measure > 0.0
     a, b, c = (points[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     heights = np.einsum("fk,fpk->fp", normals, points[None] - a[:, None])
     volume_scale = spread[0] ** 2 * spread[2]
     assert heights.max() <= 1e-9 * volume_scale + 1e-14
-
-
-def test_thin_bodies_are_called_so():
-    assert codes(body(moved(box((1.0, 1e-4, 1e-4)), (0, 0, 0), 3))) == {"thin": "info"}
 
 
 def test_copied_vertices_at_minus_zero_are_welded_for_the_verdict():
