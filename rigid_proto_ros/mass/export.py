@@ -8,13 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import numpy as np
-
 from ..base.rotation import quaternion_from_matrix
 from .properties import MassProperties
 from .tensor import principal_axes, six_from_tensor
-
-_FLAT = 1e-9  # A + B - C below this part of C: rounding in a reader's own eigenvalues may break its A + B >= C
 
 
 def _number(value: float) -> str:
@@ -53,28 +49,14 @@ def sdf_inertial(properties: MassProperties) -> str:
     )
 
 
-def is_flat(a: float, b: float, c: float) -> bool:
-    """Whether ascending principal moments are those of a flat body, to what a reader's own eigenvalues may change."""
-    return a + b - c < _FLAT * c
-
-
 def mjcf_inertial(properties: MassProperties) -> str:
-    """An MJCF <inertial> element, ``fullinertia`` in the order xx yy zz xy xz yz.
+    """An MJCF <inertial> element: principal moments and their axes' quaternion.
 
-    A flat body gets its principal moments and a quaternion instead: MuJoCo takes eigenvalues of a full tensor itself,
-    and their rounding may break A + B ≥ C, which it refuses.
+    MuJoCo takes eigenvalues of a full tensor itself, and of a flat body their rounding may break A + B ≥ C, which it
+    refuses.
     """
-    position = _numbers(properties.center_of_mass)
-    head = f'<inertial pos="{position}" mass="{_number(properties.mass)}"'
     (a, b, c), axes = principal_axes(properties.inertia)
-    if is_flat(a, b, c):
-        w, x, y, z = quaternion_wxyz(axes)
-        return f'{head} quat="{_numbers((w, x, y, z))}" diaginertia="{_numbers((a, b, min(c, a + b)))}"/>\n'
-    ixx, ixy, ixz, iyy, iyz, izz = six_from_tensor(properties.inertia)
-    return f'{head} fullinertia="{_numbers((ixx, iyy, izz, ixy, ixz, iyz))}"/>\n'
-
-
-def quaternion_wxyz(rotation: np.ndarray) -> tuple[float, float, float, float]:
-    """Unit quaternion (w, x, y, z), MuJoCo's order, of a rotation matrix (3, 3)."""
-    x, y, z, w = quaternion_from_matrix(rotation).tolist()
-    return w, x, y, z
+    x, y, z, w = quaternion_from_matrix(axes).tolist()
+    place = f'pos="{_numbers(properties.center_of_mass)}" quat="{_numbers((w, x, y, z))}"'
+    mass = f'mass="{_number(properties.mass)}"'
+    return f'<inertial {place} {mass} diaginertia="{_numbers((a, b, min(c, a + b)))}"/>\n'

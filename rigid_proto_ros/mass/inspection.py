@@ -131,7 +131,6 @@ def as_json(inspection: Inspection) -> dict:
                 "mass": inspection.models[name].mass,
                 "center_of_mass": inspection.models[name].center_of_mass.tolist(),
                 "inertia": inspection.models[name].inertia.tolist(),
-                **inspection.difference(name).as_dict(),
             }
             for name in MODELS
         },

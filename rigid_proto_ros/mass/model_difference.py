@@ -30,15 +30,6 @@ class ModelDifference:
         """Distance of the centres of mass [m]."""
         return float(np.linalg.norm(self.center_of_mass))
 
-    def as_dict(self) -> dict:
-        """For JSON."""
-        return {
-            "principal_moments_error": self.principal_moments.tolist(),
-            "principal_axes_turned": self.axes_turned,
-            "center_of_mass_offset": self.center_of_mass.tolist(),
-            "inertia_error": self.tensor,
-        }
-
 
 def model_difference(properties: MassProperties, true: MassProperties) -> ModelDifference:
     """How ``properties`` differ from the true ones."""

@@ -76,22 +76,11 @@ def repair_surface(
 
 
 def _drop_copies(surface: RepairedSurface) -> list[str]:
-    topology = surface.topology()
-    done = []
-    surplus = surplus_copies(topology)
-    if surplus.any():
-        done.append(f"removed {counted(int(np.count_nonzero(surplus)), 'duplicate face')}")
-        surface.drop(surplus)
-        topology = surface.topology()
-    if 2 * topology.opposites == len(surface.triangles):
-        # Every face lies there both ways round: a surface made visible from both sides.
-        ordered = np.sort(topology.corners, axis=1)
-        _, first = np.unique(ordered, axis=0, return_index=True)
-        back = np.ones(len(surface.triangles), dtype=bool)
-        back[first] = False
-        surface.drop(back)
-        done.append(f"removed {counted(int(np.count_nonzero(back)), 'face')} wound opposite to another")
-    return done
+    surplus = surplus_copies(surface.topology())
+    if not surplus.any():
+        return []
+    surface.drop(surplus)
+    return [f"removed {counted(int(np.count_nonzero(surplus)), 'duplicate face')}"]
 
 
 _SWEEP = np.array([0.8163, 0.3719, 0.4421])  # along no rim's plane: few points share a place along it

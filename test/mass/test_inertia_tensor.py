@@ -86,6 +86,13 @@ def test_a_turned_needle_has_the_moments_that_its_tensor_says_to_rounding_of_the
             assert abs(abs(cosine) - 1) <= 1e-15  # 5e-16
 
 
+def test_moments_of_which_two_are_too_small_for_the_third_say_how_large_it_may_be():
+    with pytest.raises(TensorError) as refused:
+        check_tensor(turned([1.0, 1.5, 3.0], 3))
+    assert "A + B >= C" in str(refused.value)
+    assert "with these A and B, C is at most 2.5 kg m²: look for swapped entries and another unit" in str(refused.value)
+
+
 def test_equal_moments_are_told():
     assert degenerate_pairs(np.array([1.0, 1.0, 1.0])) == (True, True)
     assert degenerate_pairs(np.array([1.0, 2.0, 2.0 + 1e-12])) == (False, True)

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -102,11 +100,6 @@ def test_the_pages_table_says_what_counts_and_not_the_largest_entry() -> None:
 
 
 def test_inspect_says_of_every_model_what_counts(capsys: pytest.CaptureFixture) -> None:
-    assert main(["inspect", "hammer", "--density", "7850", "--json"]) == 0
-    models = json.loads(capsys.readouterr().out)["models"]
-    assert models["bounding_box"]["principal_moments_error"][0] == pytest.approx(0.909, abs=1e-3)
-    assert np.linalg.norm(models["bounding_box"]["center_of_mass_offset"]) == pytest.approx(0.0808, abs=1e-4)
-    assert models["solid"]["principal_moments_error"] == [0.0] * 3 and models["solid"]["principal_axes_turned"] == 0.0
     assert main(["inspect", "hammer", "--density", "7850"]) == 0
     (row,) = [line for line in capsys.readouterr().out.splitlines() if line.strip().startswith("bounding_box")]
     assert "+90.9, -4.99, +3.13 %" in row and row.split()[-2:] == ["1.34", "0.0808"]

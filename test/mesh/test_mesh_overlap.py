@@ -5,9 +5,7 @@ import numpy as np
 import pytest
 from judged_meshes import body, codes, volume
 from mass_solids import box, inward, moved, sphere, together
-from mesh_files import obj
 
-from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.inspection import verify_moments
 from rigid_proto_ros.mesh import union
 
@@ -83,37 +81,3 @@ def test_a_surface_that_passes_through_itself_is_told():
     assert codes(body(tube(0.05)))["self_crossing"] == "warning"
     assert "self_crossing" not in codes(body(tube(0.5)))
     assert not body(sphere(20)).verdict.findings
-
-
-def test_a_mesh_that_is_repaired_in_flight_is_drawn_anew_where_it_was(tmp_path):
-    from rigid_proto_ros.base.rotation import matrix_from_quaternion
-    from rigid_proto_ros.export.flight_record import FlightRecord
-    from rigid_proto_ros.rerun_view.session_files import read_runs
-    from rigid_proto_ros.scene.offline import OfflineRun, read_scene
-    from rigid_proto_ros.scene.script import read_script
-    from rigid_proto_ros.simulation.observer import BodyChanged, MeshChanged, Started
-
-    mesh, script, recording = tmp_path / "two.obj", tmp_path / "repair.yaml", tmp_path / "flight.rrd"
-    mesh.write_bytes(obj(*together(box((2.0, 2.0, 2.0)), moved(box(), (0.3, 0.3, 0.3)))))
-    script.write_text("- {t: 0.1, set: {mesh_repair: true}}\n")
-    settings = {"mesh": str(mesh), "initial.angular_velocity": [1.0, 2.0, 3.0], "density": 1000.0}
-    arguments = [f"--set={name}={value}" for name, value in settings.items()]
-    arguments += ["--script", str(script), "--duration", "0.2", "--record", str(recording)]
-    assert main(["simulate", "hammer", *arguments]) == 0
-    (run,) = read_runs(str(recording))
-    assert run.mesh_chunks == 2
-    assert main(["replay", str(recording), "--verify"]) == 0
-
-    record, places = FlightRecord(), []
-    flight = OfflineRun(read_scene("hammer", settings), read_script(str(script)), record)
-    for time_ns in (100_000_000, 100_000_001):
-        flight.advance(time_ns)
-        row, body = flight.simulation.state.row, flight.simulation.setup.body
-        places.append(row[:3] - matrix_from_quaternion(row[3:7]) @ body.center_of_mass)
-    drawn = [event for event in record.changes if isinstance(event, (Started, MeshChanged))]
-    surface = flight.simulation.setup.surface
-    assert [len(event.triangles) for event in drawn] == [24, len(surface.triangles)]
-    (_, before), (_, after) = record.bodies(BodyChanged)[-2:]
-    assert after.mass == pytest.approx(7000.0)
-    assert np.abs(places[1] - places[0]).max() < 1e-8
-    assert np.linalg.norm(after.center_of_mass - before.center_of_mass) > 0.01

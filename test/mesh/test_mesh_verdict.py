@@ -86,13 +86,6 @@ def bubbles(count: int) -> tuple:
     return together(sphere(12), *holes)
 
 
-def test_a_ball_with_many_bubbles_is_right_as_it_is():
-    made = body(bubbles(6), repair=True)
-    assert codes(made) == {"cavities": "info"}
-    one = volume(body(sphere(4, (0.02, 0.02, 0.02))))
-    assert volume(made) == pytest.approx(volume(body(sphere(12))) - 216 * one, rel=1e-12)
-
-
 def test_what_is_left_undecided_accuses_no_component_and_turns_none(monkeypatch):
     monkeypatch.setattr(intersection, "WORK_LIMIT", 3000)
     made = body(bubbles(4), repair=True)
@@ -136,13 +129,6 @@ def test_repair_turns_polygons_as_a_whole(meshes):
     repaired, whole = mesh_body(broken, repair=True), mesh_body(mesh)
     assert volume(repaired) == volume(whole)
     assert repaired.moments.moments("shell").measure == pytest.approx(whole.moments.moments("shell").measure, rel=1e-14)
-
-
-def test_repair_drops_copies_and_back_sides():
-    vertices, triangles = BALL
-    twice = body((vertices, np.concatenate([triangles, triangles])), repair=True)
-    both = body((vertices, np.concatenate([triangles, triangles[:, ::-1]])), repair=True)
-    assert volume(twice) == volume(both) == pytest.approx(volume(body(BALL)), rel=1e-14)
 
 
 def test_repair_welds_a_torn_surface():

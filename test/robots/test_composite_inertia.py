@@ -2,15 +2,12 @@
 """A robot with its joints held is one rigid body: that of MuJoCo's kinematics, in a mesh of its links, flown as a scene."""
 
 import json
-import os
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
 
 import numpy as np
 import pytest
 from mesh_files import CUBE_VERTICES, stl
 
-from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mesh.reading import Mesh
@@ -210,26 +207,3 @@ def test_what_is_no_one_body_is_refused_in_one_line(tmp_path, capsys, monkeypatc
     assert main(["inspect", *arguments]) == 2
     refusal = capsys.readouterr().err
     assert refusal.count("\n") == 1 and any(word in refusal for word in words.split("|"))
-
-
-ROBOTS = os.environ.get("RIGID_PROTO_ROBOTS", "")
-
-
-@pytest.mark.stress
-@pytest.mark.skipif(not ROBOTS, reason="RIGID_PROTO_ROBOTS, a folder of robot descriptions, is not set")
-def test_real_robots_are_the_bodies_that_mujoco_makes_of_them():
-    pytest.importorskip("mujoco")
-    compared = 0
-    for path in sorted(Path(ROBOTS).rglob("*.urdf")):
-        try:
-            lump_robot(path)
-            model = for_mujoco(path.read_text("utf-8"))
-        except (InputError, ValueError):  # we refuse a file of two trees or of none, MuJoCo tensors that no body has
-            continue
-        mass, center, inertia = as_one_body(model)
-        lump = lump_robot(path)
-        if lump.properties.mass == pytest.approx(mass, rel=1e-12):  # it gives bodies without mass a little
-            assert lump.properties.center_of_mass == pytest.approx(center, abs=1e-9), path
-            assert lump.properties.inertia == pytest.approx(inertia, abs=1e-9 * np.abs(inertia).max()), path
-            compared += 1
-    assert compared > 10

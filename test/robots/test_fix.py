@@ -2,7 +2,6 @@
 """``--fix`` rewrites the inertials that are off, and nothing else; a second run finds nothing."""
 
 import json
-import os
 import re
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj, stl
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.robots.diagnosis import WRONG, compare_robot
 from rigid_proto_ros.robots.fix import fix_robot
 from rigid_proto_ros.robots.reading import read_robot
 
@@ -204,24 +202,3 @@ def test_a_shape_without_a_volume_that_a_number_can_hold_is_no_solid(parts, recw
     data, links = fixed(path)
     assert data == path.read_bytes() and links["a"].before.status == "impossible" and links["a"].left
     assert not recwarn
-
-
-ROBOTS = os.environ.get("RIGID_PROTO_ROBOTS", "")
-
-
-@pytest.mark.stress
-@pytest.mark.skipif(not ROBOTS, reason="RIGID_PROTO_ROBOTS, a folder of robot descriptions, is not set")
-def test_every_real_robot_is_mended_outside_nothing_changed_and_inside_all_right():
-    folders = (Path(ROBOTS), *(path.parent for path in Path(ROBOTS).rglob("package.xml")))
-    files = [path for ending in ("urdf", "sdf") for path in sorted(Path(ROBOTS).rglob(f"*.{ending}"))]
-    mended = 0
-    for path in files:
-        try:
-            compare_robot(path, folders=folders)
-        except InputError:
-            continue
-        data, links = fixed(path, folders=folders)
-        assert outside(data) == outside(path.read_bytes()), path
-        assert not [link.before.link for link in links.values() if link.after.status in WRONG and not link.left], path
-        mended += sum(link.written for link in links.values())
-    assert mended > 100
