@@ -32,7 +32,6 @@ MESHES = {
     "open.obj": (TETRAHEDRON.replace("f 2 3 4\n", ""), "--repair (mesh_repair), --fallback hull|box (mesh_fallback)"),
     "index.obj": (TETRAHEDRON.replace("f 2 3 4", "f 2 3 9"), "face 4 uses vertex 9, but the file has only 4"),
     "what.part": (TETRAHEDRON, ".obj, .off, .ply, .stl"),
-    "points.xyz": ("0 0 0\n1 0 0\n0 1 0\n", "triangle"),
 }
 
 
