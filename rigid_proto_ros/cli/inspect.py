@@ -9,7 +9,6 @@ import math
 import sys
 
 from ..base.errors import InputError
-from ..base.progress import Progress
 from ..mass.from_mesh import FALLBACKS, mesh_body
 from ..mass.inspection import MODELS, Inspection, as_json, inspect_mesh, verify_moments
 from ..mass.properties import scale_vector
@@ -18,8 +17,6 @@ from .inspect_robot import add_robot_arguments, compare, lump
 
 DENSITY = 1000.0
 """kg/m³, water's, when neither density nor mass is given."""
-LARGE_MESH = 100_000
-"""Triangles from which rational arithmetic may take longer than a second."""
 VERIFIED = 1e-13
 """Largest error against rational arithmetic with which ``--verify`` is content."""
 
@@ -129,9 +126,7 @@ def _print(inspection: Inspection, report: dict, args: argparse.Namespace) -> No
 def _verify(inspection: Inspection, report: dict) -> int:
     """Put the ``verification`` into the report, null where it is refused; returns the exit status."""
     report["verification"] = None
-    body = inspection.body
-    with Progress("checking in rational arithmetic", len(body.triangles) > LARGE_MESH) as progress:
-        report["verification"] = verify_moments(body, inspection.scale, progress.fraction)
+    report["verification"] = verify_moments(inspection.body, inspection.scale)
     if max(report["verification"].values()) <= VERIFIED:
         return 0
     print("rigid_proto inspect: errors beyond 1e-13 against rational arithmetic", file=sys.stderr)

@@ -14,14 +14,6 @@ from ..mass.inspection import Inspection
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes
 
-SHOWN_ZERO = 5e-7
-"""Of a quantity's largest entry: what is smaller is beyond the six digits shown, and stands as 0. JSON has it."""
-
-
-def shown_zero(values: Iterable[float], largest: float) -> list[float]:
-    """The values, those that don't show beside ``largest`` as 0."""
-    return [0.0 if abs(value) < SHOWN_ZERO * largest else float(value) for value in values]
-
 
 def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> None:
     """Print columns aligned to their widest cell."""
@@ -54,14 +46,12 @@ def print_report(inspection: Inspection, report: dict) -> None:
         rows.append(("area", f"{report['area']: .9g}", "m²"))
     density = "" if report["density"] is None else f" ({report['density']:.6g} kg/m³)"
     rows.append(("mass", f"{chosen.mass: .9g}", f"kg{density}"))
-    diagonal = float(np.linalg.norm(size))
-    rows.append(("centre of mass", row_of(shown_zero(chosen.center_of_mass, diagonal)), "m"))
+    rows.append(("centre of mass", row_of(chosen.center_of_mass), "m"))
     rows += tensor_rows(chosen.inertia)
     moments, axes = principal_axes(chosen.inertia)
     rows.append(("principal moments", row_of(moments), "kg m²"))
     rows += [
-        (f"principal axis {k + 1}", row_of(shown_zero(axes[:, k], 1.0)), f"of {moment:.6g} kg m²")
-        for k, moment in enumerate(moments)
+        (f"principal axis {k + 1}", row_of(axes[:, k]), f"of {moment:.6g} kg m²") for k, moment in enumerate(moments)
     ]
     table(rows)
     print()
@@ -81,11 +71,8 @@ def _print_models(inspection: Inspection) -> None:
         cells = [marked, f"{properties.mass:.6g}"]
         if "solid" in inspection.models and name != "solid":
             difference = inspection.difference(name)
-            errors = shown_zero(difference.principal_moments, 1.0)
-            cells.append(", ".join(f"{100.0 * error:+.3g}" for error in errors) + " %")
-            cells.append(f"{math.degrees(shown_zero([difference.axes_turned], 1.0)[0]):.3g}")
-            offset = difference.center_of_mass_offset
-            cells.append(f"{shown_zero([offset], float(np.linalg.norm(inspection.upper - inspection.lower)))[0]:.3g}")
+            cells.append(", ".join(f"{100.0 * error:+.3g}" for error in difference.principal_moments) + " %")
+            cells += [f"{math.degrees(difference.axes_turned):.3g}", f"{difference.center_of_mass_offset:.3g}"]
         rows.append(tuple(cells))
     head = ("  model", "mass [kg]", "error of the principal moments", "axes turned by [deg]", "COM offset [m]")
     table(rows, head)
@@ -99,8 +86,7 @@ def row_of(values: Iterable[float]) -> str:
 def tensor_rows(inertia: np.ndarray) -> list[tuple[str, ...]]:
     """Rows of a table for a tensor (3, 3)."""
     labels = [("inertia", "kg m², about the centre of mass"), ("", ""), ("", "")]
-    largest = float(np.abs(inertia).max())
-    return [(label, row_of(shown_zero(row, largest)), unit) for (label, unit), row in zip(labels, inertia, strict=True)]
+    return [(label, row_of(row), unit) for (label, unit), row in zip(labels, inertia, strict=True)]
 
 
 def print_inertial(args: argparse.Namespace, properties: MassProperties) -> bool:

@@ -17,7 +17,7 @@ from ..base.errors import InputError
 from ..base.files import whole_file
 from ..mass.properties import scale_vector
 from ..mass.tensor import principal_axes, six_from_tensor
-from .inspect_report import print_inertial, row_of, shown_zero, table, tensor_rows
+from .inspect_report import print_inertial, row_of, table, tensor_rows
 
 if TYPE_CHECKING:
     from ..robots.composite_inertia import Lump
@@ -127,8 +127,7 @@ def _print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
         if d.expected is not None and d.status not in ("uniform", "not uniform"):
             center_of_mass, six = d.expected.center_of_mass, six_from_tensor(d.expected.inertia)
             print(f"  expected: com {' '.join(f'{value:.9g}' for value in center_of_mass)}")
-            entries = shown_zero(six, max(map(abs, six)))
-            print(f"  expected: ixx ixy ixz iyy iyz izz {' '.join(f'{value:.9g}' for value in entries)}")
+            print(f"  expected: ixx ixy ixz iyy iyz izz {' '.join(f'{value:.9g}' for value in six)}")
     if len(diagnoses) > 1:
         counts = Counter(d.status for d in diagnoses)
         print(f"{len(diagnoses)} links: {', '.join(f'{count} {status}' for status, count in counts.items())}")

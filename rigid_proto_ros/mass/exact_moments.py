@@ -8,14 +8,13 @@ never a part of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
 CHUNK = 4096
-"""Triangles at a time: between two progress calls, and the object arrays' size."""
+"""Triangles at a time: the object arrays' size."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +56,10 @@ def _as_integers(vertices: np.ndarray) -> tuple[np.ndarray, int]:
     return np.array(flat, dtype=object).reshape(vertices.shape), power
 
 
-def exact_solid_moments(
-    vertices: np.ndarray, triangles: np.ndarray, progress: Callable[[int, int], None] | None = None
-) -> ExactMoments:
+def exact_solid_moments(vertices: np.ndarray, triangles: np.ndarray) -> ExactMoments:
     """Exact signed moments of the solid that triangles (m, 3) over vertices (n, 3) float64 bound.
 
-    ``progress`` is called with (triangles done, all triangles). Raises ZeroDivisionError when the volume is zero.
+    Raises ZeroDivisionError when the volume is zero.
     """
     whole, power = _as_integers(np.asarray(vertices, dtype=np.float64))
     # A reference amid the vertices keeps the integers short; it drops out of a closed surface's sums exactly.
@@ -82,8 +79,6 @@ def exact_solid_moments(
             for j in range(i, 3):
                 raw[slot] += sum((d * (s[i] * s[j] + a[i] * a[j] + b[i] * b[j] + c[i] * c[j])).tolist())
                 slot += 1
-        if progress is not None:
-            progress(min(start + CHUNK, len(triangles)), len(triangles))
     unit = Fraction(2) ** power
     volume = Fraction(raw[0], 6) * unit**3
     offset = [Fraction(raw[1 + k], 24) * unit**4 / volume for k in range(3)]

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,13 +138,11 @@ def as_json(inspection: Inspection) -> dict:
     }
 
 
-def verify_moments(
-    body: MeshBody, scale: np.ndarray, progress: Callable[[int, int], None] | None = None
-) -> dict[str, float]:
+def verify_moments(body: MeshBody, scale: np.ndarray) -> dict[str, float]:
     """Errors of the solid's volume, centroid and inertia against rational arithmetic on the same vertices."""
     moments = body.moments
     vertices, triangles = moments.solid_surface()  # refuses what bounds no solid
-    exact = exact_solid_moments(vertices, triangles, progress).outward().scaled(scale)
+    exact = exact_solid_moments(vertices, triangles).outward().scaled(scale)
     unit = moments.mass_properties("solid", scale=scale, density=1.0)
     points = referenced_vertices(vertices, triangles) * scale
     diagonal = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))

@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from mass_solids import PLACES, box, circle, prism, solids, sphere
+from mass_solids import PLACES, box, solids, sphere
 
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.exact_moments import exact_solid_moments, relative_errors
@@ -69,7 +69,7 @@ def test_published_truths_of_real_meshes(meshes, name):
     assert np.all(off <= BOUND * diagonal + np.spacing(np.abs(truth["center_of_mass"])))
 
 
-def test_cuboid_tetrahedron_and_octahedron_have_their_closed_forms():
+def test_cuboid_and_tetrahedron_have_their_closed_forms():
     a, b, c = 0.7, 1.9, 0.3
     moments = MeshMoments(*box((a, b, c), 3)).mass_properties(density=2.0)
     mass = 2.0 * a * b * c
@@ -83,9 +83,6 @@ def test_cuboid_tetrahedron_and_octahedron_have_their_closed_forms():
     assert tetrahedron.center_of_mass == pytest.approx([0.25] * 3, rel=1e-14)
     assert np.diag(tetrahedron.inertia) == pytest.approx([3 / 40] * 3, rel=1e-14)
     assert tetrahedron.inertia[0, 1] == pytest.approx(1 / 80, rel=1e-14)  # -∫xy = -(1/120 - 1/96)·6
-
-    octahedron = MeshMoments(*prism(circle(4), 1.0, layers=1)).mass_properties(density=1.0)
-    assert octahedron.mass == pytest.approx(2.0, rel=1e-14)  # a square prism of side √2
 
 
 def test_the_com_from_the_reference_keeps_digits_that_the_com_cannot():

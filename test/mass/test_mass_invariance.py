@@ -12,7 +12,7 @@ from rigid_proto_ros.mass.tensor import principal_axes
 MODELS = st.sampled_from(["solid", "shell", "points"])
 SEEDS = st.integers(0, 2**31)
 lengths = st.floats(-3, 3).map(lambda e: 10.0**e)
-settings.register_profile("mass", deadline=None, max_examples=20)
+settings.register_profile("mass", deadline=None, max_examples=12)
 PROFILE = settings.get_profile("mass")
 
 
@@ -107,19 +107,6 @@ def test_subdivision_changes_neither_solid_nor_shell(mesh, seed):
     for model in ("solid", "shell"):
         center, inertia = off(properties((fine, cut), model), properties((vertices, triangles), model))
         assert max(center, inertia) <= 1e-13 + 4 * np.spacing(np.max(np.abs(vertices))) / np.ptp(vertices)
-
-
-@given(bodies(), SEEDS, MODELS)
-@settings(PROFILE)
-def test_the_order_of_vertices_faces_and_corners_is_of_no_matter(mesh, seed, model):
-    vertices, triangles = mesh
-    random = np.random.default_rng(seed)
-    order = random.permutation(len(vertices))
-    place = np.argsort(order)
-    shuffled = place[triangles][random.permutation(len(triangles))]
-    shuffled = np.stack([np.roll(row, random.integers(3)) for row in shuffled])
-    center, inertia = off(properties((vertices[order], shuffled), model), properties(mesh, model))
-    assert max(center, inertia) <= 1e-13 + 2 * np.spacing(np.max(np.abs(vertices))) / np.ptp(vertices)
 
 
 @given(bodies(), st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9)), st.sampled_from(["solid", "shell", "points", "bounding_box"]))  # fmt: skip

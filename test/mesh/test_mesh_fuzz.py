@@ -38,22 +38,7 @@ SEEDS = {
     "3mf": [threemf(MODEL)],
     "dae": [collada('<node><scale>1 1 1</scale><instance_geometry url="#cube"/></node>')],
 }
-WORDS = [
-    b"nan",
-    b"-1",
-    b"1e999",
-    b"99999999999999999999",
-    b"\0",
-    b"/",
-    b"\n",
-    b" ",
-    b"\xff\xfe",
-    b"#",
-    b"f 1 1 1\n",
-    b"0x1",
-    b"e",
-    b"\r",
-]
+WORDS = b"nan|-1|1e999|99999999999999999999|\0|/|\n| |\xff\xfe|#|f 1 1 1\n|0x1|e|\r".split(b"|")
 
 
 def mutated(data: bytes, rng: np.random.Generator) -> bytes:
