@@ -12,7 +12,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..base.errors import InputError
 from ..mass.properties import MassProperties
 from ..mass.tensor import six_from_tensor, tensor_from_six
 from .link_shapes import LinkShapes
@@ -50,12 +49,7 @@ _QUARTER_TURNS = _quarter_turns()
 
 def _other_shapes(parts: LinkShapes, mass: float) -> Iterator[tuple[str, MassProperties]]:
     """What other tools and habits put in the place of the solid, in the link's axes."""
-    models = {"shell": "a thin shell", "points": "point masses at the vertices", "bounding_box": "the bounding box"}
-    for model, phrase in models.items():
-        try:
-            yield phrase, parts.properties(mass, model)
-        except InputError:
-            pass
+    yield "the bounding box", parts.box(mass)
     hull = parts.hull(mass)
     if hull is not None:
         yield "the convex hull", hull
@@ -170,14 +164,13 @@ def explain_center(given: np.ndarray, truth: MassProperties, parts: LinkShapes) 
     guesses = [
         ("COM left at the link's origin", np.zeros(3)),
         ("COM at the mesh's origin", use.position),
-        ("COM at the bounding box's centre", parts.middle),
         ("COM in mesh coordinates: the mesh's pose in the link left out", use.rotation.T @ (com - use.position)),
         ("COM in mm", 1000.0 * com),
         ("COM in cm", 100.0 * com),
         ("COM 1000 times too small", com / 1000.0),
         ("COM with the opposite sign", -com),
         ("COM with y and z exchanged", com[[0, 2, 1]]),
-        *((f"COM of {name}", of.center_of_mass) for name, of in _other_shapes(parts, truth.mass)),
+        *((f"COM that of {name}", of.center_of_mass) for name, of in _other_shapes(parts, truth.mass)),
     ]
     for sentence, guess in guesses:
         if np.max(np.abs(given - guess)) <= LIMIT * max(parts.diagonal, float(np.max(np.abs(guess)))):

@@ -135,70 +135,59 @@ class LinkShapes:
         """Diagonal of the box, in the link's axes, around all."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
-    @property
-    def middle(self) -> np.ndarray:
-        """Centre (3,) of the box, in the first shape's axes, around all."""
-        local = self.points @ self.first.rotation
-        return self.first.rotation @ (0.5 * (local.min(axis=0) + local.max(axis=0)))
+    @cached_property
+    def _moments(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Volume, centroid (3,) and second moments (3, 3) about it of each shape, in the link's axes."""
+        found = []
+        for shape, body in self.parts:
+            R = shape.rotation
+            if body is None:
+                size, squares = primitive_solid(shape.kind, shape.size)
+                found.append((size, shape.position, R @ np.diag(squares) @ R.T))
+                continue
+            size = body.moments.moments("solid").measure * math.prod(np.abs(shape.scale).tolist())
+            own = body.moments.mass_properties("solid", scale=shape.scale, mass=size)
+            moment = 0.5 * np.trace(own.inertia) * np.eye(3) - own.inertia
+            found.append((size, R @ own.center_of_mass + shape.position, R @ moment @ R.T))
+        return found
 
     def volume(self) -> float:
         """Volume [m³], what overlaps counted twice; raises InputError for a mesh that bounds none."""
-        return self._whole("solid")[0]
+        return sum(size for size, _, _ in self._moments)
 
-    def properties(self, mass: float, model: str = "solid") -> MassProperties:
-        """Mass properties of ``mass`` kg spread evenly over the shapes, in the link's axes; other models
-        of meshes alone.
-        """
-        measure, first, second = self._whole(model)
-        center = first / measure
-        moment = second / measure - np.outer(center, center)
-        return MassProperties(mass, center, mass * (np.trace(moment) * np.eye(3) - moment))
-
-    def _whole(self, model: str) -> tuple[float, np.ndarray, np.ndarray]:
-        """Measure, first (3,) and second (3, 3) moments of all shapes at unit density, about the link's origin."""
-        measure, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
-        for shape, body in self.parts:
-            size, center, moment = self._part(shape, body, model)
-            measure += size
+    def properties(self, mass: float) -> MassProperties:
+        """Mass properties of ``mass`` kg spread evenly over the shapes, in the link's axes."""
+        volume, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
+        for size, center, moment in self._moments:
+            volume += size
             first += size * center
             second += size * np.outer(center, center) + moment
-        if not 0.0 < measure < math.inf or not np.isfinite(second).all():
-            raise InputError(self.names, f"{model} of measure {measure:g}; a body needs a finite one > 0")
-        return measure, first, second
-
-    def _part(self, shape: Shape, body: MeshBody | None, model: str) -> tuple[float, np.ndarray, np.ndarray]:
-        """Measure, centroid (3,) and second moments (3, 3) about it of one shape, in the link's axes."""
-        R = shape.rotation
-        if body is None:
-            if model != "solid":
-                raise InputError("model", model, "solid, for a primitive shape")
-            size, squares = primitive_solid(shape.kind, shape.size)
-            return size, shape.position, R @ np.diag(squares) @ R.T
-        stretch = math.prod(np.abs(shape.scale).tolist())
-        if model == "shell":
-            size = body.moments.moments("shell", shape.scale).measure * float(shape.scale[0]) ** 2
-        else:
-            size = body.moments.moments(model).measure * (1.0 if model == "points" else stretch)
-        properties = body.moments.mass_properties(model, scale=shape.scale, mass=size)
-        moment = 0.5 * np.trace(properties.inertia) * np.eye(3) - properties.inertia
-        return size, R @ properties.center_of_mass + shape.position, R @ moment @ R.T
+        if not 0.0 < volume < math.inf or not np.isfinite(second).all():
+            raise InputError(self.names, f"a volume of {volume:g}; a body needs a finite one > 0")
+        center = first / volume
+        return _spread(mass, center, second / volume - np.outer(center, center))
 
     def summed_about_own_centers(self, mass: float) -> np.ndarray:
         """What comes out (3, 3) when the parts' tensors are added as if all had one centre of mass."""
-        measure, moment = 0.0, np.zeros((3, 3))
-        for shape, body in self.parts:
-            size, _, own = self._part(shape, body, "solid")
-            measure += size
-            moment += own
-        return mass / measure * (np.trace(moment) * np.eye(3) - moment)
+        moment = np.sum([own for _, _, own in self._moments], axis=0) / self.volume()
+        return _spread(mass, np.zeros(3), moment).inertia
+
+    def box(self, mass: float) -> MassProperties:
+        """The box around all, in the first shape's axes, as a solid of ``mass`` kg."""
+        R = self.first.rotation
+        local = self.points @ R
+        middle = 0.5 * (local.min(axis=0) + local.max(axis=0))
+        return _spread(mass, R @ middle, R @ np.diag(np.ptp(local, axis=0) ** 2 / 12.0) @ R.T)
 
     def hull(self, mass: float) -> MassProperties | None:
-        """The convex hull of a single mesh as a solid of ``mass`` kg; None when it has no volume."""
-        if len(self.parts) > 1 or self.parts[0][1] is None:
-            return None
+        """The convex hull of all as a solid of ``mass`` kg; None when it has no volume."""
         try:
             hull = solid_moments(self.points, convex_hull(self.points))
         except InputError:
             return None
-        second = tensor_from_six((hull.second / hull.measure).tolist())
-        return MassProperties(mass, hull.centroid, mass * (np.trace(second) * np.eye(3) - second))
+        return _spread(mass, hull.centroid, tensor_from_six((hull.second / hull.measure).tolist()))
+
+
+def _spread(mass: float, center: np.ndarray, moment: np.ndarray) -> MassProperties:
+    """Mass properties from the variances (3, 3) [m²] of the mass about its centre."""
+    return MassProperties(mass, center, mass * (np.trace(moment) * np.eye(3) - moment))

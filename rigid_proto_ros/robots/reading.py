@@ -24,10 +24,7 @@ def read_robot(path: Path) -> Robot:
 def robot_of(root: Element, path: Path) -> Robot:
     """The robot below the root of a file; raises InputError for what is none, or holds what are no numbers."""
     if path.suffix == ".xacro" or any("xacro" in str(element.tag) for element in root.iter()):
-        plain = path.name.removesuffix(".xacro").removesuffix(".urdf") + ".urdf"
-        if plain == path.name:  # the shell would empty the file before xacro reads it
-            plain = f"{path.stem}.expanded.urdf"
-        raise InputError("robot file", path.name, f"plain URDF: xacro {path} > {plain} expands it")
+        raise InputError("robot file", path.name, f"plain URDF: xacro {path} > EXPANDED.urdf")
     with valid_numbers(path.name):
         if root.tag == "robot":
             return read_urdf(root)

@@ -144,7 +144,7 @@ def test_a_bounding_boxs_tensor_is_recognised(capsys, tmp_path):
     text = urdf(R @ box.center_of_mass + POSITION, six_from_tensor(R @ box.inertia @ R.T))
     _, (link,) = compare(capsys, tmp_path, text)
     assert any("bounding box, not of the solid" in cause for cause in link["causes"])
-    assert "COM at the bounding box's centre" in link["causes"]
+    assert "COM that of the bounding box" in link["causes"]
 
 
 def test_a_mesh_may_be_named_for_the_link_that_shows_it(capsys, tmp_path, truth):
