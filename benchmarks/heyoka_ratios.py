@@ -18,7 +18,6 @@ from pathlib import Path
 
 import heyoka
 import numpy as np
-from numba import int64
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
@@ -35,7 +34,7 @@ from rigid_proto_ros.motion.integrators.integrator import ADAPTIVE
 from rigid_proto_ros.simulation import flight as fl
 from rigid_proto_ros.simulation.batch import EXPLICIT, ROW, Batch, fly_rows
 from rigid_proto_ros.simulation.commands import HELD_WRENCH, IMPULSE, NO_SLOT, PULSE, UNNAMED_SLOT
-from rigid_proto_ros.simulation.flight_arrays import _arrays
+from rigid_proto_ros.simulation.flight_arrays import SIGNATURE
 from rigid_proto_ros.simulation.quantities import CODE, MEASURE
 from work_precision_ours import prepare_simulation, setup_of, simulation_of
 from work_precision_ratios import time_at_error
@@ -61,10 +60,9 @@ COLUMNS = (
 
 
 @njit(error_model="numpy")
-def carry_from_start(at, until_ns):
-    """One segment of the flight whose arrays are at this address: its steps, and the look at the end."""
-    held, _, _, methods, room = _arrays(at)
-    return fl.advance_segment(held[0].flight, methods, room, until_ns)
+def carry_from_start(flights, loads, events, methods, room, what, until_ns):
+    """One segment of the flight: its steps, and the look at the end."""
+    return fl.advance_segment(flights[0], methods, room, until_ns)
 
 
 def kernel_runs(problem: Problem, accuracy: float):
@@ -77,7 +75,7 @@ def kernel_runs(problem: Problem, accuracy: float):
     arrays = simulation._arrays
     if arrays.methods[int(arrays.flight.method)]["way"] != ADAPTIVE:
         return None
-    kernel, end_ns = entry_of(carry_from_start, int64(int64, int64)), round(problem.duration * 1e9)
+    kernel, end_ns = entry_of(carry_from_start, SIGNATURE), round(problem.duration * 1e9)
     flight = arrays.flight
     start = flight.start.copy()
 
@@ -85,7 +83,8 @@ def kernel_runs(problem: Problem, accuracy: float):
         flight.row[:] = start
         fl.begin_variables(flight, arrays.methods, arrays.room)
 
-    return lambda: kernel(arrays._at, end_ns), lambda: flight.row.copy(), restart
+    held = arrays.arrays
+    return lambda: kernel(*held, 0, end_ns), lambda: flight.row.copy(), restart
 
 
 def whole(prepare):

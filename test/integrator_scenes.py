@@ -24,7 +24,6 @@ from rigid_proto_ros.motion.integrators.integrator import (
     WORLD_TORQUE,
     Integrator,
 )
-from rigid_proto_ros.motion.loads import LoadSum
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringSettings, StringState, tie
 
@@ -47,12 +46,9 @@ class Scene:
     def problem_and_start(self) -> tuple[np.ndarray, State]:
         """The core's problem and the state it starts from."""
         body, state = make_body(MASS, (0.0, 0.0, 0.0), TENSOR), State(0, np.array(self.row))
-        loads, wanted = LoadSum(), self._values()
-        loads.force_world += wanted["force_world"]
-        loads.force_body += wanted["force_body"]
-        loads.torque_world += wanted["torque_world"]
-        loads.torque_body += wanted["torque_body"]
-        loads.moment += wanted["moment"]
+        wanted = self._values()
+        sums = ("force_world", "force_body", "torque_world", "torque_body", "moment")
+        loads = np.concatenate([np.ravel(wanted[name]) for name in sums])
         problem = make_problem(
             body,
             loads,

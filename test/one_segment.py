@@ -10,7 +10,6 @@ from rigid_proto_ros.motion.body import LENGTH, Body
 from rigid_proto_ros.motion.integrators.integrator import Integrator
 from rigid_proto_ros.motion.integrators.series_steps import CONTROL, degree_for
 from rigid_proto_ros.motion.integrators.stepping import method_table, provide_kernel, workspace_size
-from rigid_proto_ros.motion.loads import LoadSum
 from rigid_proto_ros.motion.problem import PROBLEM, Environment, begin_body, begin_problem, begin_string
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringState
@@ -20,7 +19,7 @@ from rigid_proto_ros.simulation import flight as fl
 
 def make_problem(
     body: Body,
-    loads: LoadSum,
+    loads: np.ndarray,
     gravity,
     linear_damping: float,
     angular_damping: float,
@@ -34,7 +33,7 @@ def make_problem(
     row[LENGTH] = length
     around = Environment(gravity=gravity, linear_damping=linear_damping, angular_damping=angular_damping)
     begin_body(p, row, around.environment, float(gyroscopic))
-    begin_problem(p, loads.values, state.row)
+    begin_problem(p, loads, state.row)
     if string is not None:
         begin_string(p, row, string.row, string.begin_ns, string.end_ns, state.row, state.time_ns)
     return p

@@ -29,42 +29,33 @@ SAME_DIRECTION_S = 0.25
 DIRECTIONS = 16
 """Ways in which a flight is disturbed, one after the other and then anew."""
 
-FIELDS = {
-    "row": 13,  # x, q xyzw, v, ω body
-    "mass": 1,
-    "inertia": 9,  # body axes
-    "length": 1,  # ℓ
-    "gravity": 3,
-    "linear_damping": 1,
-    "angular_damping": 1,
-    # A wrench: a force at a point, and a torque, in world axes and in body axes; points in body axes from the COM.
-    "force_world": 3,
-    "point_world": 3,
-    "torque_world": 3,
-    "force_body": 3,
-    "point_body": 3,
-    "torque_body": 3,
-    "tied": 1,
-    "arm": 3,
-    "target": 3,  # of the free end until it moves
-    "moved": 3,  # and after
-    "stiffness": 1,
-    "damping": 1,
-    "rest_length": 1,
-    "one_sided": 1,
-}
-"""Numbers of a flight (NUMBERS,), SI, in this order."""
-_AT = dict(zip(FIELDS, np.cumsum([0, *FIELDS.values()]).tolist(), strict=False))
-NUMBERS = sum(FIELDS.values())
-_MASS, _INERTIA, _LENGTH, _GRAVITY = _AT["mass"], _AT["inertia"], _AT["length"], _AT["gravity"]
-_LINEAR, _ANGULAR = _AT["linear_damping"], _AT["angular_damping"]
-_LOADS, _TIED, _ARM, _TARGET, _MOVED = _AT["force_world"], _AT["tied"], _AT["arm"], _AT["target"], _AT["moved"]
-_STIFFNESS, _DAMPING, _REST, _ONE_SIDED = _AT["stiffness"], _AT["damping"], _AT["rest_length"], _AT["one_sided"]
+_THREE = [
+    *("gravity", "force_world", "point_world", "torque_world", "force_body", "point_body", "torque_body"),
+    *("arm", "target", "moved"),
+]
+_ONE = ["mass", "length", "linear_damping", "angular_damping", "stiffness", "damping", "rest_length"]
+NUMBERS = np.dtype(
+    [
+        ("row", np.float64, 13),  # x, q xyzw, v, ω body
+        ("inertia", np.float64, 9),  # body axes
+        *((name, np.float64, 3) for name in _THREE),
+        *((name, np.float64) for name in _ONE),
+        ("tied", np.bool_),
+        ("one_sided", np.bool_),
+    ],
+    align=True,
+)
+"""A flight in SI units. A wrench is a force at a point, and a torque, in world axes and in body axes; points in body axes from
+the COM. The string's free end is at ``target`` until it moves, and at ``moved`` after; ``length`` is ℓ.
+"""
 
 
 def numbers(scene: dict) -> np.ndarray:
-    """A scene's numbers by name as one array (NUMBERS,)."""
-    return np.concatenate([np.ravel(np.asarray(scene[name], float)) for name in FIELDS])
+    """A scene's numbers by name as an array (1,) of NUMBERS."""
+    record = np.zeros(1, NUMBERS)
+    for name in NUMBERS.names:
+        record[name] = np.ravel(scene[name]) if NUMBERS[name].shape else scene[name]
+    return record
 
 
 @njit(cache=True)
@@ -91,8 +82,8 @@ def _turned(q, v, sign):
 @njit(cache=True)
 def _solved(P, v):
     """I⁻¹ v in body axes, by Cramer's rule."""
-    i = _INERTIA
-    a, b, c = (P[i], P[i + 3], P[i + 6]), (P[i + 1], P[i + 4], P[i + 7]), (P[i + 2], P[i + 5], P[i + 8])
+    I = P.inertia
+    a, b, c = (I[0], I[3], I[6]), (I[1], I[4], I[7]), (I[2], I[5], I[8])
     bc = _cross(b, c)
     det = _dot(a, bc)
     return _dot(v, bc) / det, _dot(v, _cross(c, a)) / det, _dot(v, _cross(a, b)) / det
@@ -105,8 +96,8 @@ def _spin_of(P, q, momentum):
 
 
 @njit(cache=True)
-def _three(P, at):
-    return P[at], P[at + 1], P[at + 2]
+def _three(Y, at):
+    return Y[at], Y[at + 1], Y[at + 2]
 
 
 @njit(cache=True)
@@ -114,25 +105,22 @@ def _rates(Y, P, hand, time, loaded, pulls, dY, law):
     """Y' into dY; into law: l² − rest² and its rate, k x + c l' and its rate."""
     q, v, momentum = (Y[3], Y[4], Y[5], Y[6]), _three(Y, 7), _three(Y, 10)
     w = _spin_of(P, q, momentum)
-    mass, linear, angular = P[_MASS], P[_LINEAR], P[_ANGULAR]
+    mass, linear, angular = P.mass, P.linear_damping, P.angular_damping
     F = np.empty(3)
     T = np.empty(3)
     for j in range(3):
-        F[j] = mass * P[_GRAVITY + j] - linear * v[j]
+        F[j] = mass * P.gravity[j] - linear * v[j]
         T[j] = -angular * w[j]
     if loaded:
-        i = _LOADS
-        force, body = _three(P, i), _turned(q, _three(P, i + 9), 1.0)
-        own = _turned(q, _three(P, i + 15), 1.0)
-        one = _cross(_turned(q, _three(P, i + 3), 1.0), force)
-        two = _cross(_turned(q, _three(P, i + 12), 1.0), body)
+        force, body, own = P.force_world, _turned(q, P.force_body, 1.0), _turned(q, P.torque_body, 1.0)
+        one, two = _cross(_turned(q, P.point_world, 1.0), force), _cross(_turned(q, P.point_body, 1.0), body)
         for j in range(3):
             F[j] += force[j] + body[j]
-            T[j] += P[i + 6 + j] + own[j] + one[j] + two[j]
+            T[j] += P.torque_world[j] + own[j] + one[j] + two[j]
     r, a, rate, l = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
-    if P[_TIED] != 0.0:
-        k, c, rest = P[_STIFFNESS], P[_DAMPING], P[_REST]
-        r = _turned(q, _three(P, _ARM), 1.0)
+    if P.tied:
+        k, c, rest = P.stiffness, P.damping, P.rest_length
+        r = _turned(q, P.arm, 1.0)
         t = _cross(w, r)
         a = (
             Y[0] - hand[0] - time * hand[3] + r[0],
@@ -161,14 +149,14 @@ def _rates(Y, P, hand, time, loaded, pulls, dY, law):
     for j in range(3):
         dY[3 + j] = 0.5 * (q[3] * w[j] + e[j])
     dY[6] = -0.5 * _dot(w, q)
-    if P[_TIED] != 0.0 and l > 0.0:
+    if P.tied and l > 0.0:
         t = _cross(w, momentum)
         turn = _turned(q, _solved(P, _turned(q, (T[0] - t[0], T[1] - t[1], T[2] - t[2]), -1.0)), 1.0)
         one, two = _cross(turn, r), _cross(w, _cross(w, r))
         second = (F[0] / mass + one[0] + two[0], F[1] / mass + one[1] + two[1], F[2] / mass + one[2] + two[2])
         speed = _dot(a, rate) / l
         bend = (_dot(rate, rate) + _dot(a, second) - speed * speed) / l
-        law[3] = P[_STIFFNESS] * speed + P[_DAMPING] * bend
+        law[3] = P.stiffness * speed + P.damping * bend
 
 
 @njit(cache=True)
@@ -202,9 +190,9 @@ def _step_size(Y, P, hand, time, pulls):
     for j in range(3):
         unit = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
         softest += _solved(P, unit)[j]
-    rate = math.sqrt(_dot(w, w)) + 0.5 * (P[_ANGULAR] * softest + P[_LINEAR] / P[_MASS])
-    if P[_TIED] != 0.0 and (pulls or P[_REST] > 0.0):
-        r = _turned(q, _three(P, _ARM), 1.0)
+    rate = math.sqrt(_dot(w, w)) + 0.5 * (P.angular_damping * softest + P.linear_damping / P.mass)
+    if P.tied and (pulls or P.rest_length > 0.0):
+        r = _turned(q, P.arm, 1.0)
         t = _cross(w, r)
         a = (
             Y[0] - hand[0] - time * hand[3] + r[0],
@@ -214,15 +202,15 @@ def _step_size(Y, P, hand, time, pulls):
         along = (Y[7] + t[0] - hand[3], Y[8] + t[1] - hand[4], Y[9] + t[2] - hand[5])
         l = math.sqrt(_dot(a, a))
         if not pulls:
-            return min(FINENESS / max(rate + math.sqrt(_dot(along, along)) / P[_REST], 1e-3), LONGEST_S)
+            return min(FINENESS / max(rate + math.sqrt(_dot(along, along)) / P.rest_length, 1e-3), LONGEST_S)
         turning = _dot(r, r) * softest
-        if P[_REST] > 0.0 and l > 0.0:
+        if P.rest_length > 0.0 and l > 0.0:
             lever = _cross(r, a)
             body = _turned(q, lever, -1.0)
             turning = _dot(body, _solved(P, body)) / (l * l)
             rate += math.sqrt(_dot(along, along)) / l
-        light = 1.0 / P[_MASS] + turning
-        rate += math.sqrt(P[_STIFFNESS] * light) + 0.5 * P[_DAMPING] * light
+        light = 1.0 / P.mass + turning
+        rate += math.sqrt(P.stiffness * light) + 0.5 * P.damping * light
     return min(FINENESS / max(rate, 1e-3), LONGEST_S)
 
 
@@ -256,7 +244,7 @@ def _fly_span(Y, low, P, hand, begin, span, loaded, disturbance, ways, a, b, c):
     """Y, low on by ``span`` seconds in place; returns how many steps were taken."""
     K, Z, out, out_low = np.zeros((STAGES, 13)), np.zeros(13), np.zeros(13), np.zeros(13)
     before, after, dY = np.zeros(8), np.zeros(8), np.zeros(13)
-    may = P[_TIED] != 0.0 and P[_ONE_SIDED] != 0.0
+    may = P.tied and P.one_sided
     state, time, steps = 1, 0.0, 0
     if may:
         _rates(Y, P, hand, 0.0, loaded, False, dY, before)
@@ -303,7 +291,7 @@ def _fly_span(Y, low, P, hand, begin, span, loaded, disturbance, ways, a, b, c):
                 trial += 1
             if real:
                 h = at
-                state = 0 if ended == 1 else (1 if state != 1 else (2 if P[_DAMPING] > 0.0 else 0))
+                state = 0 if ended == 1 else (1 if state != 1 else (2 if P.damping > 0.0 else 0))
             else:
                 _step(Y, low, P, hand, time, h, loaded, pulls, K, Z, after, out, out_low, a, b, c)
         if disturbance > 0.0:
@@ -318,13 +306,13 @@ def _disturb(Y, P, size, ways):
     """Move Y by an error of this size in the measure of ``error``."""
     q = (Y[3], Y[4], Y[5], Y[6])
     w, v = _spin_of(P, q, _three(Y, 10)), _three(Y, 7)
-    spin, speed = max(math.sqrt(_dot(w, w)), 1.0), max(math.sqrt(_dot(v, v)), P[_LENGTH])
+    spin, speed = max(math.sqrt(_dot(w, w)), 1.0), max(math.sqrt(_dot(v, v)), P.length)
     for j in range(3):
-        Y[j] += size * P[_LENGTH] * ways[0, j]
+        Y[j] += size * P.length * ways[0, j]
         Y[7 + j] += size * speed * ways[1, j]
     body = _turned(q, (size * spin * ways[2, 0], size * spin * ways[2, 1], size * spin * ways[2, 2]), -1.0)
-    i = _INERTIA
-    more = _turned(q, (_dot(_three(P, i), body), _dot(_three(P, i + 3), body), _dot(_three(P, i + 6), body)), 1.0)
+    I = P.inertia
+    more = _turned(q, (_dot(I[0:3], body), _dot(I[3:6], body), _dot(I[6:9], body)), 1.0)
     turn = (0.5 * size * ways[3, 0], 0.5 * size * ways[3, 1], 0.5 * size * ways[3, 2])
     e = _cross(turn, (q[0], q[1], q[2]))
     for j in range(3):
@@ -336,10 +324,10 @@ def _disturb(Y, P, size, ways):
 @njit(cache=True)
 def _begun(P):
     """x, q, v and the angular momentum in world axes of the row in P."""
-    Y = P[:13].copy()
+    Y = P.row.copy()
     Y[3:7] /= math.sqrt(Y[3] * Y[3] + Y[4] * Y[4] + Y[5] * Y[5] + Y[6] * Y[6])
-    q, w, i = (Y[3], Y[4], Y[5], Y[6]), (Y[10], Y[11], Y[12]), _INERTIA
-    Y[10:13] = np.array(_turned(q, (_dot(_three(P, i), w), _dot(_three(P, i + 3), w), _dot(_three(P, i + 6), w)), 1.0))
+    q, w, I = (Y[3], Y[4], Y[5], Y[6]), (Y[10], Y[11], Y[12]), P.inertia
+    Y[10:13] = np.array(_turned(q, (_dot(I[0:3], w), _dot(I[3:6], w), _dot(I[6:9], w)), 1.0))
     return Y
 
 
@@ -361,11 +349,11 @@ def _fly(P, load, move, end, disturbance, ways, a, b, c):
             continue
         moving = move[0] <= begin < move[1]
         for j in range(3):
-            rate = (P[_MOVED + j] - P[_TARGET + j]) / (move[1] - move[0])
-            hand[j] = P[_MOVED + j] if begin >= move[1] else P[_TARGET + j]
+            rate = (P.moved[j] - P.target[j]) / (move[1] - move[0])
+            hand[j] = P.moved[j] if begin >= move[1] else P.target[j]
             hand[3 + j] = 0.0
             if moving:
-                hand[j], hand[3 + j] = P[_TARGET + j] + (begin - move[0]) * rate, rate
+                hand[j], hand[3 + j] = P.target[j] + (begin - move[0]) * rate, rate
         _fly_span(Y, low, P, hand, begin, span, load[0] <= begin < load[1], disturbance, ways, a, b, c)
     return _row(P, Y)
 
@@ -381,7 +369,7 @@ def fly(
     Its wrench acts from load_s[0] to load_s[1], its free end moves evenly from move_s[0] to move_s[1], to zero of which it all counts.
     disturbance: rate [1/s] in the measure of ``error``, along ways (DIRECTIONS, 4, 3) of unit vectors.
     """
-    return _fly(P, np.array(load_s, float), np.array(move_s, float), float(end_s), disturbance, ways, A, B, C)
+    return _fly(P[0], np.array(load_s, float), np.array(move_s, float), float(end_s), disturbance, ways, A, B, C)
 
 
 def error(row, exact, length: float) -> float:

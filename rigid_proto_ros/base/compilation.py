@@ -13,10 +13,8 @@ import hashlib
 import importlib.util
 import os
 import re
-import shutil
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -85,10 +83,6 @@ def _source(file: str) -> tuple[bytes, list[str]]:
 _exists = functools.cache(os.path.isfile)
 
 
-UNUSED_S = 30 * 86400
-"""Kernels of sources that nobody has run for so long are removed when their module's are compiled anew [s]."""
-
-
 @functools.cache
 def kernel_folder(file: str) -> str:
     """The folder of a source file's kernels, made and writable: named by the content of the file and of all that it
@@ -104,22 +98,12 @@ def kernel_folder(file: str) -> str:
     for place in filter(None, (_CONFIG.CACHE_DIR, *usual)):
         folder = os.path.join(place, f"{module}-{source_stamp(file).hex()[:20]}")
         try:
-            if not os.path.isdir(folder):
-                os.makedirs(folder, exist_ok=True)
-                _remove_unused(place, f"{module}-")
-            os.utime(folder)
+            os.makedirs(folder, exist_ok=True)
             tempfile.TemporaryFile(dir=folder).close()
         except OSError:
             continue
         return folder
     raise OSError(f"no folder for compiled kernels can be written to: {', '.join(usual)}")
-
-
-def _remove_unused(place: str, prefix: str) -> None:
-    before = time.time() - UNUSED_S
-    for entry in os.scandir(place):
-        if entry.name.startswith(prefix) and entry.stat().st_mtime < before:
-            shutil.rmtree(entry.path, ignore_errors=True)
 
 
 class KernelLocator:

@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import InputError
+from .errors import InputError, did_you_mean
 
 CHUNK = 1 << 20
 """Bytes read at a time from what doesn't say its size, such as a pipe."""
@@ -29,23 +28,15 @@ def read_bounded(path: Path, max_bytes: int, field: str, kind: str) -> bytes:
                 parts.append(part)
                 held += len(part)
     except FileNotFoundError:
-        nearest = ", ".join(filter(None, [kind, _file_nearest_to(path)]))
+        beside = path.parent.glob(f"*{path.suffix}")
+        hint = did_you_mean(str(path), map(str, beside)) if path.suffix else ""
+        nearest = ", ".join(filter(None, [kind, hint]))
         raise InputError(field, f"there is no file {str(path)!r}; accepted: {nearest}") from None
     except OSError as error:
         raise InputError(field, str(path), f"{kind} that can be read ({error.strerror})") from None
     if held > max_bytes:
         raise InputError(field, f"{path.name} with more than {max_bytes} bytes", f"{kind} of at most {max_bytes} bytes")
     return b"".join(parts)
-
-
-def _file_nearest_to(path: Path) -> str:
-    """A question whether a file of the same folder and ending is meant; empty where none has a like name."""
-    try:
-        beside = [file.name for file in path.parent.iterdir() if file.suffix == path.suffix]
-    except OSError:
-        return ""
-    near = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.7)
-    return f"did you mean {path.parent / near[0]}?" if near else ""
 
 
 def output_file(option: str, file: str | Path) -> Path:

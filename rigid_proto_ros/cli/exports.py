@@ -97,13 +97,11 @@ def write_exports(
     if "gltf" in files:
         from ..export.gltf import write_gltf
 
-        with Progress(f"writing {files['gltf']}"):
-            write_gltf(files["gltf"], made, tracks)
+        write_gltf(files["gltf"], made, tracks)
         say(f"{files['gltf']}: {report}")
     if "usd" in files:
         from ..export.usd import write_usd
 
-        with Progress(f"writing {files['usd']}"):
-            changed = write_usd(files["usd"], made, tracks, fps)
+        changed = write_usd(files["usd"], made, tracks, fps)
         for line in (report, *changed):
             say(f"{files['usd']}: {line}")

@@ -8,7 +8,6 @@ import sys
 
 from ..base.errors import InputError, is_missing
 from ..base.files import output_file, whole_file
-from ..base.progress import Progress
 from .options import number_from
 
 FPS = 30.0
@@ -52,11 +51,10 @@ def run(args: argparse.Namespace) -> int:
         duration_ns = nanoseconds(args.duration)
     scenario = read_scene(args.name, None, lambda text: print(f"rigid_proto lesson: {text}", file=sys.stderr))
     record = FlightRecord()
-    with Progress(f"simulating {duration_ns / 1e9:g} s"):
-        OfflineRun(scenario, script, record).advance(duration_ns)
-        made, _ = frames(record, source_of_scene(scenario, script), FPS)
+    OfflineRun(scenario, script, record).advance(duration_ns)
+    made, _ = frames(record, source_of_scene(scenario, script), FPS)
     ghosts = dict(zip(made.ghosts.times_ns, made.ghosts.rows, strict=True))
-    with Progress(f"writing {args.html}"), whole_file("--html", args.html) as path:
+    with whole_file("--html", args.html) as path:
         path.write_text(lesson_html(shown, made.changes, made.times_ns, made.rows, ghosts), encoding="utf-8")
     print(f"{args.html}: {duration_ns / 1e9:g} s of {args.name}; open it in a browser")
     return 0

@@ -29,6 +29,11 @@ BODY_SCALE = 29  # (3,)
 LENGTH = 32  # ℓ, what displacement errors are measured by [m]; 1 where no mesh gives it a size
 BODY = 33
 
+MAX_ACCELERATION = 1e15
+"""m/s² and rad/s²; m/s and rad/s for impulses. A command beyond it is a slip of the keyboard, and it
+would leave no digits.
+"""
+
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def angular_acceleration(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
@@ -118,6 +123,14 @@ class Body:
     def principal_quaternion(self) -> np.ndarray:
         """(4,) xyzw, takes principal to body axes."""
         return self.row[QUATERNION : QUATERNION + 4]
+
+    @cached_property
+    def light(self) -> float:
+        """A load stays far below MAX_ACCELERATION while (Σ|F| + Σ|τ|)(1 + Σ|point|) is no more, point in mesh
+        coordinates.
+        """
+        largest: float = max(*map(abs, self.scale.tolist()), *map(abs, self.center_of_mass.tolist()))
+        return 0.1 * MAX_ACCELERATION * min(self.mass, float(self.principal_moments[0]) / (1.0 + 3.0 * largest))
 
     def point(self, mesh_point: Numbers) -> np.ndarray:
         """Mesh coordinates (3,) to metres from the COM, body axes."""

@@ -11,8 +11,7 @@ import functools
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..base.errors import CommandRefused, did_you_mean
 from ..base.vectors import Vector, vector
@@ -35,8 +34,7 @@ SLOT_NAME = re.compile(r"[a-z][a-z0-9_]{0,11}\Z")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(NamedTuple):
     """axes: ``world``, ``body`` or ``normal``; point: a form of POINT_FORMS as a tuple, its word first. slot: which of
     several held wrenches it replaces, empty for the unnamed one.
     """

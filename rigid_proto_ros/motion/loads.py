@@ -22,15 +22,10 @@ from ..base.errors import CommandRefused
 from ..base.rotation import matrix_elements, transposed_times
 from ..base.vectors import Numbers, Vector, vector
 from . import body as of_body
-from .body import Body
+from .body import MAX_ACCELERATION, Body
 from .frames import Frame, contact_point, point_text
 from .state import State
 from .surface import Surface
-
-MAX_ACCELERATION = 1e15
-"""m/s² and rad/s²; m/s and rad/s for impulses. A command beyond it is a slip of the keyboard, and it
-would leave no digits.
-"""
 
 # Where the sums of loads stand in one row of LOADS_SIZE doubles.
 FORCE_WORLD = 0  # (3,) [N]
@@ -203,6 +198,10 @@ class Load(NamedTuple):
 
     def check_magnitude(self, body: Body) -> None:
         """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION."""
+        x, y, z = self.mesh_point or _ORIGIN
+        # Of what isn't finite this doesn't hold.
+        if sum(map(abs, (*self.force, *self.torque))) * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light:
+            return
         row = self.row
         if not is_within_magnitude(row, body.row):
             linear, angular = magnitudes(row, body.row)
@@ -225,53 +224,6 @@ def load_of_bytes(row: bytes) -> Load:
     point, force, torque, normal = (vector(numbers[k : k + 3]) for k in range(0, 12, 3))
     named = _AXES[int(axes)]
     return Load(named, point if has_point else None, force, torque, normal if named == "normal" else None)
-
-
-class LoadSum:
-    """The sum of loads: force_world, force_body, torque_world, torque_body (3,), moment (3, 3) = Σ r Fᵀ (r body, F
-    world).
-
-    All are parts of ``values`` (LOADS_SIZE,), in the order of ``accumulate_load``.
-    """
-
-    def __init__(self, values: np.ndarray | None = None) -> None:
-        self.values = np.zeros(LOADS_SIZE) if values is None else values
-        self.force_world = self.values[FORCE_WORLD : FORCE_WORLD + 3]
-        self.force_body = self.values[FORCE_BODY : FORCE_BODY + 3]
-        self.torque_world = self.values[TORQUE_WORLD : TORQUE_WORLD + 3]
-        self.torque_body = self.values[TORQUE_BODY : TORQUE_BODY + 3]
-        self.moment = self.values[MOMENT:].reshape(3, 3)
-
-
-def light_amount(body: Body) -> float:
-    """A load stays far below MAX_ACCELERATION while (Σ|F| + Σ|τ|)(1 + Σ|point|) is no more, point in mesh
-    coordinates.
-    """
-    largest: float = max(*map(abs, body.scale.tolist()), *map(abs, body.center_of_mass.tolist()))
-    return 0.1 * MAX_ACCELERATION * min(body.mass, float(body.principal_moments[0]) / (1.0 + 3.0 * largest))
-
-
-def light_row(frame: Frame, force: Numbers, torque: Numbers, most: float) -> bytes:
-    """The row of a load that is nothing but its numbers: on a point given as such, in world or body axes, and its
-    amount no more than ``most`` (of ``light_amount``). Empty for any other: ``resolve_load`` says what it is, or what
-    is wrong with it.
-    """
-    word, axes = frame.point[0], frame.axes
-    fx, fy, fz = force
-    tx, ty, tz = torque
-    amount = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz)
-    if axes == "normal":
-        return b""
-    if word == "com":
-        has_point, x, y, z = 0.0, 0.0, 0.0, 0.0
-    elif word == "point":
-        has_point, (x, y, z) = 1.0, frame.point[1]
-    else:
-        return b""
-    # Of what isn't finite this doesn't hold.
-    if amount * (1.0 + abs(x) + abs(y) + abs(z)) <= most:
-        return _ROW.pack(_AXES_NUMBERS[axes], has_point, x, y, z, fx, fy, fz, tx, ty, tz, 0.0, 0.0, 0.0)
-    return b""
 
 
 def resolve_load(

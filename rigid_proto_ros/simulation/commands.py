@@ -45,9 +45,9 @@ class Rank(IntEnum):
     POKE = 6
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(slots=True, kw_only=True)
 class Stamped:
-    """What all commands have.
+    """What all commands have; none is ever changed.
 
     stamp_ns: when they act, or as their messages were stamped. entry: of a script that they come from, counted from 1.
     """
@@ -56,7 +56,7 @@ class Stamped:
     entry: int = field(default=0, compare=False)
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class WrenchCommand(Stamped):
     """One message of the wrench topic (``held``) or the poke topic.
 
@@ -120,7 +120,7 @@ class WrenchCommand(Stamped):
             raise CommandRefused("frame", "frame_id", self.frame_id, "on the wrench topic no ;impulse: that is a poke")
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class ThrusterCommand(Stamped):
     """What the thrusters push with [N], in the alphabetical order of their names."""
 
@@ -138,7 +138,7 @@ STATE_VALUES = {"position": 3, "orientation_xyzw": 4, "linear_velocity": 3, "ang
 """What a SetState may set, world axes, and how many numbers it has."""
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class SetState(Stamped):
     """Put the body elsewhere at once: any of STATE_VALUES [m, m/s, rad/s, world axes]; the others stay."""
 
@@ -161,7 +161,7 @@ class SetState(Stamped):
         return {name: list(numbers) for name, numbers in self.values.items()}
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class ClearWrench(Stamped):
     """End the held wrench and the running pulses; scheduled commands stay."""
 
@@ -174,7 +174,7 @@ class ClearWrench(Stamped):
         return {}
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Change(Stamped):
     """A change of parameters (kind ``set``) or of the whole inertia by message (``inertia``).
 
@@ -192,7 +192,7 @@ class Change(Stamped):
         return Rank.INERTIA if self.kind == "inertia" else Rank.CHANGE
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class TieString(Stamped):
     """Where on the body the string is, or will be, tied.
 
@@ -219,7 +219,7 @@ class TieString(Stamped):
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "axes": self.axes, "point": list(self.point)}
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class MoveString(Stamped):
     """Where the string's free end goes, point (3,) [m, world]; the first one ties the string."""
 
@@ -237,7 +237,7 @@ class MoveString(Stamped):
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "point": list(self.point)}
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class ReleaseString(Stamped):
     """Let the string go."""
 

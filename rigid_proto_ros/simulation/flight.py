@@ -91,9 +91,6 @@ LOAD_ROW = record_type(
         ("share", np.float64, LOADS_SIZE),  # while it acts, what it adds to the sums
     ]
 )
-AT_NS, DURATION_NS, KIND, SLOT, COMMAND = range(5)
-"""Numbers that say what a command is: the first of its row."""
-
 EVENT = record_type(
     [
         ("time_ns", np.int64),
@@ -263,20 +260,13 @@ def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> 
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def last_good_state(flight: np.record, row: np.ndarray) -> None:
-    """The state at the last committed step, into row."""
-    if flight.committed_ns == flight.start_ns:
-        copy_numbers(flight.start, row)
-        return
-    elapsed = (flight.committed_ns - flight.start_ns) * 1e-9
-    to_good_row(flight.variables, flight.problem, elapsed, row, MAX_SPEED)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
 def stop_in_last_good_state(flight: np.record) -> None:
     """Stay where the last good step ended, or at now_ns where that is later."""
     row = flight.trial
-    last_good_state(flight, row)
+    if flight.committed_ns == flight.start_ns:
+        copy_numbers(flight.start, row[:13])
+    else:
+        to_good_row(flight.variables, flight.problem, (flight.committed_ns - flight.start_ns) * 1e-9, row, MAX_SPEED)
     good = flight.committed_ns >= flight.now_ns
     for k in range(13):
         good = good and np.isfinite(row[k])
@@ -353,19 +343,13 @@ def _write(flight: np.record, events: np.ndarray, what: int, load_id: int, row: 
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
-def _keep(loads: np.ndarray, kept: int, row: int) -> None:
-    """Let the load of a row that acts go on as row ``kept``, which is not after it."""
-    if kept != row:
-        loads[kept] = loads[row]
-
-
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def end_due(flight: np.record, loads: np.ndarray, events: np.ndarray) -> bool:
     """End what ends at now_ns or should have before; whether anything did."""
     kept = 0
     for row in range(flight.acting):
         if loads[row].end_ns > flight.now_ns:
-            _keep(loads, kept, row)
+            if kept != row:
+                loads[kept] = loads[row]
             kept += 1
             continue
         if loads[row].kind == HELD_WRENCH:
@@ -384,7 +368,7 @@ def end_slot(flight: np.record, loads: np.ndarray, events: np.ndarray, slot: int
     ended = False
     for row in range(flight.acting):
         if ended:
-            _keep(loads, row - 1, row)
+            loads[row - 1] = loads[row]
         elif loads[row].slot == slot:
             _write(flight, events, ENDED, loads[row].id, row)
             ended = True
@@ -420,7 +404,8 @@ def take_body(flight: np.record, loads: np.ndarray) -> None:
 def _begin(flight: np.record, loads: np.ndarray, row: int, end_ns: int) -> None:
     """Let the load of a row act from now_ns until ``end_ns``, as the last of those that act."""
     to = flight.acting
-    _keep(loads, to, row)
+    if to != row:
+        loads[to] = loads[row]
     acting = loads[to]
     acting.at_ns, acting.end_ns, acting.id = flight.now_ns, end_ns, flight.load_ids
     accumulate_load(acting.load, flight.body, acting.share)

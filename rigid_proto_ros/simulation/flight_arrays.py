@@ -104,10 +104,13 @@ def _call(
     return 0
 
 
+_RECORDS = [types.Array(from_dtype(kind), 1, "C") for kind in (FLIGHT, LOAD_ROW, EVENT, METHOD)]
+SIGNATURE = int64(*_RECORDS, float64[::1], int64, int64)
+
+
 @functools.cache
 def _entry() -> Callable[..., int]:
-    records = [types.Array(from_dtype(kind), 1, "C") for kind in (FLIGHT, LOAD_ROW, EVENT, METHOD)]
-    return entry_of(_call, int64(*records, float64[::1], int64, int64))
+    return entry_of(_call, SIGNATURE)
 
 
 class FlightArrays:
@@ -191,8 +194,13 @@ class FlightArrays:
         """How many of the commands put last haven't acted yet."""
         return self.integers[_DUE_END] - self.integers[_DUE]
 
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """What compiled functions take: flight (1,), tables of loads, events and methods, workspace."""
+        return self._flights, self._loads, self._events, self.methods, self.room
+
     def _do(self, what: int, until_ns: int = 0) -> int:
-        return self._call(self._flights, self._loads, self._events, self.methods, self.room, what, until_ns)
+        return self._call(*self.arrays, what, until_ns)
 
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; False when the motion failed."""

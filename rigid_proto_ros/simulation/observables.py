@@ -13,7 +13,7 @@ from ..base.rotation import cross, dot, length, times, transposed_times
 from ..base.vectors import Numbers, Vector
 from ..motion.integrators.auto import fastest_swing
 from ..motion.integrators.series_steps import degree_of_motion
-from ..motion.loads import LoadSum
+from ..motion.loads import TORQUE_WORLD
 from ..motion.problem import PROBLEM
 from ..motion.state import State, angular_momentum
 from ..motion.string import StringState
@@ -158,9 +158,10 @@ class Observables:
     @property
     def angular_momentum_drift(self) -> float:
         """|L − L₀|/|L₀| since the present segment began; 0 while something turns the body, or without spin."""
-        loads = self._load_sum()
-        turned = self.string is not None or loads.torque_world.any() or loads.torque_body.any() or loads.moment.any()
-        if turned or self.setup.angular_damping or not self.setup.gyroscopic:
+        # Torques, and moments of forces, stand behind the forces.
+        if self.string is not None or self.flight.sums[TORQUE_WORLD:].any():
+            return 0.0
+        if self.setup.angular_damping or not self.setup.gyroscopic:
             return 0.0
         start = np.array(angular_momentum(self.flight.start, self.setup.body.inertia.ravel()))
         moved, size = self.angular_momentum - start, length(start)
@@ -196,6 +197,3 @@ class Observables:
         """Of the COM (3,) [m/s², world] and angular (3,) [rad/s², body axes], now."""
         six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(VARIABLES)))
         return six[:3], six[3:]
-
-    def _load_sum(self) -> LoadSum:
-        return LoadSum(self.flight.sums.copy())

@@ -16,7 +16,6 @@ from ..motion.body import LENGTH, Body
 from ..motion.integrators.integrator import Integrator
 from ..motion.integrators.series_steps import degree_for
 from ..motion.integrators.stepping import method_table, workspace_size
-from ..motion.loads import light_amount
 from ..motion.problem import PROBLEM, Environment, begin_body
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
@@ -92,11 +91,6 @@ class Setup(Environment):
         methods = method_table(self.integrator, degree)
         integers = start.view(np.uint8).view(np.int64).data
         return FlightStart(start, integers, methods, workspace_size(methods))
-
-    @cached_property
-    def light_amount(self) -> float:
-        """Of a load that is far from too strong for the body (motion/loads.py)."""
-        return light_amount(self.body)
 
     @cached_property
     def problem(self) -> np.record:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flights import SECOND, flight, flight_setup, spinning, wrench
-from mpmath import mp, mpc, mpf
+from mpmath import mp, mpf
 
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.body import make_body
@@ -41,27 +41,6 @@ def test_a_spin_soon_goes_as_fast_as_its_torque_keeps_up(rate, accuracy):
     assert 2.0 * np.abs(row[5:7] - half).max() <= allowed
     assert abs(row[12] - speed) / max(speed, 1.0) <= allowed
     assert not row[[3, 4, 10, 11]].any()
-
-
-@pytest.mark.parametrize("accuracy", [1e-6, 1e-9])
-def test_a_force_that_turns_with_the_body_pushes_it_round_through_honey(accuracy):
-    rate, spin = 0.99 * FASTEST, 5.0
-    force, time = 4.0 * rate, DURATION_NS * 1e-9
-    row = spinning((0, 0, spin))
-    row[7] = 0.5
-    simulation = flight(BODY, integrator="auto", accuracy=accuracy, initial=row, linear_damping=rate * BODY.mass)
-    simulation.submit(wrench("body@com", (force, 0, 0)))
-    row = simulation.advance(DURATION_NS).row
-    with mp.workdps(40):
-        c, g, turn, t = mpf(rate), mpf(force) / 2, mpc(0, spin), mpf(time)
-        round_, kept = mp.exp(turn * t), mp.exp(-c * t)
-        velocity = g * (round_ - kept) / (turn + c) + mpf("0.5") * kept
-        place = g / (turn + c) * ((round_ - 1) / turn - (1 - kept) / c) + mpf("0.5") * (1 - kept) / c
-    allowed = accuracy * time + simulation.steps * 32.0 * 2.0**-52
-    assert np.abs(row[0:2] - [float(place.real), float(place.imag)]).max() <= allowed
-    assert np.abs(row[7:9] - [float(velocity.real), float(velocity.imag)]).max() <= allowed * max(
-        1.0, float(abs(velocity))
-    )
 
 
 def test_a_user_who_damps_a_toy_by_one_newton_metre_second_still_flies():

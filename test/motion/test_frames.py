@@ -45,19 +45,6 @@ def test_any_text_is_read_or_refused(text):
     assert parse_frame(frame.text) == frame
 
 
-@settings(max_examples=300, deadline=None)
-@given(frames, st.data())
-def test_a_frame_with_one_character_changed_is_read_or_refused(frame, data):
-    text = frame.text
-    at = data.draw(st.integers(0, len(text) - 1))
-    changed = text[:at] + data.draw(st.characters()) + text[at + 1 :]
-    try:
-        read = parse_frame(changed)
-    except CommandRefused:
-        return
-    assert parse_frame(read.text) == read
-
-
 @pytest.mark.parametrize(
     ("text", "axes", "point"),
     [

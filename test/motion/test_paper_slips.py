@@ -30,37 +30,6 @@ def angle_between(p: np.ndarray, q: np.ndarray) -> float:
     return 2.0 * float(np.arcsin(min(1.0, difference / np.sqrt(8.0))))
 
 
-def test_r_cross_omega_carries_a_point_the_wrong_way_round() -> None:
-    """After a quarter turn the point is half a turn from where the body has it."""
-    omega, h = np.array([0.0, 0.0, 1.0]), 1e-4
-    point = wrong = np.array([1.0, 0.0, 0.0])
-    for _ in range(round(np.pi / 2.0 / h)):
-        # Midpoint steps of r' = ω × r and of r' = r × ω.
-        point = point + h * np.cross(omega, point + 0.5 * h * np.cross(omega, point))
-        wrong = wrong + h * np.cross(wrong + 0.5 * h * np.cross(wrong, omega), omega)
-    assert np.allclose(point, [0.0, 1.0, 0.0], atol=1e-4)
-    assert np.allclose(wrong, [0.0, -1.0, 0.0], atol=1e-4)
-
-
-def test_one_axis_in_all_three_derivatives_leaves_a_spin_about_it_standing_still() -> None:
-    """e_i' = ω × e_i for each axis i; with e_x in all three, a spin about e_x turns nothing."""
-    omega, h = np.array([1.0, 0.0, 0.0]), 1e-3
-    right, wrong = np.eye(3), np.eye(3)
-    for _ in range(1571):
-        right = orthonormal(right + h * np.cross(omega, right))
-        wrong = orthonormal(wrong + h * np.cross(omega, wrong[0]))
-    assert np.allclose(right[1], [0.0, 0.0, 1.0], atol=1e-3)
-    assert np.array_equal(wrong, np.eye(3))
-
-
-def orthonormal(rows: np.ndarray) -> np.ndarray:
-    """Gram-Schmidt on the rows."""
-    x = rows[0] / np.linalg.norm(rows[0])
-    y = rows[1] - (rows[1] @ x) * x
-    y = y / np.linalg.norm(y)
-    return np.array([x, y, np.cross(x, y)])
-
-
 @pytest.mark.parametrize("integrator, order", [("euler", 1), ("midpoint", 2)])
 def test_global_orders_are_one_below_the_local_errors(integrator: str, order: int) -> None:
     exact = flown("t_handle", 1.0, integrator="rk4", step=1e-4).simulation.state.orientation_xyzw

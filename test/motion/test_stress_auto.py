@@ -7,13 +7,8 @@ from flights import SECOND
 from local_error import FLOOR, committed_steps, local_error
 from random_scenes import DURATION_S, random_scene
 
-from problems import PROBLEMS
-from work_precision_ours import simulation_of
-
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-12)
 STEPS_PER_SCENE = 6
-LONGEST_S = 2.0
-"""Of a benchmark's problem; the fastest string takes 1e5 steps a second."""
 
 
 def allowed(step, accuracy):
@@ -56,14 +51,3 @@ STRESS_SEEDS = [range(first, first + 10) for first in range(1000, 1300, 10)]
 )
 def test_auto_meets_its_accuracy_in_random_scenes(seeds, steps_per_scene):
     check(seeds, steps_per_scene)
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("accuracy", ACCURACIES)
-@pytest.mark.parametrize("name", PROBLEMS)
-def test_auto_meets_its_accuracy_on_the_benchmarks_problems(name, accuracy):
-    problem = PROBLEMS[name]
-    found = shares(simulation_of(problem, "auto", 1e-3, accuracy), min(problem.duration, LONGEST_S), accuracy, 1)
-    # Free rotation is one exact step and commits none.
-    print(f"{len(found)} steps, the worst takes {max((s for s, _ in found), default=0.0):.2f} of what is allowed")
-    assert all(share <= 1.0 for share, _ in found)

@@ -12,7 +12,6 @@ from feature_scenes import END_S, FEATURES, make_scene, random_features, share
 from flights import SECOND
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference_flights import fly
 
 END_NS = round(END_S * SECOND)
 SCENES = 10
@@ -86,15 +85,3 @@ def test_any_features_together_fly_as_the_reference_does(features, seed):
 )
 def test_a_thousand_portions_of_any_scene_give_the_bits_of_one(seed):
     check_portions(random_scene(seed)[0], seed)
-
-
-def test_a_disturbance_is_measured_as_the_error_that_it_is():
-    """Of free flight without spin the condition is known: an error of velocity all along grows with the square of time."""
-    rng = np.random.default_rng(3)
-    features = {name: levels[0] for name, levels in FEATURES.items()} | {"string": "none", "scale": 1.0}
-    scene = make_scene(features, rng)
-    ways = np.zeros((16, 4, 3))
-    ways[:, 1, 0] = 1.0
-    disturbed, exact = (fly(scene.numbers, (0.5, 0.7), (0.3, 0.4), END_S, rate, ways) for rate in (1e-6, 0.0))
-    moved = (disturbed - exact)[0] / scene.setup.length
-    assert abs(moved / (1e-6 * END_S**2 / 2.0) - 1.0) <= 5e-3

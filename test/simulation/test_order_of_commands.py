@@ -3,13 +3,10 @@
 
 import random
 
-import numpy as np
 import pytest
-from command_rig import COMMANDS, RosClient, inertia_message, point_message, wrench_message
 from flights import SECOND, wrench
 
 from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.commands import (
     Change,
@@ -33,109 +30,12 @@ SCENE = {
 }
 
 
-def hundred_commands(seed: int = 3) -> list[tuple[str, dict]]:
-    """(topic, message), all stamped for the same nanosecond: wrenches, pokes, impulses, strings, inertias, changes."""
-    numbers = random.Random(seed)
-
-    def triple(size):
-        return [numbers.uniform(-size, size) for _ in range(3)]
-
-    commands: list[tuple[str, dict]] = []
-    for _ in range(30):
-        frame = numbers.choice(("world", "body", f"vertex/{numbers.randrange(20)}", "world@origin"))
-        commands.append(("wrench", wrench_message(WHEN, frame, triple(0.01), triple(1e-5))))
-    for _ in range(50):
-        option = numbers.choice(("", ";duration=0.2", ";impulse"))
-        size = 1e-4 if option == ";impulse" else 0.01
-        frame = f"{numbers.choice(('world', 'body'))}@vertex/{numbers.randrange(20)}{option}"
-        commands.append(("poke", wrench_message(WHEN, frame, triple(size), triple(size * 0.01))))
-    for _ in range(8):
-        commands.append(("string/target", point_message(WHEN, "world", triple(0.3))))
-        commands.append(("string/attach", point_message(WHEN, "body", triple(0.1))))
-    for _ in range(2):
-        moments = sorted(numbers.uniform(1e-5, 2e-5) for _ in range(3))
-        commands.append(
-            (
-                "inertia/set",
-                inertia_message(WHEN, "", 0.02, triple(0.01), (moments[0], 0, 0, moments[1], 0, moments[2])),
-            )
-        )
-    commands.append(("schedule", {"data": f"{{t: {WHEN / 1e9}, set: {{gravity: [0.0, 0.0, -1.0]}}}}"}))
-    commands.append(("schedule", {"data": f"{{t: {WHEN / 1e9}, service: clear_wrench}}"}))
-    assert len(commands) == 100
-    return commands
-
-
-@pytest.fixture(scope="module")
-def clients(commanded):
-    """Four processes that publish commands."""
-    made = [RosClient(commanded.environment, commanded.node) for _ in range(4)]
-    for client in made:
-        client.send("forget", topics=[])
-    for client in made:
-        client.answer()
-    for client in made:
-        client.advertise(*COMMANDS)
-    yield made
-    for client in made:
-        client.close()
-
-
-CLIENT_OF = {"wrench": 0, "poke": 1, "string/target": 2, "string/attach": 3, "inertia/set": 0, "schedule": 1}
-"""Which process publishes a topic."""
-
-
-def flown_by_four(rig, clients, seed: int) -> tuple[bytes, list[str], str]:
-    """The state after the same hundred commands, each topic's in its order and the topics mixed by seed, and the kinds
-    as applied.
-    """
-    commands = mixed(hundred_commands(), lambda command: command[0], seed)
-    rig.restore()
-    rig.start_over(paused=True)
-    before = rig.sent
-    # All four at once: arrival is interleaved by the machine.
-    jobs = [(clients[CLIENT_OF[topic]], topic, message) for topic, message in commands]
-    for client, topic, message in jobs:
-        client.send("publish", topic=client.name(topic), messages=[message])
-    for client, _, _ in jobs:
-        client.answer()
-    rig.sent = before + len(commands)
-    rig.until_received(rig.sent)
-    rig.pause(False)
-    pose, twist = rig.state_at(END)
-    p, q = pose["pose"]["position"], pose["pose"]["orientation"]
-    v, w = twist["twist"]["linear"], twist["twist"]["angular"]
-    row = np.array([p["x"], p["y"], p["z"], q["x"], q["y"], q["z"], q["w"], *v.values(), *w.values()])
-    applied = [event for event in rig.events() if event["time_ns"] == WHEN]
-    return State(END, row).sha256(), [event["kind"] for event in applied], applied[-1]["sha256"]
-
-
 def mixed(commands: list, topic_of, seed: int) -> list:
     """The commands in a random order in which those of one topic keep theirs."""
     topics = [topic_of(command) for command in commands]
     random.Random(seed).shuffle(topics)
     queues = {topic: iter([c for c in commands if topic_of(c) == topic]) for topic in topics}
     return [next(queues[topic]) for topic in topics]
-
-
-@pytest.mark.slow
-def test_a_hundred_equal_stamped_commands_from_four_processes_give_one_state_however_topics_mix(rig, clients):
-    """Two mixtures: one state hash (of pose and twist as published), one chain of events."""
-    rig.set(wrench_timeout=0.0)
-    first, kinds, chain = flown_by_four(rig, clients, 1)
-    order = {
-        kind: rank
-        for rank, kinds_ in enumerate(
-            (("set", "clear_wrench"), ("inertia",), ("string_attach",), ("string_target",), ("wrench",), ("poke",))
-        )
-        for kind in kinds_
-    }
-    ranks = [order[kind] for kind in kinds]
-    assert ranks == sorted(ranks)
-    assert len(kinds) == 100
-    second, kinds_again, chain_again = flown_by_four(rig, clients, 2)
-    assert second == first
-    assert (kinds_again, chain_again) == (kinds, chain)
 
 
 def core_commands() -> list:
@@ -206,5 +106,5 @@ def test_the_total_wrench_does_not_depend_on_who_ended_before():
     alone.submit(poke((0.1, 0.2, 0.3), 2.0))
     with_others.advance(SECOND)
     alone.advance(SECOND)
-    sums = [simulation._load_sum().force_body.tobytes() for simulation in (with_others, alone)]
+    sums = [simulation.flight.sums.tobytes() for simulation in (with_others, alone)]
     assert sums[0] == sums[1]

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Simulated time: pause, step, reset, pace, clocks, and what a command's stamp means."""
 
-import itertools
 import math
 import time
 
 import pytest
-from command_rig import Commanded, NodeProcess, RosClient, point_message, stamp_ns, wrench_message
+from command_rig import NodeProcess, RosClient, point_message, stamp_ns, wrench_message
 from conftest import held_domain
 
-from rigid_proto_ros.scene.scenario import make_scenario, publication_ns
+from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.simulation import Simulation
 
 SECOND = 10**9
@@ -149,21 +148,6 @@ def test_a_stamp_ahead_acts_at_exactly_that_nanosecond(rig):
     assert rig.gained(before) == {"refused_total": 1, "refused_stamp": 1}
 
 
-def test_publication_k_is_at_the_rounded_kth_period(rig):
-    rate = 1000.0 / 3.0
-    rig.set(publish_rate=rate, real_time_factor=0.0)
-    rig.start_over(paused=False)
-    # The first may be of the time before the start.
-    rig.until(
-        lambda: rig.heard_count("pose") >= 30 and stamp_ns(rig.heard("pose", last=1)[0]) > 20 * SECOND / rate, "time"
-    )
-    stamps = [stamp_ns(m) for m in rig.heard("pose")]
-    assert all(stamp == publication_ns(round(stamp * rate / SECOND), rate) for stamp in stamps)
-    # Time goes as fast as it can: a busy client misses some of them, but not every second one.
-    gaps = sorted(b - a for a, b in itertools.pairwise(sorted(set(stamps))))
-    assert abs(gaps[0] - SECOND / rate) <= 1.0 and abs(gaps[len(gaps) // 2] - SECOND / rate) <= 1.0
-
-
 def test_the_pace_is_the_real_time_factor_and_changes_no_bit_of_the_motion(rig):
     states = []
 
@@ -274,22 +258,17 @@ def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_envir
             assert node.stop() == 0
 
 
-def test_asleep_states_still_go_out_and_it_wakes_at_a_command(ros_environment, tmp_path):
-    with held_domain() as domain:
-        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
-        rig = Commanded(environment, tmp_path, scene={"mesh": "t_handle"})
-        try:
-            report = rig.diagnostics()
-            assert report["state"] == "sleeping"
-            rig.forget("pose")
-            rig.until(lambda: rig.heard_count("pose") >= 10, "states of a sleeper")
-            stamps = [stamp_ns(m) for m in rig.heard("pose")]
-            assert stamps == sorted(set(stamps))
-            rig.publish("poke", wrench_message(0, "world;impulse", (1.0, 0.0, 0.0)))
-            rig.wait_event("poke")
-            assert rig.diagnostics()["state"] == "flying"
-        finally:
-            rig.close()
+def test_asleep_states_still_go_out_and_it_wakes_at_a_command(rig):
+    rig.set(initial__angular_velocity=[0.0] * 3, initial__linear_velocity=[0.0] * 3, gravity=[0.0] * 3)
+    rig.start_over(paused=False)
+    assert rig.diagnostics()["state"] == "sleeping"
+    rig.forget("pose")
+    rig.until(lambda: rig.heard_count("pose") >= 10, "states of a sleeper")
+    stamps = [stamp_ns(m) for m in rig.heard("pose")]
+    assert stamps == sorted(set(stamps))
+    rig.publish("poke", wrench_message(0, "world;impulse", (1.0, 0.0, 0.0)))
+    rig.wait_event("poke")
+    assert rig.diagnostics()["state"] == "flying"
 
 
 def test_a_runaway_stops_in_the_last_good_state_says_so_and_flies_again_after_a_reset(rig):
@@ -307,16 +286,8 @@ def test_a_runaway_stops_in_the_last_good_state_says_so_and_flies_again_after_a_
     assert position(rig.state_at(100 * MS)[0]) == offline.row[:7].tolist()
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        pytest.param({"integrator": "rk4", "step": 1e-9}, marks=pytest.mark.stress),
-        {"real_time_factor": 0.0, "publish_rate": 1e-4},
-    ],
-    ids=["a step of a nanosecond", "ten million steps to a publication"],
-)
-def test_services_and_commands_are_answered_while_the_motion_takes_all_the_time_there_is(rig, values):
-    rig.set_named(values)
+def test_services_and_commands_are_answered_while_ten_million_steps_lead_to_a_publication(rig):
+    rig.set_named({"real_time_factor": 0.0, "publish_rate": 1e-4})
     before = rig.counters()
     time_ns = int(rig.diagnostics()["sim_time_ns"])
     rig.until(lambda: int(rig.diagnostics()["sim_time_ns"]) > time_ns, "time going on")

@@ -24,7 +24,7 @@ from ...base.simd import Packed, filled, four, joined, load, number, store
 from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good
 from .equations import accelerations, parts_of, stretch, tension_margin
 from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator, Kernel
-from .string_law import excursion, is_one_sided, shortening_heat
+from .string_law import is_one_sided, shortening_heat
 
 Step = Callable[[np.ndarray, np.record, float, bool, np.ndarray, np.ndarray, np.ndarray], None]
 """One step (y, p, h, pulls, tableau, k, out) of h seconds from variables y into out with the string's law given.
@@ -125,16 +125,7 @@ def _step_on_string(
         pulls = at_low > 0.0
         step(here, p, left, pulls, tableau, k, end)
         at_high = tension_margin(end, p)
-        # 2. Within it the law may change and change back: where that is likely the step is looked at.
-        look = excursion(here, end, left, p, pulls)
-        if look > 0.0:
-            step(here, p, look, pulls, tableau, k, end)
-            margin = tension_margin(end, p)
-            if (margin > 0.0) == pulls:
-                low, at_low = look, margin
-            else:
-                high, at_high = look, margin
-        # 3. The first change is closed in on: regula falsi, Illinois variant (Dowell and Jarratt, BIT 11, 1971).
+        # 2. The change is closed in on: regula falsi, Illinois variant (Dowell and Jarratt, BIT 11, 1971).
         if (at_high > 0.0) != pulls and part < _MAX_PARTS - 1:
             for trial in range(_MAX_TRIALS):
                 if high - low <= resolution:

@@ -5,9 +5,8 @@ It is slack while x = l − rest length ≤ 0; else it pulls while k x + c l' > 
 than its damper lets it pull. A step of a series ends where a polynomial rises above zero, and the first such time is
 found (``first_rise``): slack ends where |a|² − rest² does, a the way from free end to knot, a polynomial
 however near the knot passes its free end; the other two where the tension, or the stretch, changes sign, whose series
-are at hand. Of a fixed step the knot is known at both ends alone: |a|² − rest² on the cubic through place and velocity
-there says where to look (``excursion``), and the step itself is repeated until the change is known to a double's digits
-(integrators/runge_kutta.py).
+are at hand. A fixed step at whose end another law holds than at its start is repeated until the change is known to a
+double's digits (integrators/runge_kutta.py).
 
 A bilateral string with a rest length pushes at the full length of that when its knot meets the free end, in a
 direction n = a/l that has no limit at l = 0. A knot that goes straight through meets no pole of its series, which lead
@@ -25,7 +24,7 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import norm
 from ..string import NO_DIRECTION
-from .equations import knot_of, stretch
+from .equations import knot_of
 from .series import A_KNOT, DISTANCE, STRETCH, TENSION, Knot, distance_series, stretch_at
 
 SLACK, PULLS, SHORTENS, PASSES = 0.0, 1.0, 2.0, 3.0
@@ -50,9 +49,6 @@ _MISSES = 1e-9
 """Distance of the nearest point by the knot's speed [s], below which series say nothing of it."""
 _APPROACH = 0.75
 """Of its distance from the free end, the knot of a string that pushes moves no more in a step."""
-
-_SAMPLES = 16
-"""Of a cubic, between which its first maximum is looked for."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -325,42 +321,6 @@ def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: fl
     wrong = abs(stiffness * x + damping * rate - tension)
     speed = abs(c[1, A_KNOT]) + abs(c[1, A_KNOT + 1]) + abs(c[1, A_KNOT + 2])
     return bool(wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE] + 2e-15 * damping * speed)
-
-
-# Along a fixed step
-
-
-@njit(cache=True, error_model="numpy")
-def excursion(y: np.ndarray, end: np.ndarray, h: float, p: np.record, pulls: bool) -> float:
-    """When, within a step of h seconds from variables y to ``end``, the knot is first farthest on the other side of the
-    rest length than a string is that pulls, or doesn't; 0 where it stays on its side.
-    """
-    rest, x = p.rest_length, stretch(y, p)[0]
-    if (x > 0.0) != pulls:
-        return 0.0
-    (start, velocity), (stop, last_velocity) = knot_of(y, p), knot_of(end, p)
-    a = np.empty((4, 3))
-    for k in range(3):
-        # a(s h) = a₀ + r₀ s + (3Δ − 2 r₀ − r₁) s² + (r₀ + r₁ − 2Δ) s³ with r = a' h.
-        r0, r1, change = velocity[k] * h, last_velocity[k] * h, stop[k] - start[k]
-        a[0, k], a[1, k] = start[k], r0
-        a[2, k], a[3, k] = 3.0 * change - 2.0 * r0 - r1, r0 + r1 - 2.0 * change
-    g = _square_less_rest(a, x, rest)
-    if pulls:
-        g *= -1.0
-    begin = first_rise(g, 6)
-    if begin == NONE or begin >= 1.0:
-        return 0.0
-    time, most = begin, 0.0
-    for k in range(1, _SAMPLES + 1):
-        t = begin + (1.0 - begin) * (k / _SAMPLES)
-        value = 0.0
-        for j in range(6, -1, -1):
-            value = value * t + g[j]
-        if value < most:
-            break
-        time, most = t, value
-    return time * h
 
 
 # Past the free end
