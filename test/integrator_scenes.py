@@ -91,7 +91,7 @@ class Scene:
 @lru_cache(maxsize=64)
 def _reference_rows(key, times):
     problem, row = key
-    return reference_motion(problem, row, times, digits=30)
+    return reference_motion(problem, row, times, digits=20)
 
 
 def _reference(scene: Scene, times):

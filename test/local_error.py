@@ -73,7 +73,7 @@ def committed_steps(
     return found
 
 
-def local_error(step: CommittedStep, digits: int = 22) -> float:
+def local_error(step: CommittedStep, digits: int = 18) -> float:
     """Largest of attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s) of a step."""
     p, length = step.problem, step.problem.length
     with mp.workdps(digits + 10):

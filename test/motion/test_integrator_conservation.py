@@ -15,7 +15,7 @@ from rigid_proto_ros.motion.state import State
 MOMENTS = np.array((1.0, 2.0, 3.0))
 BODY = make_body(1.0, (0.0, 0.0, 0.0), np.diag(MOMENTS))
 STEPPED = [name for name, integrator in INTEGRATORS.items() if integrator.kernel is not None]
-SPINS = [(0.9, 1.1, -0.7), (1.3, -0.2, 0.4), (-0.3, 0.5, 1.2), (0.6, 0.9, 0.1), (0.2, 1.4, -0.3), (1.0, -1.0, 1.0)]
+SPINS = [(0.9, 1.1, -0.7), (1.3, -0.2, 0.4), (-0.3, 0.5, 1.2)]
 
 
 def free_problem(spin, body=BODY):
@@ -65,9 +65,9 @@ def test_energy_and_momentum_walk_at_random_over_a_million_steps(name, h):
 
 
 @pytest.mark.parametrize("name", STEPPED)
-def test_attitude_stays_a_rotation_for_a_million_steps(name):
+def test_attitude_stays_a_rotation_for_a_hundred_thousand_steps(name):
     problem, y = free_problem(SPINS[0])
-    for _ in range(100):
+    for _ in range(10):
         assert INTEGRATORS[name].kernel(y, problem, 1e-3, 10_000) == 10_000
         R = matrix_from_quaternion(y[0:4])
         assert np.abs(R.T @ R - np.eye(3)).max() <= 4e-15  # measured 1.1e-15
