@@ -90,19 +90,24 @@ class FlownPage:
     def fly(self, seconds: float) -> list[tuple[int, np.ndarray]]:
         """Watch for so long; the states since the last reset."""
 
-        def fly() -> None:
-            loop, simulation = self.live.loop, self.live.loop.simulation
-            end_ns = simulation.time_ns + nanoseconds(seconds)
-            while loop._publications.next_ns <= end_ns:
-                loop._budget.begin_tick()
-                loop._publish_next()
-                assert not simulation.failure
-            simulation.advance(end_ns)
-
         self.wait_until_asked()
-        self.do(fly)
+        self.do(lambda: self.advance(seconds))
         self.wait_until_still()
         return self.seen.rows
+
+    def advance(self, seconds: float) -> None:
+        """What the physics thread does in so long."""
+        loop, simulation = self.live.loop, self.live.loop.simulation
+        end_ns = simulation.time_ns + nanoseconds(seconds)
+        while loop._publications.next_ns <= end_ns:
+            loop._budget.begin_tick()
+            loop._publish_next()
+            assert not simulation.failure
+        simulation.advance(end_ns)
+
+    def node(self, part: str):
+        """The viser node of a part of the picture."""
+        return self.page.backend._nodes[part]
 
     def wait_until_asked(self) -> None:
         """Until all that was asked for is done."""

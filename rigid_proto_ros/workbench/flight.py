@@ -225,12 +225,17 @@ class Flight:
 
     def _begin(self, scenario: Scenario, script: str, paused: bool) -> None:
         self.scenes_begun += 1
-        self.live.begin(scenario)
+        was_paused = self.paused
+        # Time stands first: a scene that begins paused begins at its time 0.
+        self.live.pause(True)
         try:
+            self.live.begin(scenario)
             if script.strip():
                 self.live.schedule(script)
-        finally:
-            self.live.pause(paused)
+        except InputError:
+            self.live.pause(was_paused)
+            raise
+        self.live.pause(paused)
 
     def reset(self) -> None:
         """Time 0 of the scene, or of the branch."""

@@ -385,7 +385,7 @@ class Page:
         picture = self.picture
         held = self._string_energies(np.array(times), np.array(rows))
         picture.draw(np.array(times), np.array(rows))
-        ghost = self._ghost_row if self.live.scenario.ghost is not None else None
+        ghost = self._ghost_state()
         if ghost is not None and picture.ghost is not None:
             picture.draw_ghost(np.array(times[-1:]), ghost[np.newaxis])
         for time_ns, row, energy in zip(times[:-1], rows[:-1], held[:-1], strict=True):
@@ -393,6 +393,13 @@ class Page:
                 self.readings.take(self._scenario, State(time_ns, row), energy, None)
         self.readings.take(self._scenario, self.state, held[-1], ghost)
         self.lessons.watched(times)
+
+    def _ghost_state(self) -> np.ndarray | None:
+        """The ghost's state (13,): as it was published last, or where it begins."""
+        ghost = self.live.loop.ghost
+        if self.live.scenario.ghost is None or ghost is None:
+            return None
+        return ghost.simulation.state.row if self._ghost_row is None else self._ghost_row
 
     def _string_energies(self, times: np.ndarray, rows: np.ndarray) -> list[float]:
         """Of the string at each of the times (n,), of states (n, 13) [J]."""

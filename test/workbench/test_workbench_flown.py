@@ -69,6 +69,29 @@ def test_a_lesson_asks_first_and_time_stands_until_it_is_answered(flown: FlownPa
     assert "You said **A**" in flown.page.lessons._text.content
 
 
+def test_a_lesson_that_asks_begins_at_its_time_0_with_its_ghost_however_fast_time_goes(
+    flown: FlownPage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = flown.live.begin
+
+    def begin_and_go_on(scenario) -> None:
+        begin(scenario)
+        if not flown.live.paused:
+            flown.advance(0.1)  # what the physics thread does before it is asked for anything else
+
+    monkeypatch.setattr(flown.live, "begin", begin_and_go_on)
+    for _ in range(2):
+        flown.set("Lesson", FREE)
+        flown.set("Lesson", lesson("true_or_box_tensor").title)
+        flown.until(lambda: flown.page.lessons._asked and not flown.page._undrawn, "question")
+        ghost, start = flown.node(style.GHOST), flown.scenario.setup.initial
+        assert flown.live.state.time_ns == flown.page.state.time_ns == 0
+        assert np.allclose(np.roll(ghost.wxyz, -1), start[3:7])
+        flown.do(lambda: flown.page.lessons.answer(0))
+        flown.fly(1.0)
+        assert not np.allclose(np.roll(ghost.wxyz, -1), start[3:7])
+
+
 def test_a_near_miss_of_the_centre_of_mass_ticks_nothing(flown: FlownPage) -> None:
     flown.pick(lesson("com_or_rim").title)
     com = flown.scenario.setup.body.center_of_mass
