@@ -20,6 +20,7 @@ class Drawn(Backend):
         self.texts: dict[str, list[str]] = {}
         self.meshes: dict[str, Any] = {}
         self.places: dict[str, tuple[Any, Any, Any]] = {}
+        self.attitudes: dict[str, dict[int, np.ndarray]] = {}
         self.size = 0.0
         self._times = np.zeros(0, np.int64)
 
@@ -49,6 +50,8 @@ class Drawn(Backend):
     def place(self, name: str, positions: Any = None, attitudes: Any = None, scale: Any = None) -> None:
         for values in (positions, attitudes):
             assert values is None or len(values) == len(self._times), name
+        if attitudes is not None:
+            self.attitudes.setdefault(name, {}).update(zip(self._times.tolist(), attitudes, strict=True))
         self.places[name] = tuple(None if values is None else values[-1] for values in (positions, attitudes)) + (
             scale,
         )

@@ -99,23 +99,22 @@ def wait_for(condition: Callable[[], Any]) -> Any:
 
 def flush(observer: Observer) -> None:
     """Wait until everything so far was handed to the file and the viewers."""
-    flusher, passes = observer._flusher, []
-    own = flusher._flush
+    own, passes = observer._flush, []
 
     def counted() -> None:
         own()
         passes.append(1)
 
-    flusher._flush = counted
-    flusher.mailbox.wake()
+    observer._flush = counted
+    observer._mailbox.wake()
     wait_for(lambda: passes)
-    flusher._flush = own
+    observer._flush = own
 
 
 def cells(path: Path, entity: str, name: str) -> tuple[list[int], list]:
     """Simulated times [ns] and values of a component over all chunks of an entity, what holds at all times left out."""
-    from rigid_proto_ros.rerun_view import entities as e
-    from rigid_proto_ros.rerun_view.reader import record_batches
+    from rigid_proto_ros.rerun_view import rrd_file as e
+    from rigid_proto_ros.rerun_view.rrd_file import record_batches
 
     times, found = [], []
     for chunk_entity, static, batch in record_batches(path):

@@ -56,7 +56,6 @@ ALLOWED = {
     "rerun_bindings": ("rerun_view",),
     "pyarrow": ("rerun_view", "sweep.table", "export.table"),  # comes with rerun, as PIL does
     "PIL": ("rerun_view",),
-    "pygltflib": ("export.gltf",),
     "pxr": ("export.usd",),
     "scipy": ("mesh.hull", "identify"),
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs

@@ -72,7 +72,7 @@ def begin(page: Browser, shown: Lesson, ghost: str = "") -> None:
     flown = page.flown
     Flight.paused = PAUSED
     flown.page.lessons.name(shown.name)
-    asyncio.run_coroutine_threadsafe(flown.page.lessons.begin(), flown.page.loop).result(60.0)
+    asyncio.run_coroutine_threadsafe(flown.page.lessons.begin(), flown.server.get_event_loop()).result(60.0)
     page.until(lambda: shown.question in page.text, "question")
     if ghost:
         flown.live.set_parameters({"ghost.inertia_model": ghost})
@@ -84,7 +84,7 @@ def begin(page: Browser, shown: Lesson, ghost: str = "") -> None:
 def answer(page: Browser) -> None:
     """Show the steps, and let time stand again at once."""
     flown = page.flown
-    flown.page.loop.call_soon_threadsafe(flown.page.lessons.answer, None)
+    flown.server.get_event_loop().call_soon_threadsafe(flown.page.lessons.answer, None)
     page.until(lambda: not flown.live.paused, "motion")
     flown.live.pause(True)
     # The bar looks as it does while time goes on.

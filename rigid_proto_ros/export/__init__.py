@@ -5,7 +5,7 @@ from importlib.util import find_spec
 
 from ..base.errors import InputError, is_missing
 
-LIBRARIES = {"--parquet": ("pyarrow.parquet", "pyarrow"), "--gltf": ("pygltflib",) * 2, "--usd": ("pxr", "usd-core")}
+LIBRARIES = {"--parquet": ("pyarrow.parquet", "pyarrow"), "--usd": ("pxr", "usd-core")}
 """By option the module that writes such files, and the package that brings it."""
 
 

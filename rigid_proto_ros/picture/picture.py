@@ -17,8 +17,6 @@ from ..simulation.observer import (
     LoadBegan,
     LoadEnded,
     MeshChanged,
-    ShownLoad,
-    ShownString,
     Started,
     StringChanged,
 )
@@ -26,16 +24,12 @@ from ..simulation.quantities import attitude_angle
 from . import style
 from .arrows import ArrowScales, Loads
 from .backend import Backend, DrawnMesh
-from .plots import angle_to, energies
-from .poinsot import PoinsotPicture
+from .poinsot import Poinsot
 from .string import StringRows, Strings, string_curves
 from .surface import ball_mesh, box_edges, box_mesh, shaded_surface
 
 RATE = 250
 """[1/s, simulated] Of what is only looked at, arrows, trails and plots; the body's place is that of every state."""
-
-REDRAWN_RATE = 20
-"""[1/s, simulated] How often Poinsot's curve and plane are drawn anew while a torque changes T and L."""
 
 AXIS_LENGTH, PRINCIPAL_LENGTH = 0.25, 0.88
 """In body sizes. The principal axes end outside the body and beyond the first ω and L, which may lie on one of them."""
@@ -45,6 +39,19 @@ LABEL_BEYOND = 1.06
 
 LINE_SIZES = 1.1
 """Body sizes that the line of a string that pulls is drawn on beyond its knot."""
+
+
+def energies(rows: np.ndarray, body: BodySnapshot) -> np.ndarray:
+    """Energies (n, 3) [J] of states (n, 13): translational, rotational, gravity's."""
+    velocity, w = rows[:, 7:10], rows[:, 10:13]
+    translational = 0.5 * body.mass * np.einsum("ni,ni->n", velocity, velocity)
+    rotational = 0.5 * np.einsum("ni,ij,nj->n", w, body.inertia, w)
+    return np.column_stack([translational, rotational, -body.mass * (rows[:, 0:3] @ body.gravity)])
+
+
+def angle_to(reference: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Angle [rad] between reference (3,) and vectors (n, 3), accurate near 0 and π; 0 where either vanishes."""
+    return np.arctan2(np.linalg.norm(np.cross(reference, vectors), axis=1), vectors @ reference)
 
 
 class Ticks:
@@ -103,7 +110,7 @@ class Picture:
         """A new run: simulated time starts again at 0; mesh, body and scales stay."""
         self.redraw()
         self._momentum_at_start: np.ndarray | None = None
-        self._poinsot = PoinsotPicture()
+        self._poinsot = Poinsot()
         self.loads = Loads()
         self.string = Strings()
         self._body_times, self._body_attitudes = np.empty(0, np.int64), np.empty((0, 4))
@@ -112,7 +119,7 @@ class Picture:
 
     def redraw(self) -> None:
         """The next state is drawn even if it was before: other parts are wanted."""
-        self._ticks, self._redraw_ticks = Ticks(self._rate), Ticks(REDRAWN_RATE)
+        self._ticks = Ticks(self._rate)
 
     # What changes
 
@@ -120,22 +127,22 @@ class Picture:
         """Take an event of the flight; states are drawn in batches by ``draw``, so that they are none."""
         match event:
             case Started(time_ns=time_ns, vertices=vertices, triangles=triangles):
-                self.set_mesh(time_ns, vertices, triangles)
+                self._set_mesh(time_ns, vertices, triangles)
             case MeshChanged(time_ns=time_ns, vertices=vertices, triangles=triangles):
-                self.set_mesh(time_ns, vertices, triangles)
+                self._set_mesh(time_ns, vertices, triangles)
             case BodyChanged(time_ns, body):
-                self.set_body(time_ns, body)
+                self._set_body(time_ns, body)
             case GhostChanged(time_ns, body):
                 self.set_ghost(time_ns, body)
             case LoadBegan(time_ns, load_id, load):
-                self.load_began(time_ns, load_id, load)
+                self.loads.began(time_ns, load_id, load)
             case LoadEnded(time_ns, load_id):
-                self.load_ended(time_ns, load_id)
+                self.loads.ended(time_ns, load_id)
             case StringChanged(time_ns, string):
-                self.set_string(time_ns, string)
+                self.string.change(time_ns, string)
 
-    def set_mesh(self, time_ns: int, vertices: np.ndarray | None, triangles: np.ndarray | None) -> None:
-        """Another mesh: vertices (n, 3) [mesh coordinates], triangles (m, 3); ``set_body`` follows."""
+    def _set_mesh(self, time_ns: int, vertices: np.ndarray | None, triangles: np.ndarray | None) -> None:
+        """Another mesh: vertices (n, 3) [mesh coordinates], triangles (m, 3); a BodyChanged follows."""
         self._vertices = self._mesh = None
         if vertices is not None and triangles is not None and len(triangles):
             self._vertices = np.array(vertices, dtype=float)
@@ -146,7 +153,7 @@ class Picture:
         self.backend.begin(np.array([time_ns]))
         self._describe_mesh(self.backend)
 
-    def set_body(self, time_ns: int, body: BodySnapshot) -> None:
+    def _set_body(self, time_ns: int, body: BodySnapshot) -> None:
         """The body is this one from ``time_ns`` on."""
         size = 0.0 if self.shape is None else self.shape.size
         self.body = body
@@ -165,18 +172,6 @@ class Picture:
         if first or ghost is None:
             self.backend.mesh(style.GHOST_MESH, None if ghost is None else self._mesh)
         self._describe_ghost(self.backend)
-
-    def load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
-        """A load begins to act."""
-        self.loads.began(time_ns, load_id, load)
-
-    def load_ended(self, time_ns: int, load_id: int) -> None:
-        """A load acts no longer."""
-        self.loads.ended(time_ns, load_id)
-
-    def set_string(self, time_ns: int, string: ShownString | None) -> None:
-        """How the string is tied from ``time_ns`` on."""
-        self.string.change(time_ns, string)
 
     def describe(self, backend: Backend) -> None:
         """Draw on a backend that comes late what is drawn only when it changes; after its ``begin`` with one time."""
@@ -250,9 +245,8 @@ class Picture:
         R = matrix_from_quaternion(rows[:, 3:7])
         spin = np.einsum("nij,nj->ni", R, rows[:, 10:13])
         L = np.einsum("nij,jk,nk->ni", R, body.inertia, rows[:, 10:13])
-        redrawn = self._redraw_ticks.choose(times_ns)
         if self._wanted(style.POINSOT):
-            self._poinsot.draw(backend, times_ns, rows, spin, L, redrawn)
+            self._poinsot.draw(backend, times_ns, rows, spin, L)
         self._draw_motion(spin, L)
         each = np.ones(len(rows), dtype=int)
         if self.shape.tip is not None and self._wanted(style.TRAIL):

@@ -54,15 +54,14 @@ STRING_LINE = "world/string_line"
 POINSOT = "poinsot"
 """A picture of its own, in units of about its size."""
 POINSOT_UPRIGHT = "poinsot/upright"
-POINSOT_PLANE = "poinsot/upright/invariable_plane"
+POINSOT_PLANE = "poinsot/invariable_plane"
 POINSOT_OMEGA = "poinsot/upright/angular_velocity"
-POINSOT_MOMENTUM = "poinsot/upright/angular_momentum"
+POINSOT_MOMENTUM = "poinsot/angular_momentum"
 POINSOT_HERPOLHODE = "poinsot/upright/herpolhode"
 POINSOT_BODY = "poinsot/upright/body"
 POINSOT_PRINCIPAL = "poinsot/upright/body/principal"
 POINSOT_ELLIPSOID = "poinsot/upright/body/principal/ellipsoid"
 POINSOT_POLHODE = "poinsot/upright/body/principal/polhode"
-POINSOT_SEPARATRIX = "poinsot/upright/body/principal/separatrix"
 
 
 def load_part(kind: str, part: str) -> str:
@@ -105,7 +104,6 @@ STYLES = {
     POINSOT_HERPOLHODE: Style((ORANGE,), 0.009),
     POINSOT_ELLIPSOID: Style((BLUE,), opacity=0.45),
     POINSOT_POLHODE: Style((YELLOW,), 0.012),
-    POINSOT_SEPARATRIX: Style((RED,), 0.007),
 }
 
 ENERGY = "plots/energy"

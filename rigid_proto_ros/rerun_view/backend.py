@@ -13,7 +13,7 @@ import rerun as rr
 from ..picture import style
 from ..picture.backend import Backend, DrawnMesh
 from ..picture.style import Colour
-from . import entities as e
+from . import rrd_file as e
 from .streams import Stream
 
 INVISIBLE = 1e-9

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The frames of an .rrd file: how far a file is whole that was cut or never finished, and how to make it whole.
+"""The .rrd file: names of what is logged beside the picture's parts, its frames, and reading a recording back.
+
+Timelines: ``sim_time`` (simulated time since the run's start) and ``ros_time`` (wall clock when the row was taken).
 
 An .rrd is a 12-byte header (``RRF2``, version, options), then frames of two little-endian uint64 (kind, length) and
 ``length`` bytes; kind 0 ends the stream, an index may stand behind it. Rerun's own reader and ``rerun rrd optimize``
@@ -11,17 +13,144 @@ from __future__ import annotations
 import shutil
 import struct
 import tempfile
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from ..base.errors import InputError
+from ..picture.style import BODY_MESH
+from ..session.recorded_session import RecordedSession
+
+SIM_TIME = "sim_time"
+ROS_TIME = "ros_time"
+
+STATE = "state"
+"""States, exactly."""
+SCENE = "session/scene"
+"""The parameters at the run's start."""
+SESSION_MESH = "session/mesh"
+"""The mesh that the run began with, exactly."""
+EVENTS = "events"
+"""Event lines as logged."""
+REFUSALS = "log/refusals"
+ACCURACY = "log/accuracy"
+"""Why the motion is held to less than its accuracy."""
 
 MAGIC = b"RRF2"
 HEADER_BYTES = 12
 FRAME_HEAD = struct.Struct("<QQ")
 KINDS = (0, 1, 2, 3)
 """End, store info, data, blueprint activation."""
+
+STATES = "Scalars:scalars"
+TEXT = "TextLog:text"
+RECORDING = "__properties"
+MADE_WITH = "__properties/made_with"
+
+
+def read_session(path: str | Path) -> RecordedSession:
+    """Everything needed to look at a recorded run again or compute it anew.
+
+    Files that were never finished or were cut are read as far as they are whole. Raises InputError for a file that
+    isn't there, isn't an .rrd, holds nothing whole, or was damaged inside.
+    """
+    path = Path(path)
+    try:
+        _, complete = whole_bytes(path)
+    except OSError as error:
+        raise InputError("session", str(path), f"a recording that can be read ({error.strerror})") from error
+    session = RecordedSession(complete=complete)
+    try:
+        _read(path, session)
+    except RuntimeError:
+        # Also a file whose index was cut: all frames are whole, but the reader wants none of it.
+        session = RecordedSession(complete=False)
+        with whole_part(path) as whole:
+            try:
+                _read(whole, session)
+            except RuntimeError as error:
+                reason = (str(error).splitlines() or [""])[-1].replace(str(whole), str(path))
+                raise InputError("session", str(path), f"an undamaged recording ({reason})") from error
+    return session
+
+
+def record_batches(path: Path) -> Iterator[tuple[str, bool, Any]]:
+    """(entity, static, pyarrow record batch) of every chunk of the newest recording in the file."""
+    from rerun.chunk import RrdReader
+
+    with warnings.catch_warnings():
+        # The missing index of an unfinished file is our concern, not the reader's.
+        warnings.simplefilter("ignore")
+        reader = RrdReader(path)
+        recordings = reader.recordings()
+        if not recordings:
+            return
+        for chunk in reader.stream(store=recordings[-1]):
+            yield chunk.entity_path.lstrip("/"), chunk.is_static, chunk.to_record_batch()
+
+
+def _read(path: Path, session: RecordedSession) -> None:
+    times, rows = [], []
+    events: list[tuple[int, str]] = []
+    refusals: list[tuple[int, str]] = []
+    first_mesh: str | None = None
+    for entity, _, batch in record_batches(path):
+        if entity == STATE:
+            times.append(_sim_times(batch))
+            rows.append(_flat(batch, STATES).reshape(-1, 13))
+        elif entity in (EVENTS, REFUSALS):
+            target = events if entity == EVENTS else refusals
+            texts = [cell[0] for cell in batch.column(TEXT).to_pylist()]
+            target.extend(zip(_sim_times(batch).tolist(), texts, strict=True))
+        elif entity.startswith(RECORDING):
+            _read_properties(entity, batch, session)
+        elif entity == SCENE:
+            session.scene = batch.column("TextDocument:text").to_pylist()[0][0]
+        elif entity.startswith(BODY_MESH) and "Mesh3D:vertex_positions" in batch.schema.names:
+            session.mesh_chunks += 1
+        elif entity.startswith(SESSION_MESH) and (first_mesh is None or entity <= first_mesh):
+            # A run may have had several; it began with the first.
+            first_mesh = entity
+            held = batch.schema.names
+            if "sha256" in held:
+                session.mesh_sha256 = batch.column("sha256").to_pylist()[0][0]
+            if "vertices" in held:
+                session.vertices = _flat(batch, "vertices").reshape(-1, 3)
+            if "triangles" in held:
+                session.triangles = _flat(batch, "triangles").reshape(-1, 3)
+    session.events, session.refusals = events, refusals
+    if times:
+        session.times, session.rows = np.concatenate(times), np.concatenate(rows)
+
+
+def _read_properties(entity: str, batch: Any, session: RecordedSession) -> None:
+    if entity == MADE_WITH:
+        # Columns of one entity may lie in chunks of their own, as in a file that was mended.
+        held = batch.schema.names
+        if "cpu" in held:
+            session.made_with["cpu"] = batch.column("cpu").to_pylist()[0][0]
+        if "versions" in held:
+            session.made_with |= dict(text.rsplit(" ", 1) for text in batch.column("versions").to_pylist()[0])
+    elif "RecordingInfo:name" in batch.schema.names:
+        # The node's name, and which run of it.
+        name = batch.column("RecordingInfo:name").to_pylist()[0][0].split(",")[0]
+        session.node_name = name if name.isidentifier() else session.node_name
+
+
+def _sim_times(batch: Any) -> np.ndarray:
+    return batch.column(SIM_TIME).to_numpy(zero_copy_only=False).astype("timedelta64[ns]").astype(np.int64)
+
+
+def _flat(batch: Any, column: str) -> np.ndarray:
+    """All values of a column of lists, in order."""
+    return batch.column(column).flatten().to_numpy(zero_copy_only=False)
+
+
+# Frames
 
 
 def whole_bytes(path: Path) -> tuple[int, bool]:

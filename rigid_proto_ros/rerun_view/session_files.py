@@ -49,6 +49,8 @@ def make_recorder(
             return McapObserver(path, node_name, parameters, on_error, simulated_log)
         except ImportError:
             raise InputError("record", is_missing("mcap", "mcap")) from None
+    if find_spec("rerun") is None:
+        raise InputError("record", is_missing("rerun-sdk", "rerun"))
     from .observer import RerunObserver
 
     return RerunObserver(record=path, name=node_name, on_error=on_error)
@@ -77,7 +79,7 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
     if not path.exists():
         raise InputError("session", f"there is no file and no folder {str(path)!r}")
     if not is_bag(path):
-        session = _rerun_reader().read_session(path)
+        session = _read_rrd(path)
         if node and node.strip("/") != session.node_name:
             raise InputError("--node", node, f"{session.node_name}, the only one of this recording")
         return [session]
@@ -101,7 +103,7 @@ def repair(path: str | Path, repaired: str | Path) -> None:
         from .rrd_file import copy_whole
 
         # What is damaged inside is refused here.
-        _rerun_reader().read_session(path)
+        _read_rrd(path)
         copy_whole(path, repaired)
         return
     if path.is_dir():
@@ -130,12 +132,12 @@ def _bag_reader() -> ModuleType:
     return session_bag
 
 
-def _rerun_reader() -> ModuleType:
+def _read_rrd(path: Path) -> RecordedSession:
     if find_spec("rerun") is None:
         raise InputError("session", is_missing("rerun-sdk", "rerun"))
-    from . import reader
+    from .rrd_file import read_session
 
-    return reader
+    return read_session(path)
 
 
 def record(

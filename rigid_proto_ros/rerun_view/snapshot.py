@@ -17,10 +17,8 @@ from PIL import Image
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..session.recorded_session import RecordedSession
-from . import entities as e
 from .ports import LOOPBACK, PortTakenError, is_free, listens, serve_on_port
-from .reader import read_session
-from .rrd_file import whole_part
+from .rrd_file import SIM_TIME, read_session, whole_part
 from .viewers import ViewerProcess, open_headless
 
 FIRST_PORT = 19876
@@ -65,7 +63,7 @@ def take_picture(
         progress(2, STAGES)
         show(client, readable)
         progress(3, STAGES)
-        client.set_time(e.SIM_TIME, duration=float(at_s), play_state="paused")
+        client.set_time(SIM_TIME, duration=float(at_s), play_state="paused")
         time.sleep(max(0.0, started + NOTICE_GONE_S - time.monotonic()))
         pixels = _stable_picture(client)
         if is_one_colour(pixels):
@@ -151,7 +149,7 @@ def show(client: Any, recording: Path) -> None:
     deadline = time.monotonic() + LOAD_TIMEOUT_S
     while time.monotonic() < deadline:
         state = client.get_state()
-        loaded = any(timeline.name == e.SIM_TIME for r in state.recordings for timeline in r.timelines)
+        loaded = any(timeline.name == SIM_TIME for r in state.recordings for timeline in r.timelines)
         if loaded and not state.loading and state.views:
             return
         time.sleep(0.1)

@@ -4,10 +4,9 @@
 Two streams rather than one with two sinks: replacing a stream's sinks shuts its server down, so no file could be begun
 anew at a reset while somebody watches.
 
-Two things are done by functions of the SDK that it doesn't promise (tried with rerun-sdk 0.41.0;
-test_rerun_internals.py says which of them another version lacks): ``rr.send_blueprint`` keeps a stream of every layout
-for ever, two threads and a third of a megabyte each, and threads and memory of closed recordings are kept until the
-process ends.
+Two things are done by functions of the SDK that it doesn't promise (tried with rerun-sdk 0.41.0):
+``rr.send_blueprint`` keeps a stream of every layout for ever, two threads and a third of a megabyte each, and threads
+and memory of closed recordings are kept until the process ends.
 """
 
 from __future__ import annotations

@@ -11,22 +11,21 @@ import rerun as rr
 
 from ..picture import style
 from ..picture.picture import Picture
-from ..session.mailbox import Block, Note
+from ..session.mailbox import Block
 from ..simulation.observer import (
     AccuracyFloor,
-    BodyChanged,
     Event,
-    GhostChanged,
     LoadBegan,
     LoadEnded,
     Logged,
     MeshChanged,
     Refused,
+    Reset,
     SceneChanged,
     Started,
     StringChanged,
 )
-from . import entities as e
+from . import rrd_file as e
 from .backend import RerunBackend, scalar_columns
 from .layout import Finished, Subject
 from .streams import LiveStream, Stream
@@ -36,9 +35,6 @@ REPEATED_ROWS = 16384
 
 REACH_PER_TIP = 1.7
 """A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
-
-BETWEEN_STATES = (Started, MeshChanged, BodyChanged, GhostChanged)
-"""Events that change what the states after them mean; others are told at their times, whatever states are around."""
 
 Line = tuple[int, int, str, str]
 """Simulated and wall clock time [ns], text and level."""
@@ -64,12 +60,16 @@ class SceneWriter:
     def restart(self) -> None:
         """A new run: simulated time starts again at 0; the parameters in force, mesh and body stay."""
         self._scene = self._scene_in_force or self._scene
-        self.moved = False
         self._last_time_ns = 0
         self._picture.restart()
         self._backend.plotted, self._backend.paths = {}, {}
         self._lines: dict[str, list[Line]] = {}
         self._commanded = False
+
+    @property
+    def moved(self) -> bool:
+        """Whether the run's time has left 0."""
+        return self._last_time_ns > 0
 
     def attach(self, stream: Stream) -> None:
         """Send a stream what holds at all times, and the body as it is now; then it gets whatever follows."""
@@ -94,23 +94,30 @@ class SceneWriter:
 
     # What happens in it
 
-    def write(self, block: Block, on_note: Callable[[Note], None]) -> None:
-        """Send a block; notes that aren't about the scene, as a reset, go to ``on_note``."""
+    def write(self, block: Block, next_run: Callable[[], None]) -> None:
+        """Send a block; at a reset ``next_run`` is called."""
         sent = 0
         for note in block.notes:
             event = note.event
             time_ns = getattr(event, "time_ns", 0)
-            self._note_time(time_ns)
-            if self._tell(event, note.wall_ns):
-                continue
-            self._write_upto(block, sent, note.after_rows)
-            sent = note.after_rows
-            self._backend.streams = self._listening()
-            self._at(time_ns, note.wall_ns)
-            if isinstance(event, BETWEEN_STATES):
-                self._change(event)
-            else:
-                on_note(note)
+            self._last_time_ns = max(self._last_time_ns, time_ns)
+            match event:
+                case LoadBegan() | LoadEnded() | StringChanged():
+                    self._picture.on(event)
+                case SceneChanged(_, scene):
+                    self._scene_in_force = scene
+                case Logged(_, line):
+                    self._lines.setdefault(e.EVENTS, []).append((time_ns, note.wall_ns, line, "INFO"))
+                case Refused(_, reason, message):
+                    line = f"refused ({reason}): {message}"
+                    self._lines.setdefault(e.REFUSALS, []).append((time_ns, note.wall_ns, line, "WARN"))
+                case AccuracyFloor(_, floor):
+                    self._lines.setdefault(e.ACCURACY, []).append((time_ns, note.wall_ns, floor, "WARN"))
+                case _:
+                    # What changes the meaning of the states that follow.
+                    self._write_upto(block, sent, note.after_rows)
+                    sent = note.after_rows
+                    self._change(event, time_ns, note.wall_ns, next_run)
         self._write_upto(block, sent, block.count)
         self._rows_since_repeat += block.count
         if self._rows_since_repeat >= REPEATED_ROWS:
@@ -120,10 +127,24 @@ class SceneWriter:
                 if isinstance(stream, LiveStream):
                     self.catch_up(stream)
 
+    def _change(self, event: Event, time_ns: int, wall_ns: int, next_run: Callable[[], None]) -> None:
+        if isinstance(event, Reset):
+            next_run()
+            return
+        self._backend.streams = self._listening()
+        self._at(time_ns, wall_ns)
+        self._picture.on(event)
+        if isinstance(event, (Started, MeshChanged)):
+            self._mesh = event.vertices, event.triangles, event.mesh_sha256
+        if isinstance(event, Started):
+            self._scene = event.scene
+            self._send_scene(self._listening())
+
     def _write_upto(self, block: Block, begin: int, end: int) -> None:
         """Exact states and picture of rows begin..end, which all belong to the present body, and what happened."""
         streams = self._backend.streams = self._listening()
         # What happened comes first: a file that is cut behind it has every line that acted on its states.
+        self._commanded = self._commanded or bool(self._lines)
         for entity, lines in self._lines.items():
             times_ns, walls, texts, levels = zip(*lines, strict=True)
             self._backend.clock(np.array(times_ns), np.array(walls))
@@ -135,7 +156,7 @@ class SceneWriter:
             if not chosen.any():
                 continue
             times, walls, rows = (own[begin:end][chosen] for own in (block.times, block.walls, block.rows))
-            self._note_time(int(times[-1]))
+            self._last_time_ns = max(self._last_time_ns, int(times[-1]))
             self._backend.clock(times, walls)
             if ghost:
                 self._picture.draw_ghost(times, rows)
@@ -152,47 +173,11 @@ class SceneWriter:
         self._backend.clock(np.array([time_ns]), np.array([wall_ns]))
         self._backend.begin(np.array([time_ns]))
 
-    def _note_time(self, time_ns: int) -> None:
-        self.moved = self.moved or time_ns > 0
-        self._last_time_ns = max(self._last_time_ns, time_ns)
-
     def _listening(self) -> list[Stream]:
         """The streams that take what they are sent; the others must be told later how things are then."""
         for stream in self.streams:
             stream.missed = stream.missed or stream.behind
         return [stream for stream in self.streams if not stream.behind]
-
-    def _tell(self, event: Event, wall_ns: int) -> bool:
-        """Take what doesn't concern the states before it; returns whether it is such an event."""
-        match event:
-            case LoadBegan() | LoadEnded() | StringChanged():
-                self._picture.on(event)
-            case SceneChanged(_, scene):
-                self._scene_in_force = scene
-            case Logged(time_ns, line):
-                self._line(e.EVENTS, time_ns, wall_ns, line, "INFO")
-            case Refused(time_ns, reason, message):
-                self._line(e.REFUSALS, time_ns, wall_ns, f"refused ({reason}): {message}", "WARN")
-            case AccuracyFloor(time_ns, floor):
-                self._line(e.ACCURACY, time_ns, wall_ns, floor, "WARN")
-            case _:
-                return False
-        return True
-
-    def _line(self, entity: str, time_ns: int, wall_ns: int, text: str, level: str) -> None:
-        self._commanded = True
-        self._lines.setdefault(entity, []).append((time_ns, wall_ns, text, level))
-
-    def _change(self, event: Event) -> None:
-        """What changes the meaning of states."""
-        self._picture.on(event)
-        match event:
-            case Started(scene, vertices, triangles, mesh_sha256):
-                self._scene = scene
-                self._mesh = vertices, triangles, mesh_sha256
-                self._send_scene(self._listening())
-            case MeshChanged(_, vertices, triangles, mesh_sha256):
-                self._mesh = vertices, triangles, mesh_sha256
 
     def _send_scene(self, streams: list[Stream]) -> None:
         """What holds for a run: the scene as text, in files the mesh's exact numbers."""

@@ -166,6 +166,8 @@ def make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
     parameters = scenario.parameters
     if parameters.viewer in ("none", "workbench"):
         return None
+    if importlib.util.find_spec("rerun") is None:
+        raise InputError("viewer", is_missing("rerun-sdk", "rerun"))
     from ..rerun_view.observer import RerunObserver
 
     def tell(line: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import asyncio
 import sys
-import time
 import webbrowser
 from collections.abc import Callable
 
@@ -27,11 +26,6 @@ TITLE = "rigid_proto workbench"
 
 TURN_S = 2e-4
 """[s] Python's own 5 ms are longer than the period of a body that is published at 1 kHz."""
-
-LAST_MESSAGE_S = 0.2
-"""[s] For the last message to reach the browsers."""
-
-ENDED = "the program has ended; this is the last state"
 
 
 class Workbench:
@@ -59,11 +53,8 @@ class Workbench:
         self._running = asyncio.run_coroutine_threadsafe(self.page.run(), self._server.get_event_loop())
 
     def close(self) -> None:
-        """Say so on the pages, and end them."""
+        """End the pages."""
         self._running.cancel()
-        self.page.deliver(self.page.bar.show, self.page.state.time_ns * 1e-9, ENDED)
-        self.page.deliver(self._server.flush)
-        time.sleep(LAST_MESSAGE_S)
         stop_server(self._server)
         self.page.close()
 

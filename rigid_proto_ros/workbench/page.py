@@ -11,7 +11,6 @@ import asyncio
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
 
 import numpy as np
 import viser
@@ -36,7 +35,6 @@ from ..simulation.observer import (
     Reset,
     SceneChanged,
     ShownLoad,
-    ShownString,
     Started,
     StringChanged,
 )
@@ -124,7 +122,6 @@ class Page:
     ) -> None:
         self._begins_anew = anew
         self.server = server
-        self.loop = server.get_event_loop()
         self.live = live
         self.announcements = Announcements(server)
         self.flight = Flight(live, self.announcements.say, self.announcements.busy)
@@ -145,8 +142,8 @@ class Page:
         # What is known of the motion.
         self.state = live.state
         self._scenario = live.scenario
-        self._loads: dict[int, tuple[int, ShownLoad]] = {}
-        self._strings: list[tuple[int, ShownString | None]] = []
+        self._loads: dict[int, LoadBegan] = {}
+        self._strings: list[StringChanged] = []
         self._ghost_row: np.ndarray | None = None
         self._drawn_moment_ns: int | None = None
         self._new_scene = True
@@ -181,13 +178,6 @@ class Page:
             lambda name: self.lessons.did(f"show {name}"),
         )
 
-    def deliver(self, function: Callable[..., object], *arguments: object) -> None:
-        """Run a function on the page's thread soon; from any thread."""
-        try:
-            self.loop.call_soon_threadsafe(function, *arguments)
-        except RuntimeError:
-            pass  # the loop has ended
-
     async def run(self) -> None:
         """Draw for as long as the server runs."""
         while True:
@@ -205,20 +195,15 @@ class Page:
 
     async def _on_connect(self, client: viser.ClientHandle) -> None:
         self.room.look(client)
-        if not self._listening:
-            self._listening = True
-            self._new_scene = True
-            await asyncio.to_thread(self.live.add_observer, self._told)
-            self._open.set()
-            if self._begins_anew:
-                self._begins_anew = False
-                await self._begin()
-            else:
-                self.lessons.show()
-
-    async def _begin(self) -> None:
-        """The first browser is there to see it."""
-        if self.lessons.lesson is not None:
+        if self._listening:
+            return
+        self._listening = self._new_scene = True
+        await asyncio.to_thread(self.live.add_observer, self._told)
+        self._open.set()
+        begins_anew, self._begins_anew = self._begins_anew, False
+        if not begins_anew:
+            self.lessons.show()
+        elif self.lessons.lesson is not None:
             await self.lessons.begin()
         else:
             self.flight.reset()
@@ -288,13 +273,13 @@ class Page:
 
     def _on(self, event: Event) -> None:
         match event:
-            case Started(vertices=vertices, triangles=triangles) | MeshChanged(vertices=vertices, triangles=triangles):
-                self.picture.set_mesh(event.time_ns, vertices, triangles)
+            case Started() | MeshChanged():
+                self.picture.on(event)
                 self.poses.forget()
                 self._new_scene = True
-            case BodyChanged(time_ns, body):
+            case BodyChanged():
                 self.backend.is_new |= self._new_scene
-                self.picture.set_body(time_ns, body)
+                self.picture.on(event)
                 self.backend.is_new = False
                 self._body_changed()
             case GhostChanged(time_ns, body):
@@ -304,13 +289,11 @@ class Page:
                 self._scene_changed()
             case Reset():
                 self._reset()
-            case LoadBegan(time_ns, load_id, load):
-                self._load_began(time_ns, load_id, load)
-            case LoadEnded(time_ns, load_id):
-                self._load_ended(time_ns, load_id)
-            case StringChanged(time_ns, string):
-                self._strings.append((time_ns, string))
-                self.picture.set_string(time_ns, string)
+            case LoadBegan() | LoadEnded():
+                self._load_changed(event)
+            case StringChanged(_, string):
+                self._strings.append(event)
+                self.picture.on(event)
                 if string is not None and self.pointer.dragging:
                     self.lessons.did("drag")
             case Refused(message=message):
@@ -318,7 +301,6 @@ class Page:
                 self.controls.show_again()
 
     def _body_changed(self) -> None:
-        unit = self.backend.unit
         scenario = self.live.scenario
         if self._new_scene:
             self._new_scene = False
@@ -326,34 +308,31 @@ class Page:
             size = self.picture.shape.size if self.picture.shape else 1.0
             self.tools.usual_force = self.tools.force = suggested_force(scenario, size)
             self.forces_tab.show_force()
-        elif unit != self._unit:
+        elif self.backend.unit != self._unit:
             self._furnish(scenario)
         self._unit = self.backend.unit
 
-    def _load_began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
-        self.picture.load_began(time_ns, load_id, load)
-        if load.kind != "impulse":
-            self._loads[load_id] = (time_ns, load)
-        if load.kind in ("poke", "impulse"):
-            self._poked(load)
+    def _load_changed(self, event: LoadBegan | LoadEnded) -> None:
+        if isinstance(event, LoadBegan):
+            if event.load.kind != "impulse":
+                self._loads[event.load_id] = event
+            if event.load.kind in ("poke", "impulse"):
+                self._poked(event.load)
+        else:
+            began = self._loads.pop(event.load_id, None)
+            if began is not None and began.load.kind == "poke":
+                factor = float(self._scenario.parameters.real_time_factor) or 1.0
+                event = event._replace(time_ns=max(event.time_ns, began.time_ns + round(SEEN_NS * factor)))
+        self.picture.on(event)
 
     def _poked(self, load: ShownLoad) -> None:
         size = self.picture.shape.size if self.picture.shape else 1.0
-        force = load.force
-        if load.axes == "world":
-            force = self.state.rotation.T @ force
+        force = self.state.rotation.T @ load.force if load.axes == "world" else load.force
         strength = float(np.linalg.norm(force))
         self.lessons.did("poke")
         if strength > 0.0:
             lever = float(np.linalg.norm(np.cross(load.point, force))) / strength / size
             self.lessons.did("poke com" if lever < AT_COM else "poke away" if lever > AWAY else "poke between")
-
-    def _load_ended(self, time_ns: int, load_id: int) -> None:
-        began = self._loads.pop(load_id, None)
-        if began is not None and began[1].kind == "poke":
-            factor = float(self._scenario.parameters.real_time_factor) or 1.0
-            time_ns = max(time_ns, began[0] + round(SEEN_NS * factor))
-        self.picture.load_ended(time_ns, load_id)
 
     def _scene_changed(self) -> None:
         before, self._scenario = self._scenario, self.live.scenario
@@ -370,7 +349,7 @@ class Page:
         self.readings.restart()
         self._loads.clear()
         self._strings.clear()
-        self._centre()
+        self.backend.origin = np.array(self.live.state.position)
         self.lessons.did("reset")
 
     # Drawing
@@ -415,9 +394,9 @@ class Page:
         self.backend.forget()
         self.state = State(moment_ns, rows[-1])
         self._follow(rows[-1][0:3])
-        for time_ns, string in self._strings:
-            if time_ns <= moment_ns:
-                self.picture.set_string(time_ns, string)
+        for change in self._strings:
+            if change.time_ns <= moment_ns:
+                self.picture.on(change)
         held = self._string_energies(times, rows)
         self.picture.draw(times, rows)
         self.readings.take(self._scenario, self.state, held[-1], None)
@@ -427,23 +406,18 @@ class Page:
         self.picture.restart()
         self.backend.forget()
         self._loads.clear()
-        threading.Thread(target=self._introduce, daemon=True).start()
+        simulation = self.live.loop.simulation
 
-    def _introduce(self) -> None:
         def introduce() -> None:
-            self.live.loop.simulation.introduce(self._told)
-            state = self.live.loop.simulation.state
-            self._told.on(Published(state.time_ns, state.row))
+            simulation.introduce(self._told)
+            self._told.on(Published(simulation.time_ns, simulation.state.row))
 
-        self.live.call(introduce)
+        threading.Thread(target=self.live.call, args=(introduce,), daemon=True).start()
 
     def _follow(self, position: np.ndarray) -> None:
         if not self.pointer.dragging:
             self.backend.origin = self.room.follow(position, self.backend.origin, self.backend.unit)
         self.room.place(self.backend.origin, self.backend.unit)
-
-    def _centre(self) -> None:
-        self.backend.origin = np.array(self.live.loop.simulation.state.position)
 
     def _furnish(self, scenario: Scenario) -> None:
         """Make room for what is going to be seen, and look at it."""

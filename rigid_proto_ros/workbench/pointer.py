@@ -16,22 +16,11 @@ import numpy as np
 import viser
 
 from ..base.rotation import matrix_from_quaternion
-from ..motion.body import Body
-from ..motion.surface import Surface
 from ..scene.scenario import Scenario
 from .flight import Entry, Flight
 
-KEPT_S = 1.0
-"""Drawn poses are remembered for this long: a page further behind isn't usable."""
-
 USUAL_DELAY_S = 0.06
 """From a pose sent to a pointer message that saw it: a window of 1/60 s each way, a frame, and the way itself."""
-
-SEARCHED_TRIANGLES = 1_000_000
-"""Times poses: more distances to a surface than this would be felt as a delay."""
-
-ON_SURFACE = 1e-4
-"""Of the body's size: a browser counts in single precision, and gives this much away with room to spare."""
 
 HOLD_S = 0.2
 """A still hand says again where it is, for the string lets go ``string.timeout`` after the last word; sooner where that
@@ -87,9 +76,9 @@ class DrawnPoses:
         self._drawn: deque[DrawnPose] = deque()
 
     def add(self, pose: DrawnPose) -> None:
-        """A pose went to the pages."""
+        """A pose went to the pages; the last one that is old enough to be seen by now is kept with those after it."""
         self._drawn.append(pose)
-        while self._drawn[0].time_s < pose.time_s - KEPT_S:
+        while len(self._drawn) > 1 and self._drawn[1].time_s <= pose.time_s - USUAL_DELAY_S:
             self._drawn.popleft()
 
     def forget(self) -> None:
@@ -98,30 +87,10 @@ class DrawnPoses:
 
     def usual(self, now_s: float) -> DrawnPose | None:
         """The pose that an event arriving now has most likely seen."""
-        for pose in reversed(self._drawn):
-            if pose.time_s <= now_s - USUAL_DELAY_S:
-                return pose
-        return self._drawn[0] if self._drawn else None
-
-    def of_point(
-        self, drawn_point: Iterable[float], now_s: float, surface: Surface | None, body: Body
-    ) -> DrawnPose | None:
-        """The pose in which ``drawn_point`` (3,) lay on the surface, so that the user grabbed what he saw.
-
-        Where several fit, as for a sphere, the one nearest to the usual delay; where none does, that of the usual
-        delay.
-        """
-        usual = self.usual(now_s)
-        if usual is None or surface is None:
-            return usual
-        size = float(np.linalg.norm(surface.extent * body.scale))
-        nearest_first = sorted(self._drawn, key=lambda pose: abs(pose.time_s - usual.time_s))
-        for pose in nearest_first[: max(1, SEARCHED_TRIANGLES // len(surface.triangles))]:
-            point = body.mesh_point(numbers(pose.body_point(drawn_point)))
-            gap = float(np.linalg.norm((surface.nearest_point(numbers(point)) - point) * body.scale))
-            if gap <= ON_SURFACE * size:
-                return pose
-        return usual
+        return next(
+            (pose for pose in reversed(self._drawn) if pose.time_s <= now_s - USUAL_DELAY_S),
+            self._drawn[0] if self._drawn else None,
+        )
 
 
 @dataclass
@@ -205,7 +174,7 @@ class Pointer:
             return
         body, surface = scenario.setup.body, scenario.setup.surface
         now = time.monotonic()
-        seen = self._poses.of_point(start, now, surface, body)
+        seen = self._poses.usual(now)
         if seen is None:
             return
         entries: list[Entry] = []

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import viser
 
-from ..picture.plots import nice_step
 from ..picture.surface import BOX_CORNERS
+from .readouts import nice_step
 
 Colour = tuple[int, int, int]
 

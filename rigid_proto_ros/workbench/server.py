@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import gzip
 import html
 import http
 import io
@@ -33,8 +32,6 @@ from .page_style import PANEL_PIXELS, lay_out
 # ruff: noqa: SLF001 (see above)
 
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "::1")
-
-VISERS_TITLE = b"<title>Viser</title>"
 
 
 def make_server(title: str, host: str, asked: int | None, default: int) -> viser.ViserServer:
@@ -95,9 +92,15 @@ def _requests_looked_at(host: str, title: str) -> Iterator[None]:
             reason = refusal(host, request.headers.get("Host", ""), request.headers.get("Origin"))
             if reason:
                 return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
+            is_page = request.path.partition("?")[0] == "/"
+            if is_page:
+                request.headers.pop("Accept-Encoding", None)  # as it is, so that its title can be set
             response = process_request(connection, request)
-            if response is not None and request.path.partition("?")[0] == "/":
-                _set_title(response, title)
+            if response is not None and is_page:
+                own = f"<title>{html.escape(title)}</title>".encode()
+                response.body = response.body.replace(b"<title>Viser</title>", own, 1)
+                response.headers.pop("Content-Length", None)
+                response.headers["Content-Length"] = str(len(response.body))
             return response
 
         return serve(*arguments, process_request=process, **options)
@@ -107,16 +110,6 @@ def _requests_looked_at(host: str, title: str) -> Iterator[None]:
         yield
     finally:
         module.serve = serve
-
-
-def _set_title(response: Response, title: str) -> None:
-    """Give the page its title, in place of viser's."""
-    packed = response.headers.get("Content-Encoding") == "gzip"
-    text = gzip.decompress(response.body) if packed else response.body
-    text = text.replace(VISERS_TITLE, f"<title>{html.escape(title)}</title>".encode(), 1)
-    response.body = gzip.compress(text, 1) if packed else text
-    del response.headers["Content-Length"]
-    response.headers["Content-Length"] = str(len(response.body))
 
 
 def refusal(served_on: str, host: str, origin: str | None) -> str:

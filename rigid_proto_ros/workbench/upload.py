@@ -8,15 +8,13 @@ flies; a saved take carries it.
 from __future__ import annotations
 
 import asyncio
-import json
 import math
 import re
 import shutil
-import struct
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,9 +31,7 @@ MAX_BYTES = 256_000_000
 """Of one upload: it comes over the page's socket and stands in memory whole. Larger files are named by path."""
 
 ACCEPTED = (*OWN_FORMATS, "glb")
-"""Endings of files that hold all of the mesh: .gltf and .dae may name other files, .3mf is a zip. A .glb
-that names others is refused.
-"""
+"""Endings of files that hold all of the mesh: .gltf and .dae may name other files, .3mf is a zip."""
 
 Y_UP = ("glb", "obj")
 """glTF says so, and most tools write .obj like that; what it says itself, in a comment ``# z up``, comes first."""
@@ -127,8 +123,6 @@ class Uploads:
         if len(data) > MAX_BYTES:
             limit = f"at most {MAX_BYTES} are accepted, so name a larger file by its path"
             raise MeshError("upload", f"{name} has {len(data)} bytes; {limit}")
-        if suffix == "glb":
-            refuse_other_files(name, data)
         if self._home is None:
             self._home = tempfile.TemporaryDirectory(prefix=PASSING)
         # Another folder each time: a body that is told the same path again sees no change.
@@ -139,11 +133,8 @@ class Uploads:
             path.write_bytes(data)
             body = mesh_body(load_mesh(str(path)))
             inspection = inspect_mesh(body)
-        except OSError as error:
-            shutil.rmtree(path.parent, ignore_errors=True)
-            raise MeshError("upload", name, f"free space for it ({error.strerror})") from None
-        except BaseException:
-            shutil.rmtree(path.parent, ignore_errors=True)
+        except InputError:
+            shutil.rmtree(path.parent)
             raise
         said = UP_COMMENT.search(data[:4096]) if suffix == "obj" else None
         up = said[1].decode().lower() if said else "y" if suffix in Y_UP else "z"
@@ -163,26 +154,9 @@ class Uploads:
             self._home = None
 
 
-def refuse_other_files(name: str, data: bytes) -> None:
-    """Raise MeshError for a .glb that isn't one, or that has parts in other files: they would be read
-    from this machine.
-    """
-    try:
-        magic, _, _, length, kind = struct.unpack_from("<4sIII4s", data)
-        parts: Any = json.loads(data[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else None
-        named = [part.get("uri") for part in (*parts.get("buffers", ()), *parts.get("images", ()))]
-    except (struct.error, ValueError, AttributeError, TypeError) as error:
-        raise MeshError("upload", name, "a binary glTF file") from error
-    if any(uri is not None and not str(uri).startswith("data:") for uri in named):
-        raise MeshError("upload", name, "a .glb that contains all of its data")
-
-
 def shown_name(file_name: str) -> tuple[str, str]:
-    """What is left of a file's name: its last part, plain letters, at most 40 before the ending; and the
-    ending itself.
-    """
-    last = PureWindowsPath(PurePosixPath(file_name.replace("\0", "")).name).name
-    stem, _, suffix = last.rpartition(".")
+    """What is left of a file's name, plain letters, at most 40 before the ending; and the ending itself."""
+    stem, _, suffix = re.split(r"[/\\]", file_name)[-1].rpartition(".")
     stem = re.sub(r"[^A-Za-z0-9_-]+", "_", stem).strip("_")[:40] or "mesh"
     suffix = re.sub(r"[^a-z0-9]+", "", suffix.lower())[:8]
     return f"{stem}.{suffix}", suffix

@@ -16,7 +16,7 @@ pytest.importorskip("rerun")
 
 
 def fly(ros_environment, folder, *arguments):
-    from rigid_proto_ros.rerun_view.reader import read_session, record_batches
+    from rigid_proto_ros.rerun_view.rrd_file import read_session, record_batches
 
     done = run("rigid_proto", "demo", *arguments, environment=ros_environment, cwd=folder, timeout=180)
     assert done.returncode == 0, done.stderr

@@ -26,7 +26,7 @@ class Player:
         self.document = json.loads(data[20 : 20 + json_length])
         _, kind = struct.unpack_from("<I4s", data, 20 + json_length)
         assert kind == b"BIN\0"
-        self._binary = data[28 + json_length :]
+        self.binary = data[28 + json_length :]
         self.nodes = {node["name"]: number for number, node in enumerate(self.document["nodes"])}
         self._parents = {c: n for n, node in enumerate(self.document["nodes"]) for c in node.get("children", [])}
         self._channels = {}
@@ -42,7 +42,7 @@ class Player:
         view = self.document["bufferViews"][accessor["bufferView"]]
         count, width = accessor["count"], WIDTHS[accessor["type"]]
         values = np.frombuffer(
-            self._binary, TYPES[accessor["componentType"]], count * width, view.get("byteOffset", 0)
+            self.binary, TYPES[accessor["componentType"]], count * width, view.get("byteOffset", 0)
         ).reshape(count, width)
         return values.astype(float if values.dtype.kind == "f" else int)
 

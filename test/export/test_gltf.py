@@ -3,21 +3,22 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
 from gltf_player import Player, z_up
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.flight_record import FlightRecord, Source, frames, source_of_scene
+from rigid_proto_ros.export.gltf import INDICES, TRIANGLES, VERTICES, Document
 from rigid_proto_ros.picture.surface import BOX_CORNERS, BOX_TRIANGLES
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
-
-pytest.importorskip("pygltflib")
 
 THROWN = {
     "gravity": [0.0, 0.0, -9.81],
@@ -149,59 +150,38 @@ def test_in_the_lesson_the_ghost_with_the_boxs_centre_turns_about_a_point_2_4_cm
 
 def painted_cube(file: Path) -> bytes:
     """A .glb of a cube in two parts of a material each, one of them with a picture; returns that picture."""
-    import io
-
-    import pygltflib
-    from PIL import Image
-
-    from rigid_proto_ros.export.gltf import INDICES, TRIANGLES, VERTICES, Document
-
-    document = Document(
-        pygltflib.GLTF2(asset=pygltflib.Asset(version="2.0"), scene=0, scenes=[pygltflib.Scene(nodes=[0])]), 0
-    )
     packed = io.BytesIO()
     Image.new("RGB", (2, 2), (200, 10, 10)).save(packed, "png")
+    document = Document(0)
     for name, colour in (("red", (200, 10, 10)), ("blue", (10, 10, 200))):
         document.material(name, colour)
-    gltf = document.gltf
     picture = packed.getvalue() + bytes(-len(packed.getvalue()) % 4)
-    gltf.bufferViews.append(pygltflib.BufferView(buffer=0, byteOffset=0, byteLength=len(picture)))
     document.data += picture
-    gltf.images.append(pygltflib.Image(bufferView=0, mimeType="image/png"))
-    gltf.textures.append(pygltflib.Texture(source=0))
-    gltf.materials[0].pbrMetallicRoughness.baseColorTexture = pygltflib.TextureInfo(index=0)
+    view = document.add("bufferViews", buffer=0, byteOffset=0, byteLength=len(picture))
+    image = document.add("images", bufferView=view, mimeType="image/png")
+    texture = document.add("textures", source=image)
+    document.lists["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": texture}
     corners = document.accessor(0.05 * BOX_CORNERS + [0.3, 0.0, 0.1], VERTICES, bounds=True)
-    document.node("cube", None)
+    cube = document.node("cube", None)
     for half, material in ((BOX_TRIANGLES[:6], 0), (BOX_TRIANGLES[6:], 1)):
-        mesh = document.mesh(
-            "half",
-            {"POSITION": corners},
-            document.accessor(half.ravel(), INDICES),
-            TRIANGLES,
-            material,
-        )
-        document.node(f"half {material}", 0, mesh=mesh)
-    gltf.buffers.append(pygltflib.Buffer(byteLength=len(document.data)))
-    gltf.set_binary_blob(bytes(document.data))
-    for node in gltf.nodes:
-        node.children = node.children or None
-    file.write_bytes(b"".join(gltf.save_to_bytes()))
+        indices = document.accessor(half.ravel(), INDICES)
+        mesh = document.mesh("half", {"POSITION": corners}, indices, TRIANGLES, material)
+        document.node(f"half {material}", cube, mesh=mesh)
+    file.write_bytes(document.binary())
     return picture
 
 
 def test_a_glb_keeps_its_materials_and_pictures_and_is_where_the_body_is(tmp_path):
-    import pygltflib
-
     picture, file = painted_cube(tmp_path / "cube.glb"), tmp_path / "flight.glb"
     settings = {"mesh": str(tmp_path / "cube.glb"), "scale": [2.0, 1.0, 1.0], **THROWN}
     arguments = [f"--set={name}={value}" for name, value in settings.items()]
     assert main(["simulate", "t_handle", "--duration", "0.5", *arguments, "--gltf", str(file), "--fps", "24"]) == 0
-    made = pygltflib.GLTF2().load(str(file))
-    assert [material.name for material in made.materials] == ["red", "blue"]
-    texture = made.textures[made.materials[0].pbrMetallicRoughness.baseColorTexture.index]
-    view = made.bufferViews[made.images[texture.source].bufferView]
-    assert made.binary_blob()[view.byteOffset : view.byteOffset + view.byteLength] == picture
     player = Player(file)
+    made = player.document
+    assert [material["name"] for material in made["materials"]] == ["red", "blue"]
+    texture = made["textures"][made["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"]]
+    view = made["bufferViews"][made["images"][texture["source"]]["bufferView"]]
+    assert player.binary[view["byteOffset"] :][: view["byteLength"]] == picture
     run = OfflineRun(read_scene("t_handle", settings), [])
     for k in (0, 5, 12):
         run.advance(round(k / 24 * 1e9))

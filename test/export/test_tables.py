@@ -94,12 +94,10 @@ def test_what_cannot_be_written_is_refused_in_one_line_before_the_flight(argumen
     assert {path.name for path in tmp_path.iterdir()} == {"file", "folder.csv"}
 
 
-@pytest.mark.parametrize(
-    ("module", "file"), [("pygltflib", "a.glb"), ("pxr", "a.usda"), ("pyarrow.parquet", "a.parquet")]
-)
+@pytest.mark.parametrize(("module", "file"), [("pxr", "a.usda"), ("pyarrow.parquet", "a.parquet")])
 def test_a_library_that_is_missing_is_named_with_the_extra_that_brings_it(module, file, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, module, None)
-    option = {"glb": "--gltf", "usda": "--usd", "parquet": "--parquet"}[file.partition(".")[2]]
+    option = {"usda": "--usd", "parquet": "--parquet"}[file.partition(".")[2]]
     assert main(["simulate", "book", option, str(tmp_path / file)]) == 2
     assert "pip install 'rigid_proto_ros[export]'" in capsys.readouterr().err
 

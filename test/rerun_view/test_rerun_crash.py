@@ -13,10 +13,8 @@ import rerun_flight as flight
 from rerun.chunk import RrdReader
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.rerun_view.flusher import FLUSH_PERIOD_S
-from rigid_proto_ros.rerun_view.observer import RerunObserver
-from rigid_proto_ros.rerun_view.reader import read_session
-from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, HEADER_BYTES, whole_bytes
+from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, RerunObserver
+from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, HEADER_BYTES, read_session, whole_bytes
 from rigid_proto_ros.rerun_view.session_files import repair
 
 
@@ -44,10 +42,11 @@ def test_a_file_cut_anywhere_is_read_as_far_as_it_is_whole(recording, tmp_path):
     data = recording.read_bytes()
     whole = read_session(recording)
     starts = frame_starts(data)
-    offsets = np.random.default_rng(3).integers(starts[2], len(data), 10).tolist()
-    # And at, just before and just behind every border between frames.
-    offsets += [start + d for start in starts[3:] for d in (-1, 0, 1, FRAME_HEAD.size)]
-    offsets += [len(data) - 1]
+    offsets = np.random.default_rng(3).integers(starts[2], len(data), 6).tolist()
+    # And at, just before and just behind borders between frames, those of the first states and the last ones among them.
+    borders = sorted({*starts[3:9], *starts[9:-4:7], *starts[-4:]})
+    offsets += [start + d for start, d in zip(borders, (-1, 0, 1, FRAME_HEAD.size) * len(borders), strict=False)]
+    offsets += [starts[-1], len(data) - 1]
     cut = tmp_path / "cut.rrd"
     for offset in offsets:
         cut.write_bytes(data[:offset])
@@ -108,13 +107,12 @@ from rigid_proto_ros.simulation.observer import BodyChanged, Published, Started
 from rigid_proto_ros.rerun_view.observer import RerunObserver
 observer = RerunObserver(record=sys.argv[1])
 states = flight.rows(100_000)
-flusher, published = observer._flusher, 0
-flush = flusher._flush
+published, flush = 0, observer._flush
 def told():
     before = published
     flush()
     print("flushed", before, flush=True)
-flusher._flush = told
+observer._flush = told
 observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
 observer.on(BodyChanged(0, flight.BODY))
 for k, row in enumerate(states):

@@ -14,10 +14,10 @@ import rerun_flight as flight
 from rerun.chunk import RrdReader
 
 from rigid_proto_ros.picture import style
-from rigid_proto_ros.rerun_view import entities as e
+from rigid_proto_ros.rerun_view import rrd_file as e
 from rigid_proto_ros.rerun_view import viewers
 from rigid_proto_ros.rerun_view.observer import RerunObserver
-from rigid_proto_ros.rerun_view.reader import read_session
+from rigid_proto_ros.rerun_view.rrd_file import read_session
 from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started
 
 RUN_WITH_A_STOPPED_VIEWER = """
@@ -32,7 +32,7 @@ observer.on(BodyChanged(0, flight.BODY))
 observer.on(Published(0, states[0]))
 print(observer.live_address, flush=True)
 sys.stdin.readline()
-streams = observer._flusher._writer.streams
+streams = observer._writer.streams
 k, deadline = 1, time.monotonic() + 150.0
 while k < 200 and time.monotonic() < deadline:
     observer.on(Published(k * flight.PERIOD_NS, states[k]))

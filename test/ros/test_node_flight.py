@@ -12,7 +12,7 @@ from ros_process import READY_S, RosProcess, dds_client, run, running_node
 from rigid_proto_ros.base.bundled import example_path, scene_path
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.rerun_view.reader import read_session
+from rigid_proto_ros.rerun_view.rrd_file import read_session
 from rigid_proto_ros.scene.command_codec import string_attach, string_target
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script

@@ -10,7 +10,7 @@ import pytest
 from conftest import needs_rerun
 from ros_process import RosProcess, alive, catches, descendants, running_node
 
-from rigid_proto_ros.rerun_view.reader import read_session
+from rigid_proto_ros.rerun_view.rrd_file import read_session
 
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.stress)])
 """One handler serves both; a node's end by SIGTERM is looked at in test_node_flight.py too."""

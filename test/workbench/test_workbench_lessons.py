@@ -19,7 +19,7 @@ from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import SENTENCES, lesson
 from rigid_proto_ros.workbench import controls, lesson_panel, readouts
 from rigid_proto_ros.workbench import page as page_module
-from rigid_proto_ros.workbench.lesson_course import COURSES
+from rigid_proto_ros.workbench.lesson_course import COURSES, LessonProgress
 from rigid_proto_ros.workbench.panel import PATHS
 
 
@@ -211,3 +211,16 @@ def test_every_step_of_the_lesson_can_be_done_on_the_page_and_gets_its_mark(user
         user.fly(0.02)
         user.until(lambda done=done: text.content.count("✓") == done, f"mark at step {done}, nor at that alone")
     assert not user.said
+
+
+def test_time_that_jumps_was_not_watched_and_another_lesson_begins_without_marks() -> None:
+    progress = LessonProgress()
+    progress.begin("t_handle")
+    for time_s in (0, 10, 20, 5, 30):
+        progress.watched(time_s * 10**9)
+    assert progress.done == 0
+    for k in range(42):
+        progress.watched((300 + k) * 10**8)
+    assert progress.done == 1
+    progress.begin("book")
+    assert progress.done == 0

@@ -60,7 +60,7 @@ def fly(page: Browser, scene) -> None:
         await flown.page.flight.fly(scene, paused=False)
         flown.page.lessons.leave()
 
-    asyncio.run_coroutine_threadsafe(begin(), flown.page.loop).result(60.0)
+    asyncio.run_coroutine_threadsafe(begin(), flown.server.get_event_loop()).result(60.0)
     shown = flown.page
     page.until(lambda: shown._scenes_seen == shown.flight.scenes_begun and not shown._undrawn, "another body")
     page.drawn(3)
@@ -133,7 +133,7 @@ def test_a_click_pokes_where_it_points_and_a_shift_click_pushes_inward(page) -> 
         # The force pushes into the body, so its arrow's tip stands at the point that was clicked.
         tail, tip = np.array(arrow.points).reshape(-1, 2, 3)[0]
         assert apart(page.pixel(tip), (x + 30.0, y + 5.0)) < NEAR
-        (load,) = (each for _, each in page.flown.page._loads.values())
+        (load,) = (began.load for began in page.flown.page._loads.values())
         point = np.asarray(load.point) / page.flown.page.backend.unit
         assert apart(page.pixel(point), (x + 30.0, y + 5.0)) < NEAR
         force = np.asarray(load.force) / np.linalg.norm(load.force)
@@ -226,7 +226,7 @@ def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_button
 
     lessons, longest = page.flown.page.lessons, lesson("true_or_box_tensor")
     lessons.name(longest.name)
-    asyncio.run_coroutine_threadsafe(lessons.begin(), page.flown.page.loop).result(60.0)
+    asyncio.run_coroutine_threadsafe(lessons.begin(), page.flown.server.get_event_loop()).result(60.0)
     page.until(lambda: longest.choices[2] in page.text, "answers to choose from")
     cut = "labels => Math.max(...labels.map(label => label.scrollWidth - label.clientWidth))"
     assert page.page.locator(".mantine-Button-label").evaluate_all(cut) <= 0, "an answer that isn't to be read whole"

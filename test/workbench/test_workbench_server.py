@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import gzip
 import http.client
 import importlib.util
 import re
@@ -77,13 +76,10 @@ def test_the_address_is_told_while_kernels_that_the_mesh_needs_are_compiled(caps
         serve(read, "t_handle", None, LOOPBACK, opens=False, wait=lambda: 0)
 
 
-@pytest.mark.parametrize("encoding", ["gzip", "identity"])
-def test_the_browsers_tab_has_our_title(server, encoding: str) -> None:
+def test_the_browsers_tab_has_our_title(server) -> None:
     connection = http.client.HTTPConnection(LOOPBACK, server.get_port(), timeout=20)
-    connection.request("GET", "/", headers={"Accept-Encoding": encoding})
-    response = connection.getresponse()
-    text = response.read()
-    text = gzip.decompress(text) if response.headers["Content-Encoding"] == "gzip" else text
+    connection.request("GET", "/", headers={"Accept-Encoding": "gzip"})
+    text = connection.getresponse().read()
     connection.close()
     assert f"<title>{TITLE}</title>".encode() in text
     assert b"<title>Viser" not in text
@@ -129,21 +125,17 @@ def test_pages_of_other_sites_and_foreign_names_are_turned_away(server) -> None:
 
 
 def test_without_viser_the_command_says_so_in_one_line(monkeypatch, capsys) -> None:
-    package, extra = "viser", "[workbench]"
     find = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name, *given: None if name == package else find(name, *given)
-    )
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *given: None if name == "viser" else find(name))
     assert main(["workbench"]) == 2
     told = capsys.readouterr()
-    assert told.out == "" and told.err.count("\n") == 1 and package in told.err and extra in told.err
+    assert told.out == "" and told.err.count("\n") == 1 and "viser" in told.err and "[workbench]" in told.err
 
 
 def test_nobody_can_ask_for_a_public_tunnel(server) -> None:
     from viser import _messages
 
-    handlers = server._websock_server._incoming_handlers
-    assert _messages.ShareUrlRequest not in handlers
+    assert _messages.ShareUrlRequest not in server._websock_server._incoming_handlers
 
 
 def test_what_one_page_sets_another_one_shows(server) -> None:
