@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The page's own pictures, drawn anew in headless Chromium: ``python test/workbench_pictures.py docs`` writes flight.gif,
-workbench.png and true_against_box.png there; ``--lessons FOLDER`` one picture of each lesson.
+workbench.png and true_against_box.png there.
 
 Time stands between two pictures, and isn't said to: a browser without a graphics card takes seconds for each.
 """
@@ -17,7 +17,7 @@ from PIL import Image
 from workbench_page import SOFTWARE_GL, Browser, Flown, chromium
 
 from rigid_proto_ros.rerun_view.ports import any_free_port
-from rigid_proto_ros.scene.lessons import Lesson, lesson, lessons
+from rigid_proto_ros.scene.lessons import Lesson, lesson
 from rigid_proto_ros.workbench.flight import Flight
 from rigid_proto_ros.workbench.time_bar import motion_words
 
@@ -32,7 +32,6 @@ PAUSED = Flight.paused
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--lessons", action="store_true")
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
     flown = Flown("t_handle", port=any_free_port())
@@ -42,15 +41,6 @@ def main() -> None:
     )
     try:
         with chromium(SOFTWARE_GL) as started:
-            if args.lessons:
-                page = Browser(started, flown, SIZE, DRAWN_MS)
-                for each in lessons():
-                    begin(page, each)
-                    page.page.screenshot(path=args.folder / f"{each.name}_asked.png")
-                    answer(page)
-                    play(page, 1.0)
-                    page.page.screenshot(path=args.folder / f"{each.name}.png")
-                return
             page = Browser(started, flown, MOVING_SIZE, DRAWN_MS)
             draw_moving(page, args.folder / "flight.gif")
             page.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})

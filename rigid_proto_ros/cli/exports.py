@@ -78,13 +78,10 @@ def write_exports(
         from ..export import table
 
         columns = table.state_columns(record)
-        for name in ("csv", "parquet"):
+        for name, write in (("csv", table.write_csv), ("parquet", table.write_parquet)):
             if name in files:
-                with Progress(f"writing {files[name]}") as progress:
-                    if name == "csv":
-                        table.write_csv(files[name], columns, progress.fraction)
-                    else:
-                        table.write_parquet(files[name], columns)
+                with Progress(f"writing {files[name]}"):
+                    write(files[name], columns)
                 say(f"{files[name]}: {len(record.times_ns)} states")
     if not set(ANIMATIONS) & set(files):
         return

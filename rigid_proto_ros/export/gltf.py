@@ -166,10 +166,6 @@ def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
         steps = tracks.mesh_steps(mesh)
         if steps is not None:
             _draw_mesh(document, node, name, steps, style.STYLES[mesh], model_of(record) if name == "body" else None)
-        if times_ns[0] > record.times_ns[0]:
-            # A ghost that comes in flight is of no size before.
-            begins = np.array([0.0, seconds[0]], np.float32)
-            document.animate_steps(node, begins, scale=np.array([np.zeros(3), np.ones(3)]))
     _draw_string(document, root, tracks.string)
     with whole_file("--gltf", file) as path:
         path.write_bytes(document.binary())

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 
 import numpy as np
 
@@ -21,8 +20,6 @@ UNITS = {"time": "s", **STATE_COLUMNS}
 KEY = b"rigid_proto_ros"
 """Of a Parquet file's metadata: a JSON object."""
 
-ROWS_AT_ONCE = 10_000
-
 
 def state_columns(record: FlightRecord) -> dict[str, np.ndarray]:
     """The columns (n,) float64 by name."""
@@ -31,17 +28,12 @@ def state_columns(record: FlightRecord) -> dict[str, np.ndarray]:
     return columns
 
 
-def write_csv(
-    file: str, columns: dict[str, np.ndarray], progress: Callable[[float, float], None] = lambda *_: None
-) -> None:
+def write_csv(file: str, columns: dict[str, np.ndarray]) -> None:
     """Write a .csv: a line of names, then a line a state; numbers are read back as they were, to the last bit."""
-    table = np.column_stack(list(columns.values()))
     with whole_file("--csv", file) as path, open(path, "w", encoding="utf-8") as stream:
         stream.write(",".join(columns) + "\n")
-        for begin in range(0, len(table), ROWS_AT_ONCE):
-            part = table[begin : begin + ROWS_AT_ONCE].tolist()
-            stream.write("".join(",".join(map(repr, row)) + "\n" for row in part))
-            progress(begin + len(part), len(table))
+        for row in zip(*(column.tolist() for column in columns.values()), strict=True):
+            stream.write(",".join(map(repr, row)) + "\n")
 
 
 def write_parquet(file: str, columns: dict[str, np.ndarray]) -> None:

@@ -54,9 +54,6 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
             continue
         prim = UsdGeom.Xform.Define(stage, f"/flight/{name}")
         _animate(prim, [clock.code(t) for t in times_ns.tolist()], positions, attitudes)
-        if times_ns[0] > record.times_ns[0]:
-            _show(prim, False, 0.0)
-            _show(prim, True, clock.code(int(times_ns[0])))
         steps = tracks.mesh_steps(mesh)
         if steps is not None:
             _draw_mesh(stage, prim, style.STYLES[mesh], steps, clock)

@@ -33,16 +33,6 @@ def scalar_columns(values: np.ndarray) -> Any:
     return rr.Scalars.columns(scalars=np.ascontiguousarray(values).ravel()).partition([values.shape[1]] * len(values))
 
 
-def drawn_mesh(surface: DrawnMesh, colour: tuple[int, ...]) -> rr.Mesh3D:
-    """The surface in one colour."""
-    return rr.Mesh3D(
-        vertex_positions=surface.vertices,
-        triangle_indices=surface.triangles,
-        vertex_normals=surface.normals,
-        albedo_factor=colour,
-    )
-
-
 def mesh_entity(name: str, number: int) -> str:
     """Where the run's mesh of a part with this number, from 1, is logged: a static mesh can't be replaced."""
     return name if number == 1 else f"{name}_{number}"
@@ -105,7 +95,13 @@ class RerunBackend(Backend):
             entity, own = mesh_entity(name, number + 1), style.STYLES[name]
             if number:
                 stream.send(entity, time_columns(np.zeros(1, np.int64), self._clock[1][:1]), _nowhere())
-            stream.log_static(entity, drawn_mesh(surface, (*own.colours[0], round(255 * own.opacity))))
+            drawn = rr.Mesh3D(
+                vertex_positions=surface.vertices,
+                triangle_indices=surface.triangles,
+                vertex_normals=surface.normals,
+                albedo_factor=(*own.colours[0], round(255 * own.opacity)),
+            )
+            stream.log_static(entity, drawn)
 
     def place(
         self,

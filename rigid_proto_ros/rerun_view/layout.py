@@ -102,7 +102,13 @@ def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
     """The views of a flight that goes on, or of one that is finished: those that have something to show."""
     flight = _body_view(subject)
     if finished is None or finished.commanded:
-        flight = rrb.Vertical(flight, _command_view(), row_shares=[5, 1])
+        commands = rrb.TextLogView(
+            origin="/",
+            contents=[f"/{e.EVENTS}", f"/{e.REFUSALS}", f"/{e.ACCURACY}"],
+            name="Commands",
+            columns=rrb.TextLogColumns(timeline_columns=[e.SIM_TIME], text_log_columns=["loglevel", "body"]),
+        )
+        flight = rrb.Vertical(flight, commands, row_shares=[5, 1])
     turns_freely = subject.ghost or not (subject.dropped_term or subject.tied or subject.falls)
     poinsot = [_poinsot_view()] if turns_freely else []
     plots = [_plot(name, finished) for name in subject.plots if finished is None or name in finished.plotted]
@@ -155,7 +161,7 @@ def _plot(name: str, finished: Finished | None) -> Any:
         name=TITLES[name],
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=len(style.SERIES[name]) > 1),
         axis_x=rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=boundary.cursor_relative(seconds=room_s))),
-        time_ranges=_up_to_cursor(boundary.infinite()),
+        time_ranges=_last_seconds(),
         axis_y=None if ends is None else rrb.ScalarAxis(range=ends),
     )
 
@@ -173,50 +179,35 @@ def _body_view(subject: Subject) -> Any:
     overrides: dict[Any, Any] = {"/" + name: rrb.EntityBehavior(visible=False) for name in hidden}
     overrides["/" + style.TRAIL] = _last_seconds(TRAIL_SECONDS)
     overrides["/" + style.COM_TRAIL] = _last_seconds(FAR_SECONDS if subject.falls else TRAIL_SECONDS)
-    return rrb.Spatial3DView(
-        origin="/" + style.CENTRE,
-        contents=f"/{style.WORLD}/**",
-        name="Motion",
-        line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=_orbital(subject.reach * eye, subject.reach * target),
-        overrides=overrides,
-    )
+    return _view(style.CENTRE, f"/{style.WORLD}/**", "Motion", subject.reach * eye, subject.reach * target, overrides)
 
 
 def _poinsot_view() -> Any:
     """The ellipsoid of inertia rolling on the invariable plane."""
+    name = "Poinsot: the inertia ellipsoid rolls on the invariable plane"
+    overrides = {"/" + style.POINSOT_HERPOLHODE: _last_seconds(HERPOLHODE_SECONDS)}
+    eye, target = np.array([2.8, -2.25, 1.1]), np.array([0.0, 0.0, -0.45])
+    return _view(style.POINSOT, "$origin/**", name, eye, target, overrides)
+
+
+def _view(origin: str, contents: str, name: str, eye: np.ndarray, target: np.ndarray, overrides: dict[Any, Any]) -> Any:
     return rrb.Spatial3DView(
-        origin="/" + style.POINSOT,
-        contents="$origin/**",
-        name="Poinsot: the inertia ellipsoid rolls on the invariable plane",
+        origin="/" + origin,
+        contents=contents,
+        name=name,
         line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=_orbital(np.array([2.8, -2.25, 1.1]), np.array([0.0, 0.0, -0.45])),
-        overrides={"/" + style.POINSOT_HERPOLHODE: _last_seconds(HERPOLHODE_SECONDS)},
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=eye, look_target=target, eye_up=[0.0, 0.0, 1.0]
+        ),
+        overrides=overrides,
     )
 
 
-def _command_view() -> Any:
-    """Commands as applied and refusals, by simulated time."""
-    return rrb.TextLogView(
-        origin="/",
-        contents=[f"/{e.EVENTS}", f"/{e.REFUSALS}", f"/{e.ACCURACY}"],
-        name="Commands",
-        columns=rrb.TextLogColumns(timeline_columns=[e.SIM_TIME], text_log_columns=["loglevel", "body"]),
-    )
-
-
-def _orbital(position: np.ndarray, target: np.ndarray) -> Any:
-    return rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=position, look_target=target, eye_up=[0.0, 0.0, 1.0])
-
-
-def _last_seconds(seconds: float) -> Any:
-    """Shows what was logged in the last seconds before the cursor."""
-    return _up_to_cursor(rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds))
-
-
-def _up_to_cursor(start: Any) -> Any:
-    """What was logged from ``start`` to the cursor, on either timeline."""
-    end = rrb.TimeRangeBoundary.cursor_relative()
+def _last_seconds(seconds: float | None = None) -> Any:
+    """Shows what was logged in the last seconds before the cursor, or all before it, on either timeline."""
+    boundary = rrb.TimeRangeBoundary
+    start = boundary.infinite() if seconds is None else boundary.cursor_relative(seconds=-seconds)
+    end = boundary.cursor_relative()
     return rrb.VisibleTimeRanges(
         [rrb.VisibleTimeRange(timeline, start=start, end=end) for timeline in (e.SIM_TIME, e.ROS_TIME)]
     )

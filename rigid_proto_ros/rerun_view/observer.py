@@ -17,6 +17,7 @@ import time
 import uuid
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -40,10 +41,12 @@ from ..simulation.observer import (
     Started,
     StringChanged,
 )
-from . import viewers
 from .ports import serve_on_port
 from .streams import FileStream, LiveServer, LiveStream, Stream, end_without_waiting, forget_closed_recordings
 from .writer import SceneWriter
+
+if TYPE_CHECKING:
+    from .viewers import ViewerProcess
 
 VIEWERS = ("none", "web", "native", "serve")
 
@@ -105,7 +108,7 @@ class RerunObserver(Observer):
         self._mailbox = Mailbox(lambda: self._lost("recording stopped: nothing can be written to the disk any more"))
         self._path: Path | None = None
         self._server: LiveServer | None = None
-        self._viewer: viewers.ViewerProcess | None = None
+        self._viewer: ViewerProcess | None = None
         self._flushing_since_s: float | None = None
         self._thread = threading.Thread(target=self._flush_until_closed, name="rerun", daemon=True)
         try:
@@ -130,6 +133,8 @@ class RerunObserver(Observer):
         self._thread.start()
 
     def _open_viewer(self, viewer: str, web_port: int | None) -> None:
+        from . import viewers
+
         try:
             if viewer == "web":
                 self._viewer, self.web_address = serve_on_port(

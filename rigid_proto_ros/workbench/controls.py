@@ -100,12 +100,7 @@ class Controls:
             return {name: numbers[0] if parameter_named(name).type == "double" else numbers}
 
         def shown(values: Values) -> object:
-            # "1.50" means what is in force, so it may stay as it was typed.
-            value: Any = values[name]
-            mine: Any = changes(handle.value)
-            if mine is not None and np.array_equal(mine[name], value):
-                return handle.value
-            return " ".join(f"{x:.9g}" for x in np.broadcast_to(value, length))
+            return " ".join(f"{x:.9g}" for x in np.broadcast_to(values[name], length))
 
         return self.bind(handle, shown, changes, TYPING_S, parameter_named(name).accepted)
 

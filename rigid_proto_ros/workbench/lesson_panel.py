@@ -18,9 +18,6 @@ from .readouts import Readings, html_table
 
 FREE = "– (no lesson)"
 
-COMPARED = "true_or_box_tensor"
-"""The lesson that shows a body and its ghost."""
-
 NUMBERS_S = 0.2
 """[s] How often the numbers are written anew."""
 
@@ -57,10 +54,6 @@ class LessonPanel:
             self._numbers = gui.add_html("")
             self._script = gui.add_button("Do it with exact forces", visible=False, hint="Runs the lesson's script")
             self._again = gui.add_button("Begin again", visible=False, hint="The lesson from its start")
-            self._compare = gui.add_button(
-                "True tensor against its box's",
-                hint="An L-bracket and its ghost, started alike: one with its own tensor, one with its bounding box's",
-            )
             # Here, for class mode hides the other tabs.
             self._class: Any = gui.add_checkbox("Class mode", False, hint="In large letters; F11 fills the screen")
             gui.add_html(SPACE)
@@ -70,11 +63,6 @@ class LessonPanel:
         async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
                 await self.begin()
-
-        @self._compare.on_click
-        async def _(_: viser.GuiEvent[Any]) -> None:
-            if self.name(COMPARED) and self.lesson is not None:
-                await self._fly(self.lesson, "", False)
 
         @self._script.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
@@ -108,13 +96,9 @@ class LessonPanel:
         lesson = self.lesson
         return NO_LESSON if lesson is None else COURSES.get(lesson.name, NO_LESSON)
 
-    def name(self, name: str) -> bool:
-        """Choose the lesson of a bundled scene; whether there is one of this name."""
-        title = next((title for title, lesson in self._lessons.items() if lesson.name == name), None)
-        if title is None:
-            return False
-        self._choice.value = title
-        return True
+    def name(self, name: str) -> None:
+        """Choose the lesson of a bundled scene."""
+        self._choice.value = next(title for title, lesson in self._lessons.items() if lesson.name == name)
 
     def leave(self) -> None:
         """Another body flies: no lesson."""
@@ -132,7 +116,7 @@ class LessonPanel:
 
     def _show_buttons(self) -> None:
         lesson, alone = self.lesson, bool(self._class.value)
-        self._choice.visible = self._compare.visible = not alone
+        self._choice.visible = not alone
         self._script.visible = lesson is not None and bool(lesson.script) and not alone
         self._again.visible = lesson is not None and not alone
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Awaitable, Callable
 from typing import Any
 
 import viser
@@ -38,23 +37,27 @@ class TimeBar:
 
         @play.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
-            await {STEP: self.step, RESET: self.reset}.get(play.value, self.play_or_pause)()
+            if play.value == RESET:
+                flight.reset()
+            elif play.value == STEP:
+                flight.look_at_present()
+                if flight.paused:
+                    flight.step()
+                else:
+                    flight.pause(True)
+            else:
+                await self.play_or_pause()
 
         def shown(values: Any) -> str:
             return next((name for name, f in SPEEDS.items() if f == values["real_time_factor"]), self.speed.value)
 
         controls.bind(self.speed, shown, lambda name: {"real_time_factor": SPEEDS[name]})
-        # Browsers send no key that is typed into an input. Letters W A S D Q E move viser's camera.
-        keys: tuple[tuple[Any, str, Callable[[], Awaitable[None]]], ...] = (
-            ("space", "Pause or resume; after rewinding, continue from there", self.play_or_pause),
-            ("arrowright", "One step; pauses first", self.step),
-            ("R", "Reset", self.reset),
-        )
-        for hotkey, does, act in keys:
+        does = "Pause or resume; after rewinding, continue from there"
 
-            @gui.add_command(does, hotkey=hotkey).on_trigger
-            async def _(_: Any, act: Callable[[], Awaitable[None]] = act) -> None:
-                await act()
+        # Browsers send no key that is typed into an input.
+        @gui.add_command(does, hotkey="space").on_trigger
+        async def _(_: Any) -> None:
+            await self.play_or_pause()
 
     async def play_or_pause(self) -> None:
         """Pause or go on; from the past that is looked at, go on from there."""
@@ -62,18 +65,6 @@ class TimeBar:
             await self._flight.go_on_from_here()
         else:
             self._flight.pause(not self._flight.paused)
-
-    async def step(self) -> None:
-        """One publication period on; pauses first."""
-        self._flight.look_at_present()
-        if self._flight.paused:
-            self._flight.step()
-        else:
-            self._flight.pause(True)
-
-    async def reset(self) -> None:
-        """Time 0."""
-        self._flight.reset()
 
     def show(self, time_s: float, what: str) -> None:
         """The time that is shown, and what the body is doing."""

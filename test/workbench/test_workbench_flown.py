@@ -227,9 +227,8 @@ def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -
     ]
 
 
-@pytest.mark.parametrize(
-    ("values", "motion", "words"),
-    [
+def test_the_status_line_says_in_plain_words_what_the_body_does() -> None:
+    for values, motion, words in (
         ({}, (0, False, False, False), "free rotation, exact"),
         ({}, (2, True, False, False), "2 forces act"),
         ({}, (0, True, False, False), "string attached"),
@@ -237,10 +236,8 @@ def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -
         ({}, (0, False, True, False), "at rest"),
         ({"gravity": [0.0, 0.0, -9.81]}, (0, False, False, False), "free fall"),
         ({"gyroscopic": False, "integrator": "rk4"}, (0, False, False, False), "free rotation, without ω × Iω"),
-    ],
-)
-def test_the_status_line_says_in_plain_words_what_the_body_does(values, motion, words) -> None:
-    assert motion_words(make_scenario(values), *motion) == words
+    ):
+        assert motion_words(make_scenario(values), *motion) == words
 
 
 def test_a_pushed_body_shows_the_force_and_at_most_three_labels(flown: FlownPage) -> None:

@@ -19,7 +19,6 @@ from workbench_page import CHROMIUM, FLAGS, NO_CHROMIUM, Browser, Flown, chromiu
 
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
-from rigid_proto_ros.scene.parameters import PARAMETERS
 from rigid_proto_ros.workbench.flight import COMPILING
 
 pytestmark = [pytest.mark.drawn, pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)]
@@ -162,36 +161,32 @@ def test_a_drag_beside_the_body_turns_the_camera_and_touches_nothing(page) -> No
     assert len(commands(page)) == logged and not np.any(page.flown.live.state.position)
 
 
-@pytest.mark.parametrize(("width", "height"), [(1400, 800), (800, 360), (768, 1024), (390, 844)])
-def test_body_and_controls_of_time_are_in_sight_in_windows_of_every_size(page, width: int, height: int) -> None:
-    page.page.set_viewport_size({"width": width, "height": height})
-    page.drawn(3)
-    for name in ("Pause", "Step", "Reset"):
-        box = page.page.locator("button:visible", has_text=name).first.bounding_box()
-        assert box["x"] >= 0.0 and box["x"] + box["width"] <= width, name
-        assert box["y"] >= 0.0 and box["y"] + box["height"] <= height, name
-    tabs = [tab.bounding_box() for tab in page.page.get_by_role("tab").all()]
-    assert len({round(tab["y"]) for tab in tabs}) == 1, "tabs on two lines"
-    assert max(tab["x"] + tab["width"] for tab in tabs) <= width
-    box, (x, y) = page.canvas, com_pixel(page)
-    assert box["width"] * box["height"] > 0.45 * width * height
-    assert box["x"] < x < box["x"] + box["width"] and box["y"] < y < box["y"] + box["height"]
-    # Nothing of the panel lies over the body.
-    assert page.page.evaluate("([x, y]) => document.elementFromPoint(x, y).tagName", [x, y]) == "CANVAS"
-    # What is waited for, and for how long, is to be read whole.
-    page.flown.page.announcements.busy(COMPILING)
-    page.until(lambda: f"{COMPILING} … 1 s" in page.text, "word of what is waited for")
-    cut = page.page.locator(".rp-bar").first.evaluate("bar => bar.scrollWidth - bar.clientWidth")
-    page.flown.page.announcements.busy("")
-    assert cut <= 0
-
-
-def test_a_string_is_seen_whole_on_a_telephone(page) -> None:
-    page.page.set_viewport_size({"width": 390, "height": 844})
+def test_body_string_and_controls_of_time_are_in_sight_in_windows_of_every_size(page) -> None:
     fly(page, lesson("top_on_string").path.read_text("utf-8"))
     page.flown.live.pause(True)
+    for width, height in ((1400, 800), (800, 360), (768, 1024), (390, 844)):
+        page.page.set_viewport_size({"width": width, "height": height})
+        page.drawn(3)
+        for name in ("Play", "Step", "Reset"):
+            box = page.page.locator("button:visible", has_text=name).first.bounding_box()
+            assert box["x"] >= 0.0 and box["x"] + box["width"] <= width, name
+            assert box["y"] >= 0.0 and box["y"] + box["height"] <= height, name
+        tabs = [tab.bounding_box() for tab in page.page.get_by_role("tab").all()]
+        assert len({round(tab["y"]) for tab in tabs}) == 1, "tabs on two lines"
+        assert max(tab["x"] + tab["width"] for tab in tabs) <= width
+        box, (x, y) = page.canvas, com_pixel(page)
+        assert box["width"] * box["height"] > 0.45 * width * height
+        assert box["x"] < x < box["x"] + box["width"] and box["y"] < y < box["y"] + box["height"]
+        # Nothing of the panel lies over the body.
+        assert page.page.evaluate("([x, y]) => document.elementFromPoint(x, y).tagName", [x, y]) == "CANVAS"
+        # What is waited for, and for how long, is to be read whole.
+        page.flown.page.announcements.busy(COMPILING)
+        page.until(lambda: f"{COMPILING} … 1 s" in page.text, "word of what is waited for")
+        cut = page.page.locator(".rp-bar").first.evaluate("bar => bar.scrollWidth - bar.clientWidth")
+        page.flown.page.announcements.busy("")
+        assert cut <= 0
+    # On a telephone, too, the string is seen whole.
     string = page.until(lambda: page.flown.node(style.STRING), "string")
-    page.drawn()
     picture, ends = page.look(), page.pixel(string.points[0])
     places = np.round(np.linspace(*ends, 50)[2:-8]).astype(int)
     seen = [picture[y - 2 : y + 3, x - 2 : x + 3] for x, y in places]
@@ -244,50 +239,15 @@ def test_plots_show_their_curves_also_after_a_lesson_was_begun(page) -> None:
         )
 
 
-def test_a_second_workbench_on_this_machine_has_a_port_and_a_name_of_its_own(page, browser) -> None:
-    other = Flown("book")
-    try:
-        assert other.workbench.address != page.flown.workbench.address
-        second = Browser(browser, other, (600, 400))
-        try:
-            # Only who serves on the usual port is called without it.
-            for each in (page, second):
-                port = each.flown.workbench.address.rpartition(":")[2]
-                moved = int(port) != PARAMETERS["workbench_port"].default
-                assert (f":{port}" in each.page.title()) == (f":{port}" in each.text) == moved
-            assert second.page.title() != page.page.title()
-        finally:
-            second.page.close()
-    finally:
-        other.end()
-
-
 OPEN_BOX = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n"
 """A tetrahedron without its largest face."""
 CLOSED = "mtllib none.mtl\nusemtl red\n" + OPEN_BOX + "f 2 3 4\n"
 
 
-def test_an_upload_is_judged_beside_no_word_of_success_and_flies_upright(page, tmp_path) -> None:
+def test_an_open_mesh_is_refused_and_from_a_closed_one_to_an_animation_it_takes_five_actions(page, tmp_path) -> None:
     page.page.set_viewport_size({"width": 900, "height": 500})
-    page.tab("Body")
     for name, text in (("open.obj", OPEN_BOX), ("closed.obj", CLOSED)):
         (tmp_path / name).write_text(text)
-    chooser = page.page.locator('input[type="file"]').first
-    chooser.set_input_files(tmp_path / "open.obj")
-    page.until(lambda: "refused: " in page.text, "refusal")
-    assert "successfully" not in page.text
-    assert not page.page.get_by_role("button", name="Simulate it", exact=True).is_visible()
-    chooser.set_input_files(tmp_path / "closed.obj")
-    page.until(lambda: page.page.get_by_role("button", name="Simulate it", exact=True).is_visible(), "question")
-    page.page.get_by_role("button", name="Simulate it", exact=True).click()
-    page.until(lambda: page.flown.live.scenario.parameters.mesh.endswith("closed.obj"), "uploaded body")
-    # The start is read before the reset that follows it: an .obj is y-up.
-    page.until(lambda: np.allclose(page.flown.live.state.rotation @ [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]), "upright start")
-
-
-def test_from_a_mesh_to_an_animation_it_takes_five_actions(page, tmp_path) -> None:
-    page.page.set_viewport_size({"width": 900, "height": 500})
-    (tmp_path / "closed.obj").write_text(CLOSED)
     actions = 0
 
     def act(do, *arguments) -> None:
@@ -296,8 +256,16 @@ def test_from_a_mesh_to_an_animation_it_takes_five_actions(page, tmp_path) -> No
         do(*arguments)
 
     act(page.tab, "Body")
-    act(page.page.locator('input[type="file"]').first.set_input_files, tmp_path / "closed.obj")
-    act(page.page.get_by_role("button", name="Simulate it", exact=True).click)
+    chooser = page.page.locator('input[type="file"]').first
+    simulate = page.page.get_by_role("button", name="Simulate it", exact=True)
+    chooser.set_input_files(tmp_path / "open.obj")
+    page.until(lambda: "refused: " in page.text, "refusal")
+    assert "successfully" not in page.text and not simulate.is_visible()
+    act(chooser.set_input_files, tmp_path / "closed.obj")
+    act(simulate.click)
+    page.until(lambda: page.flown.live.scenario.parameters.mesh.endswith("closed.obj"), "uploaded body")
+    # The start is read before the reset that follows it: an .obj is y-up.
+    page.until(lambda: np.allclose(page.flown.live.state.rotation @ [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]), "upright start")
     page.until(lambda: page.flown.live.state.time_ns > 5e8, "half a second of motion")
     act(page.tab, "Record")
     with page.page.expect_download() as download:
