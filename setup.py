@@ -81,7 +81,7 @@ setup(
     ],
     python_requires=">=3.11",
     # What inspect, simulate, replay and the page need: `uvx --from WHEEL rigid_proto workbench` works.
-    install_requires=["numpy>=1.26", "numba>=0.62", "PyYAML>=6.0", *MCAP, *WORKBENCH],
+    install_requires=["numpy>=1.26", "numba>=0.62", "PyYAML>=6.0", "trimesh>=4.4", *MCAP, *WORKBENCH],
     extras_require={
         "all": [*RERUN, *MCAP, *MESHES, *ROBOTS, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT],
         "ros": ROS,

@@ -41,7 +41,7 @@ CONDITIONS: dict[str, dict[str, str]] = {
 OTHER_KERNELS = ("generic-cpu", "opt-1")
 """Conditions under which kernels are compiled otherwise; all others share theirs."""
 
-NEEDS = ("PyYAML", "scipy")
+NEEDS = ("trimesh", "PyYAML", "scipy")
 OLDEST = {"3.11": ("numba==0.62.0", "numpy==1.26.0"), "3.13": ("numba==0.62.0", "numpy==2.1.0")}
 """By Python's version, the oldest of the range that setup.py states that there is for it."""
 

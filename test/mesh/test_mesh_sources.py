@@ -9,6 +9,7 @@ import pytest
 from judged_meshes import load, volume
 from mesh_files import (
     CUBE_QUADS,
+    CUBE_TRIANGLES,
     CUBE_VERTICES,
     Gltf,
     collada,
@@ -139,3 +140,33 @@ def test_no_traceback_and_no_raw_bytes_in_a_message(tmp_path, capsys, name, data
     assert main(["inspect", str(tmp_path / name)]) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and all(c.isprintable() or c == "\n" for c in err)
+
+
+def xaml(matrix: str) -> bytes:
+    points = " ".join(f"{x},{y},{z}" for x, y, z in CUBE_VERTICES)
+    corners = " ".join(str(i) for i in CUBE_TRIANGLES.ravel())
+    return (
+        '<ModelVisual3D xmlns="http://schemas.microsoft.com/winfx/2006/xaml/presentation"><ModelVisual3D.Transform>'
+        f'<MatrixTransform3D Matrix="{matrix}"/></ModelVisual3D.Transform><ModelVisual3D.Content><GeometryModel3D>'
+        f'<GeometryModel3D.Geometry><MeshGeometry3D Positions="{points}" Normals="{points}" TriangleIndices="{corners}"/>'
+        "</GeometryModel3D.Geometry></GeometryModel3D></ModelVisual3D.Content></ModelVisual3D>"
+    ).encode()
+
+
+def test_a_format_without_a_reader_here_is_read_by_trimesh(tmp_path):
+    pytest.importorskip("lxml")
+    path = tmp_path / "a.xaml"
+    path.write_bytes(xaml("2 0 0 0 0 2 0 0 0 0 2 0 5 6 7 1"))
+    mesh = load_mesh(str(path))
+    assert mesh.vertices.tolist() == (2.0 * CUBE_VERTICES + [5.0, 6.0, 7.0]).tolist()
+    assert volume(load_mesh(str(path))) == 8.0
+    path.write_bytes(b"<a/>")
+    with pytest.raises(MeshError, match=r"a\.xaml"):
+        load_mesh(str(path))
+
+
+def test_what_is_no_surface_to_trimesh_is_refused(tmp_path):
+    path = tmp_path / "points.xyz"
+    path.write_text("0 0 0\n1 0 0\n0 1 0\n0 0 1\n")
+    with pytest.raises(MeshError, match="PointCloud"):
+        load_mesh(str(path))
