@@ -198,10 +198,6 @@ class Load(NamedTuple):
 
     def check_magnitude(self, body: Body) -> None:
         """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION."""
-        x, y, z = self.mesh_point or _ORIGIN
-        # Of what isn't finite this doesn't hold.
-        if sum(map(abs, (*self.force, *self.torque))) * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light:
-            return
         row = self.row
         if not is_within_magnitude(row, body.row):
             linear, angular = magnitudes(row, body.row)
@@ -224,6 +220,23 @@ def load_of_bytes(row: bytes) -> Load:
     point, force, torque, normal = (vector(numbers[k : k + 3]) for k in range(0, 12, 3))
     named = _AXES[int(axes)]
     return Load(named, point if has_point else None, force, torque, normal if named == "normal" else None)
+
+
+def light_row(frame: Frame, force: Numbers, torque: Numbers, body: Body) -> bytes:
+    """The row of a load that is nothing but its numbers, as most are: on a point given as such, in world or body axes,
+    and far from too strong. Empty for any other: ``resolve_load`` says what it is, or what is wrong with it.
+    """
+    word, axes = frame.point[0], frame.axes
+    if axes == "normal" or word not in ("com", "point"):
+        return b""
+    fx, fy, fz = force
+    tx, ty, tz = torque
+    x, y, z = frame.point[1] if word == "point" else _ORIGIN
+    amount = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz)
+    # Of what isn't finite this doesn't hold.
+    if amount * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light:
+        return _ROW.pack(_AXES_NUMBERS[axes], word == "point", x, y, z, fx, fy, fz, tx, ty, tz, 0.0, 0.0, 0.0)
+    return b""
 
 
 def resolve_load(

@@ -17,7 +17,7 @@ from ..motion.integrators.integrator import (
     STRING,
     needs_of_load,
 )
-from ..motion.loads import Load, resolve_load
+from ..motion.loads import Load, light_row, resolve_load
 from ..motion.state import State
 from ..motion.string import most_yielding
 from .commands import Command, MoveString, ThrusterCommand, WrenchCommand
@@ -54,8 +54,13 @@ def check_thrust(forces: tuple[float, ...], setup: Setup) -> None:
 
 def load_row(command: WrenchCommand, setup: Setup, state: State | None) -> bytes:
     """The row of the command's load; raises CommandRefused where body or integrator can't take it."""
-    load = resolve_load(command.frame, command.force, command.torque, setup.body, setup.surface, setup.contacts, state)
-    load.check_magnitude(setup.body)
+    frame, force, torque, body = command.frame, command.force, command.torque, setup.body
+    if setup.integrator.supports_loads or frame.impulse:
+        row = light_row(frame, force, torque, body)
+        if row:
+            return row
+    load = resolve_load(frame, force, torque, body, setup.surface, setup.contacts, state)
+    load.check_magnitude(body)
     check_load_supported(command, load, setup)
     return load.packed
 

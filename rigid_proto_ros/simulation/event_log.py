@@ -30,7 +30,7 @@ class EventLog:
         """Start a new chain."""
         self.count = 0
         self._hash = hashlib.sha256()
-        self._noted: list[tuple[int, Command]] = []
+        self._noted: list[tuple[int, Command | tuple[str, dict[str, Any]]]] = []
 
     @property
     def sha256(self) -> str:
@@ -45,17 +45,18 @@ class EventLog:
         line = self._chain(time_ns, kind, content)
         return f'{line[:-1]}, "sha256": "{self._hash.hexdigest()}"}}'
 
-    def note(self, time_ns: int, command: Command) -> None:
-        """Add a command that has acted, whose line nobody wants now."""
-        self._noted.append((time_ns, command))
+    def note(self, time_ns: int, event: Command | tuple[str, dict[str, Any]]) -> None:
+        """Add an event whose line nobody wants now: a command that has acted, or kind and content of another one."""
+        self._noted.append((time_ns, event))
         self.count += 1
         if len(self._noted) >= MOST_NOTED:
             self._chain_noted()
 
     def _chain_noted(self) -> None:
         noted, self._noted = self._noted, []
-        for time_ns, command in noted:
-            self._chain(time_ns, command.kind, command.content)
+        for time_ns, event in noted:
+            kind, content = event if isinstance(event, tuple) else (event.kind, event.content)
+            self._chain(time_ns, kind, content)
 
     def _chain(self, time_ns: int, kind: str, content: Mapping[str, Any]) -> str:
         line = json.dumps({"time_ns": time_ns, "kind": kind, "content": content})

@@ -146,9 +146,10 @@ class Simulation(Observables):
 
     def log(self, kind: str, content: dict[str, Any]) -> None:
         """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever causes it."""
-        line = self.events.append(self.time_ns, kind, content)
         if self.observer.wants(Logged):
-            self.observer.on(Logged(self.time_ns, line))
+            self.observer.on(Logged(self.time_ns, self.events.append(self.time_ns, kind, content)))
+        else:
+            self.events.note(self.time_ns, (kind, content))
 
     # The way of a command
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a load may be: finite, and far from leaving no digits; a rough bound passes those that are light."""
+"""What a load may be: finite, and far from leaving no digits; the short way for light ones gives what the long one does."""
 
 import math
 
@@ -9,10 +9,11 @@ from flights import flight, wrench
 
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.loads import Load, is_within_magnitude
+from rigid_proto_ros.motion.frames import parse_frame
+from rigid_proto_ros.motion.loads import light_row, resolve_load
 
 
-def test_none_that_is_too_strong_for_its_body_is_light() -> None:
+def test_a_light_load_is_resolved_as_any_other_and_none_too_strong_is_light() -> None:
     rng = np.random.default_rng(1)
     light = 0
     for _ in range(1000):
@@ -20,15 +21,14 @@ def test_none_that_is_too_strong_for_its_body_is_light() -> None:
         moments = mass * size[0] ** 2 * np.array([1.0, 1.5, 2.0])
         body = make_body(mass, rng.normal(size=3) * size[1], np.diag(moments), rng.choice([-1.0, 1.0], 3) * size[1:])
         numbers = (10.0 ** rng.uniform(-5, 18) * rng.normal(size=6)).tolist()
-        load = Load(rng.choice(["world", "body"]), (0.1, -0.2, 3e5), tuple(numbers[:3]), tuple(numbers[3:]))
-        try:
-            load.check_magnitude(body)
+        frame = parse_frame(f"{rng.choice(['world', 'body'])}@{rng.choice(['com', 'point/0.1,-0.2,3e5'])}")
+        row = light_row(frame, numbers[:3], numbers[3:], body)
+        if row:
             light += 1
-        except CommandRefused:
-            pass
-        else:
-            assert is_within_magnitude(load.row, body.row)
-    assert 200 < light < 1000
+            load = resolve_load(frame, numbers[:3], numbers[3:], body, None, {}, None)
+            load.check_magnitude(body)
+            assert row == load.packed
+    assert light > 200
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
