@@ -3,7 +3,7 @@
 """Truth for an attitude filter: ~/imu has angular rate and specific force with errors, and the true attitude.
 
 A book swings on a string. Start the node first, with a biased gyroscope:
-rigid_body_node --ros-args --params-file config/plumb_line.yaml -p noise.gyroscope:="[0.001, 0.0, 0.02]"
+rigid_body_node --ros-args --params-file config/plumb_line.yaml -p noise.imu:="[0.001, 0.0, 0.02, 0.0]"
 """
 
 import numpy as np

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import settings
 from ros_domain import hold_domain
 
-settings.register_profile("the same examples every time", derandomize=True)
-settings.register_profile("new examples every time")
+settings.register_profile("the same examples every time", derandomize=True, deadline=None)
+settings.register_profile("new examples every time", deadline=None)
 settings.load_profile(f"{os.environ.get('RIGID_PROTO_EXAMPLES', 'the same')} examples every time")
 
 NEEDED = {"rerun": ["cli/test_demo.py", "rerun_view/test_*.py"]}

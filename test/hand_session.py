@@ -8,7 +8,7 @@ from flights import EventLines
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.scene.command_codec import string_attach, string_target
+from rigid_proto_ros.scene.command_codec import of_event
 from rigid_proto_ros.scene.scenario import check_inertia, make_scenario, mesh_sha256_of
 from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, ReleaseString, WrenchCommand
@@ -57,11 +57,11 @@ class HandSession:
 
     def tie(self, frame_id: str, point) -> None:
         """A message of ~/string/attach."""
-        self._submit(string_attach(frame_id, tuple(map(float, point))))
+        self._submit(of_event("string_attach", {"frame_id": frame_id, "point": point}))
 
     def pull(self, point) -> None:
         """A message of ~/string/target."""
-        self._submit(string_target("world", tuple(map(float, point))))
+        self._submit(of_event("string_target", {"frame_id": "world", "point": point}))
 
     def release(self) -> None:
         self._submit(ReleaseString())

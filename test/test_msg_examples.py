@@ -114,8 +114,8 @@ def test_a_recording_verifies_and_is_converted_and_continued(environment, tmp_pa
 
 def test_a_filter_is_compared_with_the_truth(environment, tmp_path) -> None:
     pytest.importorskip("rclpy")
-    bias = {"noise.gyroscope": [0.001, 0.0, 0.02], "real_time_factor": 10.0}
-    assert 'noise.gyroscope:="[0.001, 0.0, 0.02]"' in EXAMPLES[9].read_text("utf-8")
+    bias = {"noise.imu": [0.001, 0.0, 0.02, 0.0], "real_time_factor": 10.0}
+    assert 'noise.imu:="[0.001, 0.0, 0.02, 0.0]"' in EXAMPLES[9].read_text("utf-8")
     node = NodeProcess(environment, tmp_path / "node", bias, "--params-file", scene_path("plumb_line"))
     try:
         node.wait_for("is simulating")

@@ -265,13 +265,13 @@ def test_message_to_publish_is_accepted_and_moves_the_t_handle(command: str, top
 
 def _submit(run: OfflineRun, topic: str, message) -> None:
     from rigid_proto_ros.motion.frames import parse_frame
-    from rigid_proto_ros.scene.command_codec import string_target
+    from rigid_proto_ros.scene.command_codec import of_event
     from rigid_proto_ros.simulation.commands import WrenchCommand
 
     simulation, frame_id = run.simulation, message.header.frame_id
     if topic == "string/target":
         point = message.point
-        simulation.submit(string_target(frame_id, (point.x, point.y, point.z)))
+        simulation.submit(of_event("string_target", {"frame_id": frame_id, "point": (point.x, point.y, point.z)}))
         return
     frame = parse_frame(frame_id)
     force, torque = ((v.x, v.y, v.z) for v in (message.wrench.force, message.wrench.torque))

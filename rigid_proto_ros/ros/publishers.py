@@ -147,16 +147,16 @@ class StatePublisher:
         row = self._with_noise("odom", time_ns, row)
         twist = (*rotate(-row[3], -row[4], -row[5], row[6], *row[7:10]), *row[10:13])
         covariances = (
-            self._covariance(POSITION, ORIENTATION, time_ns),
-            self._covariance(LINEAR_VELOCITY, ANGULAR_VELOCITY, time_ns),
+            self._covariance(POSITION, ORIENTATION),
+            self._covariance(LINEAR_VELOCITY, ANGULAR_VELOCITY),
         )
         return cdr.odometry(self._stamp_ns(time_ns), self._frames, row[:7], twist, covariances)
 
-    def _covariance(self, linear: int, angular: int, time_ns: int) -> Sequence[float]:
+    def _covariance(self, linear: int, angular: int) -> Sequence[float]:
         """Of a pose or twist (36,), from the variances of two sensors."""
         if self._noise is None:
             return cdr.NO_COVARIANCE
-        variances = [self._noise.variance(sensor, time_ns) for sensor in (linear, angular)]
+        variances = [self._noise.variance(sensor) for sensor in (linear, angular)]
         return np.diag(np.repeat(variances, 3)).ravel().tolist()
 
     def _imu_message(self, time_ns: int, row: list[float]) -> Imu:
@@ -169,9 +169,9 @@ class StatePublisher:
         noise, turns, force = self._noise, row[10:13], self._specific_force().tolist()
         if noise is not None:
             turns, force = noise.imu(time_ns, turns, force)
-            message.orientation_covariance = _isotropic(noise.variance(ORIENTATION, time_ns))
-            message.angular_velocity_covariance = _isotropic(noise.variance(GYROSCOPE, time_ns))
-            message.linear_acceleration_covariance = _isotropic(noise.variance(ACCELEROMETER, time_ns))
+            message.orientation_covariance = _isotropic(noise.variance(ORIENTATION))
+            message.angular_velocity_covariance = _isotropic(noise.variance(GYROSCOPE))
+            message.linear_acceleration_covariance = _isotropic(noise.variance(ACCELEROMETER))
         rate.x, rate.y, rate.z = turns
         felt.x, felt.y, felt.z = force
         return message

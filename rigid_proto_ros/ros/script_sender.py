@@ -20,7 +20,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ..base.errors import InputError
-from ..scene.command_codec import outgoing, topic_of
+from ..scene.command_codec import TOPICS, outgoing
 from ..scene.parameters import PARAMETERS
 from ..scene.script import with_contacts
 from ..simulation.commands import Command, TieString, nanoseconds
@@ -131,7 +131,7 @@ class ScriptSender(Node):
             self._topics[message.topic].publish(message.data)
             number += len(message.commands)
             for command in message.commands:
-                sent[topic_of(command)] += 1
+                sent[TOPICS.get(command.kind, "schedule")] += 1
         self._confirm(len(script))
         if paused:
             self._call(self._pause_client, SetBool.Request(data=False))

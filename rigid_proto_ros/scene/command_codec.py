@@ -12,13 +12,12 @@ entry can say (``entry_of``).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Any
 
 from ..base.errors import CommandRefused, InputError
-from ..base.vectors import Vector, vector
+from ..base.vectors import vector
 from ..motion.frames import parse_frame
 from ..simulation.commands import (
     Change,
@@ -68,49 +67,20 @@ def frame_names(parameters: Parameters, node_name: str) -> Names:
     return world, body or node_name.rpartition("/")[2] or "rigid_body"
 
 
-# Read: each from its frame and numbers
+EVENT_KINDS = (
+    *("wrench", "poke", "string_target", "string_attach", "inertia", "thrusters", "state"),
+    *("set", "clear_wrench", "string_release"),
+)
+"""Events that a command is behind."""
 
-
-def load_command(
-    held: bool, frame_id: str, force: Vector, torque: Vector, names: Names = WORDS, **stamp: Any
-) -> WrenchCommand:
-    """A wrench (``held``) or poke; raises CommandRefused."""
-    return WrenchCommand(held, parse_frame(frame_id, *names), force, torque, frame_id, **stamp)
-
-
-def string_target(frame_id: str, point: Vector, names: Names = WORDS, **stamp: Any) -> MoveString:
-    """A target of the string; raises CommandRefused."""
-    if frame_id not in ("", "world", names[0]):
-        raise CommandRefused("frame", "frame_id", frame_id[:80], f"{names[0]}: the target is a point of the world")
-    return MoveString(point, frame_id, **stamp)
-
-
-def string_attach(frame_id: str, point: Vector, names: Names = WORDS, **stamp: Any) -> TieString:
-    """A knot of the string; raises CommandRefused."""
-    world, body = names
-    axes = {"": "world", "world": "world", world: "world", "body": "body", body: "body"}
-    axes |= {MESH_FRAME: "mesh", f"{body}/mesh": "mesh"}
-    if frame_id not in axes:
-        accepted = f"{world}, {body} (metres from the COM) or {body}/mesh (mesh coordinates)"
-        raise CommandRefused("frame", "frame_id", frame_id[:80], accepted)
-    return TieString(axes[frame_id], point, frame_id, **stamp)
-
-
-def inertia(frame_id: str, numbers: Sequence[float], names: Names = WORDS, **stamp: Any) -> Change:
-    """The whole inertia, from mass, com, ixx ixy ixz iyy iyz izz; raises CommandRefused."""
-    body = names[1]
-    axes = {"body": "body", body: "body", "": "mesh", MESH_FRAME: "mesh", f"{body}/mesh": "mesh"}
-    if frame_id not in axes:
-        raise CommandRefused("frame", "frame_id", frame_id[:80], f"{body}/mesh, or {body} (from the present COM)")
-    content = {
-        "stamp_ns": stamp.get("stamp_ns", 0),
-        "frame_id": frame_id,
-        "relative": axes[frame_id] == "body",
-        "mass": numbers[0],
-        "com": list(numbers[1:4]),
-        "tensor": list(numbers[4:]),
-    }
-    return Change(content, kind="inertia", **stamp)
+_FIELDS: dict[str, dict[str, int | slice]] = {
+    "wrench": {"force": slice(0, 3), "torque": slice(3, 6)},
+    "poke": {"force": slice(0, 3), "torque": slice(3, 6)},
+    "string_target": {"point": slice(0, 3)},
+    "string_attach": {"point": slice(0, 3)},
+    "inertia": {"mass": 0, "com": slice(1, 4), "tensor": slice(4, 10)},
+}
+"""Where the doubles of a message stand in the content of its event: ixx ixy ixz iyy iyz izz is the tensor."""
 
 
 def of_message(topic: str, data: bytes, names: Names = WORDS) -> Command:
@@ -119,31 +89,13 @@ def of_message(topic: str, data: bytes, names: Names = WORDS) -> Command:
     Raises ValueError for bytes that are no such message, CommandRefused for what no command says.
     """
     kind = _KINDS[topic]
+    fields = _FIELDS[kind]
     count = {"wrench": 6, "poke": 6, "inertia": 10}.get(kind, 3)
     seconds, nanoseconds, frame_id, numbers = cdr.read_stamped_doubles(data, count)
-    stamp_ns = whole_stamp(seconds, nanoseconds)
-    if count == 6:
-        return load_command(
-            kind == "wrench", frame_id, vector(numbers[:3]), vector(numbers[3:]), names, stamp_ns=stamp_ns
-        )
-    if kind == "inertia":
-        return inertia(frame_id, numbers, names, stamp_ns=stamp_ns)
-    read = string_target if kind == "string_target" else string_attach
-    return read(frame_id, vector(numbers), names, stamp_ns=stamp_ns)
-
-
-def whole_stamp(seconds: int, nanoseconds: int) -> int:
-    """A stamp [ns]; raises CommandRefused (``stamp``) unless the nanoseconds are less than a second."""
     if nanoseconds >= 1_000_000_000:
         raise CommandRefused("stamp", "header.stamp", f"{nanoseconds} nanosec", "nanosec below 1000000000")
-    return seconds * 1_000_000_000 + nanoseconds
-
-
-EVENT_KINDS = (
-    *("wrench", "poke", "string_target", "string_attach", "inertia", "thrusters", "state"),
-    *("set", "clear_wrench", "string_release"),
-)
-"""Events that a command is behind."""
+    content = {"stamp_ns": seconds * 1_000_000_000 + nanoseconds, "frame_id": frame_id}
+    return _command(kind, content | {name: numbers[place] for name, place in fields.items()}, names)
 
 
 def of_event(kind: str, content: Mapping, names: Names = WORDS) -> Command | None:
@@ -156,24 +108,18 @@ def of_event(kind: str, content: Mapping, names: Names = WORDS) -> Command | Non
         return None
     if kind not in EVENT_KINDS:
         raise InputError("kind", kind, ", ".join([*EVENT_KINDS, *MARKS]))
-    stamp_ns = content.get("stamp_ns", 0)
-    if type(stamp_ns) is not int:
-        raise InputError("stamp_ns", stamp_ns, "nanoseconds")
     try:
-        return _of_event(kind, content, names, stamp_ns)
+        return _command(kind, content, names)
     except CommandRefused:
         raise
     except (KeyError, TypeError, ValueError, AttributeError):
         raise InputError(kind, str(content)[:80], "the content of a recorded event") from None
 
 
-def _of_event(kind: str, content: Mapping, names: Names, stamp_ns: int) -> Command:
-    def numbers(key: str, count: int = 3) -> tuple[float, ...]:
-        found = tuple(map(float, content[key]))
-        if len(found) != count:
-            raise ValueError
-        return found
-
+def _command(kind: str, content: Mapping, names: Names) -> Command:
+    """The command of an event's content, which a message becomes before it is read; raises CommandRefused, and what
+    Python raises for content that is none.
+    """
     match kind:
         case "set":
             return Change(dict(content))
@@ -185,17 +131,41 @@ def _of_event(kind: str, content: Mapping, names: Names, stamp_ns: int) -> Comma
             return ThrusterCommand(tuple(map(float, content["forces"])))
         case "state":
             return SetState({name: tuple(map(float, values)) for name, values in content.items()})
-    frame_id = content["frame_id"]
-    if not isinstance(frame_id, str):
+    stamp_ns, frame_id, (world, body) = content.get("stamp_ns", 0), content["frame_id"], names
+    if type(stamp_ns) is not int or not isinstance(frame_id, str):
         raise TypeError
-    if kind == "inertia":
-        values = (float(content["mass"]), *numbers("com"), *numbers("tensor", 6))
-        return inertia(frame_id, values, names, stamp_ns=stamp_ns)
     if kind in ("wrench", "poke"):
-        force, torque = vector(numbers("force")), vector(numbers("torque"))
-        return load_command(kind == "wrench", frame_id, force, torque, names, stamp_ns=stamp_ns)
-    read = string_target if kind == "string_target" else string_attach
-    return read(frame_id, vector(numbers("point")), names, stamp_ns=stamp_ns)
+        frame = parse_frame(frame_id, world, body)
+        force, torque = vector(content["force"]), vector(content["torque"])
+        return WrenchCommand(kind == "wrench", frame, force, torque, frame_id, stamp_ns=stamp_ns)
+    in_world, in_body = dict.fromkeys(("world", world), "world"), dict.fromkeys(("body", body), "body")
+    in_mesh = dict.fromkeys((MESH_FRAME, f"{body}/mesh"), "mesh")
+    if kind == "string_target":
+        _axes(frame_id, {"": "world", **in_world}, f"{world}: the target is a point of the world")
+        return MoveString(vector(content["point"]), frame_id, stamp_ns=stamp_ns)
+    if kind == "string_attach":
+        accepted = f"{world}, {body} (metres from the COM) or {body}/mesh (mesh coordinates)"
+        axes = _axes(frame_id, {"": "world", **in_world, **in_body, **in_mesh}, accepted)
+        return TieString(axes, vector(content["point"]), frame_id, stamp_ns=stamp_ns)
+    axes = _axes(frame_id, {"": "mesh", **in_body, **in_mesh}, f"{body}/mesh, or {body} (from the present COM)")
+    tensor = list(map(float, content["tensor"]))
+    if len(tensor) != 6:
+        raise ValueError
+    whole = {
+        "stamp_ns": stamp_ns,
+        "frame_id": frame_id,
+        "relative": axes == "body",
+        "mass": float(content["mass"]),
+        "com": list(vector(content["com"])),
+        "tensor": tensor,
+    }
+    return Change(whole, kind="inertia", stamp_ns=stamp_ns)
+
+
+def _axes(frame_id: str, known: Mapping[str, str], accepted: str) -> str:
+    if frame_id not in known:
+        raise CommandRefused("frame", "frame_id", frame_id[:80], accepted)
+    return known[frame_id]
 
 
 # Written
@@ -213,11 +183,6 @@ def in_words(command: Command) -> Command:
         frame_id = "body" if command.content["relative"] else MESH_FRAME
         return replace(command, content={**command.content, "frame_id": frame_id})
     return command
-
-
-def topic_of(command: Command) -> str:
-    """The topic that carries a command, below the node's name."""
-    return TOPICS.get(command.kind, "schedule")
 
 
 def message(command: Command, stamp_ns: int) -> bytes:
@@ -334,6 +299,6 @@ def outgoing(script: list[Command], start_ns: int = 0, offset_ns: int = 0) -> It
             text = flow(entries, quoted=True)
             yield Outgoing("schedule", cdr.string(text), tuple(commands[: len(entries)]), time_ns)
         for command in commands[len(entries) :]:
-            topic = topic_of(command)
+            topic = TOPICS.get(command.kind, "schedule")
             stamp_ns = time_ns if topic == "schedule" else time_ns + offset_ns
             yield Outgoing(topic, message(command, stamp_ns), (command,), time_ns)

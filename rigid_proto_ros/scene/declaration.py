@@ -28,30 +28,6 @@ Value = bool | int | float | str | list[float]
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
 
 
-_PROFILES = "noise.gyroscope, accelerometer, position, orientation, linear_velocity and angular_velocity"
-GONE = {
-    "imu_noise.": _PROFILES,
-    "pose_noise.": _PROFILES,
-    "noise_seed": "noise.seed",
-    "step_until": "~/step_simulation, with a number of steps",
-    "step_periods": "~/step_simulation, with a number of steps",
-    "frames": "world_frame and body_frame",
-    "initial.flight": "replay --at T --as-scene writes a scene and a script",
-}
-"""Parameters of earlier versions, and what takes their place; a name ending in a dot is a prefix."""
-
-GONE_DEFAULTS = {"step_periods": 1, "frames": "own"}
-"""Of those among them whose default isn't empty or 0."""
-
-
-def instead_of(name: str) -> str:
-    """What takes the place of a parameter of an earlier version; empty for any other name."""
-    for gone, instead in GONE.items():
-        if name == gone or (gone.endswith(".") and name.startswith(gone)):
-            return instead
-    return ""
-
-
 @dataclass(frozen=True)
 class Parameter:
     """type: ``double``, ``doubles``, ``integer``, ``bool`` or ``string``, one of the ``choices``. lower

@@ -21,7 +21,6 @@ from .declaration import (
     Parameter,
     Value,
     declared,
-    instead_of,
     number,
     numbers,
     port,
@@ -34,8 +33,8 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 PointMass = tuple[float, float, float, float]
 ThrusterNumbers = tuple[float, ...]
+Noise = tuple[float, float, float, float]
 Tensor = tuple[float, float, float, float, float, float]
-Profile = tuple[float, ...]
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -114,27 +113,24 @@ class StringParameters:
     )
 
 
-PROFILE = (
-    "density of its white noise; where wanted, density of the random walk of its bias, and standard deviation of the "
-    "bias that it begins with"
-)
-
-
-def profile(description: str, unit: str) -> Any:
-    """A sensor's noise: density of its white noise, of its bias' random walk, and standard deviation of its bias."""
-    return numbers((0.0,), f"{description}: {PROFILE}.", unit, lower=0.0, lengths=(1, 2, 3))
-
-
 @dataclass(frozen=True, slots=True)
 class NoiseParameters:
-    """What published messages err, by sensor; the motion stays exact. Units: densities per √Hz, walks per s and √Hz."""
+    """What published messages err; the motion stays exact."""
 
-    gyroscope: Profile = profile("Angular velocity in ~/imu", "rad/s")
-    accelerometer: Profile = profile("Specific force in ~/imu", "m/s²")
-    position: Profile = profile("Position in ~/pose and ~/odom, world axes", "m")
-    orientation: Profile = profile("Attitude in ~/pose, ~/odom and ~/imu, about each body axis", "rad")
-    linear_velocity: Profile = profile("Velocity in ~/twist and ~/odom", "m/s")
-    angular_velocity: Profile = profile("Angular velocity in ~/twist and ~/odom", "rad/s")
+    imu: Noise = numbers(
+        (0.0, 0.0, 0.0, 0.0),
+        "Errors in ~/imu: densities of white noise of angular velocity and specific force [per √Hz], then the standard "
+        "deviations of their biases.",
+        "rad/s, m/s²",
+        lower=0.0,
+    )
+    state: Noise = numbers(
+        (0.0, 0.0, 0.0, 0.0),
+        "Densities of white noise [per √Hz] of position, attitude, velocity and angular velocity in ~/pose, ~/twist, "
+        "~/odom; the attitude's in ~/imu too.",
+        "m, rad, m/s, rad/s",
+        lower=0.0,
+    )
     seed: int = whole(
         0, "Seed of the noise: the same seed gives the same errors at the same stamps.", lower=0, upper=2**62
     )
@@ -352,8 +348,6 @@ def parameter_named(name: str) -> Parameter:
     """The declaration behind a name; raises InputError with the nearest known name."""
     if name in PARAMETERS:
         return PARAMETERS[name]
-    if instead := instead_of(name):
-        raise InputError(name, f"it was a parameter of an earlier version; use {instead}")
     for prefix, pattern in PATTERNS.items():
         own = name.removeprefix(prefix)
         if own != name and "." not in own:

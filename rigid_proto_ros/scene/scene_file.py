@@ -17,11 +17,20 @@ import yaml
 
 from ..base.bundled import scene_names, scene_path
 from ..base.errors import InputError, did_you_mean
-from .declaration import GONE_DEFAULTS, instead_of
 from .yaml_text import compose_yaml, read_text, scalar
 
 KINDS: dict[type[yaml.Node], str] = {yaml.SequenceNode: "list", yaml.MappingNode: "mapping"}
 """What a value is that is no single one, in a refusal."""
+
+
+GONE = re.compile(
+    r"(imu_noise\..*|pose_noise\..*|noise\.(gyroscope|accelerometer|position|orientation|(linear|angular)_velocity)"
+    r"|noise_seed|step_until|step_periods|frames|initial\.flight)\Z"
+)
+"""Parameters of earlier versions."""
+
+GONE_DEFAULTS = {"step_periods": 1, "frames": "own"}
+"""Of those among them whose default isn't empty or 0."""
 
 
 def scene_file(name: str) -> Path:
@@ -88,11 +97,11 @@ def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFi
         scene.values.update(values)
         if name != "/**":
             named |= values.keys()
-    for name in [name for name in scene.values if instead_of(name)]:
+    for name in [name for name in scene.values if GONE.match(name)]:
         value = scene.values.pop(name)
         # A recorded scene holds all parameters of its version: what had no effect is left out.
-        if (any(value) if isinstance(value, list) else value) and value != GONE_DEFAULTS.get(name):
-            raise InputError(f"{path}, {name}", f"it was a parameter of an earlier version; use {instead_of(name)}")
+        if any(value) if isinstance(value, list) else value not in (0, "", GONE_DEFAULTS.get(name)):
+            raise InputError(f"{path}, {name}", "a parameter of an earlier version; this one has no such parameter")
     scene.wildcard = scene.values.keys() - named
     return scene
 
@@ -140,7 +149,7 @@ def _collect(path: str, node: yaml.Node, prefix: str, values: dict[str, object])
             _collect(path, value, f"{name}.", values)
         elif isinstance(value, yaml.SequenceNode):
             values[name] = _sequence(path, value)
-        elif value.style is None and value.value == "":
+        elif not value.style and value.value == "":
             raise _refused(path, key, f"a value behind {name}:")
         else:
             values[name] = _typed(value)
@@ -153,7 +162,7 @@ def _name(path: str, key: yaml.Node) -> str:
 
 
 def _typed(node: yaml.ScalarNode) -> bool | int | float | str:
-    return scalar(node.value) if node.style is None else node.value
+    return node.value if node.style else scalar(node.value)
 
 
 def _sequence(path: str, node: yaml.SequenceNode) -> list:

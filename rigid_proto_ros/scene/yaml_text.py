@@ -30,40 +30,33 @@ _WORD = re.compile(r"(?!null\Z)[a-z_]{3,}\Z")
 """Text that stands in YAML without quotes, unless it reads as true or false."""
 
 
-def _marked(problem: str, event: yaml.NodeEvent) -> yaml.MarkedYAMLError:
-    mark: Any = event.start_mark
-    return yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
-
-
-class _Loader(yaml.SafeLoader):
-    """Without aliases, which rcl doesn't read either."""
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        event = self.peek_event()
-        if isinstance(event, yaml.AliasEvent):
-            raise _marked(f"the alias *{event.anchor}", event)
-        self.check_node_event(event)
-        return super().compose_node(parent, index)
-
-    def check_node_event(self, event: yaml.NodeEvent) -> None:
-        """Refuse what a node may not have."""
-
-
-class _PlainLoader(_Loader):
-    """Without tags too, whose constructors fail in ways of their own."""
-
-    def check_node_event(self, event: yaml.NodeEvent) -> None:
-        if event.anchor is not None:
-            raise _marked(f"the anchor &{event.anchor}", event)
-        tag = getattr(event, "tag", None)
-        if tag is not None:
-            raise _marked(f"the tag {tag}", event)
-
-
-_FAST_LOADER = getattr(yaml, "CSafeLoader", None)
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """libyaml's, ten times as fast, where it is installed."""
-_NOT_PLAIN = re.compile(r"[&*!]")
-"""Without these a text has neither anchors, aliases nor tags, which it reads."""
+MAX_DEPTH = 100
+"""Of lists and mappings in each other: libyaml's reader ends the process in deeper ones."""
+
+
+def _check_nodes(text: str, plain: bool) -> None:
+    """Raise MarkedYAMLError for an alias, which rcl doesn't read either, and where only ``plain`` values are read for
+    anchors and tags, too.
+    """
+    depth = 0
+    for event in yaml.parse(text, Loader=_LOADER):
+        problem = ""
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if depth > MAX_DEPTH:
+            problem = f"more than {MAX_DEPTH} lists and mappings in each other"
+        elif isinstance(event, yaml.AliasEvent):
+            problem = f"the alias *{event.anchor}"
+        elif plain and isinstance(event, yaml.NodeEvent):
+            anchor, tag = event.anchor, getattr(event, "tag", None)
+            problem = f"the anchor &{anchor}" if anchor else f"the tag {tag}" if tag else ""
+        if problem:
+            mark: Any = event.start_mark
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
 
 
 def read_text(path: Path, kind: str) -> str:
@@ -78,8 +71,9 @@ def read_text(path: Path, kind: str) -> str:
 def compose_yaml(text: str, name: str) -> yaml.Node | None:
     """The YAML tree of a text, with its lines; raises InputError, where ``name`` stands."""
     try:
-        return yaml.compose(text, Loader=_Loader)
-    except (yaml.YAMLError, RecursionError) as error:
+        _check_nodes(text, plain=False)
+        return yaml.compose(text, Loader=_LOADER)
+    except yaml.YAMLError as error:
         raise _unreadable(error, name, "valid YAML without aliases") from None
 
 
@@ -101,14 +95,10 @@ def load_plain_yaml(text: str, name: str) -> Any:
     """
     if (said := load_json(text)) is not None:
         return said
-    if _FAST_LOADER is not None and not _NOT_PLAIN.search(text):
-        try:
-            return yaml.load(text, Loader=_FAST_LOADER)
-        except (yaml.YAMLError, RecursionError, ValueError, OverflowError):
-            pass  # the other reader says what is wrong, in the words that it has for all texts
     try:
-        return yaml.load(text, Loader=_PlainLoader)
-    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:
+        _check_nodes(text, plain=True)
+        return yaml.load(text, Loader=_LOADER)
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise _unreadable(error, name, "plain YAML") from None
 
 

@@ -13,10 +13,11 @@ import pytest
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.warm_up import warm_up
+from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene import scenario as scenario_module
-from rigid_proto_ros.scene.command_codec import load_command
 from rigid_proto_ros.scene.parameters import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.simulation.observer import Logged, Observer, Published
 
 PERIOD_NS = 10_000_000
@@ -78,13 +79,13 @@ print(live.state.linear_velocity[0] > 0.0)
 
 def test_commands_act_and_are_counted_and_a_refusal_is_raised(live):
     mass = live.scenario.setup.body.mass
-    live.submit(load_command(False, "world;impulse", (mass, 0.0, 0.0), ZERO))
+    live.submit(WrenchCommand(False, parse_frame("world;impulse"), (mass, 0.0, 0.0), ZERO))
     live.schedule(f"[{{t: 0, impulse: [0, {mass!r}, 0]}}, {{t: 0, set: {{gravity: [0, 0, -1]}}}}]")
     live.step(10)
     assert live.state.time_ns == 10 * PERIOD_NS
     assert live.state.linear_velocity == pytest.approx([1.0, 1.0, -0.1], abs=1e-12)
     with pytest.raises(CommandRefused, match="nowhere"):
-        live.submit(load_command(True, "world@nowhere", (1.0, 0.0, 0.0), ZERO))
+        live.submit(WrenchCommand(True, parse_frame("world@nowhere"), (1.0, 0.0, 0.0), ZERO))
     with pytest.raises(CommandRefused, match="t"):
         live.schedule("[{t: -1, force: [1, 0, 0]}]")
     assert live.commands.received == {"poke": 1, "wrench": 1, "schedule": 3}

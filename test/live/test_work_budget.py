@@ -11,7 +11,6 @@ from flights import SECOND, wrench
 from rigid_proto_ros.live.pacing import WorkBudget
 from rigid_proto_ros.live.simulation_loop import Endpoints, SimulationLoop
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.simulation.simulation import Simulation
 
 ENDLESS = {
     "integrator": "rk4",
@@ -69,32 +68,6 @@ def test_commands_and_requests_get_in_meanwhile():
     assert rig.loop.simulation.time_ns == reached_ns
 
 
-def test_the_way_to_a_command_that_was_not_finished_in_its_tick_goes_on_in_the_next():
-    rig = Rig({**ENDLESS, "real_time_factor": 1000.0})
-    rig.loop.tick()
-    rig.commands.append(wrench("world", (1e-3, 0.0, 0.0)))
-    rig.loop.tick()
-    assert rig.loop.next_wake_ns() == 0
-    reached_ns = rig.loop.simulation.time_ns
-    rig.loop.tick()
-    assert rig.loop.simulation.time_ns > reached_ns
-    assert rig.published == [0]
-
-
-def test_a_step_that_takes_years_is_begun_and_given_up_by_resuming():
-    rig = Rig({**ENDLESS, "start_paused": True})
-    rig.loop.tick()
-    assert not rig.loop.step()
-    begun_ns = rig.loop.simulation.time_ns
-    rig.loop.tick()
-    assert rig.loop.stepping
-    assert rig.loop.simulation.time_ns > begun_ns
-    # States of the middle of a step are nobody's business.
-    assert set(rig.published) <= {0}
-    rig.loop.pause(False)
-    assert not rig.loop.stepping
-
-
 def test_a_step_asked_for_while_another_is_made_follows_it(monkeypatch) -> None:
     rig = Rig({"start_paused": True, "publish_rate": 1000.0})
     rig.loop.tick()
@@ -132,23 +105,6 @@ def test_without_listeners_a_motion_that_is_too_dear_gives_time_up_and_says_so(m
     while rig.loop.timekeeping.real_time_lost_s == lost_s:
         rig.loop.tick()
     assert rig.loop.simulation.time_ns > 0
-
-
-@pytest.mark.parametrize("integrator", ["auto", "rk4", "taylor"])
-def test_slices_give_the_same_bits(integrator):
-    values = {"integrator": integrator, "step": 1e-4, "initial.angular_velocity": [0.1, 0.2, 12.0]}
-    whole, sliced = (Simulation(make_scenario(values).setup) for _ in range(2))
-    budget = WorkBudget()
-    for simulation in (whole, sliced):
-        simulation.submit(wrench("body", (1e-3, 2e-3, 0.0), (1e-4, 0.0, 0.0)), SECOND // 3)
-    whole.advance(SECOND)
-    ticks = 0
-    while sliced.time_ns < SECOND:
-        budget.begin_tick()
-        budget.advance(sliced, SECOND)
-        ticks += 1
-    assert sliced.state.sha256() == whole.state.sha256()
-    assert (sliced.steps, sliced.force_evaluations) == (whole.steps, whole.force_evaluations)
 
 
 def test_while_commands_come_they_are_taken_once_more_shortly_before_each_publication(monkeypatch):

@@ -112,7 +112,7 @@ def test_states_go_out_with_their_stamps_to_the_bit(session, clock_client, endin
 
 
 def test_states_go_out_with_the_noise_that_the_node_gave_them_and_their_stamps_on_the_clock(clock_client, tmp_path):
-    noise = {"noise.position": [1e-3], "noise.angular_velocity": [1e-2]}
+    noise = {"noise.state": [1e-3, 0.0, 0.0, 1e-2]}
     session = flown_session(tmp_path, *(word for name, value in noise.items() for word in ("--set", f"{name}={value}")))
     (exact,) = read_runs(session)
     own = sensor_noise(Parameters().replaced(noise))

@@ -1,15 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The heads of the bundled scenes are lessons: they have what pages and documents show."""
 
-from __future__ import annotations
-
-import pytest
-
 from rigid_proto_ros.base.bundled import example_names, scene_names
-from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.scene.lessons import lesson, lessons, read_lesson
-
-HEAD = "# SPDX\n#\n# Title\n#\n# {question}\n#\n# One. Two.\n#\n# Why.\n#\n# Run it.\nrigid_body: {{}}\n"
+from rigid_proto_ros.scene.lessons import lessons
 
 
 def test_every_bundled_scene_is_a_lesson_with_a_title_a_question_three_sentences_and_a_reason() -> None:
@@ -27,18 +20,3 @@ def test_every_bundled_scene_is_a_lesson_with_a_title_a_question_three_sentences
         assert len(one.reason) > 60, name
         assert f"rigid_proto simulate config/{name}.yaml" in one.commands, name
         assert not one.script or one.script in example_names(), name
-
-
-def test_a_scene_without_a_lessons_head_is_told_what_is_missing(tmp_path) -> None:
-    with pytest.raises(InputError, match="scene"):
-        lesson("no_such")
-    path = tmp_path / "x.yaml"
-    path.write_text(HEAD.format(question="Question: Up? A: Yes. B: No. C: Both. Answer: A."))
-    with pytest.raises(InputError, match="2 sentences"):
-        read_lesson(path)
-    path.write_text(HEAD.format(question="Question: Up or down?"))
-    with pytest.raises(InputError, match="A: "):
-        read_lesson(path)
-    path.write_text("# Title\nrigid_body: {}\n")
-    with pytest.raises(InputError, match="paragraphs"):
-        read_lesson(path)

@@ -13,7 +13,6 @@ import pytest
 from flights import SECOND, EventLines
 
 from rigid_proto_ros.rerun_view.session_files import read_runs
-from rigid_proto_ros.scene.command_codec import in_words, of_event
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import Ghost
@@ -120,14 +119,6 @@ def test_a_session_recorded_before_lists_acts_in_its_own_order() -> None:
         # The last digits are of the version: measured 2e-13, at 20 rad/s.
         assert np.abs(again.advance(time_ns) - recorded).max() <= 1e-11
     assert told.lines == session.lines
-
-
-def test_recorded_frames_go_to_a_node_of_any_name() -> None:
-    content = {"stamp_ns": 0, "frame_id": "spinning_top@tip;impulse", "force": [1, 0, 0], "torque": [0, 0, 0]}
-    knot = {"stamp_ns": 0, "frame_id": "spinning_top/mesh", "axes": "mesh", "point": [0, 0, 1]}
-    frames = ("world", "spinning_top")
-    assert in_words(of_event("poke", content, frames)).frame_id == "body@tip;impulse"
-    assert in_words(of_event("string_attach", knot, frames)).frame_id == "body/mesh"
 
 
 def test_a_session_of_a_node_of_another_name_is_sent_in_words_that_every_node_reads() -> None:

@@ -24,17 +24,6 @@ def test_rows_and_notes_come_out_in_the_order_in_which_they_went_in():
     assert box.take() is None
 
 
-def test_the_next_row_is_handed_over_at_once_where_that_was_asked_for():
-    box = Mailbox()
-    box.note("began")
-    box.hurry()
-    box.put(0, np.zeros(13))
-    box.put(1, np.zeros(13))
-    first = box.take()
-    assert ([n.event for n in first.notes], first.count) == (["began"], 1)
-    assert box.take().count == 1
-
-
 def test_a_recorder_that_is_stuck_is_given_up_and_what_waits_has_no_gap(monkeypatch):
     monkeypatch.setattr(mailbox, "PATIENCE_S", 0.02)
     given_up = []

@@ -230,11 +230,6 @@ def test_a_node_killed_at_a_random_moment_loses_at_most_a_second(ros_environment
     kill_while_recording(ros_environment, tmp_path, ending, random.Random(seed).uniform(0.3, 3.0))
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_a_node_killed_as_soon_as_it_flies_leaves_a_recording_with_its_scene(ros_environment, tmp_path, ending):
-    kill_while_recording(ros_environment, tmp_path, ending, 0.0)
-
-
 @pytest.mark.stress
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("seed", range(21))

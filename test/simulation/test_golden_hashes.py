@@ -87,10 +87,8 @@ BY_AUTO = {
 
 NOISY = {
     "noise.seed": 3,
-    "noise.gyroscope": [0.01, 0.001, 0.1],
-    "noise.position": [0.001],
-    "noise.orientation": [0.001, 0.001],
-    "noise.angular_velocity": [0.01],
+    "noise.imu": [0.01, 0.0, 0.1, 0.0],
+    "noise.state": [0.001, 0.001, 0.0, 0.01],
 }
 
 DRAWN = {
@@ -210,7 +208,7 @@ def rows() -> str:
 
 
 def noise() -> str:
-    """Hash of what the sensors tell of a state, by white noise, bias and walk."""
+    """Hash of what the sensors tell of a state, by white noise and bias."""
     parameters = Parameters().replaced(NOISY)
     sensors = sensor_noise(parameters)
     row = [0.1, -0.2, 0.3, 0.1, -0.2, 0.3, 0.9273618495495704, 1.0, 2.0, 3.0, -1.0, 0.5, 2.5]

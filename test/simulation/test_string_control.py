@@ -11,7 +11,7 @@ from flights import SECOND
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import free_end_at
-from rigid_proto_ros.scene.command_codec import string_attach, string_target
+from rigid_proto_ros.scene.command_codec import of_event
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, MoveString, ReleaseString, TieString
 from rigid_proto_ros.simulation.simulation import Simulation
@@ -120,7 +120,8 @@ def test_the_knot_is_the_nearest_point_of_the_surface_as_it_is_then(frame):
     from_com = mesh_point * np.array(SCENE["scale"]) - body.center_of_mass
     points = {"mesh": mesh_point, "body": from_com, "world": state.position + state.rotation @ from_com}
     word = "mesh" if frame.endswith("/mesh") else "body" if "body" in frame else "world"
-    simulation.submit(string_attach(frame, points[word].tolist(), ("world", "rigid_body")), 300 * MS)
+    knot = {"frame_id": frame, "point": points[word].tolist()}
+    simulation.submit(of_event("string_attach", knot, ("world", "rigid_body")), 300 * MS)
     simulation.submit(MoveString((0.0, 0.0, 1.0)), 301 * MS)
     simulation.advance(302 * MS)
     surface = scenario.setup.surface
@@ -220,19 +221,19 @@ def test_reset_ties_the_string_as_its_parameters_say():
 
 
 @pytest.mark.parametrize(
-    ("read", "frame", "point", "reason"),
+    ("kind", "frame", "point", "reason"),
     [
-        (string_target, "body", (0, 0, 0), "frame"),
-        (string_target, "world", (math.nan, 0, 0), "nonfinite"),
-        (string_target, "world", (1e101, 0, 0), "magnitude"),
-        (string_attach, "body/mesh/", (0, 0, 0), "frame"),
-        (string_attach, "body", (0, 0, -math.inf), "nonfinite"),
-        (string_attach, "body/mesh", (0, 0, 1e300), "magnitude"),
+        ("string_target", "body", (0, 0, 0), "frame"),
+        ("string_target", "world", (math.nan, 0, 0), "nonfinite"),
+        ("string_target", "world", (1e101, 0, 0), "magnitude"),
+        ("string_attach", "body/mesh/", (0, 0, 0), "frame"),
+        ("string_attach", "body", (0, 0, -math.inf), "nonfinite"),
+        ("string_attach", "body/mesh", (0, 0, 1e300), "magnitude"),
     ],
 )
-def test_odd_string_messages_are_refused_with_their_reason(read, frame, point, reason):
+def test_odd_string_messages_are_refused_with_their_reason(kind, frame, point, reason):
     with pytest.raises(CommandRefused) as refused:
-        read(frame, point)
+        of_event(kind, {"frame_id": frame, "point": point})
     assert refused.value.reason == reason
 
 
