@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -18,13 +17,6 @@ from rigid_proto_ros.base.interrupts import end_with_this_thread
 SOURCE = Path(__file__).resolve().parent.parent
 READY_S = 180.0
 """Longer than a first start with all kernels to compile on a loaded machine; every wait's end."""
-
-LOOPBACK = (
-    '<General><AllowMulticast>false</AllowMulticast><Interfaces><NetworkInterface name="lo"/></Interfaces></General>'
-    "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60</MaxAutoParticipantIndex>"
-    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery>'
-)
-"""Cyclone DDS finds the node by unicast, as ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST wants it."""
 
 
 def command(name: str, *arguments: object) -> list[str]:
@@ -155,18 +147,3 @@ def catches(pid: int, number: int) -> bool:
     status = Path(f"/proc/{pid}/status").read_text()
     caught = int(status.partition("SigCgt:")[2].split()[0], 16)
     return all(caught >> (each - 1) & 1 for each in (number, signal.SIGTERM))
-
-
-def dds_client(environment: dict[str, str], node: str, commands: list, until_ns: int) -> subprocess.Popen:
-    """Start the outside client; its result is the last line of its output, see dds_client.py."""
-    process = subprocess.Popen(
-        [sys.executable, str(Path(__file__).parent / "dds_client.py")],
-        env={**environment, "CYCLONEDDS_URI": LOOPBACK},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    process.stdin.write(json.dumps({"node": node, "commands": commands, "until_ns": until_ns}) + "\n")
-    process.stdin.flush()
-    return process

@@ -83,10 +83,7 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
         if node and node.strip("/") != session.node_name:
             raise InputError("--node", node, f"{session.node_name}, the only one of this recording")
         return [session]
-    bags = _bag_reader()
-    from ..session.runs import is_session_topic, session_runs
-
-    return session_runs(bags.read_bag(path, is_session_topic), path, node)
+    return _bag_reader().session_runs(path, node)
 
 
 def repair(path: str | Path, repaired: str | Path) -> None:

@@ -21,11 +21,9 @@ from rosgraph_msgs.msg import Clock
 from ..base.errors import InputError
 from ..scene import cdr
 from ..scene.command_codec import frame_names, in_words, of_event
-from ..scene.sensor_noise import sensor_noise
 from ..session.messages import PROJECTIONS
-from ..session.recorded_session import RecordedSession, StampedRows
+from ..session.recorded_session import RecordedSession, StampedRows, decode_event
 from ..session.replay import recorded_parameters, sorted_states
-from ..session.runs import decode_event
 from ..simulation.commands import Change, Command
 from . import qos
 from .script_sender import ScriptSender
@@ -138,17 +136,13 @@ def _wait_for_subscribers(node: Node, publishers: list[Publisher]) -> None:
 
 
 def _streams(session: RecordedSession) -> dict[str, StampedRows]:
-    """What is to be published: the numbers that a bag holds, else what the node makes of a state, with its noise."""
-    noise = sensor_noise(recorded_parameters(session))
-    if session.published and not (noise and session.made_with):
+    """What is to be published: the numbers that a bag holds, else what the node makes of a state."""
+    if session.published:
         return {name: rows for name, rows in session.published.items() if len(rows)}
     states = list(sorted_states(session))
     times = np.array([time_ns for time_ns, _ in states], dtype=np.int64)
     return {
-        name: StampedRows(
-            times,
-            np.array([project(noise.measured(name, t, row.tolist()) if noise else row.tolist()) for t, row in states]),
-        )
+        name: StampedRows(times, np.array([project(row.tolist()) for _, row in states]))
         for name, project in PROJECTIONS.items()
     }
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import rclpy
@@ -39,11 +38,10 @@ DEFAULT_HORIZON_S = float(str(PARAMETERS["schedule_horizon"].default))
 STALLED_S = 15.0
 """A node that confirms nothing for this long is gone, or receives nothing."""
 
-STANDSTILL_REPORTS = 3
-"""Simulated time that so many reports find unmoved is paused by somebody, or follows a clock that stands."""
-
-BURST_S = 0.5
-"""Reports that have waited in the queue come together within this time; the node makes one a second."""
+STANDSTILL_S = 5.0
+"""Simulated time that reports, one a second, find unmoved for so long is paused by somebody, or follows a clock that
+stands.
+"""
 
 
 @dataclass(frozen=True)
@@ -210,15 +208,11 @@ class ScriptSender(Node):
         """Until a report from after the last command: only there a ray meets the body or misses it. Not for ever where
         simulated time doesn't get there.
         """
-        unmoved = 0
-        while (before_ns := self._reported_ns()) <= last_ns and unmoved < STANDSTILL_REPORTS:
-            is_new = partial(self._has_reported, self._reports, time.monotonic() + BURST_S)
-            self._spin_until(is_new, f"a report of {self.target}")
-            unmoved = unmoved + 1 if self._reported_ns() == before_ns else 0
-
-    def _has_reported(self, number: int, burst_end: float) -> bool:
-        """Whether there are more reports than ``number``, the last one of those that came together among them."""
-        return self._reports > number and time.monotonic() > burst_end
+        reached_ns, since = -1, time.monotonic()
+        while self._reported_ns() <= last_ns and time.monotonic() < since + STANDSTILL_S:
+            rclpy.spin_once(self, timeout_sec=0.1)
+            if self._reported_ns() != reached_ns:
+                reached_ns, since = self._reported_ns(), time.monotonic()
 
     def _reported_ns(self) -> int:
         """Simulated time of the last report."""

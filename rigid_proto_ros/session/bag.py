@@ -1,20 +1,26 @@
 # SPDX-License-Identifier: MIT
 """Bags: the MCAP files that we record and that ``ros2 bag record`` writes, alone or in a folder, read up to where they
-were cut; and what is whole of a cut one written anew.
+were cut, and the runs in them: a reset starts simulated time again, and a bag holds it all in one. What is whole of a
+cut file is written anew.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
 from mcap import records
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from ..base.errors import InputError
+from ..base.rotation import rotate, rotate_inverse
+from ..scene.scenario import mesh_sha256_of
+from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_state, read_string
+from .recorded_session import RecordedSession, StampedRows, decode_event
 
 ROS_PROFILE = "ros2"
 
@@ -136,3 +142,131 @@ def _files(path: Path) -> list[Path]:
         accepted = "a folder with .mcap files; ros2 bag convert makes one of other or compressed files"
         raise InputError("session", str(path), accepted)
     return files
+
+
+# Runs
+
+RESET_WINDOW_NS = 1_000_000_000
+"""Topics reach a recorder one by one: a reset's line and the first state after it lie this close in its log."""
+
+
+def session_runs(path: Path, node: str = "") -> list[RecordedSession]:
+    """The runs of one body in a bag, in their order; ``node`` chooses the body where there are several.
+
+    Raises InputError for a bag without states, and for messages that can't be decoded.
+    """
+    content = read_bag(path, lambda topic: topic.rpartition("/")[2] in READ)
+    prefix = _prefix(content, str(path), node)
+    events = [(log, read_string(data, f"{prefix}/events")) for log, data in _messages(content, prefix, "events")]
+    scenes = [(log, read_string(data, f"{prefix}/scene")) for log, data in _messages(content, prefix, "scene")]
+    decoded = [decode_event(line, number) for number, (_, line) in enumerate(events, 1)]
+    if MADE_WITH not in content.metadata and any(
+        kind == "clock" and told.get("offset_ns") for _, kind, told in decoded
+    ):
+        accepted = "what the node's own parameter record writes; a followed /clock stamps the topics by its own time"
+        raise InputError("session", str(path), accepted)
+    states = {name: _states(content, prefix, name) for name in PROJECTIONS}
+    states = {name: found for name, found in states.items() if len(found[0])}
+    # A topic without messages may be whole: nobody did anything. A latched one is never without.
+    there = {"scene": bool(scenes), "events": f"{prefix}/events" in content.types, "pose": bool(states)}
+    missing = [f"{prefix}/{name}" for name, is_there in there.items() if not is_there]
+    resets = [log for (log, _), (_, kind, _) in zip(events, decoded, strict=True) if kind == "reset"]
+    if not events and states:
+        logs, rows = next(iter(states.values()))
+        resets = logs[1:][np.diff(rows.times) < 0].tolist()
+    whole = RecordedSession(
+        complete=content.complete,
+        node_name=prefix.strip("/"),
+        scenes=[text for _, text in scenes],
+        missing=tuple(missing),
+        attachments=content.attachments,
+        made_with=content.metadata.get(MADE_WITH, {}),
+        folder=path if path.is_dir() else path.parent,
+    )
+    cuts = {name: _cuts(logs, rows.times, resets) for name, (logs, rows) in states.items()}
+    runs = []
+    for k, (begin, end) in enumerate(zip([None, *resets], [*resets, None], strict=True)):
+        # The scene in force at a reset; at the recording's own start the first one that it holds.
+        before = [text for log, text in scenes if begin is not None and log <= begin]
+        run = replace(whole, scene=before[-1] if before else scenes[0][1] if scenes else "")
+        run.mesh_sha256 = mesh_sha256_of(run.scene)
+        run.accuracy_floor = content.metadata.get(FLOOR.format(k), {}).get("floor", "")
+        run.events = [
+            (time_ns, line)
+            for (log, line), (time_ns, _, _) in zip(events, decoded, strict=True)
+            if (begin is None or log >= begin) and (end is None or log < end)
+        ]
+        run.published = {
+            name: StampedRows(
+                rows.times[cuts[name][k] : cuts[name][k + 1]], rows.rows[cuts[name][k] : cuts[name][k + 1]]
+            )
+            for name, (_, rows) in states.items()
+        }
+        run.times, run.rows = _shown_rows(run.published)
+        if run.events or len(run.times):
+            runs.append(run)
+    return runs or [whole]
+
+
+def _prefix(content: BagContent, path: str, node: str) -> str:
+    """What stands before the topics' names: the node's name with a slash before it."""
+    kinds: dict[str, set[str]] = {}
+    for topic, message_type in content.types.items():
+        before, slash, name = topic.rpartition("/")
+        if slash and READ.get(name) == message_type:
+            kinds.setdefault(before, set()).add(name)
+    flown = sorted(p for p, names in kinds.items() if names & {"scene", "events"}) or sorted(kinds)
+    if node:
+        flown = [p for p in kinds if p.strip("/") == node.strip("/")]
+        if not flown:
+            raise InputError("--node", node, f"one of the bag's: {', '.join(sorted(kinds)) or 'it has none'}")
+    if not flown:
+        topics = ", ".join(sorted(content.types)[:5]) or "no topics"
+        raise InputError("session", f"{path} has {topics}, and no pose, twist or odom topic of a node")
+    if len(flown) > 1:
+        raise InputError("session", f"{path} has several bodies, {', '.join(flown)}; choose one with --node NAME")
+    return flown[0]
+
+
+def _messages(content: BagContent, prefix: str, name: str) -> list[tuple[int, bytes]]:
+    """A topic's messages in the order they were logged."""
+    return sorted(content.messages.get(f"{prefix}/{name}", []), key=lambda message: message[0])
+
+
+def _states(content: BagContent, prefix: str, name: str) -> tuple[np.ndarray, StampedRows]:
+    """When a topic's states were logged, and they."""
+    messages = _messages(content, prefix, name)
+    read = [read_state(name, data, f"{prefix}/{name}") for _, data in messages]
+    logs = np.array([log for log, _ in messages], dtype=np.int64)
+    times = np.array([stamp for stamp, _ in read], dtype=np.int64)
+    return logs, StampedRows(times, np.array([row for _, row in read], dtype=float))
+
+
+def _cuts(logs: np.ndarray, stamps: np.ndarray, resets: list[int]) -> list[int]:
+    """Where a topic's messages of each run begin, and the end: at the restart of the stamps nearest to each reset."""
+    restarts = np.flatnonzero(np.diff(stamps) < 0) + 1
+    cuts = [0]
+    for reset in resets:
+        # A reset of a body at time 0 shows in no stamp: there the log decides.
+        cut = int(np.searchsorted(logs, reset, side="right"))
+        near = [k for k in restarts.tolist() if abs(int(logs[k]) - reset) < RESET_WINDOW_NS and k >= cuts[-1]]
+        cuts.append(max(cuts[-1], min(near, key=lambda k: abs(int(logs[k]) - reset)) if near else cut))
+    return [*cuts, len(stamps)]
+
+
+def _shown_rows(published: dict[str, StampedRows]) -> tuple[np.ndarray, np.ndarray]:
+    """State rows (n, 13) and their times, one per stamp, from what was published; velocities that weren't are 0."""
+    merged: dict[int, list[float]] = {}
+    listed = {name: list(zip(r.times.tolist(), r.rows.tolist(), strict=True)) for name, r in published.items()}
+    for name in ("odom", "pose"):
+        for time_ns, row in listed.get(name, []):
+            state = merged.setdefault(time_ns, [0.0] * 6 + [1.0] + [0.0] * 6)
+            state[:7] = row[:7]
+            if name == "odom":
+                state[7:10], state[10:13] = rotate(*row[3:7], *row[7:10]), row[10:13]
+    for time_ns, row in listed.get("twist", []):
+        if time_ns in merged:
+            state = merged[time_ns]
+            state[7:10], state[10:13] = row[:3], rotate_inverse(*state[3:7], *row[3:6])
+    times = sorted(merged)
+    return np.array(times, dtype=np.int64), np.array([merged[t] for t in times]).reshape(-1, 13)

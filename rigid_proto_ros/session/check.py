@@ -14,9 +14,8 @@ from ..base.provenance import cpu, versions
 from ..simulation.event_log import EventLog
 from ..simulation.observer import Event, Logged, Observer
 from .messages import FIELDS, PROJECTIONS
-from .recorded_session import RecordedSession
+from .recorded_session import RecordedSession, decode_event
 from .replay import Resimulation, as_published, resimulation
-from .runs import decode_event
 
 
 class NotVerifiableError(InputError):

@@ -6,6 +6,7 @@ found by its hash.
 from __future__ import annotations
 
 import hashlib
+import json
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -13,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.bundled import body_names
 from ..base.errors import InputError, MeshError
 from ..mesh.reading import Mesh, load_mesh
 
@@ -76,16 +76,28 @@ class RecordedSession:
         return int(self.times[-1]) if len(self.times) else 0
 
 
+def decode_event(line: str, number: int) -> tuple[int, str, dict]:
+    """time_ns, kind and content of a line of the event log; raises InputError naming the event by number."""
+    try:
+        event = json.loads(line)
+        time_ns, kind, content = event["time_ns"], event["kind"], event["content"]
+        if type(time_ns) is int and time_ns >= 0 and isinstance(kind, str) and isinstance(content, dict):
+            return time_ns, kind, content
+    except (ValueError, KeyError, TypeError, RecursionError):
+        pass
+    raise InputError(f"event {number}", line[:80], "a JSON line with time_ns, kind and content")
+
+
 def find_mesh(
     name: str, sha256: str, attachments: Iterable[tuple[str, bytes]] = (), folder: Path | None = None
 ) -> Mesh:
-    """The mesh whose file has this hash: by its name, from the session's attachments, beside the session, or among the
-    bundled bodies. Raises MeshError naming it.
+    """The mesh whose file has this hash: by its name, beside the session, or from the session's attachments. Raises
+    MeshError naming it.
     """
     places = [name]
     if folder is not None:
         places.append(str(folder / Path(name).name))
-    for place in (*places, *body_names()):
+    for place in places:
         try:
             mesh = load_mesh(place)
         except InputError:

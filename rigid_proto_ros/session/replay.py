@@ -21,8 +21,7 @@ from ..simulation.commands import Change, Command
 from ..simulation.observer import BodyChanged, Observer, Published, snapshot
 from ..simulation.setup import Setup
 from .messages import PROJECTIONS
-from .recorded_session import RecordedSession, find_mesh
-from .runs import decode_event
+from .recorded_session import RecordedSession, decode_event, find_mesh
 
 
 def recorded_parameters(session: RecordedSession) -> Parameters:

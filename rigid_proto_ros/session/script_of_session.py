@@ -22,9 +22,8 @@ from ..scene.yaml_text import flow
 from ..simulation.commands import TieString, WrenchCommand
 from ..simulation.observer import Applied, Event, Logged, Observer
 from ..simulation.string_control import mesh_point
-from .recorded_session import RecordedSession
+from .recorded_session import RecordedSession, decode_event
 from .replay import Resimulation, resimulation
-from .runs import decode_event
 
 NOT_OF_THE_MOTION = frozenset({"record", "viewer", "rerun_port", "web_port", "workbench_port", "start_paused"})
 """Parameters of a running node that a scene to keep or to send doesn't carry."""

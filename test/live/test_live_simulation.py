@@ -14,7 +14,6 @@ from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.warm_up import warm_up
 from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.scene import scenario as scenario_module
 from rigid_proto_ros.scene.parameters import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.commands import WrenchCommand
@@ -90,22 +89,6 @@ def test_commands_act_and_are_counted_and_a_refusal_is_raised(live):
         live.schedule("[{t: -1, force: [1, 0, 0]}]")
     assert live.commands.received == {"poke": 1, "wrench": 1, "schedule": 3}
     assert live.call(lambda: dict(live.loop.simulation.refused)) == {"frame": 1, "schedule": 1}
-
-
-def test_a_scheduled_mesh_is_loaded_once_and_acts_at_its_time(live, monkeypatch):
-    loaded, load = [], scenario_module.mesh_body
-
-    def counted(*arguments, **named):
-        loaded.append(arguments)
-        return load(*arguments, **named)
-
-    monkeypatch.setattr(scenario_module, "mesh_body", counted)
-    live.schedule("[{t: 0.02, set: {mesh: book}}, {t: 0.02, set: {integrator: rk4}}]")
-    live.step(2)
-    assert live.scenario.parameters.mesh == "t_handle"
-    live.step()
-    assert (live.scenario.parameters.mesh, live.scenario.parameters.integrator) == ("book", "rk4")
-    assert len(loaded) == 1
 
 
 def test_time_runs_pauses_steps_and_starts_anew(live, watcher):

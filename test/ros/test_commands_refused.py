@@ -181,21 +181,6 @@ def test_everything_of_a_kind_is_refused_with_its_reason_and_counted_and_the_bod
     assert float(report["angular_momentum_drift"]) < 1e-9
 
 
-def test_after_one_refusal_of_each_kind_the_flight_is_that_without_any_command_to_the_bit(rig):
-    rig.start_over(paused=True)
-    for commands in (*REFUSED.values(), stamps_out_of_reach(3600)):
-        rig.publish(*commands[0])
-    rig.schedule("{t: 1", "5", "{t: 1, set: {masse: 1}}", "{t: 1, set: {mass: -1}}", "{t: 1, push: 1}")
-    rig.until_received(rig.sent)
-    rig.pause(False)
-    simulation = Simulation(make_scenario(rig.scene).setup)
-    for k in range(1, 101):
-        time_ns = k * SECOND // 100
-        pose = rig.state_at(time_ns)[0]["pose"] if k in (1, 50, 100) else None
-        row = simulation.advance(time_ns).row.tolist()
-        assert pose is None or [*pose["position"].values(), *pose["orientation"].values()] == row[:7]
-
-
 def warn_again(rig) -> None:
     """Let the time pass in which what an earlier test has sent keeps further warnings of its kind back."""
     time.sleep(WARNING_S)
@@ -218,16 +203,6 @@ def test_refusals_are_warned_of_at_most_once_a_second(rig):
     elapsed_s = time.monotonic() - start
     # One at once, then one for each full second that has passed: however slow the machine, never more.
     assert log.read_text().count("refused:") - warned <= 1 + elapsed_s
-
-
-def test_a_flood_of_one_refusal_doesnt_hide_the_warning_of_another(rig):
-    warn_again(rig)
-    log = rig.node_process.log
-    before = log.read_text().count("nan")
-    mars, not_a_number = wrench_message(0, "mars", (1e-3, 0.0, 0.0)), wrench_message(0, "", (NAN, 0.0, 0.0))
-    # At once, so within the second in which only one of the first kind is warned of.
-    rig.publish("poke", *[mars] * 20, not_a_number)
-    rig.until(lambda: log.read_text().count("nan") > before, "warning of the other")
 
 
 def test_what_is_refused_when_it_is_to_act_is_warned_of_too(rig):

@@ -158,15 +158,6 @@ def test_a_nodes_own_dump_can_be_loaded_and_what_differs_acts(rig):
     assert rig.get("inertia_model", "mesh") == {"inertia_model": "shell", "mesh": "book"}
 
 
-def test_what_ros_itself_declares_is_refused_together_with_ours_or_not_at_all(rig):
-    before = rig.get("linear_damping", "use_sim_time")
-    for name, value in (("use_sim_time", 3), ("start_type_description_service", False), ("qos_overrides.none", 1)):
-        ((accepted, reason),) = rig.set_named({"linear_damping": 0.5, name: value}, atomically=True)
-        assert not accepted
-        assert name in reason
-    assert rig.get(*before) == before
-
-
 def test_two_nodes_of_one_domain_do_not_mix(ros_environment, tmp_path):
     with held_domain() as domain:
         environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
@@ -209,11 +200,3 @@ def test_two_nodes_of_one_domain_do_not_mix(ros_environment, tmp_path):
             one.close()
             two.close()
             assert {node.stop() for node in nodes} == {0}
-
-
-def test_depth_and_reliability_of_each_topic_are_parameters_like_others(rig):
-    depths = {"wrench.subscription": 5000, "schedule.subscription": 5000, "pose.publisher": 10, "odom.publisher": 10}
-    depths |= {"inertia.publisher": 1, "scene.publisher": 1}
-    for topic, depth in depths.items():
-        own = f"qos_overrides./rigid_body/{topic}"
-        assert list(rig.get(f"{own}.depth", f"{own}.reliability").values()) == [depth, "reliable"]

@@ -32,36 +32,6 @@ def declared(tree: ast.Module) -> dict[str, tuple[str, str]]:
     return {name: (default, description) for name, default, description in ast.literal_eval(table)}
 
 
-def test_imports_nothing_but_launch_and_this_package(tree: ast.Module) -> None:
-    modules = {
-        name.split(".")[0]
-        for node in ast.walk(tree)
-        for name in (
-            [alias.name for alias in node.names]
-            if isinstance(node, ast.Import)
-            else [node.module]
-            if isinstance(node, ast.ImportFrom)
-            else []
-        )
-    }
-    assert modules == {"launch", "launch_ros", "rigid_proto_ros"}
-
-
-def test_every_argument_is_described_and_used(tree: ast.Module) -> None:
-    arguments = declared(tree)
-    used = {
-        node.value
-        for function in tree.body
-        if isinstance(function, ast.FunctionDef)
-        for node in ast.walk(function)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-    }
-    for name, (default, description) in arguments.items():
-        assert isinstance(default, str)
-        assert len(description) > 10
-        assert name in used, f"{name} is declared and not used"
-
-
 def test_arguments_that_become_parameters_are_parameters_with_accepted_defaults(tree: ast.Module) -> None:
     arguments = declared(tree)
     for name in ("mesh", "viewer", "record"):

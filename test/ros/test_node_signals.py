@@ -16,21 +16,6 @@ BOTH = pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIG
 """One handler serves both; a node's end by SIGTERM is looked at in test_node_flight.py too."""
 
 
-@pytest.mark.stress
-@needs_rerun
-@BOTH
-def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environment, tmp_path, number):
-    flight = ("rigid_proto", "demo", "--duration", 60, "--out", tmp_path)
-    demo = RosProcess(*flight, environment=ros_environment, log=tmp_path / "demo")
-    demo.wait_for("3. simulating")
-    children = descendants(demo.pid)
-    assert children
-    assert demo.end(number) == 128 + number, demo.errors
-    assert "Traceback" not in demo.errors
-    assert not [pid for pid in children if alive(pid)]
-    assert read_session(tmp_path / "session.rrd").complete
-
-
 @BOTH
 def test_up_without_a_viewer_ends(ros_environment, tmp_path, number):
     up = RosProcess("rigid_proto", "up", "--viewer", "none", environment=ros_environment, log=tmp_path / "up")
@@ -75,11 +60,3 @@ def test_a_node_that_compiles_its_kernels_ends_at_once(ros_environment, tmp_path
     assert node.end(number, within_s=10.0) == 0, node.errors  # 59 s before
     assert "Traceback" not in node.errors
     assert "is simulating" not in node.output + node.errors
-
-
-def test_a_first_simulation_says_that_it_compiles_and_ends(ros_environment, tmp_path):
-    environment = {**ros_environment, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
-    flight = RosProcess("rigid_proto", "simulate", "t_handle", environment=environment, log=tmp_path / "flight")
-    flight.wait_for("compiling kernels, at the first start only")
-    assert flight.end() == 130
-    assert flight.output == "" and len(flight.errors.splitlines()) == 1

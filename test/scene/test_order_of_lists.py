@@ -17,9 +17,8 @@ from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import Ghost
 from rigid_proto_ros.scene.script import expand_script
-from rigid_proto_ros.session.recorded_session import RecordedSession
+from rigid_proto_ros.session.recorded_session import RecordedSession, decode_event
 from rigid_proto_ros.session.replay import resimulation
-from rigid_proto_ros.session.runs import decode_event
 from rigid_proto_ros.simulation.commands import Command
 from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation

@@ -8,7 +8,6 @@ import pytest
 
 pytest.importorskip("mcap")
 
-from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
@@ -76,14 +75,6 @@ def test_a_branch_begins_with_the_recorded_state_and_flies_on_as_the_session_did
     # Measured 1.3e-14, in the spin of 12 rad/s, which is turned to the world's axes and back.
     assert differs(fly_on(tmp_path, 0.0).simulation.state.row, at) <= 4e-14
     assert differs(fly_on(tmp_path, until).simulation.state.row, at + until) < 1e-7
-
-
-def test_a_branch_has_the_parameters_in_force(session, tmp_path):
-    for at, density in ((0.1, 7850.0), (0.5, 9000.0)):
-        assert main(["replay", str(session), "--at", str(at), "--as-scene", str(tmp_path / "x.yaml")]) == 0
-        values = read_scene(str(tmp_path / "x.yaml")).parameters.named()
-        assert values["density"] == density
-        assert values["record"] == ""
 
 
 FEATURES = {
@@ -206,13 +197,6 @@ def test_what_acts_ends_in_a_branch_when_it_would_have_ended():
     assert branch.string is None
     branch.advance(SECOND)
     assert not branch.acting
-
-
-def test_a_scene_with_a_parameter_that_went_is_read_where_it_says_nothing_and_else_refused():
-    head = "/**:\n  ros__parameters:\n    initial.flight: "
-    assert not read_scene_text(f'{head}""\n    frames: own\n    step_periods: 1\n    step_until: 0.0\n').values
-    with pytest.raises(InputError, match="initial.flight.*parameter of an earlier version"):
-        read_scene_text(f'{head}"{{began_ns: -1}}"\n')
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,8 @@ from rigid_proto_ros.base.provenance import versions
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.session.check import Difference, made_with_table
-from rigid_proto_ros.session.recorded_session import RecordedSession
+from rigid_proto_ros.session.recorded_session import RecordedSession, decode_event
 from rigid_proto_ros.session.replay import resimulation
-from rigid_proto_ros.session.runs import decode_event
 
 RECORDED = Path(__file__).parents[1] / "recorded"
 
