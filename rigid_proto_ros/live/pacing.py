@@ -92,14 +92,6 @@ class WorkBudget:
         return True
 
 
-def publications_until(time_ns: int, rate: float) -> int:
-    """How many publications after that of time 0 are made up to a time, it included."""
-    count = max(0, int(time_ns * 1e-9 * rate) - 1)
-    while publication_ns(count + 1, rate) <= time_ns:
-        count += 1
-    return count
-
-
 class Publications:
     """The times of publications at ``rate`` a simulated second; ``next_ns`` is the next one's."""
 
@@ -122,7 +114,8 @@ class Publications:
 
     def find_after(self, now_ns: int) -> None:
         """The next one is the first after ``now_ns``."""
-        self._number = publications_until(now_ns, self.rate) + 1
+        self._number = 0
+        self.pass_over(now_ns)
 
     def pass_over(self, present_ns: int) -> None:
         """Make none up to the present; one that is next already stays so."""

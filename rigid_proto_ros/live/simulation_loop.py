@@ -90,8 +90,7 @@ class SimulationLoop(ScenarioRun):
         self._caught_up = True
         self._end_ns: int | None = None
         self._on_end: Callable[[], None] = lambda: None
-        self._pace.anchor(0)
-        self._begin_anew()
+        self._anchor(stamps_stay=True)
 
     def end_at(self, time_ns: int, on_end: Callable[[], None]) -> None:
         """Stop when simulated time reaches ``time_ns``, and call on_end()."""
@@ -138,7 +137,7 @@ class SimulationLoop(ScenarioRun):
             if not paused:
                 self.take_commands()
             self.timekeeping.paused = paused
-            self._end_steps()
+            self._steps_left = self._steps_requested = 0
             self.simulation.log("pause", {"data": paused})
             self.simulation.notify_floor()
             self._anchor(stamps_stay=paused)
@@ -194,9 +193,6 @@ class SimulationLoop(ScenarioRun):
                     return
             yield
 
-    def _end_steps(self) -> None:
-        self._steps_left = self._steps_requested = 0
-
     def request_step(self) -> None:
         """A wrench was taken: paused and in lockstep it is followed by a step."""
         if self.timekeeping.paused and self.scenario.parameters.lockstep:
@@ -216,7 +212,7 @@ class SimulationLoop(ScenarioRun):
         elif Published in self.observer.takes:
             self.begin_ghost()
         self._publications.restart()
-        self._end_steps()
+        self._steps_left = self._steps_requested = 0
         self._anchor()
 
     # In the thread's loop
@@ -285,7 +281,7 @@ class SimulationLoop(ScenarioRun):
         while self._steps_left and self._publish_next():
             self._steps_left -= 1
         if self.simulation.failure:
-            self._end_steps()
+            self._steps_left = self._steps_requested = 0
 
     def _tick_paused(self) -> None:
         if self.stepping:
@@ -328,7 +324,7 @@ class SimulationLoop(ScenarioRun):
         self.simulation.failure = (
             f"simulated time beyond {LAST_STAMP_NS // 1_000_000_000} s, the largest that a stamp can hold"
         )
-        self._end_steps()
+        self._steps_left = self._steps_requested = 0
         self._check_failure()
 
     def _check_failure(self) -> bool:
@@ -342,19 +338,17 @@ class SimulationLoop(ScenarioRun):
     # Time
 
     def _anchor(self, stamps_stay: bool = False) -> None:
+        """Simulated time goes on from where it is."""
         self._pace.anchor(self.simulation.time_ns)
-        if not stamps_stay:
-            self._follow_stamps()
-        self._begin_anew()
+        self._begin_anew(stamps_stay)
 
-    def _follow_stamps(self) -> None:
-        """Stamps are the followed clock's from now on; the log keeps how far they are ahead of simulated time."""
-        if self._pace.offset_ns != self.stamps.offset_ns:
+    def _begin_anew(self, stamps_stay: bool = False) -> None:
+        """Everything that goes by the wall clock is due from now on. Stamps are the followed clock's; the log keeps how
+        far they are ahead of simulated time.
+        """
+        if not stamps_stay and self._pace.offset_ns != self.stamps.offset_ns:
             self.stamps.offset_ns = self._pace.offset_ns
             self.simulation.log("clock", {"offset_ns": self.stamps.offset_ns})
-
-    def _begin_anew(self) -> None:
-        """Everything that goes by the wall clock is due from now on."""
         self._last_drain_ns = time.monotonic_ns()
         self._paused_publication_ns = 0
         self._next_listener_check_ns = 0
@@ -364,7 +358,6 @@ class SimulationLoop(ScenarioRun):
         anchored_ns = self._pace.anchored_ns
         present_ns = self._pace.present_ns(self.simulation.time_ns, self._publications.next_ns, self.timekeeping)
         if self._pace.anchored_ns != anchored_ns:
-            self._follow_stamps()
             self._begin_anew()
         return present_ns
 

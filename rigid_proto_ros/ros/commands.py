@@ -203,8 +203,14 @@ class StepService:
         """Take what is asked for, one request after another, each for as long as a tick has time, and answer. Returns
         whether more is to be expected soon.
         """
-        while self._under_way is not None or self._take():
-            assert self._under_way is not None
+        while True:
+            if self._under_way is None:
+                handle = self._service.handle
+                with handle:
+                    _, header = handle.service_take_request(Trigger.Request)
+                if header is None:
+                    return wall_ns < self._expected_until_ns
+                self._under_way = header, self._live.loop.steps()
             self._expected_until_ns = wall_ns + EXPECTED_NS
             header, steps = self._under_way
             answer = Trigger.Response(success=True)
@@ -218,16 +224,6 @@ class StepService:
                 answer = Trigger.Response(success=False, message=str(error))
             self._under_way = None
             self._service.send_response(answer, header)
-        return wall_ns < self._expected_until_ns
-
-    def _take(self) -> bool:
-        """Whether there is a request."""
-        handle = self._service.handle
-        with handle:
-            _, header = handle.service_take_request(Trigger.Request)
-        if header is not None:
-            self._under_way = header, self._live.loop.steps()
-        return header is not None
 
 
 def _never_called(*_: object) -> None:

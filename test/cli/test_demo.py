@@ -69,15 +69,6 @@ def test_a_real_mesh_flies_too_and_hangs_where_the_state_says(ros_environment, t
     assert verified.returncode == 0, verified.stderr
 
 
-def test_an_open_mesh_is_refused_in_one_line_that_names_what_helps(ros_environment, tmp_path, meshes):
-    mesh = meshes / "teapot_open.obj"
-    done = run("rigid_proto", "demo", "--mesh", mesh, environment=ros_environment, cwd=tmp_path)
-    assert done.returncode == 2
-    # Where no mesh has been repaired before, a line says that its kernels are compiled.
-    *compiling, line = done.stderr.splitlines()
-    assert "mesh_repair" in line and all("compil" in word for word in compiling)
-
-
 @pytest.mark.stress
 def test_what_the_set_up_compiles_is_all_that_the_first_flight_needs(ros_environment, tmp_path):
     environment = {**ros_environment, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}

@@ -46,16 +46,6 @@ def test_a_poked_session_gives_back_the_body_that_was_flown(flight: tuple, capsy
     assert found["inertia"]["izz"]["value"] == pytest.approx(truth["inertia"][2][2], rel=1e-6)
 
 
-def test_a_recording_for_rerun_is_a_session_too(flight: tuple, capsys: pytest.CaptureFixture) -> None:
-    folder = flight[1]["folder"]
-    file = folder / "flight.rrd"
-    words = ["simulate", "t_handle", "--script", str(folder / "pokes.yaml"), "--duration", "1.5", "--record", str(file)]
-    assert main(words) == 0
-    found = _json(capsys, str(file))
-    assert found["hidden"] == []
-    assert found["mass"]["value"] == pytest.approx(_inspected(capsys)["mass"], rel=1e-5)
-
-
 def test_before_the_poke_its_mass_is_no_number(flight: tuple, capsys: pytest.CaptureFixture) -> None:
     found = _json(capsys, str(flight[0]), "--to", "0.5")
     assert found["mass"] is None

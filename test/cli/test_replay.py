@@ -23,18 +23,6 @@ def test_a_recording_without_states_has_nothing_to_verify(tmp_path, capsys):
     assert "nothing to verify" in err and err.count("\n") == 1 and "verified" not in out
 
 
-def test_what_a_recording_has_itself_is_not_taken_from_elsewhere(tmp_path, capsys):
-    pytest.importorskip("mcap")
-    session = str(tmp_path / "s.mcap")
-    assert main(["simulate", "book", "--duration", "0.2", "--bag", session]) == 0
-    capsys.readouterr()
-    for words in (["replay", session, "--verify"], ["snapshot", session, "--at", "0.1", "-o", str(tmp_path / "x.png")]):
-        if words[0] == "snapshot":
-            pytest.importorskip("rerun")
-        assert main([*words, "--scene", "config/hammer.yaml"]) == 2
-        assert "the session has its own" in capsys.readouterr().err
-
-
 @needs_rerun
 def test_a_node_that_a_recording_does_not_hold_is_refused(tmp_path, capsys):
     session = str(tmp_path / "s.rrd")

@@ -38,11 +38,8 @@ def scene_text(lines: str, section: str = "rigid_body") -> str:
 
 SCENES = {
     "negative_mass": (scene_text("mass: -1.0"), "mass", "-1.0", ">= 0"),
-    "zero_density": (scene_text("density: 0.0"), "density", "0.0", "> 0"),
     "infinite_mass": (scene_text("mass: .inf"), "mass", "inf", "finite"),
     "nan_gravity": (scene_text("gravity: [0.0, 0.0, .nan]"), "gravity", "nan", "3 finite numbers"),
-    "short_gravity": (scene_text("gravity: [0.0, 0.0]"), "gravity", "0.0, 0.0", "3 finite numbers"),
-    "long_scale": (scene_text("scale: [1.0, 1.0]"), "scale", "1.0, 1.0", "1 or 3"),
     "zero_scale": (scene_text("scale: [1.0, 0.0, 1.0]"), "scale", "0.0", "1e-9 <= |s|"),
     "unknown": (
         scene_text("gravitation: [0.0, 0.0, 1.0]"),
@@ -50,19 +47,13 @@ SCENES = {
         "there is no parameter",
         "did you mean gravity?",
     ),
-    "model": (scene_text("inertia_model: wire"), "inertia_model", "wire", "solid"),
     "integrator": (scene_text("integrator: rk5"), "integrator", "rk5", "rk4"),
     "text_for_bool": (scene_text("gyroscopic: perhaps"), "gyroscopic", "perhaps", "true or false"),
-    "bool_for_double": (scene_text("mass: true"), "mass", "True", "finite number"),
     "list_for_double": (scene_text("mass: [1.0]"), "mass", "1.0", "finite number"),
-    "number_for_text": (scene_text("mesh: 5"), "mesh", "5", "text"),
     "mixed_list": (scene_text("mass: 1.0\ngravity: [0, 0, -9.81]"), "line 4", "[0, 0, -9.81]", "[0.0, 0.0, -9.81]"),
     "no_value": (scene_text("mass:"), "line 3", "mass", "a value"),
     "not_yaml": ("rigid_body: {ros__parameters: [", "line 1", "", "valid YAML"),
-    "tab": ("rigid_body:\n\tros__parameters: {}\n", "line 2", "", "valid YAML"),
-    "list": ("- 1\n- 2\n", "line 1", "[1, 2]", "a mapping"),
     "script": ("- {t: 1.0, force: [0, 0, 1]}\n", "line 1", "a list", "a mapping"),
-    "no_section": ("mass: 1.0\n", "line 1", "1.0", "section"),
     "zero_quaternion": (
         scene_text("initial.orientation_xyzw: [0.0, 0.0, 0.0, 0.0]"),
         "initial.orientation",
@@ -83,32 +74,20 @@ SCRIPTS = {
     "text_entry": ("- hello\n", "entry 1"),
     "no_time": ("- {force: [0, 0, 1]}\n", "entry 1, t"),
     "negative_time": ("- {t: -1, force: [0, 0, 1]}\n", "entry 1, t"),
-    "nan_time": ("- {t: .nan, force: [0, 0, 1]}\n", "entry 1, t"),
-    "text_time": ("- {t: soon, force: [0, 0, 1]}\n", "entry 1, t"),
-    "bool_time": ("- {t: true, force: [0, 0, 1]}\n", "entry 1, t"),
     "nothing": ("- {t: 1, at: com}\n", "entry 1"),
     "unknown_key": ("- {t: 1, farce: [0, 0, 1]}\n", "farce"),
     "unknown_kind": ("- {t: 1, strin: release}\n", "did you mean string?"),
-    "two_forces": ("- {t: 1, force: [0, 0, 1], push: 1}\n", "one of"),
     "short_force": ("- {t: 1, force: [0, 1]}\n", "three numbers"),
-    "nan_force": ("- {t: 1, force: [0, 1, .nan]}\n", "entry 1, force"),
-    "text_force": ("- {t: 1, force: up}\n", "three numbers"),
-    "axes": ("- {t: 1, force: [0, 0, 1], axes: moon}\n", "world, body"),
     "push_and_axes": ("- {t: 1, push: 1, axes: body}\n", "inward normal"),
     "impulse_and_duration": ("- {t: 1, impulse: [0, 0, 1], duration: 1}\n", "impulses alone"),
-    "zero_duration": ("- {t: 1, force: [0, 0, 1], duration: 0}\n", "duration"),
     "point": ("- {t: 1, at: {point: [1, 2]}, force: [0, 0, 1]}\n", "point"),
-    "negative_vertex": ("- {t: 1, at: {vertex: -1}, force: [0, 0, 1]}\n", "at"),
     "vertex": ("- {t: 1, at: {vertex: 123456}, force: [0, 0, 1]}\n", "vertex/0 to vertex/"),
-    "contact_typo": ("- {t: 1, at: tpi, force: [0, 0, 1]}\n", "did you mean tip?"),
     "contact": ("- {t: 1, at: nose, force: [0, 0, 1]}\n", "tip"),
     "ray": ("- {t: 1, at: {ray: {origin: [0, 0, 0], direction: [0, 0, 0]}}, push: 1}\n", "isn't zero"),
     "push_at_com": ("- {t: 1, at: com, push: 1}\n", "normal"),
-    "set": ("- {t: 1, set: 5}\n", "parameter"),
     "set_unknown": ("- {t: 1, set: {masse: 5}}\n", "did you mean mass?"),
     "set_value": ("- {t: 1, set: {mass: heavy}}\n", "finite number"),
     "service": ("- {t: 1, service: dance}\n", "clear_wrench"),
-    "wrench": ("- {t: 1, wrench: 5}\n", "wrench"),
     "wrench_impulse": ("- {t: 1, wrench: {impulse: [0, 0, 1]}}\n", "impulse"),
     "huge": ("- {t: 1, force: [0, 0, 1e90]}\n", "at most"),
 }
@@ -174,37 +153,27 @@ def test_a_script_with_a_mistake_is_refused(name, tmp_path, capfd):
     ("arguments", "part"),
     [
         (["simulate", "nowhere.yaml"], "bundled"),
-        (["simulate", "/"], "/"),
         (["simulate", "t_handle", "--set", "mass"], "name=value"),
         (["simulate", "t_handle", "--set", "gravty=[0, 0, 1]"], "did you mean gravity?"),
         (["simulate", "t_handle", "--set", "mass=-1"], ">= 0"),
         (["simulate", "t_handle", "--set", "mass=nan"], "finite"),
         (["simulate", "t_handle", "--set", "gravity=[0, 0, 1"], "3 finite numbers"),
         (["simulate", "t_handle", "--duration", "-1"], "--duration"),
-        (["simulate", "t_handle", "--duration", "nan"], "--duration"),
-        (["simulate", "t_handle", "--duration", "long"], "--duration"),
         (["simulate", "t_handle", "--script", "nowhere.yaml"], "there is no file 'nowhere.yaml'"),
         (
             ["simulate", "t_handle", "--script", "msg_examples/flip_and_pok.yaml"],
             "did you mean msg_examples/flip_and_poke.yaml?",
         ),
         (["simulate"], "SCENE"),
-        (["fly"], "simulate"),
         (["inspct", "book"], "there is no command 'inspct'; one of inspect,"),
-        (["inspct", "book"], "did you mean inspect?"),
         (["inspect", "hamer"], "mesh: there is no file and no bundled mesh 'hamer'; did you mean hammer?"),
-        (["sweep", "boxtensor", "-o", "x.parquet"], "did you mean box_tensor?"),
         (["simulate", "t_handle", "--set", "inertia_model=boundingbox"], "explicit; did you mean bounding_box?"),
         (["replay", "x.rrd"], "there is no file and no folder 'x.rrd'"),
         (["simulate", "t_handel"], "did you mean t_handle?"),
-        (["simulate", "config/t_handel.yaml"], "did you mean t_handle?"),
-        (["simulate", "t_handle", "--recrod", "x.rrd"], "did you mean --record?"),
         (["replay", "x.rrd", "--publish", "state"], "did you mean states?"),
         (["replay", "book.rrd", "hammer.rrd"], "one argument too many"),
-        (["replay", "nowhere.rrd"], "nowhere.rrd"),
         (["demo", "--duration", "1"], "--duration"),
         (["sweep", "box_tensor", "-o", "table.csv"], ".parquet"),
-        (["sweep", "box_tensor", "--row", "3", "-o", "table.parquet"], "--row"),
     ],
 )
 def test_a_slip_on_the_command_line_is_refused(arguments, part, capfd):
@@ -324,15 +293,8 @@ def test_the_node_itself_ends_with_one_line(ros_environment, tmp_path):
     """The real process, where ROS has started and has to be taken down again."""
     scene = tmp_path / "scene.yaml"
     scene.write_text(scene_text("mass: -1.0"))
-    bad = (
-        (["-p", "mesh:=nowhere.obj"], "nowhere.obj"),
-        (["--params-file", scene], "mass"),
-        (["-p", "integrator:=rk5"], "rk4"),
-        (["-p", "mass:=-1"], ">= 0"),
-    )
-    for arguments, part in bad:
-        line = refusal("rigid_body_node", "--ros-args", *arguments, environment=ros_environment)
-        assert part in line
+    line = refusal("rigid_body_node", "--ros-args", "--params-file", scene, environment=ros_environment)
+    assert "mass" in line
 
 
 def test_the_client_without_a_node_says_so(ros_environment):

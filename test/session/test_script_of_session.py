@@ -52,19 +52,6 @@ def test_a_thousand_hand_sessions_fly_again_to_the_bit(first: int) -> None:
     assert other == []
 
 
-def test_what_was_done_before_a_reset_is_no_part_of_it() -> None:
-    hand = HandSession(SCENE)
-    hand.set(mass=0.2)
-    hand.load(False, "world@tip", [0.03, 0.0, 0.0])
-    hand.wait(SECOND)
-    hand.reset()
-    hand.load(False, "world@tip", [0.0, 0.03, 0.0])
-    hand.wait(SECOND)
-    saved = assert_flies_again(hand)
-    assert saved.commands == 1
-    assert read_scene_text(saved.scene).values["mass"] == 0.2
-
-
 def test_what_was_done_in_one_paused_instant_is_one_message_to_a_node_in_the_order_in_which_it_acted() -> None:
     hand = HandSession(SCENE)
     hand.pause()
@@ -77,16 +64,6 @@ def test_what_was_done_in_one_paused_instant_is_one_message_to_a_node_in_the_ord
     assert message.topic == "schedule"
     assert expand_schedule(read_schedule(read_string(message.data, "schedule"))) == script
     assert [c.content["ballast.tip"][0] for c in script[:200]] == [0.0001 * k for k in range(200)]
-
-
-def test_a_script_is_judged_in_the_scene_that_it_has_made_by_then() -> None:
-    hand = HandSession({**SCENE, "integrator": "free_body"})
-    hand.wait(SECOND // 10)
-    hand.set(integrator="auto")
-    hand.wait(SECOND // 10)
-    hand.load(False, "world@tip", [0.01, 0.0, 0.0])
-    hand.wait(SECOND // 10)
-    assert assert_flies_again(hand).notes == []
 
 
 def test_a_log_with_a_line_missing_is_refused() -> None:

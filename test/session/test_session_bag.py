@@ -109,8 +109,7 @@ def stamp_of(data: bytes) -> int:
     return sec * SECOND + nanosec
 
 
-def test_a_mesh_that_is_nowhere_is_named_with_its_hash(flown, tmp_path, monkeypatch):
-    monkeypatch.setattr("rigid_proto_ros.session.recorded_session.body_names", tuple)
+def test_a_mesh_that_is_nowhere_is_named_with_its_hash(flown, tmp_path):
     LAYOUTS["bare"](tmp_path / "bag", flown)
     (run, _) = read_runs(tmp_path / "bag.mcap")
     with pytest.raises(InputError, match=f"bracket.obj.*{run.mesh_sha256}"):

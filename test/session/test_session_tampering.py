@@ -15,12 +15,10 @@ from hypothesis.strategies import randoms
 
 pytest.importorskip("mcap")
 
-from conftest import needs_rerun
 from scripts import EVERY_KIND
 
 from rigid_proto_ros.base.bundled import example_names, example_path, scene_names
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
@@ -112,21 +110,6 @@ def test_one_bit_of_a_state_is_found(session, topic):
         assert re.fullmatch(rf"at \S+ s: state \d+, {topic} {name} differs: \S+ recorded, .*", str(difference))
         before = [line for time_ns, line in session.events if time_ns < difference.time_ns]
         assert difference.command == (f"command {len(before)}: {before[-1]}" if before else "")
-
-
-@needs_rerun
-def test_a_changed_event_of_a_file_is_one_line_and_exit_1(tmp_path, capsys):
-    path = tmp_path / "session.rrd"
-    arguments = ["simulate", "t_handle", "--script", str(example_path("flip_and_poke")), "--duration", "2"]
-    assert main([*arguments, "--record", str(path)]) == 0
-    assert main(["replay", str(path), "--verify"]) == 0
-    data = path.read_bytes()
-    assert b"0.004" in data
-    path.write_bytes(data.replace(b"0.004", b"0.005"))
-    capsys.readouterr()
-    assert main(["replay", str(path), "--verify"]) == 1
-    said = capsys.readouterr().err
-    assert len(said.splitlines()) == 1 and "command 1 " in said
 
 
 @pytest.mark.parametrize(
