@@ -181,7 +181,7 @@ def session_runs(path: Path, node: str = "") -> list[RecordedSession]:
         missing=tuple(missing),
         attachments=content.attachments,
         made_with=content.metadata.get(MADE_WITH, {}),
-        folder=path if path.is_dir() else path.parent,
+        folder=path.absolute().parent,
     )
     cuts = {name: _cuts(logs, rows.times, resets) for name, (logs, rows) in states.items()}
     runs = []

@@ -52,7 +52,7 @@ SCENES = {
     "list_for_double": (scene_text("mass: [1.0]"), "mass", "1.0", "finite number"),
     "mixed_list": (scene_text("mass: 1.0\ngravity: [0, 0, -9.81]"), "line 4", "[0, 0, -9.81]", "[0.0, 0.0, -9.81]"),
     "no_value": (scene_text("mass:"), "line 3", "mass", "a value"),
-    "not_yaml": ("rigid_body: {ros__parameters: [", "line 1", "", "valid YAML"),
+    "not_yaml": ("rigid_body: {ros__parameters: ]\n", "line 1", "", "valid YAML"),
     "script": ("- {t: 1.0, force: [0, 0, 1]}\n", "line 1", "a list", "a mapping"),
     "zero_quaternion": (
         scene_text("initial.orientation_xyzw: [0.0, 0.0, 0.0, 0.0]"),

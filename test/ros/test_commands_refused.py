@@ -178,7 +178,6 @@ def test_refusals_are_warned_of_at_most_once_a_second_also_when_they_are_to_act(
     rig.pause(True)
     rig.publish("poke", wrench_message(0, "world@ray/5,5,5/1,0,0", (1e-3, 0.0, 0.0)))
     rig.until_received(rig.sent)
-    assert "5.0,5.0,5.0" not in log.read_text()
     rig.pause(False)
     rig.until(lambda: "5.0,5.0,5.0" in log.read_text(), "a warning")
 
