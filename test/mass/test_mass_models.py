@@ -126,18 +126,14 @@ def test_a_rescale_never_passes_over_the_mesh_again(monkeypatch, lopsided):
 
 def test_refusals_name_the_field_and_what_is_accepted():
     moments = MeshMoments(*box())
-    for arguments, field in (
-        ({"scale": 0.0}, "scale"),
-        ({"scale": (1.0, 2.0)}, "scale"),
-        ({"scale": (1.0, float("nan"), 1.0)}, "scale"),
-        ({"scale": 1e10}, "scale"),
-        ({"mass": -1.0}, "mass"),
-        ({"mass": float("nan")}, "mass"),
-        ({"density": 0.0}, "density"),
-        ({"density": float("inf")}, "density"),
-        ({"ballast": ((-1.0, 0.0, 0.0, 0.0),)}, "ballast"),
-        ({"ballast": ((1.0, float("nan"), 0.0, 0.0),)}, "ballast"),
-    ):
+    nan, inf = float("nan"), float("inf")
+    wrong = {
+        "scale": (0.0, (1.0, 2.0), (1.0, nan, 1.0), 1e10),
+        "mass": (-1.0, nan),
+        "density": (0.0, inf),
+        "ballast": (((-1.0, 0.0, 0.0, 0.0),), ((1.0, nan, 0.0, 0.0),)),
+    }
+    for field, arguments in ((field, {field: value}) for field, values in wrong.items() for value in values):
         with pytest.raises(InputError) as refused:
             moments.mass_properties(**arguments)
         assert refused.value.field == field

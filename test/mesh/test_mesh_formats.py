@@ -73,11 +73,6 @@ def test_obj_corners_with_texture_and_normal_numbers_tabs_and_continued_lines(tm
     assert mesh.polygons == 6
 
 
-def test_a_byte_order_mark_hides_no_vertex_of_an_obj(tmp_path):
-    mesh = load(tmp_path, "marked.obj", b"\xef\xbb\xbf" + obj())
-    assert np.array_equal(mesh.vertices, CUBE_VERTICES) and volume(mesh) == 1.0
-
-
 def test_unreferenced_vertices_are_counted_and_carry_nothing(tmp_path):
     mesh = load(tmp_path, "stray.obj", b"v 100 100 100\n" + obj(faces=CUBE_TRIANGLES + 1))
     assert len(mesh.vertices) == 9
@@ -108,16 +103,6 @@ def test_a_ply_of_strips_or_of_polygons_of_several_sizes_is_refused_with_the_rem
             load(tmp_path, "a.ply", text)
     with pytest.raises(MeshError, match=r"save the mesh as \.obj or \.stl"):
         load(tmp_path, "a.ply", strip)
-
-
-def test_a_textured_ply_keeps_the_order_of_its_vertices(tmp_path):
-    """As many would be renumbered, one for each place on the texture."""
-    header = ply().replace(b"property double z\n", b"property double z\nproperty float s\nproperty float t\n", 1)
-    lines = header.decode().split("\n")
-    first = lines.index("end_header") + 1
-    lines[first : first + 8] = [f"{line} 0.{k} 0.5" for k, line in enumerate(lines[first : first + 8])]
-    mesh = load(tmp_path, "a.ply", "\n".join(lines).encode())
-    assert np.array_equal(mesh.vertices, CUBE_VERTICES) and np.array_equal(mesh.triangles, CUBE_TRIANGLES)
 
 
 def test_concave_polygons_are_fanned_exactly(tmp_path):
@@ -218,11 +203,6 @@ class TestCache:
     def test_a_folder_that_cannot_be_written_is_no_error(self, tmp_path, monkeypatch):
         (tmp_path / "file").write_text("")
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-        assert volume(load(tmp_path, "a.obj", obj())) == 1.0
-
-    def test_it_can_be_turned_off(self, tmp_path, monkeypatch):
-        monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
-        assert mesh_cache.folder() is None
         assert volume(load(tmp_path, "a.obj", obj())) == 1.0
 
 

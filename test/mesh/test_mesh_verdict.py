@@ -24,14 +24,6 @@ BALL = sphere(10)
 HOLLOW = together(box((4.0, 4.0, 4.0)), inward(sphere(10)))
 
 
-def test_corners_split_for_textures_are_one_vertex_to_the_verdict():
-    vertices, triangles = BALL
-    soup = vertices[triangles].reshape(-1, 3)
-    made = body((soup, np.arange(len(soup)).reshape(-1, 3)))
-    assert made.verdict.closed
-    assert volume(made) == pytest.approx(volume(body(BALL)), rel=1e-14)
-
-
 def test_cavities_are_kept():
     made = body(HOLLOW)
     assert codes(made) == {"cavities": "info"}
@@ -95,18 +87,6 @@ def test_repair_turns_faces_to_agree():
     repaired = body((vertices, broken), repair=True)
     assert volume(repaired) == pytest.approx(volume(body(BALL)), rel=1e-14)
     assert codes(repaired) == {"repaired": "warning"}
-
-
-def test_repair_of_bodies_wound_apart(meshes):
-    repaired = mesh_body(load_mesh(str(meshes / "multibody.stl")), repair=True)
-    # Each body's volume by itself, whichever way the file winds it.
-    mesh = repaired.mesh
-    topology = mesh_topology(mesh.vertices, repaired.triangles)
-    parts = [
-        abs(solid_moments(mesh.vertices, repaired.triangles[topology.component == c]).measure)
-        for c in range(topology.components)
-    ]
-    assert volume(repaired) == pytest.approx(sum(parts), rel=1e-13)
 
 
 def test_repair_turns_polygons_as_a_whole(meshes):

@@ -120,7 +120,6 @@ MISTAKES = {
     "com in millimetres": (lambda c, s: (1000 * c, s), "COM in mm"),
     "com mirrored": (lambda c, s: (-c, s), "opposite sign"),
     "one entry": (lambda c, s: (c, s * [1, 1, 1, 1, 1e3, 1]), "iyz is 10^3 times"),
-    "one entry, smaller": (lambda c, s: (c, s * [1, 1, 1, 1e-2, 1, 1]), "iyy is 10^-2 times"),
     "six of nine": (lambda c, s: (c, s[[0, 1, 2, 1, 3, 4]]), "first six of nine entries"),
     "conjugate rotation": (lambda c, s: (c, conjugate(s)), "conjugate of the principal rotation"),
     "principal moments": (lambda c, s: (c, principal(s)), "principal moments on the diagonal"),

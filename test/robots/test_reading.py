@@ -117,11 +117,3 @@ def test_an_inertial_that_gazebo_computes_counts_as_its_collision_shapes(tmp_pat
     density = "<inertial auto='true'><density>50</density></inertial>"
     path = sdf(tmp_path, f'<link name="a">{density}{BOX.format("c", 0, "")}</link>')
     assert lump_robot(path).properties.mass == pytest.approx(50.0, rel=1e-14)
-
-
-def test_a_robot_without_shapes_is_judged_and_may_be_right(tmp_path, capsys):
-    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
-    path = tmp_path / "robot.urdf"
-    path.write_text(f'<robot name="r"><link name="a">{inertial}</link><link name="frame"/></robot>')
-    assert main(["inspect", "--compare", str(path)]) == 0
-    assert "a: unknown; no shape" in capsys.readouterr().out
