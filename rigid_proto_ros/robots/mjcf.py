@@ -136,7 +136,7 @@ def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int)
 
 def _link(spec: Any, body: Any, name: str, shapes: list[Shape | None], inertial: Element | None) -> Link:
     """A body with the inertial that the file has."""
-    bare = bare_link(name, shapes, None)
+    bare = bare_link(name, shapes)
     if not body.explicitinertial:
         return bare
     if np.isnan(body.fullinertia[0]):
@@ -174,7 +174,7 @@ def _simulated(source: _Source, links: list[Link], names: list[str]) -> list[Lin
     for body, name in list(enumerate(names))[1:]:
         rotation = rotation_from_wxyz(model.body_iquat[body])
         link = replace(
-            known.get(name) or bare_link(name, (), None),
+            known.get(name) or bare_link(name, ()),
             mass=float(model.body_mass[body]),
             center_of_mass=model.body_ipos[body].copy(),
             inertia=rotation @ np.diag(model.body_inertia[body]) @ rotation.T,

@@ -63,7 +63,7 @@ class Link:
     """What a file says of one link: mass [kg], COM (3,) [m] and tensor (3, 3) [kg m²] about it, both in the link's
     axes; ``problem`` instead when there are none. The steps are half a unit of the last digit printed, for mass, COM
     (3,) and tensor (3, 3): what a number may be off by for its printing alone. ``element``: the <inertial> that was
-    read, or the whole link where it has none that can be, None where the file has it from elsewhere. ``computed``: a
+    read, None where the file has it from elsewhere. ``computed``: a
     simulator computes the inertial from the collision shapes, for the mass if there is one.
     """
 
@@ -187,10 +187,8 @@ def printed_link(
     )
 
 
-def bare_link(
-    name: str, shapes: Iterable[Shape | None], element: Element | None, problem: str = "no <inertial>"
-) -> Link:
+def bare_link(name: str, shapes: Iterable[Shape | None], problem: str = "no <inertial>") -> Link:
     """A link of which the file doesn't say the mass or the tensor."""
     present = tuple(shape for shape in shapes if shape is not None)
     nothing = math.nan, np.full(3, math.nan), np.full((3, 3), math.nan)
-    return Link(name, *nothing, present, problem, element=element)
+    return Link(name, *nothing, present, problem)

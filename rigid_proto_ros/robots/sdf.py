@@ -55,7 +55,7 @@ def _link(link: Element) -> Link:
     name, inertial = link.get("name", "?"), link.find("inertial")
     density = WATER if inertial is None else float(inertial.findtext("density", str(WATER)))
     shapes = [_shape(role, part, name, density) for role in (VISUAL, COLLISION) for part in link.findall(role)]
-    bare = bare_link(name, shapes, link)
+    bare = bare_link(name, shapes)
     if inertial is None:
         return bare
     tensor, mass = inertial.find("inertia"), inertial.findtext("mass")
@@ -63,7 +63,7 @@ def _link(link: Element) -> Link:
         computed = replace(bare, problem="the simulator computes its inertial (auto='true')", computed=True)
         return computed if mass is None else replace(computed, mass=float(mass))
     if tensor is None or mass is None:
-        return bare_link(name, shapes, link, "an <inertial> without mass or inertia")
+        return replace(bare, problem="an <inertial> without mass or inertia")
     six = [tensor.findtext(entry, "1" if entry in ("ixx", "iyy", "izz") else "0") for entry in SIX]
     center = (inertial.findtext("pose") or "").split()[:3]
     return printed_link(bare, mass, center, six, _pose(inertial).rotation, inertial)

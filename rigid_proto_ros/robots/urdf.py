@@ -57,13 +57,13 @@ def sized(
 
 def _link(link: Element) -> Link:
     shapes = [_shape(role, part) for role in (VISUAL, COLLISION) for part in link.findall(role)]
-    bare = bare_link(link.get("name", "?"), shapes, link)
+    bare = bare_link(link.get("name", "?"), shapes)
     inertial = link.find("inertial")
     if inertial is None:
         return bare
     origin, mass, tensor = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
     if mass is None or tensor is None or mass.get("value") is None:
-        return bare_link(bare.name, shapes, link, "an <inertial> without mass or inertia")
+        return replace(bare, problem="an <inertial> without mass or inertia")
     six = [tensor.get(entry, "0") for entry in SIX]
     center = (_get(origin, "xyz") or "").split()
     return printed_link(bare, mass.get("value", ""), center, six, _pose(origin).rotation, inertial)
