@@ -27,7 +27,7 @@ MCAP = ["mcap>=1.6,<2"]
 # Reads MJCF files.
 ROBOTS = ["mujoco>=3.3"]
 SWEEP = ["pyarrow>=15"]
-# Motion for other tools: tables, glTF, USD.
+# Motion for other tools: Parquet, USD.
 EXPORT = ["pyarrow>=15", "usd-core>=25.5"]
 # Mass and tensor from recorded motion: our sessions by mcap, with which zstandard comes, other bags by rosbags.
 IDENTIFY = ["scipy>=1.11", "rosbags>=0.11,<0.12", *MCAP]

@@ -169,12 +169,12 @@ def comparison(scenario: Scenario) -> str:
     try:
         true = model_properties(scenario, "solid")
     except InputError as error:
-        return _alone(scenario, f"No true tensor: {error}")
+        return f"Simulating: **{flying}**. No true tensor: {error}"
     try:
         approximate = model_properties(scenario, other)
         own = model_properties(scenario, other, com="model")
     except InputError as error:
-        return _alone(scenario, f"No {other} to compare with: {error}")
+        return f"Simulating: **{flying}**. No {other} to compare with: {error}"
     difference = model_difference(approximate, true)
     title = TITLES.get(other, other)
     what = f"Simulating: **{TITLES.get(flying, flying)}**. "
@@ -223,11 +223,3 @@ def _degrees(angle: float) -> str:
 
 def _per_cent(error: float) -> str:
     return f"{100.0 * error if abs(error) > ROUNDING else 0.0:+.3g}"
-
-
-def _alone(scenario: Scenario, reason: str) -> str:
-    body = scenario.setup.body
-    lines = [f"Simulating: **{scenario.parameters.inertia_model}**. {reason}", "", "|  |  |", "| --- | --- |"]
-    lines.append(f"| mass [kg] | {body.mass:.5g} |")
-    lines += [f"| I{'₁₂₃'[k]} principal [kg m²] | {m:.5g} |" for k, m in enumerate(body.principal_moments)]
-    return "\n".join(lines)

@@ -23,6 +23,7 @@ from ..picture.picture import Picture
 from ..scene.scenario import Scenario
 from ..simulation.observer import (
     BodyChanged,
+    BodySnapshot,
     Event,
     GhostChanged,
     GhostPublished,
@@ -145,6 +146,7 @@ class Page:
         self._loads: dict[int, LoadBegan] = {}
         self._strings: list[StringChanged] = []
         self._ghost_row: np.ndarray | None = None
+        self._hidden_ghost: BodySnapshot | None = None
         self._drawn_moment_ns: int | None = None
         self._new_scene = True
         self._scenes_seen = 0
@@ -388,6 +390,10 @@ class Page:
         moment_ns = self.flight.moment_ns
         if moment_ns == self._drawn_moment_ns or moment_ns is None:
             return
+        if self._drawn_moment_ns is None:
+            # Of the ghost no past is kept.
+            self._hidden_ghost = self.picture.ghost
+            self.picture.set_ghost(moment_ns, None)
         self._drawn_moment_ns = moment_ns
         times, rows = self.flight.past_rows(TRAIL_NS)
         self.picture.restart()
@@ -405,6 +411,8 @@ class Page:
         self._drawn_moment_ns = None
         self.picture.restart()
         self.backend.forget()
+        if self._hidden_ghost is not None:
+            self.picture.set_ghost(self.live.state.time_ns, self._hidden_ghost)
         self._loads.clear()
         simulation = self.live.loop.simulation
 

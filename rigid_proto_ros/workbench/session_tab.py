@@ -17,9 +17,8 @@ from ..base.errors import InputError
 from ..export.flight_record import FlightRecord, frames, source_of_session
 from ..export.gltf import write_gltf
 from ..export.tracks import tracks_of
-from ..scene.offline import notify_start
+from ..session.replay import play
 from ..session.script_of_session import script_of_session
-from ..simulation.observer import Published
 from .flight import Flight
 
 STEP_S = 0.05
@@ -127,16 +126,9 @@ class SessionTab:
 
     def _motion(self, rate: float) -> tuple[bytes, str]:
         session = self._flight.memory.session()
-        source = source_of_session(session)
-        assert source is not None
         record = FlightRecord()
-        again = source(record)
-        notify_start(record, again.scenario)
-        again.simulation.announce()
-        for time_ns, row in zip(session.times.tolist(), session.rows, strict=True):
-            again.advance(time_ns)
-            record.on(Published(time_ns, row))
-        made, report = frames(record, source, rate)
+        play(session, record)
+        made, report = frames(record, source_of_session(session), rate)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "take.glb"
             write_gltf(str(file), made, tracks_of(made))
