@@ -74,11 +74,6 @@ class Scene:
         return simulation
 
 
-def random_features(rng: np.random.Generator) -> dict:
-    """A level of each feature."""
-    return {name: levels[rng.integers(len(levels))] for name, levels in FEATURES.items()}
-
-
 def make_scene(features: dict, rng: np.random.Generator, accuracy: float = 1e-9) -> Scene:
     """A scene of these features, all else at random."""
     f, size = features, features["scale"] * log_uniform(rng, 0.3, 3.0)

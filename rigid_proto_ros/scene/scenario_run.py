@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from ..base.errors import InputError
 from ..mesh.reading import Mesh
 from ..simulation.commands import Change, Command, Listed
-from ..simulation.observer import Event, GhostChanged, GhostPublished, Observer, Refused, SceneChanged
+from ..simulation.observer import Event, GhostChanged, GhostPublished, Observer, Refused, SceneChanged, snapshot
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
 from .scenario import BodyMesh, Scenario, check_inertia
@@ -49,7 +49,7 @@ class Ghost:
 
     def announce(self) -> None:
         """Tell the observer what the ghost is."""
-        self._observer.on(GhostChanged(self.simulation.time_ns, self.simulation.snapshot()))
+        self._observer.on(GhostChanged(self.simulation.time_ns, snapshot(self.simulation.setup)))
 
     def watch(self, observer: Observer) -> None:
         """Tell another observer from now on."""
@@ -83,7 +83,7 @@ class Ghost:
         self._shown = setup is not None
         if setup is not None:
             self.simulation.submit(Change({}, lambda: setup), max(time_ns, self.simulation.time_ns), listed)
-            self._observer.on(GhostChanged(time_ns, self.simulation.snapshot(setup)))
+            self._observer.on(GhostChanged(time_ns, snapshot(setup)))
 
     def reset(self, scenario: Scenario) -> None:
         """Time 0 and the initial state."""

@@ -68,7 +68,11 @@ class ActingLoad(NamedTuple):
         return "thruster" if self.thruster >= 0 else "wrench" if self.kind == HELD_WRENCH else "poke"
 
 
-_FLY, _BEGIN, _APPLY, _CUT, _FINISH, _END_DUE, _END_ALL, _TAKE_BODY = range(8)
+FLY, BEGIN, APPLY, CUT, FINISH, END_DUE, END_ALL, TAKE_BODY = range(8)
+"""What a call does. APPLY: the commands put last, at the time of the flight. CUT: end the segment there by the step
+that sampling took, and begin another. FINISH: keep its counts and begin another from the present state. END_DUE: end
+what ends then. END_ALL: end the held wrench and the pulses.
+"""
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -83,26 +87,26 @@ def _call(
 ) -> int:
     """One of these on the flight; how it came back."""
     flight = flights[0]
-    if what == _FLY:
+    if what == FLY:
         return fl.fly(flight, loads, events, methods, room, until_ns)
-    if what == _BEGIN:
+    if what == BEGIN:
         fl.begin_segment(flight, loads, methods, room)
         return 0
-    if what == _CUT:
+    if what == CUT:
         fl.cut_segment(flight, loads, methods, room)
         return 0
-    if what == _FINISH:
+    if what == FINISH:
         fl.finish_segment(flight, loads, methods, room)
         return 0
-    if what == _TAKE_BODY:
+    if what == TAKE_BODY:
         fl.take_body(flight, loads)
         return 0
     flight.events, flight.timeouts = 0, 0
-    if what == _APPLY:
+    if what == APPLY:
         while flight.due < flight.due_end:
             fl.apply(flight, loads, events, flight.due)
             flight.due += 1
-    elif what == _END_ALL:
+    elif what == END_ALL:
         fl.end_all(flight, loads, events)
     else:
         return int(fl.end_due(flight, loads, events))
@@ -157,7 +161,7 @@ class FlightArrays:
         flight.body[:], flight.common = new.body, new.common
         flight.accuracy, flight.degree, flight.chooses = new.accuracy, new.degree, new.chooses
         flight.step_ns, flight.timeout_ns, flight.poke_ns = new.step_ns, new.timeout_ns, new.poke_ns
-        self._do(_TAKE_BODY)
+        self.call(TAKE_BODY)
 
     def start_over(self, setup: Setup, tied: StringState | None) -> None:
         """Time 0, the initial state, and nothing that acts but a string."""
@@ -168,7 +172,7 @@ class FlightArrays:
         numbers[_LOAD_IDS] = load_ids
         if tied is not None:
             self.tie(tied)
-        self._do(_BEGIN)
+        self.call(BEGIN)
 
     def tie(self, tied: StringState | None) -> None:
         """The string is tied like this, or not at all, from the next segment on."""
@@ -205,28 +209,17 @@ class FlightArrays:
         """What compiled functions take: flight (1,), tables of loads, events and methods, workspace."""
         return self._flights, self._loads, self._events, self.methods, self.room
 
-    def _do(self, what: int, until_ns: int = 0) -> int:
+    def call(self, what: int, until_ns: int = 0) -> int:
+        """Do one of these; how it came back: of END_DUE, whether anything ended."""
         return self._call(*self.arrays, what, until_ns)
 
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; False when the motion failed."""
-        while (came := self._do(_FLY, until_ns)) != _REACHED:
+        while (came := self.call(FLY, until_ns)) != _REACHED:
             if came == fl.FAILED:
                 return False
             provide_kernel(self.integrator, self.methods, int(self.flight.method))
         return True
-
-    def apply(self) -> None:
-        """Apply the commands put last, at the time of the flight."""
-        self._do(_APPLY)
-
-    def end_due(self) -> bool:
-        """End what ends at the time of the flight; whether anything did."""
-        return bool(self._do(_END_DUE))
-
-    def end_all(self) -> None:
-        """End the held wrench and the pulses."""
-        self._do(_END_ALL)
 
     def last_events(self) -> list[tuple[int, ...]]:
         """What the last call began and ended: time_ns, what, load_id and row of each."""
@@ -237,16 +230,6 @@ class FlightArrays:
         """The body's attitude (4,) xyzw when a command acted, by the number of its event among the last."""
         attitude: np.ndarray = self._events["attitude"][number].copy()
         return attitude
-
-    # Segments
-
-    def cut_segment(self) -> None:
-        """End the segment at the time of the flight by the step that sampling there took, and begin another."""
-        self._do(_CUT)
-
-    def finish_segment(self) -> None:
-        """Keep the segment's counts and begin another from the present state."""
-        self._do(_FINISH)
 
     # Observables
 

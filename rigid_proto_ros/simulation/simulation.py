@@ -41,13 +41,12 @@ from .commands import (
     slot_name,
 )
 from .event_log import EventLog
-from .flight_arrays import TIMEOUTS, FlightArrays
+from .flight_arrays import APPLY, CUT, END_ALL, END_DUE, FINISH, TIMEOUTS, FlightArrays
 from .observables import Observables
 from .observer import (
     AccuracyFloor,
     Applied,
     BodyChanged,
-    BodySnapshot,
     LoadBegan,
     LoadEnded,
     Logged,
@@ -105,7 +104,7 @@ class Simulation(Observables):
 
     def introduce(self, observer: Observer) -> None:
         """Tell an observer that comes in flight about the body, what acts on it and the string."""
-        observer.on(BodyChanged(self.time_ns, self.snapshot()))
+        observer.on(BodyChanged(self.time_ns, snapshot(self.setup)))
         for acting in self.acting:
             shown = shown_load(acting.shown_kind, acting.load, self.setup.body)
             observer.on(LoadBegan(self.time_ns, acting.load_id, shown))
@@ -113,7 +112,7 @@ class Simulation(Observables):
 
     def announce(self) -> None:
         """Tell the observer about the body as it is now."""
-        self.observer.on(BodyChanged(self.time_ns, self.snapshot()))
+        self.observer.on(BodyChanged(self.time_ns, snapshot(self.setup)))
 
     def notify_floor(self, at_end: bool = False) -> None:
         """Tell the observer what holds the motion to less than its accuracy, where that changed: from time to time, and
@@ -139,10 +138,6 @@ class Simulation(Observables):
         self._told_string = self.string
         if StringChanged in self.observer.takes:
             self.observer.on(StringChanged(self.time_ns, shown_string(self.string, self.setup.body)))
-
-    def snapshot(self, setup: Setup | None = None) -> BodySnapshot:
-        """The body as an observer is told of it; of another setup, when one is given."""
-        return snapshot(setup or self.setup)
 
     def log(self, kind: str, content: dict[str, Any]) -> None:
         """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever causes it."""
@@ -197,7 +192,7 @@ class Simulation(Observables):
         """Time 0, the initial state (of a new setup, if given), no held wrench, no pulses, nothing scheduled; counters
         stay.
         """
-        self._arrays.end_all()
+        self._arrays.call(END_ALL)
         self._notify([])
         self.notify_floor(at_end=True)
         self.observer.on(Reset())
@@ -313,7 +308,7 @@ class Simulation(Observables):
     def _act(self) -> None:
         """Everything that ends or begins now; a new segment if anything did."""
         arrays, now_ns = self._arrays, self.time_ns
-        changed = arrays.end_due()
+        changed = bool(arrays.call(END_DUE))
         self._notify([])
         changed |= self._string.end_due(now_ns)
         if self.thrusters.due_ns <= now_ns:
@@ -335,7 +330,7 @@ class Simulation(Observables):
         self.listed = None
         if changed:
             arrays.tie(self._string.tied)
-            arrays.cut_segment()
+            arrays.call(CUT)
             self._notify_string()
 
     def _apply(self, pending: Pending) -> None:
@@ -344,7 +339,7 @@ class Simulation(Observables):
             if isinstance(command, WrenchCommand) and not self._still_holds(pending, command):
                 pending.set_load(command, load_row(command, self.setup, self.state), self.setup)
             self._arrays.put([pending])
-            self._arrays.apply()
+            self._arrays.call(APPLY)
             self._notify([pending])
             if isinstance(command, ClearWrench):
                 self.thrusters.clear()
@@ -375,7 +370,7 @@ class Simulation(Observables):
             row.kind, row.slot = HELD_WRENCH if load.is_zero else PULSE, -1 - number
             rows.append(row)
         arrays.put(rows)
-        arrays.apply()
+        arrays.call(APPLY)
         if not self._wants_loads:
             return
         for now_ns, what, load_id, row_number in arrays.last_events():
@@ -448,7 +443,7 @@ class Simulation(Observables):
         self.time_ns, self.state = arrays.time_ns, arrays.state
         when = f"{int(self.flight.committed_ns) * 1e-9:.9g} s"
         self.failure = f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}"
-        arrays.finish_segment()
+        arrays.call(FINISH)
         return self.state
 
 
