@@ -60,9 +60,6 @@ twice that of this process's memory.
 FLUSH_PERIOD_S = 0.5
 """What a kill -9 loses at most, and how far viewers lag; every flush costs about 5 ms and 20 kB of overhead."""
 
-TIMEOUT_S = 10.0
-"""A disk that doesn't take what waits in this time is given up."""
-
 STALLED_S = 0.9
 """A flush that takes longer is told of: a report comes once a second, and a stalled file is to be told within two."""
 
@@ -178,11 +175,9 @@ class RerunObserver(Observer):
         self._mailbox.close()
         if self._thread.ident is None:
             self._finish()
-        else:
-            self._thread.join(TIMEOUT_S)
-            if self._thread.is_alive():
-                end_without_waiting()
-                self._lost("recording stopped: the last states could not be written")
+        elif not self._mailbox.emptied_by(self._thread):
+            end_without_waiting()
+            self._lost("recording stopped: the last states could not be written")
         if self._viewer is not None:
             self._viewer.stop()
 
@@ -219,6 +214,7 @@ class RerunObserver(Observer):
                 stream.flush()
             except OSError as error:
                 self._give_up(stream, error)
+            self._mailbox.moved()
             if stream.missed and not stream.behind:
                 self._writer.catch_up(stream)
 
@@ -260,6 +256,7 @@ class RerunObserver(Observer):
             try:
                 self._writer.finish(stream)
                 stream.close()
+                self._mailbox.moved()
                 self._writer.streams.remove(stream)
             except OSError as error:
                 self._give_up(stream, error)

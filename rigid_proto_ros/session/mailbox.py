@@ -20,7 +20,8 @@ BLOCKS_WAITING_MAX = 16
 only a run faster than real time reaches: the file keeps every row, and memory stays bounded."""
 
 PATIENCE_S = 10.0
-"""A flusher that has taken nothing for so long, with all blocks full, won't: the flight goes on and nothing is kept."""
+"""A flusher that got nothing done for so long, with all blocks full or at the end, won't: the simulation goes on, or ends,
+and what waits is lost."""
 
 
 @dataclass
@@ -57,7 +58,7 @@ class Mailbox:
 
     def __init__(self, on_given_up: Callable[[], None] = lambda: None) -> None:
         self._on_given_up = on_given_up
-        self._taken_at = time.monotonic()
+        self._moved_at = time.monotonic()
         self._given_up = False
         # The plain lock itself on the hot path: a Condition's own enter and exit cost more than the copy.
         self._lock = threading.Lock()
@@ -96,7 +97,7 @@ class Mailbox:
     def _hand_over(self) -> None:
         self._hurried = False
         while len(self._waiting) >= BLOCKS_WAITING_MAX and not self._closed and not self._given_up:
-            rest = self._taken_at + PATIENCE_S - time.monotonic()
+            rest = self._moved_at + PATIENCE_S - time.monotonic()
             if rest <= 0.0:
                 self._given_up = True
                 self._on_given_up()
@@ -110,7 +111,7 @@ class Mailbox:
     def take(self) -> Block | None:
         """The oldest block, or what has been put since; None when empty."""
         with self._changed:
-            self._taken_at = time.monotonic()
+            self.moved()
             if self._waiting:
                 block = self._waiting.popleft()
                 self._changed.notify_all()
@@ -120,6 +121,16 @@ class Mailbox:
             else:
                 block = None
             return block
+
+    def moved(self) -> None:
+        """The consumer got something done: as long as it does, a disk is slow, or the machine busy, and no more."""
+        self._moved_at = time.monotonic()
+
+    def emptied_by(self, thread: threading.Thread) -> bool:
+        """Wait, after ``close``, until the consumer's thread has ended; False when it got nothing done for PATIENCE_S."""
+        while thread.is_alive() and time.monotonic() < self._moved_at + PATIENCE_S:
+            thread.join(max(0.0, self._moved_at + PATIENCE_S - time.monotonic()))
+        return not thread.is_alive()
 
     def wait(self, seconds: float) -> None:
         """Return after ``seconds``, or at once when a block is full, on ``wake`` and when the mailbox is closed."""
@@ -138,6 +149,7 @@ class Mailbox:
         """Wake both sides; what is inside can still be taken. A producer that waited no longer does."""
         with self._changed:
             self._closed = True
+            self.moved()
             self._changed.notify_all()
 
     @property

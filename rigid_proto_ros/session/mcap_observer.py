@@ -49,9 +49,6 @@ FLUSH_PERIOD_S = 0.4
 CHUNK_NS = 500_000_000
 """Simulated time that a chunk holds at most: what a cut inside it loses, also in a run faster than the clock."""
 
-CLOSE_TIMEOUT_S = 10.0
-"""A disk that doesn't take the rest in this time is given up."""
-
 _logger = logging.getLogger(__name__)
 
 
@@ -115,8 +112,7 @@ class McapObserver(Observer):
             return
         self._closed = True
         self._mailbox.close()
-        self._thread.join(CLOSE_TIMEOUT_S)
-        if self._thread.is_alive():
+        if not self._mailbox.emptied_by(self._thread):
             self._stopped("the last states could not be written")
 
     def _begin(self, node_name: str) -> Writer:

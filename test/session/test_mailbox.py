@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from rigid_proto_ros.session import mailbox
 from rigid_proto_ros.session.mailbox import BLOCK_ROWS, BLOCKS_WAITING_MAX, Mailbox
@@ -36,3 +37,29 @@ def test_a_recorder_that_is_stuck_is_given_up_and_what_waits_has_no_gap(monkeypa
     while (block := box.take()) is not None:
         taken.append(block.times[: block.count].copy())
     assert (np.concatenate(taken) == np.arange(BLOCKS_WAITING_MAX * BLOCK_ROWS)).all()
+
+
+class Consumer:
+    """A thread on a clock of its own: each wait for it takes as long as it may, and it gets something done meanwhile."""
+
+    def __init__(self, box: Mailbox, monkeypatch, moves: int) -> None:
+        self.now_s, self.box, self.moves = 0.0, box, moves
+        monkeypatch.setattr(mailbox.time, "monotonic", lambda: self.now_s)
+
+    def is_alive(self) -> bool:
+        return self.moves != 0
+
+    def join(self, timeout: float) -> None:
+        self.now_s += timeout
+        if self.moves > 0:
+            self.moves -= 1
+            self.box.moved()
+
+
+@pytest.mark.parametrize(("moves", "emptied"), [(0, True), (7, True), (-1, False)])
+def test_at_the_end_a_consumer_is_waited_for_as_long_as_it_gets_something_done(monkeypatch, moves, emptied):
+    box = Mailbox()
+    consumer = Consumer(box, monkeypatch, moves)
+    box.close()
+    assert box.emptied_by(consumer) == emptied
+    assert consumer.now_s == pytest.approx(mailbox.PATIENCE_S * abs(moves))
