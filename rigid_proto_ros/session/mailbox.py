@@ -20,8 +20,8 @@ BLOCKS_WAITING_MAX = 16
 only a run faster than real time reaches: the file keeps every row, and memory stays bounded."""
 
 PATIENCE_S = 10.0
-"""A flusher that got nothing done for so long, with all blocks full or at the end, won't: the simulation goes on, or ends,
-and what waits is lost."""
+"""A flusher that got nothing done for so long, with all blocks full or at the end, won't: the simulation goes on, or
+ends, and what waits is lost."""
 
 
 @dataclass
@@ -127,7 +127,7 @@ class Mailbox:
         self._moved_at = time.monotonic()
 
     def emptied_by(self, thread: threading.Thread) -> bool:
-        """Wait, after ``close``, until the consumer's thread has ended; False when it got nothing done for PATIENCE_S."""
+        """Wait, after ``close``, for the end of the consumer's thread; False when it does nothing for PATIENCE_S."""
         while thread.is_alive() and time.monotonic() < self._moved_at + PATIENCE_S:
             thread.join(max(0.0, self._moved_at + PATIENCE_S - time.monotonic()))
         return not thread.is_alive()
