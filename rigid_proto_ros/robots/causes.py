@@ -132,7 +132,7 @@ def explain_inertia(given: np.ndarray, truth: MassProperties, stated: np.ndarray
         return ("all entries zero",)
     mistakes = [("", truth.inertia)]
     mistakes += [(f"tensor of {name}, not of the solid", of.inertia) for name, of in _other_shapes(parts, truth.mass)]
-    mistakes += [*_wrong_frames(truth, stated, parts), *_wrong_orders(truth.inertia)]
+    mistakes += [*_wrong_orders(truth.inertia), *_wrong_frames(truth, stated, parts)]
     found = []
     for sentence, wrong in mistakes:
         factor = float(np.sum(given * wrong) / max(np.sum(wrong * wrong), 1e-300))

@@ -137,6 +137,14 @@ def test_each_usual_mistake_is_named(capsys, tmp_path, truth, mistake):
     assert link["expected"]["center_of_mass"] == pytest.approx(truth[0], rel=1e-12)
 
 
+def test_exchanged_axes_of_a_box_are_called_so(capsys, tmp_path):
+    box = '<collision><geometry><box size="0.3 0.2 0.1"/></geometry></collision>'
+    inertia = '<inertia ixx="0.1350" iyy="0.0675" izz="0.1755"/>'
+    text = f'<robot name="r"><link name="a">{box}<inertial><mass value="16.2"/>{inertia}</inertial></link></robot>'
+    _, (link,) = compare(capsys, tmp_path, text)
+    assert link["causes"] == ["axes x and y exchanged"]
+
+
 def test_a_bounding_boxs_tensor_is_recognised(capsys, tmp_path):
     box = mesh_body("hammer").moments.mass_properties("bounding_box", scale=SCALE, mass=MASS)
     R = rotation_from_rpy(*RPY)
