@@ -13,8 +13,8 @@ from ..scene.lessons import Lesson, lessons
 from ..scene.scenario import Scenario
 from .flight import Flight
 from .lesson_course import COURSES, NO_LESSON, Course, LessonProgress
-from .page_style import ANSWERS
 from .readouts import Readings, html_table
+from .server import ANSWERS
 
 FREE = "– (no lesson)"
 

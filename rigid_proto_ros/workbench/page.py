@@ -46,11 +46,11 @@ from .drawing import ViserBackend
 from .flight import Flight
 from .lesson_course import Course
 from .lesson_panel import LessonPanel
-from .page_style import ClassMode
 from .panel import ALWAYS, AT_FIRST, CENTRE_OF_MASS, PARTS, ForcesTab, ShowTab
 from .pointer import DrawnPose, DrawnPoses, Pointer, Tools, suggested_force
 from .readouts import Readings, ReadoutTab
 from .room import Room
+from .server import ClassMode
 from .session_tab import SessionTab
 from .time_bar import Announcements, TimeBar, motion_words
 

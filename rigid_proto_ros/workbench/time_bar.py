@@ -11,7 +11,7 @@ import viser
 from ..scene.scenario import Scenario
 from .controls import Controls
 from .flight import Flight
-from .page_style import MARK
+from .server import MARK
 
 SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0}
 """Simulated seconds per second, as the bar names them."""
