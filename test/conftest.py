@@ -91,13 +91,6 @@ def ros_environment(ros_domain_id: int) -> dict[str, str]:
 
 
 @pytest.fixture(scope="session")
-def foreign_environment(ros_environment: dict[str, str]) -> dict[str, str]:
-    """The same for an interpreter of another virtual environment, whose ROS wheels must find their own libraries."""
-    marks = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
-    return {key: value for key, value in ros_environment.items() if key not in marks}
-
-
-@pytest.fixture(scope="session")
 def commanded(ros_environment, tmp_path_factory):
     """A flying node and a client of it, in a domain of their own, shared by all tests of commands (test/command_rig.py)."""
     from command_rig import Commanded

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import ENDINGS
 from ros_process import refusal
 
 from rigid_proto_ros.cli.main import main as rigid_proto
@@ -181,9 +180,8 @@ def test_a_slip_on_the_command_line_is_refused(arguments, part, capfd):
 
 
 @pytest.mark.parametrize("option", ["--record", "--bag", "--set"])
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_what_is_refused_overwrites_no_recording(option, ending, tmp_path, capfd):
-    kept, script = tmp_path / f"kept{ending}", tmp_path / "pokes.yaml"
+def test_what_is_refused_overwrites_no_recording(option, tmp_path, capfd):
+    kept, script = tmp_path / "kept.mcap", tmp_path / "pokes.yaml"
     kept.write_bytes(b"an earlier flight")
     script.write_text(SCRIPTS["contact"][0])
     recorded = [option, f"record={kept}" if option == "--set" else str(kept)]
