@@ -31,8 +31,8 @@ from ..simulation.observer import Event, Logged, Observer, Published, Reset, Sce
 KEPT_S = 300.0
 """[s, simulated] How far back one can go."""
 
-SPACING_NS = 5_000_000
-"""States closer than this aren't kept: a body at 1 kHz would fill the memory five times as fast."""
+SPACING_NS = 10_000_000
+"""States closer than this aren't kept: a body at 1 kHz would fill the memory ten times as fast."""
 
 MAX_EVENTS = 50_000
 """Of one run: 40 minutes of pulling at 20 targets a second, 20 MB."""
