@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..simulation.observer import ShownLoad
+from . import style
+from .backend import Backend
 
 FIRST = 0.6
 """Body sizes of the first arrow of its kind: it reaches out of most bodies, and one four times as long can be seen."""
@@ -67,26 +68,13 @@ class _Acting:
     pushes: bool | None = None
 
 
-@dataclass
-class LoadArrowRows:
-    """The arrows of one kind of load at n states: counts (n,), then of all of them origins and vectors (m, 3), the
-    places (m, 3) and texts of their labels.
-    """
-
-    counts: np.ndarray
-    origins: np.ndarray
-    vectors: np.ndarray
-    label_positions: np.ndarray
-    texts: list[str] = field(default_factory=list)
-
-
 class Loads:
     """The loads of one run, by when they act; a load that ends before any state shows it is shown at the next one."""
 
     def __init__(self) -> None:
         self._acting: dict[int, _Acting] = {}
         self._ended: list[_Acting] = []
-        self._drawn: set[tuple[str, str]] = set()
+        self._drawn: set[str] = set()
 
     def began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
         """A load begins to act."""
@@ -102,57 +90,76 @@ class Loads:
             acting.end_ns = time_ns
             self._ended.append(acting)
 
-    def rows(
-        self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray, scales: ArrowScales, size: float, weight: float
-    ) -> dict[tuple[str, str], LoadArrowRows]:
-        """By kind and part the arrows at times (n,), states (n, 13) and attitudes R (n, 3, 3), of a body of this size
-        [m] and weight on earth [N]: none, once, where they ended.
+    def draw(
+        self,
+        backend: Backend,
+        wanted: Callable[[str], bool],
+        times_ns: np.ndarray,
+        rows: np.ndarray,
+        R: np.ndarray,
+        scales: ArrowScales,
+        size: float,
+        weight: float,
+    ) -> None:
+        """Draw the arrows at times (n,), states (n, 13) and attitudes R (n, 3, 3), of a body of this size [m] and
+        weight on earth [N]: none, once, where they ended.
         """
-        found: dict[tuple[str, str], list[tuple[np.ndarray, Any, str]]] = {}
+        found: dict[str, list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, str]]] = {}
         for acting in (*self._acting.values(), *self._ended):
             present = (times_ns >= acting.begin_ns) & (times_ns < acting.end_ns)
             if not present.any() and not acting.shown and acting.end_ns < np.inf:
                 present[np.searchsorted(times_ns, acting.begin_ns) :][:1] = True
-            if not present.any():
-                continue
-            acting.shown = True
-            load, point = acting.load, np.asarray(acting.load.point, dtype=float)
-            if acting.pushes is None:
-                force = load.force if load.axes == "body" else R[present][0].T @ load.force
-                acting.pushes = bool(point @ force < 0.0)
-            impulsive = load.kind == "impulse"
-            for part, value, unit in (("force", load.force, "N"), ("torque", load.torque, "N m")):
-                value, unit = np.asarray(value, dtype=float), f"{unit} s" if impulsive else unit
-                magnitude = float(np.linalg.norm(value))
-                usual = weight * (1.0 if part == "force" else 0.5 * size)
-                (length,) = scales.lengths(unit, np.array([magnitude]), size, usual) if magnitude else (0.0,)
-                if length == 0.0:
-                    continue
-                vectors = np.broadcast_to(value * (length / magnitude), (len(times_ns), 3))
-                vectors = np.einsum("nij,nj->ni", R, vectors) if load.axes == "body" else vectors
-                origins = rows[:, 0:3] + R @ point
-                # A force that pushes has its tip at the point, as a finger would stand: inside the body none is seen.
-                if part == "force" and acting.pushes:
-                    origins = origins - vectors
-                    ends = origins
-                else:
-                    ends = origins + vectors
-                arrow = (vectors, origins, ends)
-                found.setdefault((load.kind, part), []).append((present, arrow, f"{_short(magnitude)} {unit}"))
+            if present.any():
+                acting.shown = True
+                for name, arrow in _arrows(acting, present, rows, R, scales, size, weight):
+                    found.setdefault(name, []).append((present, *arrow))
         self._ended = [acting for acting in self._ended if acting.end_ns > times_ns[-1] or not acting.shown]
-        none = np.zeros(len(times_ns), dtype=int)
-        drawn = {key: LoadArrowRows(none, *np.zeros((3, 0, 3))) for key in self._drawn - found.keys()}
-        drawn |= {key: _in_order(arrows) for key, arrows in found.items()}
+        for name in filter(wanted, self._drawn - found.keys()):
+            none = np.zeros(len(times_ns), dtype=int)
+            backend.arrows(name, none, np.zeros((0, 3)), np.zeros((0, 3)))
+            backend.labels(name, none, np.zeros((0, 3)), [])
+        for name, arrows in found.items():
+            if wanted(name):
+                # Of several loads, by state.
+                present = np.stack([arrow[0] for arrow in arrows], axis=1)
+                vectors, origins, ends = (np.stack([arrow[k] for arrow in arrows], axis=1)[present] for k in (1, 2, 3))
+                backend.arrows(name, present.sum(axis=1), vectors, origins)
+                texts = [arrows[k][4] for k in np.nonzero(present)[1].tolist()]
+                backend.labels(name, present.sum(axis=1), ends, texts)
         self._drawn = set(found)
-        return drawn
 
 
-def _in_order(arrows: Sequence[tuple[np.ndarray, Any, str]]) -> LoadArrowRows:
-    """Arrows of several loads, by state."""
-    present = np.stack([shown for shown, _, _ in arrows], axis=1)
-    vectors, origins, ends = (np.stack([own[k] for _, own, _ in arrows], axis=1)[present] for k in range(3))
-    texts = [arrows[k][2] for k in np.nonzero(present)[1].tolist()]
-    return LoadArrowRows(present.sum(axis=1), origins, vectors, ends, texts)
+def _arrows(
+    acting: _Acting,
+    present: np.ndarray,
+    rows: np.ndarray,
+    R: np.ndarray,
+    scales: ArrowScales,
+    size: float,
+    weight: float,
+) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray, np.ndarray, str]]]:
+    """By name a load's arrows at all states: vectors, origins, the places of labels (n, 3), and the label."""
+    load, point = acting.load, np.asarray(acting.load.point, dtype=float)
+    if acting.pushes is None:
+        force = load.force if load.axes == "body" else R[present][0].T @ load.force
+        acting.pushes = bool(point @ force < 0.0)
+    for part, value, unit in (("force", load.force, "N"), ("torque", load.torque, "N m")):
+        value, unit = np.asarray(value, dtype=float), f"{unit} s" if load.kind == "impulse" else unit
+        magnitude = float(np.linalg.norm(value))
+        usual = weight * (1.0 if part == "force" else 0.5 * size)
+        (length,) = scales.lengths(unit, np.array([magnitude]), size, usual) if magnitude else (0.0,)
+        if length == 0.0:
+            continue
+        vectors = np.broadcast_to(value * (length / magnitude), (len(rows), 3))
+        vectors = np.einsum("nij,nj->ni", R, vectors) if load.axes == "body" else vectors
+        origins = rows[:, 0:3] + R @ point
+        # A force that pushes has its tip at the point, as a finger would stand: inside the body none is seen.
+        if part == "force" and acting.pushes:
+            origins = origins - vectors
+            ends = origins
+        else:
+            ends = origins + vectors
+        yield style.load_part(load.kind, part), (vectors, origins, ends, f"{_short(magnitude)} {unit}")
 
 
 def _short(value: float) -> str:

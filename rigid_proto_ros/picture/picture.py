@@ -254,7 +254,8 @@ class Picture:
         if rows[:, 7:10].any() and self._wanted(style.COM_TRAIL):
             backend.points(style.COM_TRAIL, each, rows[:, 0:3])
         string = self.string.rows(times_ns, rows, R) if self.string.was_tied else None
-        self._draw_loads(times_ns, rows, R)
+        weight = 9.81 * body.mass
+        self.loads.draw(backend, self._wanted, times_ns, rows, R, self.scales, self.shape.size, weight)
         if string is not None:
             self._draw_string(string, rows)
             self.string.forget_before(int(times_ns[-1]))
@@ -298,16 +299,6 @@ class Picture:
             counts = seen.astype(int)
             self.backend.arrows(name, counts, drawn)
             self.backend.labels(name, counts, LABEL_BEYOND * drawn, [symbol] * len(drawn))
-
-    def _draw_loads(self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray) -> None:
-        assert self.body is not None and self.shape is not None
-        weight = 9.81 * self.body.mass
-        drawn = self.loads.rows(times_ns, rows, R, self.scales, self.shape.size, weight)
-        for (kind, part), arrows in drawn.items():
-            name = style.load_part(kind, part)
-            if self._wanted(name):
-                self.backend.arrows(name, arrows.counts, arrows.vectors, arrows.origins)
-                self.backend.labels(name, arrows.counts, arrows.label_positions, arrows.texts)
 
     def _draw_string(self, string: StringRows, rows: np.ndarray) -> None:
         assert self.body is not None and self.shape is not None
