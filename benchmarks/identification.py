@@ -43,7 +43,7 @@ from rigid_proto_ros import __version__
 from rigid_proto_ros.identify import measurements as ms
 from rigid_proto_ros.identify import rotations as rot
 from rigid_proto_ros.identify.identification import Known, identify
-from rigid_proto_ros.identify.local_motion import local_start
+from rigid_proto_ros.identify.initial_estimate import local_start
 from rigid_proto_ros.identify.shooting import moved_starts
 from rigid_proto_ros.identify.unknowns import Values, second_moments
 from rigid_proto_ros.mass.properties import MassProperties

@@ -42,9 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--gravity", type=float, nargs=3, metavar=("X", "Y", "Z"), help="[m/s²] (default: the scene's, or 0 0 -9.81)"
     )
     parser.add_argument(
-        "--offset", action="append", default=[], metavar="TOPIC=S", help="seconds to add to a topic's stamps"
-    )
-    parser.add_argument(
         "--from", type=float, default=0.0, dest="first", metavar="S", help="use samples from this time on [s]"
     )
     parser.add_argument(
@@ -70,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("identify", is_missing(package, "identify")) from None
     choice = _choice(args)
     flights, scenes = _flights(args.sessions, choice)
-    known = Known(args.mass, offsets=choice.offsets)
+    known = Known(args.mass)
     if scenes:
         setup = scenes[0].setup
         body = MassProperties(setup.body.mass, setup.body.center_of_mass, setup.body.inertia)
@@ -86,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _choice(args: argparse.Namespace) -> Choice:
-    from ..identify.bag_reading import Choice, given_offsets
+    from ..identify.bag_reading import Choice
 
     if args.mass is not None and not (0.0 < args.mass < math.inf):
         raise InputError("--mass", args.mass, "a finite number above 0")
@@ -98,7 +95,7 @@ def _choice(args: argparse.Namespace) -> Choice:
         raise InputError("--urdf", "can't be combined with --json")
     topics = {sensor: getattr(args, sensor) for sensor in SENSORS if getattr(args, sensor)}
     gravity = None if args.gravity is None else tuple(args.gravity)
-    return Choice(topics, given_offsets(args.offset), args.first, args.last, gravity)
+    return Choice(topics, args.first, args.last, gravity)
 
 
 def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], list[Scenario]]:

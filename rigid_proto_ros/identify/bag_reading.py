@@ -5,7 +5,8 @@ loads: commands that hold until the next one, or samples of what changed in betw
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -45,50 +46,33 @@ LEAST_JUMP, MOST_CHANGES = 0.03, 16
 
 @dataclass(frozen=True)
 class Choice:
-    """What of a bag counts. topics: by option, as given, ``TOPIC`` or ``TOPIC@frame``. offsets [s] by
-    topic: given ones.
-    """
+    """What of a bag counts. topics: by option, as given, ``TOPIC`` or ``TOPIC@frame``."""
 
     topics: dict[str, str] = field(default_factory=dict)
-    offsets: dict[str, float] = field(default_factory=dict)
     first_s: float = 0.0
     last_s: float = np.inf
     gravity: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
-class _Message:
-    """stamp_ns as its header says. numbers: position and attitude, rate and acceleration, or force and torque; NaN
-    where an IMU doesn't measure them.
-    """
-
-    stamp_ns: int
-    frame_id: str
-    child_frame_id: str
-    numbers: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class _Topic:
-    """name and the frame that stands behind it, or empty; messages in the order of their stamps."""
+    """name and the frame that stands behind it, or empty; times_ns (n,) ascending, as the headers say; numbers (n, k):
+    position and attitude, rate and acceleration (NaN where an IMU doesn't measure them), or force and torque; parent
+    and child: frames of the first message.
+    """
 
     name: str
     frame: str
-    messages: list[_Message]
-
-    @property
-    def times_ns(self) -> np.ndarray:
-        return np.array([message.stamp_ns for message in self.messages], np.int64)
-
-    @property
-    def numbers(self) -> np.ndarray:
-        return np.array([message.numbers for message in self.messages], float)
+    times_ns: np.ndarray
+    numbers: np.ndarray
+    parent: str
+    child: str
 
 
 def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     """What was measured in a bag; raises InputError naming the topic and what is wrong with it."""
     chosen = _chosen_topics(path, choice)
-    _check_clocks(chosen, choice)
+    _check_clocks(chosen)
     begin = min(int(topic.times_ns[0]) for topic in chosen.values())
     window = (begin + round(choice.first_s * 1e9), begin + round(min(choice.last_s, 1e9) * 1e9))
     series = [one for kind in ("pose", "imu") if kind in chosen for one in _series(kind, chosen[kind])]
@@ -115,11 +99,11 @@ def _chosen_topics(path: Path, choice: Choice) -> dict[str, _Topic]:
             types = {one.topic: one.msgtype for one in bag.connections if one.msgcount}
             chosen = _chosen(types, choice.topics, str(path))
             names = {topic for topic, _ in chosen.values()}
-            found: dict[str, list[_Message]] = {name: [] for name in names}
-            connections = [one for one in bag.connections if one.topic in names]
-            for connection, logged_ns, data in bag.messages(connections):
-                message = bag.deserialize(data, connection.msgtype)
-                found[connection.topic] += _messages(connection.msgtype, message, logged_ns)
+            found: dict[str, list[tuple[int, Any]]] = defaultdict(list)
+            for connection, logged_ns, data in bag.messages([one for one in bag.connections if one.topic in names]):
+                message: Any = bag.deserialize(data, connection.msgtype)
+                parts = message.transforms if connection.msgtype == TRANSFORMS[1] else [message]
+                found[connection.topic] += [(logged_ns, part) for part in parts]
     except InputError:
         raise
     except Exception as error:  # the library lets through whatever cut or damaged bytes lead to
@@ -134,10 +118,8 @@ def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str
     for kind, text in given.items():
         topic, _, frame = text.partition("@")
         fitting = ", ".join(sorted(name for name, its_type in types.items() if its_type in KINDS[kind]))
-        if topic not in types:
+        if types.get(topic) not in KINDS[kind]:
             raise InputError(f"--{kind}", topic, f"a topic of the bag: {fitting or 'it has none of such a type'}")
-        if types[topic] not in KINDS[kind]:
-            raise InputError(f"--{kind}", f"{topic}, a {types[topic]}", " or ".join(KINDS[kind]))
         found[kind] = (topic, frame)
     for kind, accepted in KINDS.items() if not given else ():
         topics = sorted(topic for topic, its_type in types.items() if its_type in accepted)
@@ -152,24 +134,10 @@ def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str
     return found
 
 
-def _messages(message_type: str, message: Any, logged_ns: int) -> list[_Message]:
-    """What a message of one of KINDS holds: one, but any number in a TFMessage."""
-    if message_type == "tf2_msgs/msg/TFMessage":
-        return [one for part in message.transforms for one in _messages(TRANSFORMS[0], part, logged_ns)]
-    header = message.header
-    stamp_ns = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
-    child = getattr(message, "child_frame_id", "")
-    return [_Message(stamp_ns or logged_ns, header.frame_id, child, _NUMBERS[message_type](message))]
-
-
 def _pair(one: Any, other: Any) -> tuple[float, ...]:
     """Of two vectors, or of a position and an orientation xyzw."""
     numbers = (one.x, one.y, one.z, other.x, other.y, other.z)
     return (*numbers, other.w) if hasattr(other, "w") else numbers
-
-
-def _pose(pose: Any) -> tuple[float, ...]:
-    return _pair(pose.position, pose.orientation)
 
 
 def _imu(m: Any) -> tuple[float, ...]:
@@ -181,38 +149,39 @@ def _imu(m: Any) -> tuple[float, ...]:
 
 
 _NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
-    "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
-    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
+    "geometry_msgs/msg/PoseStamped": lambda m: _pair(m.pose.position, m.pose.orientation),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pair(m.pose.pose.position, m.pose.pose.orientation),
     "geometry_msgs/msg/TransformStamped": lambda m: _pair(m.transform.translation, m.transform.rotation),
+    "tf2_msgs/msg/TFMessage": lambda m: _pair(m.transform.translation, m.transform.rotation),
     "geometry_msgs/msg/WrenchStamped": lambda m: _pair(m.wrench.force, m.wrench.torque),
-    "nav_msgs/msg/Odometry": lambda m: _pose(m.pose.pose),
+    "nav_msgs/msg/Odometry": lambda m: _pair(m.pose.pose.position, m.pose.pose.orientation),
     "sensor_msgs/msg/Imu": _imu,
 }
 
 
-def _topic(messages: list[_Message], name: str, message_type: str, frame: str) -> _Topic:
+def _topic(messages: list[tuple[int, Any]], name: str, message_type: str, frame: str) -> _Topic:
     if message_type in TRANSFORMS:
         messages, frame = _one_transform(messages, name, frame), ""
     elif frame and message_type not in KINDS["wrench"]:
         raise InputError(name, f"{name}@{frame}", f"{name} alone, as a {message_type} has no choice of frames")
-    messages = sorted(messages, key=lambda message: message.stamp_ns)
+    stamps = [m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec or logged for logged, m in messages]
     # Of messages with one stamp the first counts: a repeated one says nothing new.
-    kept = [m for k, m in enumerate(messages) if k == 0 or m.stamp_ns != messages[k - 1].stamp_ns]
-    for message in kept:
-        if not np.isfinite(message.numbers).all() and message_type not in KINDS["imu"]:
-            at = 1e-9 * (message.stamp_ns - kept[0].stamp_ns)
-            raise InputError(name, f"the message {at:.6g} s after the first has a number that isn't finite")
-    return _Topic(name, frame, kept)
+    times, first = np.unique(np.array(stamps, np.int64), return_index=True)
+    numbers = np.array([_NUMBERS[message_type](message) for _, message in messages])[first]
+    bad = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
+    if len(bad) and message_type not in KINDS["imu"]:
+        at = 1e-9 * (times[bad[0]] - times[0])
+        raise InputError(name, f"the message {at:.6g} s after the first has a number that isn't finite")
+    head = messages[0][1]
+    return _Topic(name, frame, times, numbers, head.header.frame_id, getattr(head, "child_frame_id", ""))
 
 
-def _one_transform(messages: list[_Message], topic: str, child: str) -> list[_Message]:
-    children = sorted({message.child_frame_id for message in messages})
-    if not child and len(children) > 1:
-        raise InputError("--pose", topic, f"{topic}@CHILD with the frame of the body, one of {', '.join(children)}")
-    if child and child not in children:
-        raise InputError("--pose", f"{topic}@{child}", f"one of the frames {', '.join(children)}")
-    found = [message for message in messages if message.child_frame_id == (child or children[0])]
-    parents = {message.frame_id for message in found}
+def _one_transform(messages: list[tuple[int, Any]], topic: str, child: str) -> list[tuple[int, Any]]:
+    children = sorted({message.child_frame_id for _, message in messages})
+    if child not in children and (child or len(children) > 1):
+        raise InputError("--pose", f"{topic}@{child}", f"{topic}@CHILD, CHILD one of {', '.join(children)}")
+    found = [(logged, message) for logged, message in messages if message.child_frame_id == (child or children[0])]
+    parents = {message.header.frame_id for _, message in found}
     if len(parents) > 1:
         raise InputError(topic, f"{child or children[0]} has several parents, {', '.join(sorted(parents))}")
     return found
@@ -221,15 +190,15 @@ def _one_transform(messages: list[_Message], topic: str, child: str) -> list[_Me
 def _series(kind: str, topic: _Topic) -> list[ms.Series]:
     times, numbers = topic.times_ns, topic.numbers
     if kind == "pose":
-        attitudes = _units(numbers[:, 3:7], topic)
-        return [
-            ms.Series(topic.name, *one)
-            for one in ((ms.POSITION, times, numbers[:, :3]), (ms.ATTITUDE, times, attitudes))
-        ]
-    found = [
-        ms.Series(topic.name, ms.RATE, times, numbers[:, :3]),
-        ms.Series(topic.name, ms.ACCELERATION, times, numbers[:, 3:]),
-    ]
+        sizes = np.linalg.norm(numbers[:, 3:], axis=1, keepdims=True)
+        if np.any(np.abs(sizes - 1.0) > 0.1):
+            worst = float(sizes[np.argmax(np.abs(sizes - 1.0))][0])
+            raise InputError(topic.name, f"an orientation of length {worst:.3g}, where a unit quaternion should be")
+        attitudes = numbers[:, 3:] / sizes
+        position = ms.Series(topic.name, ms.POSITION, times, numbers[:, :3])
+        return [position, ms.Series(topic.name, ms.ATTITUDE, times, attitudes)]
+    rate = ms.Series(topic.name, ms.RATE, times, numbers[:, :3])
+    found = [rate, ms.Series(topic.name, ms.ACCELERATION, times, numbers[:, 3:])]
     given = [one for one in found if not np.isnan(one.values).all()]
     for one in given:
         if not np.isfinite(one.values).all():
@@ -237,33 +206,21 @@ def _series(kind: str, topic: _Topic) -> list[ms.Series]:
     return given
 
 
-def _units(q: np.ndarray, topic: _Topic) -> np.ndarray:
-    size = np.linalg.norm(q, axis=1, keepdims=True)
-    if np.any(np.abs(size - 1.0) > 0.1):
-        worst = float(size[np.argmax(np.abs(size - 1.0))][0])
-        raise InputError(topic.name, f"an orientation of length {worst:.3g}, where a unit quaternion should be")
-    return q / size
-
-
-def _check_clocks(chosen: dict[str, _Topic], choice: Choice) -> None:
-    held = {kind: WRENCH_TIMEOUT_NS if kind == "wrench" else 0 for kind in chosen}
-    spans = {t.name: (int(t.times_ns[0]), int(t.times_ns[-1]) + held[kind]) for kind, t in chosen.items()}
-    first, *others = spans.items()
-    for name, (begin, end) in others:
-        shift = round(1e9 * (choice.offsets.get(name, 0.0) - choice.offsets.get(first[0], 0.0)))
-        if begin + shift > first[1][1] or end + shift < first[1][0]:
-            apart = 1e-9 * (begin + shift - first[1][0])
-            raise InputError(
-                "clocks",
-                f"{name} begins {apart:.6g} s after {first[0]} and they have no time in common; give --offset {name}=S",
-            )
+def _check_clocks(chosen: dict[str, _Topic]) -> None:
+    pose = chosen["pose"]
+    for kind, topic in chosen.items():
+        held = WRENCH_TIMEOUT_NS if kind == "wrench" else 0
+        if topic.times_ns[0] > pose.times_ns[-1] or topic.times_ns[-1] + held < pose.times_ns[0]:
+            apart = 1e-9 * (topic.times_ns[0] - pose.times_ns[0])
+            accepted = "stamps of one clock, or of clocks that differ by at most 0.05 s (--fit offset)"
+            received = f"{topic.name} begins {apart:.6g} s after {pose.name}, with no time in common"
+            raise InputError("clocks", received, accepted)
 
 
 def _wrench_frame(topic: _Topic, pose: _Topic) -> tuple[str, tuple[float, float, float] | None]:
     """Axes of a wrench, and where it acts in the tracked frame, None for the centre of mass."""
-    worlds = {"world", pose.messages[0].frame_id} - {""}
-    bodies = {"body", pose.messages[0].child_frame_id} - {""}
-    text = topic.frame or topic.messages[0].frame_id
+    worlds, bodies = {"world", pose.parent} - {""}, {"body", pose.child} - {""}
+    text = topic.frame or topic.parent
     axes, at, point = text.partition("@")
     axes = "world" if axes in worlds else "body" if axes in bodies else axes
     try:
@@ -277,20 +234,6 @@ def _wrench_frame(topic: _Topic, pose: _Topic) -> tuple[str, tuple[float, float,
     if frame.axes == "normal" or frame.point[0] not in ("com", "origin", "point") or frame.options:
         raise InputError("--wrench", text, "axes world or body, at com, origin or point/x,y,z")
     return frame.axes, {"com": None, "origin": (0.0, 0.0, 0.0)}.get(frame.point[0], frame.point[-1])
-
-
-def given_offsets(words: Sequence[str]) -> dict[str, float]:
-    """``TOPIC=S`` by topic; raises InputError."""
-    found = {}
-    for word in words:
-        topic, equals, text = word.rpartition("=")
-        try:
-            found[topic] = float(text)
-        except ValueError:
-            equals = ""
-        if not equals or not topic or not abs(found[topic]) < 1e9:
-            raise InputError("--offset", word, "TOPIC=S with a number of seconds, added to the topic's stamps")
-    return found
 
 
 def wrench_history(

@@ -1,52 +1,55 @@
 # SPDX-License-Identifier: MIT
 """The fit: the initial estimate is improved on short segments, which converge from far, then on ever longer ones, until
 each flight is one segment.
+
+With [J_start J r] = Q R the start of a segment takes what it can of the residuals, and the rows of R below its own are
+what is left: so every segment finds its own start while the steps are of the few numbers that all share (variable
+projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973, with Kaufman's derivative). The steps are Levenberg's and
+Marquardt's, among the bodies that can exist.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import InputError
 from . import shooting as sh
-from .initial_estimate import initial_values
-from .least_squares import SMALL_STEP, Problem, best_unknowns
-from .local_motion import high_rate, least_noise, local_start, noise_by_differences, spread
-from .measurements import MeasuredFlight
-from .psd_projection import is_possible, possible_step
-from .unknowns import Unknowns, Values, possible_tensor
+from .initial_estimate import initial_values, least_noise, local_start, noise_by_differences
+from .measurements import ATTITUDE, MeasuredFlight
+from .trajectories import STATE
+from .unknowns import Unknowns, Values, is_possible, possible_step, possible_tensor
 
-LEAST_NOISE = 1e-4
-"""Part of what a series shows that is taken for noise at first: a simulated flight leaves nothing at the end."""
-WIDER = 8.0
-"""Of steps of difference quotients: of what is rounding alone so much less is left."""
-MOST_RIM_STEPS = 6
-ROUGH = 1e-3
-"""Tolerance of a stage that only leads on to the next one."""
-OFFSET_MARGIN_S = 0.05
-"""The largest difference of two clocks that is looked for."""
-FIRST_ANGLES = (6.0, 3.0)
-"""Turn of the first segments [rad], of which the initial estimate's errors of some hundredths aren't much: the next one
-where the one before leaves more than noise.
+START_WIDTHS = np.repeat([1e3, 0.1, 1e3, 1e3], 3)
+"""Standard deviations of what is assumed of a start beforehand, little: what too few samples leave open stays where it
+is, and takes nothing of the residuals.
 """
-FITS = 2.0
-"""Residuals so many times what neighbouring samples say are no noise."""
-NEAR = 1e-3
-"""Part of what a series shows, or radians, within which a stage that leads on to the next one is near enough."""
+SETTLING = 6
+"""Most steps of the starts alone before the first step of the unknowns."""
+CONVERGED = 0.1
+"""Part of the squares that starts could still take away, by a step that is then the last one."""
+SMALL_STEP = 0.03
+"""Of all residuals together, in standard deviations: such a step is the last one."""
+POOR, GOOD = 0.25, 0.75
+"""Parts of what a step promised that it kept: below the first the damping grows, above the second it shrinks."""
+SLICE = 128
+"""Rows of a QR decomposition at once."""
+FIRST_DAMPING, MOST_DAMPING = 1.0, 1e12
+FIRST_ANGLE = 3.0
+"""Turn of the first segments [rad], of which the initial estimate's errors of some hundredths aren't much."""
 MOST_SEGMENTS = 40
 """Of all flights together in the first stage."""
 FEWEST_SAMPLES = 6
 """Of a segment in the first stage: a start has 12 numbers."""
-ENOUGH_SAMPLES, ENOUGH_IN_A_RADIAN = 300, 2.0
-"""Of a series until the last stage, or so many in a radian of its turn, where that is more."""
-LENGTHENING = (4.0, 2.0)
-"""Segments become so many times longer from stage to stage: the second where the first leaves more than noise."""
-GROWN = 1.5
-"""Residuals of longer segments so many times those of shorter ones are no noise."""
+FITS = 2.0
+"""Residuals so many times what neighbouring samples say are no noise."""
+NEAR = 1e-3
+"""Radians, or part of the standard deviation of any other series, within which short segments fit well enough."""
+OFFSET_MARGIN_S = 0.05
+"""The largest difference of two clocks that is looked for."""
 
 
 class CannotFlyError(InputError):
@@ -57,220 +60,252 @@ class CannotFlyError(InputError):
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """values: what came out. segments and starts: one for each flight. sigmas: of each series by its name.
+class Linear:
+    """numbers (n,): the unknowns. starts: where the segments were flown from. triangles: R of each segment.
 
-    root (m, n): rootᵀ root is the Fisher information of the unknowns, the starts eliminated; root_wide by steps WIDER
-    times as long, which shows what of it is rounding. cost: sum of squares in standard deviations.
+    residuals (k,) and their jacobian (k, n): of all segments together, the starts eliminated.
     """
 
-    values: Values
-    unknowns: Unknowns
-    segments: list[sh.Segment]
+    numbers: np.ndarray
     starts: list[np.ndarray]
-    sigmas: dict[str, float]
-    root: np.ndarray
-    root_wide: np.ndarray
-    cost: float
+    triangles: list[np.ndarray]
+    residuals: np.ndarray
+    jacobian: np.ndarray
 
-    def rise(self, change: np.ndarray) -> float:
-        """By how much the squares rise with the unknowns changed (n,), whatever the starts are then; without end for a
-        body that can't exist.
-        """
-        problem = Problem(self.segments, self.unknowns.moved(self.values, change), self.unknowns)
-        if not is_possible(problem.given.inertia):
-            return np.inf
-        none = np.zeros(len(change))
-        there = problem.linear(none, problem.settled(none, self.starts))
-        return np.inf if there is None else there.cost - self.cost
+    @property
+    def cost(self) -> float:
+        """Sum of the squared residuals."""
+        return float(self.residuals @ self.residuals)
 
+    @property
+    def could_take(self) -> float:
+        """Sum of the squares that the starts could still take away."""
+        own = [triangle[: len(start) - 1, -1] for triangle, start in zip(self.triangles, self.starts, strict=True)]
+        return sum(float(part @ part) for part in own)
 
-def fit_flights(
-    flights: Sequence[MeasuredFlight],
-    unknowns: Unknowns,
-    values: Values,
-) -> Estimate:
-    """The most likely values, from these on; raises InputError where they can't be flown."""
-    fit = _Fit(flights, unknowns, values)
-    starts = _approached(fit)
-    fit.sigmas = fit.noise_left(fit.cut(math.inf), starts)
-    for _ in range(4):
-        segments, before = fit.cut(math.inf), fit.sigmas
-        starts = fit.improve(segments, starts, 60, 1e-7)
-        fit.sigmas = fit.noise_left(segments, starts)
-        if all(abs(fit.sigmas[key] - before[key]) < 0.01 * before[key] for key in before):
-            break
-    return _estimate(fit, fit.cut(math.inf), starts)
-
-
-class _Fit:
-    """Values as far as they have come, and the noise by series' name."""
-
-    def __init__(self, flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> None:
-        self.flights, self.unknowns, self.values = flights, unknowns, values
-        self.series = [one for flight in flights for one in flight.series]
-        self.sigmas = {one.name: max(noise_by_differences(one), LEAST_NOISE * spread(one)) for one in self.series}
-        self.near = {one.name: NEAR * spread(one) for one in self.series}
-        every = {}
-        for flight in flights:
-            enough = max(ENOUGH_SAMPLES, round(ENOUGH_IN_A_RADIAN * high_rate(flight) * flight.duration_s))
-            every.update({id(series): max(len(series.times_ns) // enough, 1) for series in flight.series})
-        self._every = every
-
-    def cut(self, length_s: float, is_thin: bool = False) -> list[sh.Segment]:
-        """Segments of about this length. is_thin: with as many samples as stages before the last one need."""
-        is_open = "offset" in self.unknowns
-        margin = OFFSET_MARGIN_S if is_open else max(0.0, -min(self.values.offsets.values(), default=0.0))
-        return sh.cut(
-            self.flights,
-            length_s,
-            self.sigmas,
-            margin,
-            lambda series: self._every[id(series)] if is_thin else 1,
-        )
-
-    def improve(
-        self, segments: Sequence[sh.Segment], starts: Sequence[np.ndarray], most: int, tolerance: float
-    ) -> list[np.ndarray]:
-        """Improve the values; returns the starts that go with them."""
-        problem = Problem(segments, self.values, self.unknowns)
-        found = best_unknowns(problem, starts, most, tolerance)
-        if found is None:
-            raise CannotFlyError
-        numbers, starts = found
-        self.values = problem.values(numbers)
-        is_inside = is_possible(self.values.inertia)
-        self.values = replace(self.values, inertia=possible_tensor(self.values.inertia))
-        return starts if is_inside or tolerance > ROUGH else self._along_the_rim(segments, starts)
-
-    def _along_the_rim(self, segments: Sequence[sh.Segment], starts: list[np.ndarray]) -> list[np.ndarray]:
-        """Improve the values among the bodies that can exist, where the best of all tensors is none of these."""
-        first = self.unknowns.slots.index(("inertia", 0))
-        for _ in range(MOST_RIM_STEPS):
-            problem = Problem(segments, self.values, self.unknowns)
-            here = problem.linear(np.zeros(len(self.unknowns)), starts)
-            if here is None:
-                raise CannotFlyError
-            step = possible_step(here.jacobian, here.residuals, slice(first, first + 6), self.values.inertia)
-            values, starts = problem.values(step), here.starts_for(step)
-            self.values = replace(values, inertia=possible_tensor(values.inertia))
-            if np.linalg.norm(here.jacobian @ step) < SMALL_STEP:
-                break
-        return starts
-
-    def noise_left(self, segments: Sequence[sh.Segment], starts: Sequence[np.ndarray]) -> dict[str, float]:
-        """Standard deviation of each series from its residuals; those of one topic and quantity share it over all
-        flights.
-        """
-        sums = {one.name: 0.0 for one in self.series}
-        counts = dict(sums)
-        for segment, start in zip(segments, starts, strict=True):
-            for piece, residual in zip(segment.pieces, residuals_of(segment, start, self.values), strict=True):
-                sums[piece.series.name] += float((residual**2).sum())
-                counts[piece.series.name] += residual.size
-        samples = 3 * sum(segment.samples for segment in segments)
-        left = max(1.0 - (sh.START * len(segments) + len(self.unknowns)) / samples, 0.1)
-        found = {}
-        for one in self.series:
-            found[one.name] = max(math.sqrt(sums[one.name] / (left * counts[one.name])), least_noise(one))
+    def starts_for(self, numbers: np.ndarray) -> list[np.ndarray]:
+        """The best starts for other unknowns, as far as the derivatives say."""
+        change = np.append(numbers - self.numbers, 1.0)
+        found = []
+        for start, triangle in zip(self.starts, self.triangles, strict=True):
+            own = len(start) - 1
+            step = -np.linalg.solve(triangle[:own, :own], triangle[:own, own:] @ change)
+            found.append(sh.moved_starts(start[None], step[None])[0])
         return found
 
 
+@dataclass(frozen=True)
+class Problem:
+    """Segments flown with ``unknowns`` about the values ``given``, in numbers (n,) of which 1 is a large change.
+    sigmas: standard deviation of the noise by name of the series. prior: 1 for a wide one about what was given, which
+    holds what the motion can't tell and hardly moves the rest; 0 for none.
+    """
+
+    segments: Sequence[sh.Segment]
+    sigmas: Mapping[str, float]
+    given: Values
+    unknowns: Unknowns
+    prior: float = 1.0
+
+    def values(self, numbers: np.ndarray) -> Values:
+        """With these numbers."""
+        return self.unknowns.moved(self.given, self.unknowns.scales(self.given) * numbers)
+
+    def linear(self, numbers: np.ndarray, starts: Sequence[np.ndarray]) -> Linear | None:
+        """The residuals and their derivatives about these numbers and starts; None where a flight failed."""
+        turn = max(segment.flight.high_rate * segment.duration_s for segment in self.segments)
+        variations = sh.Variations(self.unknowns, self.given, numbers, turn)
+        triangles, rows = [], [self.prior * np.column_stack([np.eye(len(numbers)), numbers])]
+        for segment, start in zip(self.segments, starts, strict=True):
+            columns = sh.linearized(segment, start, self.sigmas, variations)
+            if columns is None or not np.isfinite(columns).all():
+                return None
+            own, sds = len(start) - 1, segment.change_sds_s
+            known = np.zeros((own, len(columns)))
+            known[:, :own] = np.diag(1.0 / np.concatenate([START_WIDTHS, sds]))
+            known[sh.START :, -1] = start[STATE:] / sds
+            triangles.append(upper_triangle(np.vstack([known, columns.T])))
+            rows.append(triangles[-1][own:, own:])
+        left = upper_triangle(np.concatenate(rows))
+        return Linear(numbers, list(starts), triangles, left[:, -1], left[:, :-1])
+
+    def settled(self, numbers: np.ndarray, starts: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Starts improved by steps of their own; raises CannotFlyError."""
+        alone = replace(self, given=self.values(numbers), unknowns=Unknowns(()))
+        for _ in range(SETTLING):
+            linear = alone.linear(np.zeros(0), starts)
+            if linear is None:
+                raise CannotFlyError
+            starts = linear.starts_for(np.zeros(0))
+            if linear.could_take <= CONVERGED * linear.cost:
+                break
+        return list(starts)
+
+    def step(self, here: Linear, damping: float) -> np.ndarray:
+        """The best step (n,) with a damping, to a body that can exist."""
+        width = len(here.numbers)
+        jacobian = np.vstack([here.jacobian, math.sqrt(damping) * np.eye(width)])
+        residuals = np.concatenate([here.residuals, np.zeros(width)])
+        step = -np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
+        if "inertia" not in self.unknowns or is_possible(self.values(here.numbers + step).inertia):
+            return step
+        first = self.unknowns.slots.index(("inertia", 0))
+        tensor = slice(first, first + 6)
+        return possible_step(jacobian, residuals, tensor, self.given.inertia, here.numbers[tensor])
+
+    def solved(
+        self, starts: Sequence[np.ndarray], most: int = 12, tolerance: float = 1e-2
+    ) -> tuple[Values, list[np.ndarray]]:
+        """The best values and starts, until a step promises less than this part of the squares: it is taken unseen.
+        Raises CannotFlyError.
+        """
+        zero, damping = np.zeros(len(self.unknowns)), FIRST_DAMPING
+        # What a start could still take counts as taken already: so it has to be near before steps are measured by what
+        # is left.
+        here = self.linear(zero, self.settled(zero, starts))
+        if here is None:
+            raise CannotFlyError
+        numbers = zero
+        for _ in range(most):
+            step = self.step(here, damping)
+            numbers = here.numbers + step
+            promised = here.cost - float(np.sum((here.residuals + here.jacobian @ step) ** 2))
+            if promised < max(SMALL_STEP**2, tolerance * here.cost):
+                break
+            there = self.linear(numbers, here.starts_for(numbers))
+            kept = -np.inf if there is None else (here.cost - there.cost) / promised
+            if kept > GOOD:
+                damping /= 10.0
+            elif kept < POOR:
+                damping *= 10.0
+            if there is not None and kept > 0.0:
+                here = there
+            numbers = here.numbers
+            if damping > MOST_DAMPING:
+                break
+        values = self.values(numbers)
+        # Rounding may have left it a little outside.
+        return replace(values, inertia=possible_tensor(values.inertia)), here.starts_for(numbers)
+
+    def noise_left(self, values: Values, starts: Sequence[np.ndarray]) -> dict[str, float]:
+        """Standard deviation of each series from its residuals; those of one topic and quantity share it over all
+        flights.
+        """
+        found: dict[str, list[np.ndarray]] = {name: [] for name in self.sigmas}
+        for segment, start in zip(self.segments, starts, strict=True):
+            for series, residual in zip(segment.series, residuals_of(segment, start, values), strict=True):
+                found[series.name].append(residual.ravel())
+        samples = 3 * sum(segment.samples for segment in self.segments)
+        left = max(1.0 - (sh.START * len(self.segments) + len(self.unknowns)) / samples, 0.1)
+        least = {one.name: least_noise(one) for segment in self.segments for one in segment.flight.series}
+        squares = {name: float(np.mean(np.concatenate(parts) ** 2)) for name, parts in found.items()}
+        return {name: max(math.sqrt(square / left), least[name]) for name, square in squares.items()}
+
+
+def upper_triangle(rows: np.ndarray) -> np.ndarray:
+    """R of a QR decomposition of rows (n, k).
+
+    In slices, as LAPACK would share more rows out among threads that wait for one another: eight times as much
+    processor time was seen.
+    """
+    triangle = np.zeros((0, rows.shape[1]))
+    for first in range(0, len(rows), SLICE):
+        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, rows[first : first + SLICE]]), mode="r"))
+    return triangle
+
+
 def residuals_of(segment: sh.Segment, start: np.ndarray, values: Values) -> list[np.ndarray]:
-    """Measured minus shown of each piece (m, 3), in its own unit; raises InputError where it can't be flown."""
+    """Measured minus shown of each series (m, 3), in its own unit; raises CannotFlyError."""
     found = sh.segment_residuals(segment, start, values)
     if found is None:
         raise CannotFlyError
     return found
 
 
-def residuals_by_series(
-    segments: Sequence[sh.Segment], starts: Sequence[np.ndarray], values: Values
-) -> dict[int, np.ndarray]:
-    """Residuals (n, 3) of each series in its own unit, by ``id``, of segments that are whole flights."""
-    return {
-        id(piece.series): residual
-        for segment, start in zip(segments, starts, strict=True)
-        for piece, residual in zip(segment.pieces, residuals_of(segment, start, values), strict=True)
-    }
+class Estimate:
+    """values: what came out of a problem whose segments are whole flights, with their starts.
 
-
-def short_misfit(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> float:
-    """How much larger the residuals of short segments are than any noise, at most 1 where they fit; infinite where they
-    can't be flown.
+    root (k, n): rootᵀ root is the Fisher information of the unknowns, the starts eliminated. Raises CannotFlyError.
     """
-    try:
-        return _short(_Fit(flights, unknowns, values), FIRST_ANGLES[-1:])[3]
-    except CannotFlyError:
-        return np.inf
+
+    def __init__(self, problem: Problem, values: Values, starts: list[np.ndarray]) -> None:
+        self.problem, self.values, self.starts = replace(problem, given=values, prior=0.0), values, starts
+        self.unknowns = problem.unknowns
+        self._zero = np.zeros(len(problem.unknowns))
+        linear = self.problem.linear(self._zero, starts)
+        if linear is None:
+            raise CannotFlyError
+        self.root = linear.jacobian / problem.unknowns.scales(values)
+        self._cost = linear.cost
+
+    def rise(self, change: np.ndarray) -> float:
+        """By how much the squares rise with the unknowns changed (n,), whatever the starts are then; without end for a
+        body that can't exist.
+        """
+        problem = replace(self.problem, given=self.unknowns.moved(self.values, change))
+        if not is_possible(problem.given.inertia):
+            return np.inf
+        try:
+            there = problem.linear(self._zero, problem.settled(self._zero, self.starts))
+        except CannotFlyError:
+            return np.inf
+        return np.inf if there is None else there.cost - self._cost
 
 
-def _short(
-    fit: _Fit, angles: Sequence[float] = FIRST_ANGLES
-) -> tuple[float, list[sh.Segment], list[np.ndarray], float]:
-    """Bring ``fit`` near the truth by short segments: their length [s], they, their starts, and their misfit."""
-    sigmas = fit.sigmas
-    initial = initial_values(fit.flights, fit.unknowns, fit.values)
-    for angle in angles:
-        fit.values, fit.sigmas = initial, sigmas
-        length = _first_length(fit.flights, angle)
-        segments = fit.cut(length, is_thin=True)
-        starts = fit.improve(segments, _starts(segments), 12, 1e-2)
-        fit.sigmas = fit.noise_left(segments, starts)
-        misfit = max(fit.sigmas[key] / max(FITS * sigmas[key], fit.near[key]) for key in sigmas)
-        if misfit <= 1.0:
-            break
-    return length, segments, starts, misfit
-
-
-def _approached(fit: _Fit) -> list[np.ndarray]:
-    """Bring ``fit`` near the truth by ever longer segments; returns starts of whole flights."""
-    length, segments, starts, _ = _short(fit)
-    while len(segments) > len(fit.flights):
-        values, sigmas = fit.values, fit.sigmas
-        for factor in LENGTHENING:
-            fit.values, fit.sigmas = values, sigmas
-            longer = fit.cut(factor * length, is_thin=True)
-            joined = fit.improve(longer, _starts(longer, segments, starts), 12, 1e-2)
-            fit.sigmas = fit.noise_left(longer, joined)
-            if all(fit.sigmas[key] <= GROWN * max(sigmas[key], fit.near[key]) for key in sigmas):
-                break
-        length, segments, starts = factor * length, longer, joined
-    return [segment.begin(start) for segment, start in zip(fit.cut(math.inf), starts, strict=True)]
-
-
-def _starts(
-    segments: Sequence[sh.Segment], before: Sequence[sh.Segment] = (), starts: Sequence[np.ndarray] = ()
-) -> list[np.ndarray]:
-    """Those of the segments before that begin at the same time, or what the samples nearby say."""
-    known = {(id(one.flight), one.begin_ns): start for one, start in zip(before, starts, strict=True)}
-    found = []
-    for one in segments:
-        start = known.get((id(one.flight), one.begin_ns))
-        found.append(one.begin(local_start(one.flight, one.begin_ns) if start is None else start))
-    return found
-
-
-def _first_length(flights: Sequence[MeasuredFlight], angle: float) -> float:
+def _first_problem(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> tuple[Problem, float]:
+    """Short segments about the initial estimate, and their length [s]."""
     total = sum(flight.duration_s for flight in flights)
-    samples = sum(len(flight.pose[0].times_ns) for flight in flights if flight.pose is not None)
-    rate = max(high_rate(flight) for flight in flights)
-    return max(angle / max(rate, 1e-9), total / MOST_SEGMENTS, FEWEST_SAMPLES * total / samples)
+    samples = sum(len(flight.pose[0].times_ns) for flight in flights)
+    rate = max(flight.high_rate for flight in flights)
+    length = max(FIRST_ANGLE / max(rate, 1e-9), total / MOST_SEGMENTS, FEWEST_SAMPLES * total / samples)
+    sigmas = {one.name: noise_by_differences(one) for flight in flights for one in flight.series}
+    segments = sh.cut(flights, length, _margin(unknowns))
+    return Problem(segments, sigmas, initial_values(flights, unknowns, values), unknowns), length
 
 
-def _estimate(fit: _Fit, segments: list[sh.Segment], starts: list[np.ndarray]) -> Estimate:
-    roots, cost = [], 0.0
-    for wider in (1.0, WIDER):
-        variations = sh.Variations(fit.unknowns, fit.values, wider=wider)
-        parts = []
-        for segment, start in zip(segments, starts, strict=True):
-            columns = sh.linearized(segment, start, variations)
-            if columns is None:
-                raise CannotFlyError
-            triangle = sh.compressed(columns, segment, start, is_held=False)
-            # Rows that are left when the start has taken all that it can.
-            own = len(columns) - 1 - len(fit.unknowns)
-            parts.append(triangle[own:-1, own:-1])
-            cost += float(triangle[:, -1] @ triangle[:, -1]) if wider == 1.0 else 0.0
-        roots.append(np.concatenate(parts))
-    return Estimate(fit.values, fit.unknowns, segments, starts, fit.sigmas, roots[0], roots[1], cost)
+def _margin(unknowns: Unknowns) -> float:
+    return OFFSET_MARGIN_S if "offset" in unknowns else 0.0
+
+
+def _local_starts(problem: Problem) -> list[np.ndarray]:
+    return [one.begin(local_start(one.flight, one.begin_ns)) for one in problem.segments]
+
+
+def fit_flights(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> Estimate:
+    """The most likely values, from these on; raises CannotFlyError."""
+    problem, length = _first_problem(flights, unknowns, values)
+    starts = _local_starts(problem)
+    while len(problem.segments) > len(flights):
+        values, starts = problem.solved(starts)
+        sigmas = problem.noise_left(values, starts)
+        # Segments twice as long begin where every second of these does.
+        known = {(id(one.flight), one.begin_ns): start for one, start in zip(problem.segments, starts, strict=True)}
+        length *= 2.0
+        problem = Problem(sh.cut(flights, length, _margin(unknowns)), sigmas, values, unknowns)
+        starts = [
+            one.begin(known[id(one.flight), one.begin_ns])
+            if (id(one.flight), one.begin_ns) in known
+            else one.begin(local_start(one.flight, one.begin_ns))
+            for one in problem.segments
+        ]
+    for _ in range(5):
+        values, starts = problem.solved(starts, 60, 1e-7)
+        before, sigmas = problem.sigmas, problem.noise_left(values, starts)
+        problem = replace(problem, given=values, sigmas=sigmas)
+        if all(abs(sigmas[key] - before[key]) < 0.01 * before[key] for key in before):
+            break
+    return Estimate(problem, values, starts)
+
+
+def fits_in_short(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> bool:
+    """Whether short segments leave no more than noise."""
+    problem, _ = _first_problem(flights, unknowns, values)
+    try:
+        sigmas = problem.noise_left(*problem.solved(_local_starts(problem), most=4))
+    except CannotFlyError:
+        return False
+    for series in flights[0].series:
+        near = NEAR * (1.0 if series.kind == ATTITUDE else float(np.std(series.values)))
+        if sigmas[series.name] > max(FITS * problem.sigmas[series.name], near):
+            return False
+    return True

@@ -1,38 +1,50 @@
 # SPDX-License-Identifier: MIT
-"""From measured flights to the body's mass properties."""
+"""From measured flights to the body's mass properties, and what else samples could mean where no rigid body shows them:
+other units, another direction of gravity, another order.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..mass.properties import MassProperties
-from .fitting import CannotFlyError, fit_flights
-from .measurements import ACCELERATION, MeasuredFlight, topics_of
+from .fitting import CannotFlyError, fit_flights, fits_in_short
+from .measurements import ACCELERATION, ATTITUDE, POSITION, RATE, MeasuredFlight, Series, topics_of
 from .report import Identification
-from .residual_checks import check_residuals, likely_cause
-from .unknowns import DEFAULT_FIT, Values, make_unknowns, possible_tensor
-from .verdict import Identifiability
+from .unknowns import DEFAULT_FIT, Unknowns, Values, make_unknowns, possible_tensor
+from .verdict import Identifiability, check_residuals
 
 GUESSED_RADIUS = 0.1
 """Of the ball that stands for a body of which nothing is known [m]."""
 FEWEST = 8
 """Poses of a flight."""
+USUAL = (
+    "usual causes: positions that aren't in m, rates in degrees, accelerations in g, gravity along another axis"
+    " (--gravity), quaternions that begin with w, a wrench along other axes (--wrench TOPIC@FRAME), clocks"
+)
+_SCALES = (
+    (POSITION, 1e-3, "positions are in mm"),
+    (POSITION, 1e-2, "positions are in cm"),
+    (RATE, np.pi / 180.0, "rates are in degrees a second"),
+    (ACCELERATION, 9.80665, "accelerations are in g"),
+)
+_GRAVITIES = ((0.0, -9.81, 0.0), (0.0, 0.0, -9.81), (0.0, 0.0, 9.81), (0.0, 9.81, 0.0), (0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True)
 class Known:
     """mass [kg] when it is known. body: what stands for whatever isn't estimated, or None. length: of the body, by
-    which an error of its COM is large [m]. offsets [s]: given, by topic.
+    which an error of its COM is large [m].
     """
 
     mass: float | None = None
     body: MassProperties | None = None
     length: float = GUESSED_RADIUS
-    offsets: Mapping[str, float] = field(default_factory=dict)
 
 
 def identify(
@@ -42,32 +54,24 @@ def identify(
 ) -> Identification:
     """Mass properties of the body that flew in all of these flights; raises InputError."""
     known = known or Known()
-    _check(flights)
+    for flight in flights:
+        count = len(flight.pose[0].times_ns)
+        if count < FEWEST:
+            raise InputError("session", f"{flight.name} has {count} samples", f"at least {FEWEST} poses")
     fit = [group for group in fit if not (group == "mass" and known.mass is not None)]
     unknowns = make_unknowns(fit, topics_of(flights))
     first = _first_values(flights[0], known)
     try:
         estimate = fit_flights(flights, unknowns, first)
     except CannotFlyError:
-        cause = likely_cause(flights, unknowns, first)
+        cause = _likely_cause(flights, unknowns, first)
         raise CannotFlyError(cause) if cause else CannotFlyError() from None
-    identifiability = Identifiability(estimate, known.length)
     given = {"mass": known.mass is not None or known.body is not None}
     guessed = frozenset(name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.body is not None))
     checks = check_residuals(flights, estimate)
-    cause = "" if all(check.is_noise for check in checks) else likely_cause(flights, unknowns, first)
-    assumed = _assumed(flights, known, fit)
-    return Identification(flights, estimate, identifiability, checks, assumed, guessed, cause)
-
-
-def _check(flights: Sequence[MeasuredFlight]) -> None:
-    """Raises InputError where a flight has no poses, or too few for its start and anything else."""
-    for flight in flights:
-        if flight.pose is None:
-            raise InputError("session", f"{flight.name} has no poses", "poses, transforms or odometry")
-        count = len(flight.pose[0].times_ns)
-        if count < FEWEST:
-            raise InputError("session", f"{flight.name} has {count} samples", f"at least {FEWEST} poses")
+    cause = "" if all(check.is_noise for check in checks) else _likely_cause(flights, unknowns, first)
+    identifiability = Identifiability(estimate, known.length)
+    return Identification(flights, estimate, identifiability, checks, _assumed(flights, known, fit), guessed, cause)
 
 
 def _first_values(first: MeasuredFlight, known: Known) -> Values:
@@ -77,7 +81,7 @@ def _first_values(first: MeasuredFlight, known: Known) -> Values:
     if known.body is not None:
         inertia = possible_tensor(known.body.inertia) * (mass / known.body.mass)
     damping = np.array([first.linear_damping, first.angular_damping])
-    return Values(mass, zero, inertia, damping, np.array(first.gravity, float), known.offsets, zero, zero, zero)
+    return Values(mass, zero, inertia, damping, np.array(first.gravity, float), {}, zero, zero, zero)
 
 
 def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]) -> list[str]:
@@ -92,7 +96,54 @@ def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]
         lines.append(f"damping {first.linear_damping:g} N s/m, {first.angular_damping:g} N m s")
     if "imu_place" not in fit and any(s.kind == ACCELERATION for flight in flights for s in flight.series):
         lines.append("the IMU stands at the tracked frame's origin, its axes those of the frame")
-    for history in {flight.load_history.topic: flight.load_history for flight in flights}.values():
-        if len(history.changes):
-            lines.append(f"{history.topic} was sampled: it changed between messages, and the errors count that")
+    for topic in dict.fromkeys(f.load_history.topic for f in flights if len(f.load_history.changes)):
+        lines.append(f"{topic} was sampled: it changed between messages, and the errors count that")
     return lines
+
+
+def _likely_cause(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> str:
+    """Which conversion makes the flights fit, in words, or the usual causes; empty where short parts fit as they are
+    and no conversion makes the whole fit.
+    """
+    fits_short = fits_in_short(flights, unknowns, values)
+    for cause, remedy, converted, gravity in _conversions(flights, values, sensors_only=fits_short):
+        other = replace(values, gravity=gravity)
+        if not fits_in_short(converted, unknowns, other):
+            continue
+        try:
+            checks = check_residuals(converted, fit_flights(converted, unknowns, other))
+        except CannotFlyError:
+            continue
+        if all(check.is_noise for check in checks):
+            return f"it fits if {cause}: {remedy}"
+    return "" if fits_short else USUAL
+
+
+def _conversions(
+    flights: Sequence[MeasuredFlight], values: Values, sensors_only: bool
+) -> Iterator[tuple[str, str, Sequence[MeasuredFlight], np.ndarray]]:
+    """Cause, remedy, and flights and gravity as they are then; of rates and accelerations alone or of all: poses of
+    wrong units or axes don't fit for a moment, accelerations may, with another mass.
+    """
+    kinds = {series.kind for flight in flights for series in flight.series}
+    for kind, factor, cause in _SCALES:
+        if kind in kinds and not (sensors_only and kind == POSITION):
+            converted = _converted(flights, kind, partial(np.multiply, factor))
+            yield cause, f"multiply them by {factor:.6g}", converted, values.gravity
+    if sensors_only:
+        return
+    for gravity in map(np.array, _GRAVITIES):
+        if not np.allclose(gravity, values.gravity):
+            text = " ".join(f"{g:g}" for g in gravity.tolist())
+            yield f"gravity is {text} m/s²", f"--gravity {text}", flights, gravity
+    reordered = _converted(flights, ATTITUDE, partial(np.roll, shift=-1, axis=1))
+    yield "quaternions begin with w", "reorder them to x y z w", reordered, values.gravity
+
+
+def _converted(
+    flights: Sequence[MeasuredFlight], kind: str, convert: Callable[[np.ndarray], np.ndarray]
+) -> list[MeasuredFlight]:
+    def one(series: Series) -> Series:
+        return replace(series, values=convert(series.values)) if series.kind == kind else series
+
+    return [replace(flight, series=tuple(one(series) for series in flight.series)) for flight in flights]

@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""A first body from measured poses alone, by linear least squares: no guess of the body, nothing is integrated.
+"""What measured poses say by themselves: how noisy they are, where a segment starts, and a first body by linear least
+squares. No guess of the body is needed, and nothing is integrated.
 
 With R the attitude, c the centre of mass and S the tensor divided by its trace, all measured samples obey
 
-    p + R c = x0 + v0 t + ½ g t² + (1/m) ∬ F dt² - (d/m) ∫ p dt,      R S ω = L0 + κ ∫ τ dt - κ a ∫ ω dt,  κ = 1 / tr I,
+    p + R c = x0 + v0 t + ½ g t² + (1/m) ∬ F dt²,      R S ω = L0 + κ ∫ τ dt,  κ = 1 / tr I,
 
-which are linear in c, 1/m, d/m, g and the start of the path, then in S, κ, κ a and L0; d and a: damping. The trace of S
-is 1, so that rates that are noise don't make the body small. As the loads' integrals are known, one poke in a long fall
-tells the mass as well as in a short one.
+which are linear in c and 1/m, then in S and κ; x0, v0 and L0 are projected out. The trace of S is 1, so that rates that
+are noise don't make the body small. As the loads' integrals are known, one poke in a long fall tells the mass as well
+as in a short one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,9 +22,20 @@ import numpy as np
 from ..motion import loads as ld
 from . import measurements as ms
 from . import rotations as rot
-from .incremental_qr import upper_triangle
 from .unknowns import Unknowns, Values, possible_tensor
 
+NEIGHBOURS = 9
+"""Samples for a local parabola: at 100 Hz and .2 degrees of noise its slope errs by some hundredths rad/s."""
+NEAR_TURN = 1.5
+"""Over which rotation vectors change nearly as the angular velocity does [rad]."""
+MOST_DIFFERENCES = 7
+"""Of noise all orders from the third on have the same spread, but for their factor; of a motion the higher ones leave
+less.
+"""
+MEDIAN = 0.6745
+"""Of the size of a normal number, in standard deviations."""
+LEAST_NOISE = 1e-6
+"""Of the largest value of a series: difference quotients of flights don't tell less from rounding."""
 TURN = 0.5
 """Between the two attitudes that give an angular velocity [rad]: farther apart the mean isn't the middle's."""
 TOLD = 4.0
@@ -47,6 +60,57 @@ _SHAPES = [
     )
 ]
 """What the shape may have beside a third of the unit tensor: symmetric, of trace 0."""
+
+
+def noise_by_differences(series: ms.Series) -> float:
+    """Standard deviation of one component of the noise, from third and higher differences, in which a smooth motion
+    hardly shows; rough where the samples aren't evenly spaced.
+    """
+    if len(series.values) < 5:
+        return 1.0
+    differences = rot.turns(series.values) if series.kind == ms.ATTITUDE else np.diff(series.values, axis=0)
+    spread = np.inf
+    for order in range(2, min(MOST_DIFFERENCES, len(series.values) - 2) + 1):
+        differences = np.diff(differences, axis=0)
+        if order >= 3:
+            own = float(np.median(np.abs(differences))) / MEDIAN / math.sqrt(math.comb(2 * order, order))
+            spread = min(spread, own)
+    return max(spread, least_noise(series))
+
+
+def least_noise(series: ms.Series) -> float:
+    """What is taken for noise where there is less."""
+    return LEAST_NOISE * max(1.0, float(np.max(np.abs(series.values))))
+
+
+def local_start(flight: ms.MeasuredFlight, time_ns: int) -> np.ndarray:
+    """The tracked frame's state (13,) at a time: position, attitude xyzw, velocity, angular velocity in body axes."""
+    position, attitude = flight.pose
+    start = np.zeros(13)
+    start[:3], start[7:10] = _parabola(position.times_ns, position.values, time_ns, NEIGHBOURS)
+    turn = float(np.median(np.linalg.norm(rot.turns(attitude.values), axis=1)))
+    # Farther away the body has turned so much that a parabola doesn't follow.
+    count = min(NEIGHBOURS, max(3, int(NEAR_TURN / max(turn, 1e-9)) + 1))
+    near = int(np.clip(np.searchsorted(attitude.times_ns, time_ns), 0, len(attitude.values) - 1))
+    middle = attitude.values[near]
+    around = slice(max(near - count, 0), near + count + 1)
+    turns = rot.logarithm(rot.product(rot.inverse(middle), attitude.values[around]))
+    turn_now, slope = _parabola(attitude.times_ns[around], turns, time_ns, count)
+    # A vector's rate is the angular velocity but for half its product with it, and so on; of a small turn nothing is
+    # left of that.
+    start[3:7] = rot.product(middle, rot.exponential(turn_now))
+    start[10:13] = slope - 0.5 * rot.cross(turn_now, slope)
+    return start
+
+
+def _parabola(times_ns: np.ndarray, values: np.ndarray, time_ns: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Value (3,) and slope (3,) [1/s] at a time, of the ``count`` samples (n, 3) nearest to it."""
+    count = min(count, len(times_ns))
+    first = int(np.clip(np.searchsorted(times_ns, time_ns) - count // 2, 0, len(times_ns) - count))
+    seconds = 1e-9 * (times_ns[first : first + count] - time_ns)
+    span = max(float(np.ptp(seconds)), 1e-9)
+    fit = np.polynomial.polynomial.polyfit(seconds / span, values[first : first + count], min(2, count - 1))
+    return fit[0], fit[1] / span
 
 
 @dataclass(frozen=True)
@@ -89,40 +153,17 @@ class _Poses:
     impulses: Impulses
 
 
-@dataclass(frozen=True)
-class _Equations:
-    """columns by unknown (n, 3, k) and right side (n, 3): the sum of columns times unknowns is the right side."""
-
-    columns: Mapping[str, np.ndarray]
-    right: np.ndarray
-
-
 def initial_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, values: Values) -> Values:
-    """``values`` with the free ones of mass, COM, tensor, damping and gravity as the balance of momentum says, where it
+    """``values`` with the free ones of mass, centre of mass and tensor as the balance of momentum says, where it
     does.
     """
-    poses = [_poses_of(flight, values) for flight in flights]
-    for _ in range(2 if values.damping[0] > 0.0 or "damping" in unknowns else 1):
-        # Drag is that of the centre of mass, whose path has to be known for it.
-        values = _from_path(poses, unknowns, values)
-    return _from_turns(poses, unknowns, values)
-
-
-def _poses_of(flight: ms.MeasuredFlight, values: Values) -> _Poses:
-    assert flight.pose is not None
-    position, attitude = flight.pose
-    seconds = 1e-9 * (attitude.times_ns - flight.begin_ns) + values.offset(attitude.topic)
-    loads = flight.load_history.moved(values.offset(flight.load_history.topic), np.zeros(0))
-    impulses = _impulses_of(loads, flight.begin_ns, seconds, attitude.values)
-    return _Poses(seconds, position.values, attitude.values, impulses)
-
-
-def _attitudes_at(seconds: np.ndarray, known_s: np.ndarray, attitudes: np.ndarray) -> np.ndarray:
-    """Attitudes (m, 4) at times between the samples (n, 4) at ``known_s`` (n,)."""
-    after = np.clip(np.searchsorted(known_s, seconds), 1, len(known_s) - 1)
-    first, last = attitudes[after - 1], attitudes[after]
-    part = np.clip((seconds - known_s[after - 1]) / (known_s[after] - known_s[after - 1]), 0.0, 1.0)
-    return rot.product(first, rot.exponential(part[:, None] * rot.logarithm(rot.product(rot.inverse(first), last))))
+    poses = []
+    for flight in flights:
+        position, attitude = flight.pose
+        seconds = 1e-9 * (attitude.times_ns - flight.begin_ns)
+        impulses = _impulses_of(flight.load_history, flight.begin_ns, seconds, attitude.values)
+        poses.append(_Poses(seconds, position.values, attitude.values, impulses))
+    return _from_turns(poses, unknowns, _from_path(poses, unknowns, values))
 
 
 def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: np.ndarray, attitudes: np.ndarray) -> Impulses:
@@ -137,7 +178,11 @@ def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: np.ndarray, at
     middles = begin[which] + (end - begin)[which] * (number + 0.5) / counts[which]
     order = np.argsort(middles, kind="stable")
     middles, length = middles[order], length[order, None]
-    rows, turns = history.loads[which[order]], _attitudes_at(middles, seconds, attitudes)
+    after = np.clip(np.searchsorted(seconds, middles), 1, len(seconds) - 1)
+    part = np.clip((middles - seconds[after - 1]) / (seconds[after] - seconds[after - 1]), 0.0, 1.0)
+    between = rot.turns(attitudes)[after - 1] * part[:, None]
+    turns = rot.product(attitudes[after - 1], rot.exponential(between))
+    rows = history.loads[which[order]]
     in_body = rows[:, ld.LOAD_AXES, None] != ld.WORLD_AXES
     force, torque = (
         np.where(in_body, rot.turned(turns, vectors), vectors)
@@ -149,90 +194,51 @@ def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: np.ndarray, at
 
 
 def _from_path(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> Values:
-    """With centre of mass, mass, linear damping and gravity from how the centre of mass moves."""
-    com, mass, drag = values.center_of_mass, values.mass, float(values.damping[0])
-    is_loaded = drag > 0.0 or any(len(one.impulses.seconds) for one in poses)
-    equations = []
-    for number, one in enumerate(poses):
+    """With centre of mass and mass from how the centre of mass moves."""
+    rows = []
+    for one in poses:
         t = one.seconds[:, None]
         # Columns of the attitude's matrix are its turned axes.
         turns = rot.turned(one.attitudes[:, None], np.eye(3)[None]).transpose(0, 2, 1)
-        moved = -integral(one.seconds, one.positions + turns @ com - one.positions[0])
-        known = one.impulses.path(one.seconds) + (0.0 if "damping" in unknowns else drag) * moved
-        columns = {
-            f"place {number}": np.broadcast_to(-np.eye(3), turns.shape),
-            f"velocity {number}": -np.eye(3) * t[:, :, None],
-        }
-        right = -one.positions
-        if "com" in unknowns:
-            columns["com"] = turns
-        else:
-            right = right - turns @ com
-        if "mass" in unknowns and is_loaded:
-            columns["1/m"] = -known[:, :, None]
-        else:
-            right = right + known / mass
-        if "damping" in unknowns:
-            columns["d/m"] = -moved[:, :, None]
-        fall = 0.5 * np.eye(3) * (t * t)[:, :, None]
-        if "gravity" in unknowns:
-            columns["gravity"] = -fall
-        else:
-            right = right + fall @ values.gravity
-        equations.append(_Equations(columns, right))
-    found = _solved(equations, {"com": (com, LOOSE * values.size)})
-    inverse, sd = found.get("1/m", (np.zeros(1), np.ones(1)))
-    if inverse[0] > TOLD * sd[0]:
-        mass = 1.0 / float(inverse[0])
-    if "d/m" in found:
-        drag = max(float(found["d/m"][0][0]) * mass, 0.0)
-    return replace(
-        values,
-        mass=mass,
-        inertia=values.inertia * (mass / values.mass),
-        center_of_mass=found["com"][0] if "com" in found else com,
-        damping=np.array([drag, values.damping[1]]),
-        gravity=found["gravity"][0] if "gravity" in found else values.gravity,
-    )
+        right = 0.5 * t * t * values.gravity - one.positions
+        columns = [turns, -one.impulses.path(one.seconds)[:, :, None], right[:, :, None]]
+        rows.append(_without(np.hstack([np.ones_like(t), t]), np.concatenate(columns, axis=2)))
+    is_pushed = any(len(one.impulses.seconds) for one in poses)
+    free = np.array(["com" in unknowns] * 3 + ["mass" in unknowns and is_pushed])
+    known = np.append(values.center_of_mass, 1.0 / values.mass)
+    found, sds = _solved(np.concatenate(rows), free, known, np.array([LOOSE * values.size] * 3 + [np.inf]))
+    mass = 1.0 / float(found[3]) if free[3] and found[3] > TOLD * sds[3] else values.mass
+    inertia = values.inertia * (mass / values.mass)
+    return replace(values, mass=mass, inertia=inertia, center_of_mass=found[:3])
 
 
 def _from_turns(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> Values:
-    """With tensor and angular damping from how the body turns."""
+    """With the tensor from how the body turns."""
     if "inertia" not in unknowns:
         return values
-    is_damped, known = "damping" in unknowns, float(values.damping[1])
-    is_loaded = known > 0.0 or any(len(one.impulses.seconds) for one in poses)
-    equations = []
-    for number, one in enumerate(poses):
+    rows = []
+    for one in poses:
         seconds, attitudes, rates = _rates(one)
-        turned = rot.turned(attitudes, rates)
         shape = np.stack([rot.turned(attitudes, rates @ basis) for basis in _SHAPES], axis=2)
-        columns = {"shape": shape, f"momentum {number}": np.broadcast_to(-np.eye(3), (len(seconds), 3, 3))}
-        slowing = -integral(seconds, turned)
-        if is_loaded:
-            torques = one.impulses.momentum(seconds, one.impulses.about(values.center_of_mass))
-            columns["1/trace"] = -(torques + (0.0 if is_damped else known) * slowing)[:, :, None]
-        if is_damped:
-            columns["a/trace"] = -slowing[:, :, None]
-        equations.append(_Equations(columns, -turned / 3.0))
+        pushed = one.impulses.momentum(seconds, one.impulses.about(values.center_of_mass))
+        right = -rot.turned(attitudes, rates) / 3.0
+        columns = np.concatenate([shape, -pushed[:, :, None], right[:, :, None]], axis=2)
+        rows.append(_without(np.ones((len(seconds), 1)), columns))
+    is_pushed = any(len(one.impulses.seconds) for one in poses)
     trace = float(np.trace(values.inertia))
-    before = values.inertia / trace
-    assumed = np.array([np.sum(basis * before) / np.sum(basis * basis) for basis in _SHAPES])
-    found = _solved(equations, {"shape": (assumed, LOOSE)})
-    tensor = np.eye(3) / 3.0 + np.tensordot(found["shape"][0], _SHAPES, 1)
-    if is_loaded:
-        inverse, sd = found["1/trace"]
-        trace = 1.0 / float(inverse[0]) if inverse[0] > TOLD * sd[0] else trace
-    damping = max(float(found["a/trace"][0][0]) * trace, 0.0) if is_damped else known
-    return replace(
-        values, inertia=trace * possible_tensor(tensor, THIN), damping=np.array([values.damping[0], damping])
-    )
+    before = [np.sum(basis * values.inertia) / trace / np.sum(basis * basis) for basis in _SHAPES]
+    free = np.array([True] * 5 + [is_pushed])
+    found, sds = _solved(np.concatenate(rows), free, np.array([*before, 1.0 / trace]), np.array([LOOSE] * 5 + [np.inf]))
+    tensor = possible_tensor(np.eye(3) / 3.0 + np.tensordot(found[:5], _SHAPES, 1), THIN)
+    if is_pushed and found[5] > TOLD * sds[5]:
+        trace = 1.0 / float(found[5])
+    return replace(values, inertia=trace * tensor)
 
 
 def _rates(poses: _Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Seconds (m,), attitudes (m, 4) and angular velocities (m, 3) [rad/s, body axes] midway between two attitudes."""
-    step = np.linalg.norm(rot.logarithm(rot.product(rot.inverse(poses.attitudes[:-1]), poses.attitudes[1:])), axis=1)
-    apart = int(np.clip(TURN / max(float(np.median(step)), 1e-9), 1, max(len(poses.seconds) // 8, 1)))
+    step = float(np.median(np.linalg.norm(rot.turns(poses.attitudes), axis=1)))
+    apart = int(np.clip(TURN / max(step, 1e-9), 1, max(len(poses.seconds) // 8, 1)))
     begin, end = poses.seconds[:-apart], poses.seconds[apart:]
     turn = rot.logarithm(rot.product(rot.inverse(poses.attitudes[:-apart]), poses.attitudes[apart:]))
     middle = rot.product(poses.attitudes[:-apart], rot.exponential(0.5 * turn))
@@ -245,42 +251,25 @@ def _rates(poses: _Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return (0.5 * (begin + end))[kept], middle[kept], (turn / (end - begin)[:, None])[kept]
 
 
-def integral(seconds: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """∫ (n, 3) of vectors (n, 3) from the first time on, by trapezoids."""
-    steps = 0.5 * np.diff(seconds)[:, None] * (vectors[1:] + vectors[:-1])
-    return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+def _without(basis: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Rows (3 n, k) of columns (n, 3, k) less the part of each that ``basis`` (n, b) can make, axis by axis."""
+    Q, _ = np.linalg.qr(basis)
+    rest = columns - np.tensordot(Q, np.tensordot(Q.T, columns, 1), 1)
+    return rest.reshape(-1, columns.shape[2])
 
 
-def _solved(
-    equations: Sequence[_Equations], assumed: Mapping[str, tuple[np.ndarray, float]]
-) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Numbers (k,) by unknown and their standard deviations. assumed: numbers and their standard deviation, which count
-    as much as one sample.
+def _solved(rows: np.ndarray, free: np.ndarray, known: np.ndarray, widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers (k,) with the least squares of rows (n, k + 1), whose last column is the right side, and standard
+    deviations (k,) of those that are ``free``; the others stay as ``known``. widths: standard deviations of what is
+    known of the free ones, which counts as much as one sample.
     """
-    widths = {name: column.shape[2] for one in equations for name, column in one.columns.items()}
-    ends = np.cumsum(list(widths.values()))
-    places = {name: slice(end - width, end) for (name, width), end in zip(widths.items(), ends, strict=True)}
-    rows = []
-    for one in equations:
-        block = np.zeros((*one.right.shape, ends[-1] + 1))
-        for name, column in one.columns.items():
-            block[:, :, places[name]] = column
-        block[:, :, -1] = one.right
-        rows.append(block.reshape(-1, ends[-1] + 1))
-    matrix = np.concatenate(rows)
-    prior = np.zeros((ends[-1], ends[-1] + 1))
-    for name, (numbers, sd) in assumed.items():
-        if name in places:
-            prior[places[name], places[name]] = np.eye(len(numbers)) / sd
-            prior[places[name], -1] = numbers / sd
-    noise = 0.0
-    triangle = upper_triangle(matrix.T)
+    matrix, right = rows[:, :-1][:, free], rows[:, -1] - rows[:, :-1][:, ~free] @ known[~free]
+    found, sds, noise = np.array(known), np.zeros(len(known)), 0.0
     for _ in range(2):
-        whole = np.vstack([triangle, noise * prior])
-        left, sizes, axes = np.linalg.svd(whole[:, :-1], full_matrices=False)
-        inverse = np.where(sizes > 1e-12 * sizes[0], 1.0 / np.maximum(sizes, 1e-300), 0.0)
-        found = axes.T @ (inverse * (left.T @ whole[:, -1]))
-        rest = float(np.linalg.norm(triangle[:, :-1] @ found - triangle[:, -1]))
-        noise = max(rest / np.sqrt(len(matrix)), 1e-12 * float(np.abs(matrix[:, -1]).max()))
-    sds = noise * np.linalg.norm(axes.T * inverse, axis=1)
-    return {name: (found[place], sds[place]) for name, place in places.items()}
+        whole = np.vstack([matrix, np.diag(noise / widths[free])])
+        inverse = np.linalg.pinv(whole, rcond=1e-12)
+        found[free] = inverse @ np.append(right, noise * known[free] / widths[free])
+        rest = float(np.linalg.norm(matrix @ found[free] - right))
+        noise = max(rest / np.sqrt(len(right)), 1e-12 * float(np.abs(right).max()))
+        sds[free] = noise * np.linalg.norm(inverse, axis=1)
+    return found, sds

@@ -5,11 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
+from ..base.errors import InputError
 from ..motion.loads import LOAD
 from ..simulation.flight import IMPULSE, PULSE
+from . import rotations as rot
 from .trajectories import Wrenches
 
 POSITION, ATTITUDE, RATE, ACCELERATION = "position", "attitude", "rate", "acceleration"
@@ -140,18 +143,25 @@ class MeasuredFlight:
         return 1e-9 * (self.end_ns - self.begin_ns)
 
     @property
-    def pose(self) -> tuple[Series, Series] | None:
-        """Positions and attitudes of the first topic that has both, with the same times."""
+    def pose(self) -> tuple[Series, Series]:
+        """Positions and attitudes of the first topic that has both, with the same times; raises InputError without."""
         for attitude in self.series:
             for position in self.series:
                 if (attitude.kind, position.kind, position.topic) == (ATTITUDE, POSITION, attitude.topic):
                     return position, attitude
-        return None
+        raise InputError("session", f"{self.name} has no poses", "poses, transforms or odometry")
+
+    @cached_property
+    def high_rate(self) -> float:
+        """Angular speed that four of five samples don't pass [rad/s]."""
+        _, attitude = self.pose
+        seconds = 1e-9 * np.diff(attitude.times_ns)
+        return float(np.quantile(np.linalg.norm(rot.turns(attitude.values), axis=1) / seconds, 0.8))
 
 
 def topics_of(flights: Sequence[MeasuredFlight]) -> list[str]:
     """Topics whose clocks may differ, in their order: those of poses first, as theirs is taken as right."""
-    poses = [flight.pose[0].topic for flight in flights if flight.pose is not None]
+    poses = [flight.pose[0].topic for flight in flights]
     sensors = [series.topic for flight in flights for series in flight.series]
     loads = [flight.load_history.topic for flight in flights if flight.load_history.topic]
     return list(dict.fromkeys([*poses, *sensors, *loads]))

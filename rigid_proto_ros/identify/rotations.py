@@ -43,3 +43,8 @@ def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     u, s = q[..., :3], q[..., 3:]
     t = 2.0 * cross(u, v)
     return v + s * t + cross(u, t)
+
+
+def turns(q: np.ndarray) -> np.ndarray:
+    """Rotation vectors (n - 1, 3) from each attitude (n, 4) to the next one, in body axes."""
+    return logarithm(product(inverse(q[:-1]), q[1:]))

@@ -14,14 +14,14 @@ from numba import from_dtype, int64, types
 
 from ..base.compilation import njit
 from ..base.records import copy_numbers
-from ..base.rotation import quaternion_of_axes, rotate_inverse
+from ..base.rotation import rotate_inverse
 from ..mass.tensor import principal_axes_kernel
-from ..motion import body as of_body
-from ..motion import loads as ld
+from ..motion.body import BODY, fill_body
 from ..motion.integrators.auto import AUTO
 from ..motion.integrators.series_steps import degree_for
 from ..motion.integrators.stepping import METHOD, method_table, provide_kernel, workspace_size
-from ..motion.problem import ENVIRONMENT, begin_body
+from ..motion.problem import ENVIRONMENT, PROBLEM, begin_body
+from ..motion.variables import VARIABLES
 from ..simulation import flight as fl
 from ..simulation.commands import NO_SLOT
 
@@ -37,8 +37,8 @@ LINEAR_DAMPING, ANGULAR_DAMPING = 16, 17
 START = 18  # (13,) state of the COM at the segment's start
 FLOWN = 31
 
-# A row of what is known at a sample.
-STATE = 0  # (13,)
+# A row of what is known at a sample: the state (13,), and
+STATE = 13
 SPECIFIC_FORCE = 13  # (3,) at the COM: acceleration without gravity [m/s², body axes]
 ANGULAR_ACCELERATION = 16  # (3,) [rad/s², body axes]
 SAMPLE = 19
@@ -61,55 +61,6 @@ class Wrenches:
         return np.sort(np.concatenate([self.commands[:, 0], self.commands[:, 0] + self.commands[:, 1]]))
 
 
-@njit(cache=True, error_model="numpy")
-def _make_body(flown: np.ndarray, body: np.ndarray) -> bool:
-    """Fill ``body`` (BODY,) from a row; whether a body can have it."""
-    inertia = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            inertia[i, j] = flown[INERTIA + 3 * i + j]
-    moments, axes = principal_axes_kernel(inertia)
-    body[of_body.MASS] = flown[MASS]
-    quaternion_of_axes(axes, body[of_body.QUATERNION : of_body.QUATERNION + 4])
-    for k in range(3):
-        body[of_body.COM + k] = flown[COM + k]
-        body[of_body.MOMENTS + k] = moments[k]
-        body[of_body.BODY_SCALE + k] = 1.0
-        for j in range(3):
-            body[of_body.INERTIA + 3 * k + j] = inertia[k, j]
-            body[of_body.AXES + 3 * k + j] = axes[k, j]
-    body[of_body.LENGTH] = 1.0
-    return bool(moments[0] > 0.0 and np.isfinite(moments[2]) and flown[MASS] > 0.0)
-
-
-@njit(cache=True, error_model="numpy")
-def _rates(flown: np.ndarray, body: np.ndarray, sums: np.ndarray, row: np.ndarray, sample: np.ndarray) -> None:
-    """What an accelerometer at the COM feels, and ω', from the loads that act: both from the equations of motion."""
-    qx, qy, qz, qw = row[3], row[4], row[5], row[6]
-    wx, wy, wz = row[10], row[11], row[12]
-    W, B, T, U, M = ld.FORCE_WORLD, ld.FORCE_BODY, ld.TORQUE_WORLD, ld.TORQUE_BODY, ld.MOMENT
-    c, d = flown[LINEAR_DAMPING], flown[ANGULAR_DAMPING]
-    force = (sums[W] - c * row[7], sums[W + 1] - c * row[8], sums[W + 2] - c * row[9])
-    fx, fy, fz = rotate_inverse(qx, qy, qz, qw, force[0], force[1], force[2])
-    m = flown[MASS]
-    sample[SPECIFIC_FORCE] = (fx + sums[B]) / m
-    sample[SPECIFIC_FORCE + 1] = (fy + sums[B + 1]) / m
-    sample[SPECIFIC_FORCE + 2] = (fz + sums[B + 2]) / m
-    tx, ty, tz = rotate_inverse(qx, qy, qz, qw, sums[T], sums[T + 1], sums[T + 2])
-    _, m01, m02 = rotate_inverse(qx, qy, qz, qw, sums[M], sums[M + 1], sums[M + 2])
-    m10, _, m12 = rotate_inverse(qx, qy, qz, qw, sums[M + 3], sums[M + 4], sums[M + 5])
-    m20, m21, _ = rotate_inverse(qx, qy, qz, qw, sums[M + 6], sums[M + 7], sums[M + 8])
-    I = of_body.INERTIA
-    lx = body[I] * wx + body[I + 1] * wy + body[I + 2] * wz
-    ly = body[I + 3] * wx + body[I + 4] * wy + body[I + 5] * wz
-    lz = body[I + 6] * wx + body[I + 7] * wy + body[I + 8] * wz
-    tx += sums[U] + (m12 - m21) - d * wx - (wy * lz - wz * ly)
-    ty += sums[U + 1] + (m20 - m02) - d * wy - (wz * lx - wx * lz)
-    tz += sums[U + 2] + (m01 - m10) - d * wz - (wx * ly - wy * lx)
-    x, y, z = of_body.angular_acceleration(body, tx, ty, tz)
-    sample[ANGULAR_ACCELERATION], sample[ANGULAR_ACCELERATION + 1], sample[ANGULAR_ACCELERATION + 2] = x, y, z
-
-
 def _fly_all(
     flown: np.ndarray,
     times_ns: np.ndarray,
@@ -128,11 +79,15 @@ def _fly_all(
     """
     methods, flights, rows, events, room = tables
     count, flight = commands.shape[0], flights[0]
-    body, environment = np.zeros(of_body.BODY), np.zeros(1, ENVIRONMENT)[0]
+    body, environment, scale = np.zeros(BODY), np.zeros(1, ENVIRONMENT)[0], np.ones(3)
+    problem, variables = np.zeros(1, PROBLEM), np.zeros(VARIABLES)
     for i in range(flown.shape[0]):
         own = flown[i]
         good[i] = 0
-        if not _make_body(own, body):
+        inertia = own[INERTIA : INERTIA + 9].copy().reshape(3, 3)
+        principal = principal_axes_kernel(inertia)
+        fill_body(own[MASS], own[COM : COM + 3], inertia, principal, scale, body)
+        if not (principal[0][0] > 0.0 and np.isfinite(principal[0][2]) and own[MASS] > 0.0):
             continue
         fl.begin_flight(flight)
         flight.method, flight.chooses, flight.step_ns = -1, True, 1_000_000
@@ -159,8 +114,13 @@ def _fly_all(
             if came != fl.REACHED:
                 good[i] = 0
                 break
-            copy_numbers(flight.row, samples[i, k, :13])
-            _rates(own, body, flight.sums, flight.row, samples[i, k])
+            sample = samples[i, k]
+            copy_numbers(flight.row, sample[:STATE])
+            rates = fl.accelerations_now(flight, problem, variables)
+            g, q = environment.gravity, sample[3:7]
+            felt = rotate_inverse(q[0], q[1], q[2], q[3], rates[0] - g[0], rates[1] - g[1], rates[2] - g[2])
+            for j in range(3):
+                sample[SPECIFIC_FORCE + j], sample[ANGULAR_ACCELERATION + j] = felt[j], rates[3 + j]
     return DONE
 
 

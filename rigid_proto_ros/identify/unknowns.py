@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What is estimated: mass, centre of mass and tensor, and on request damping, gravity, clock offsets, an IMU's place
-and biases.
+and biases. Tensors are those that a body can have: their second moments Σ = ∫ x xᵀ dm have no eigenvalue below 0.
 """
 
 from __future__ import annotations
@@ -11,17 +11,24 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from ..base.errors import InputError
 from ..mass.tensor import principal_axes
 
-GROUPS = ("mass", "com", "inertia", "damping", "gravity", "offset", "gyro_bias", "accel_bias", "imu_place")
+GROUPS = ("mass", "inertia", "com", "damping", "gravity", "offset", "gyro_bias", "accel_bias", "imu_place")
 """What ``--fit`` takes."""
 DEFAULT_FIT = ("mass", "com", "inertia")
-STEP = 2e-6
-"""Of difference quotients, part of what counts as a large change: long flights bend so much that 1e-5 is too long for
-some, and 1e-7 leaves too little above rounding.
-"""
+_SIZES = {
+    "mass": 1,
+    "inertia": 6,
+    "com": 3,
+    "damping": 2,
+    "gravity": 3,
+    "gyro_bias": 3,
+    "accel_bias": 3,
+    "imu_place": 3,
+}
 THINNEST = 1e-9
 """Least second moment of an estimate, of the largest: of none at all there may be a rod, whose least moment is 0."""
 
@@ -109,20 +116,6 @@ class Unknowns:
         return ("linear_damping", "angular_damping")[index] if group == "damping" else f"{group}.{'xyz'[index]}"
 
 
-NONE = Unknowns(())
-"""Nothing is free."""
-_SIZES = {
-    "mass": 1,
-    "inertia": 6,
-    "com": 3,
-    "damping": 2,
-    "gravity": 3,
-    "gyro_bias": 3,
-    "accel_bias": 3,
-    "imu_place": 3,
-}
-
-
 def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:
     """Of the groups in ``fit``; topics: those whose clocks may differ, of which the first keeps its own. Raises
     InputError for a group that isn't known.
@@ -131,10 +124,10 @@ def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:
         if group not in GROUPS:
             raise InputError("--fit", group, ", ".join(GROUPS))
     slots: list[tuple[str, Any]] = []
-    for group in ("mass", "inertia", "com", "damping", "offset", "gravity", "gyro_bias", "accel_bias", "imu_place"):
+    for group in GROUPS:
         if group in fit:
             # All clocks together say nothing but when the flight began: the first one is taken as right.
-            slots += [(group, index) for index in (topics[1:] if group == "offset" else range(_SIZES.get(group, 3)))]
+            slots += [(group, index) for index in (topics[1:] if group == "offset" else range(_SIZES[group]))]
     if not slots:
         raise InputError("--fit", ",".join(fit), ", ".join(GROUPS) + "; an offset needs a second topic")
     return Unknowns(tuple(slots))
@@ -165,3 +158,52 @@ def possible_tensor(inertia: np.ndarray, thinnest: float = THINNEST) -> np.ndarr
         return inertia
     second = (axes * np.maximum(values, least)) @ axes.T
     return np.trace(second) * np.eye(3) - second
+
+
+def is_possible(inertia: np.ndarray) -> bool:
+    """Whether a body can have it, to rounding."""
+    values = np.linalg.eigvalsh(second_moments(inertia))
+    return bool(values[0] >= -1e-12 * values[2])
+
+
+_ROWS, _COLUMNS = np.triu_indices(3)
+_UNITS = np.zeros((6, 3, 3))
+_UNITS[np.arange(6), _ROWS, _COLUMNS] = _UNITS[np.arange(6), _COLUMNS, _ROWS] = 1.0
+
+
+def possible_step(
+    jacobian: np.ndarray, residuals: np.ndarray, tensor: slice, inertia: np.ndarray, change: np.ndarray
+) -> np.ndarray:
+    """The step (n,) with the least ``|jacobian step + residuals|`` that leads to a body that can exist. tensor: where
+    the six numbers of ``moved_tensor`` stand in it; so far they have changed ``inertia`` by ``change`` (6,).
+
+    Flat bodies lie on the rim of what can exist. There the second moments are S S with a symmetric S, which is regular
+    on the rim (Burer and Monteiro, Math. Program. 95, 2003).
+    """
+    own, others = jacobian[:, tensor], np.delete(jacobian, np.r_[tensor], axis=1)
+    # The others take what they can, whatever the tensor is.
+    Q, _ = np.linalg.qr(others)
+    left, aim = own - Q @ (Q.T @ own), residuals - Q @ (Q.T @ residuals)
+    size = float(np.trace(inertia))
+    begin = second_moments(inertia) / size
+    changes = [second_moments(moved_tensor(inertia, unit)) / size - begin for unit in np.eye(6)]
+    of_second = np.linalg.inv(np.array(changes)[:, _ROWS, _COLUMNS].T)
+
+    def step_to(root: np.ndarray) -> np.ndarray:
+        S = np.tensordot(root, _UNITS, 1)
+        return of_second @ (S @ S - begin)[_ROWS, _COLUMNS] - change
+
+    def slopes(root: np.ndarray) -> np.ndarray:
+        S = np.tensordot(root, _UNITS, 1)
+        return left @ of_second @ np.array([(unit @ S + S @ unit)[_ROWS, _COLUMNS] for unit in _UNITS]).T
+
+    values, axes = np.linalg.eigh(begin)
+    # Away from 0, where the root's slope is nothing.
+    root = ((axes * np.sqrt(np.maximum(values, 1e-6 * values[2]))) @ axes.T)[_ROWS, _COLUMNS]
+    found = least_squares(lambda r: left @ step_to(r) + aim, root, slopes, method="lm", xtol=1e-10, ftol=1e-10)
+    step = np.empty(jacobian.shape[1])
+    step[tensor] = step_to(found.x)
+    step[np.delete(np.arange(len(step)), np.r_[tensor])] = np.linalg.lstsq(
+        others, -(residuals + own @ step[tensor]), rcond=None
+    )[0]
+    return step

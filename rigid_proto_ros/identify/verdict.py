@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What a motion identifies of a body: the directions in which its Fisher information vanishes, in physical words."""
+"""What a motion identifies of a body: the directions in which its Fisher information vanishes, in physical words; and
+whether the residuals are noise.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +10,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.stats import chi2
 
-from ..mass.tensor import principal_axes
-from .fitting import Estimate
-from .unknowns import STEP, Unknowns, Values
+from .fitting import Estimate, residuals_of
+from .initial_estimate import noise_by_differences
+from .measurements import UNITS, MeasuredFlight
+from .unknowns import Unknowns, Values
 
 MOST_RELATIVE = 0.5
 """A standard deviation of more than half of the quantity itself says nothing: neither the number nor its
@@ -21,25 +25,30 @@ LEAST_SHARE = 1e-3
 """A quantity that changes by more than this part of itself along a direction that isn't identified isn't
 identified either.
 """
-ROUNDING = 0.5
-"""Where longer difference quotients leave less than this part of the information, by its root, it is rounding."""
 NAMED = 0.98
 """Part of a named direction's square that must lie among those that aren't identified."""
-
 DOUBTED = 0.01
 """Standard deviations above this are tried out: a spin whose wobble is only noise seems to identify too much."""
 TRIED = 4.0
 """So many standard deviations away the fit is tried again, with other starts."""
 LEAST_RISE = 4.0
 """Of the sum of squares there, where sixteen is expected."""
+GRADIENT_STEP = 2e-6
+"""Of quantities, part of what counts as a large change of an unknown."""
+
+LAGS = 10
+"""Of the residuals' autocorrelation."""
+LEAST_PROBABILITY = 1e-4
+"""Of noise that is white looking so little like it: below it the check fails."""
+FAR = 5.0
+"""Standard deviations beyond which a sample is called an outlier; noise alone does that once in half a
+million numbers.
+"""
+TOO_LARGE = 1.5
+"""Residuals so many times the noise between neighbouring samples are no noise."""
 
 POKE = "one poke of a known force beside the centre of mass"
 TUMBLE = "a motion that tumbles about several axes"
-_REMEDIES = {
-    "mass": "one poke of a known force, or --mass",
-    "size of the tensor": f"{POKE}, or a known torque",
-    "mass, tensor and damping by one factor": f"{POKE}, or --mass",
-}
 COORDINATES = {
     "mass": ("mass",),
     "inertia": (
@@ -49,10 +58,8 @@ COORDINATES = {
     "com": ("centre of mass along x", "centre of mass along y", "centre of mass along z"),
 }
 """Axes 1, 2, 3 are those of the moments, ascending; x, y, z those of the tracked frame."""
-UNITS = {"damping": 1.0, "gravity": 1.0, "offset": 0.01, "gyro_bias": 0.1, "accel_bias": 1.0, "imu_place": 0.1}
-"""Of what a standard deviation is to be small for it to be identified: N s/m and N m s by the body's own, m/s²,
-s, rad/s, m/s², m.
-"""
+SMALL_UNITS = {"offset": 0.01, "gyro_bias": 0.1, "imu_place": 0.1}
+"""Of what a standard deviation is to be small for it to be identified, where that isn't 1: s, rad/s, m."""
 
 
 @dataclass(frozen=True)
@@ -78,76 +85,37 @@ class Identifiability:
         """length: by which an error of the centre of mass is called large [m]."""
         self.unknowns, self.values = estimate.unknowns, estimate.values
         self.names, self._units = _coordinates(estimate.unknowns, estimate.values, length)
-        root = estimate.root * self._units
+        _, self.roots, directions = np.linalg.svd(estimate.root * self._units)
         # Fewer rows than columns: the rest of the directions has no information at all.
-        short = root.shape[1] - root.shape[0]
-        root = np.vstack([root, np.zeros((max(short, 0), root.shape[1]))])
-        _, self.roots, directions = np.linalg.svd(root, full_matrices=False)
+        self.roots = np.append(self.roots, np.zeros(len(self.names) - len(self.roots)))
         self._directions = directions.T
-        wide = np.linalg.norm((estimate.root_wide * self._units) @ self._directions, axis=0)
-        self._unidentified = (self.roots < 1.0 / MOST_RELATIVE) | (wide < ROUNDING * self.roots)
-        for k in np.flatnonzero(~self._unidentified & (self.sds > DOUBTED)):
-            far = min(TRIED * float(self.sds[k]), MOST_RELATIVE) * self._units * self._directions[:, k]
+        self._unidentified = self.roots < 1.0 / MOST_RELATIVE
+        for k in np.flatnonzero(~self._unidentified & (self.roots < 1.0 / DOUBTED)):
+            far = min(TRIED / self.roots[k], MOST_RELATIVE) * self._units * self._directions[:, k]
             self._unidentified[k] = min(estimate.rise(far), estimate.rise(-far)) < LEAST_RISE
-
-    @property
-    def sds(self) -> np.ndarray:
-        """Standard deviations along all directions, ascending."""
-        return 1.0 / np.maximum(self.roots, 1e-300)
 
     @cached_property
     def unidentified(self) -> list[Unidentified]:
         """The directions that aren't identified, named."""
         space = self._directions[:, self._unidentified]
         found: list[Unidentified] = []
-        for what, vector in self._named():
+        for name, vector in zip(self.names, np.eye(len(self.names)), strict=True):
             if space.shape[1] and np.sum((space.T @ vector) ** 2) > NAMED:
-                found.append(Unidentified(what, self._remedy(what)))
+                found.append(Unidentified(name, _remedy(name)))
                 # What is left of the space is at right angles to it.
-                space = space - np.outer(vector, vector @ space)
-                space = _orthonormal(space)
+                left, sizes, _ = np.linalg.svd(space - np.outer(vector, vector @ space), full_matrices=False)
+                space = left[:, sizes > 0.5]
         for direction in space.T:
             largest = [self.names[k] for k in np.argsort(-np.abs(direction))[:3] if abs(direction[k]) > 0.2]
             found.append(Unidentified(f"a mixture of {', '.join(largest)}", f"{TUMBLE}, {POKE}"))
         return found
-
-    def _named(self) -> list[tuple[str, np.ndarray]]:
-        unit = np.eye(len(self.names))
-        named = [(name, unit[k]) for k, name in enumerate(self.names)]
-        named += self._com_along_axes()
-        factor = [k for k, name in enumerate(self.names) if name in ("mass", "size of the tensor") or "damping" in name]
-        if len(factor) > 1:
-            vector = unit[factor].sum(axis=0)
-            named.append(("mass, tensor and damping by one factor", vector / np.linalg.norm(vector)))
-        return named
-
-    def _com_along_axes(self) -> list[tuple[str, np.ndarray]]:
-        if "com" not in self.unknowns:
-            return []
-        first = self.names.index(COORDINATES["com"][0])
-        _, axes = principal_axes(self.values.inertia)
-        named = []
-        for k in range(3):
-            vector = np.zeros(len(self.names))
-            vector[first : first + 3] = axes[:, k]
-            named.append((f"centre of mass along principal axis {k + 1}", vector))
-        return named
-
-    def _remedy(self, what: str) -> str:
-        if what in _REMEDIES:
-            return _REMEDIES[what]
-        if what.startswith("centre of mass"):
-            return "a spin about an axis at right angles to it"
-        if what.startswith(("ratio", "turn")):
-            return TUMBLE
-        return "a longer recording, or a given value"
 
     def quantity(self, of: Callable[[Values], float]) -> Quantity:
         """A function of the estimate with its standard deviation, or nothing where a direction that isn't
         identified changes it.
         """
         gradient = np.empty(len(self.unknowns))
-        for k, step in enumerate(STEP * self.unknowns.scales(self.values)):
+        for k, step in enumerate(GRADIENT_STEP * self.unknowns.scales(self.values)):
             change = step * np.eye(len(gradient))[k]
             sides = [of(self.unknowns.moved(self.values, sign * change)) for sign in (1.0, -1.0)]
             gradient[k] = (sides[0] - sides[1]) / (2.0 * step)
@@ -164,22 +132,89 @@ def _coordinates(unknowns: Unknowns, values: Values, length: float) -> tuple[lis
     names, units = [], []
     for k, (group, index) in enumerate(unknowns.slots):
         names.append(COORDINATES[group][index] if group in COORDINATES else unknowns.name(k).replace("_", " "))
-        unit = length if group == "com" else UNITS.get(group, 1.0)
+        unit = length if group == "com" else SMALL_UNITS.get(group, 1.0)
         if group == "damping":
             unit = values.mass if index == 0 else float(np.trace(values.inertia)) / 3.0
         units.append(unit)
     return names, np.array(units)
 
 
-def _orthonormal(space: np.ndarray) -> np.ndarray:
-    """A basis of the columns that aren't nothing."""
-    left, sizes, _ = np.linalg.svd(space, full_matrices=False)
-    return left[:, sizes > 0.5]
+def _remedy(name: str) -> str:
+    if name == "mass":
+        return "one poke of a known force, or --mass"
+    if name == "size of the tensor":
+        return f"{POKE}, or a known torque"
+    if name.startswith("centre of mass"):
+        return "a spin about an axis at right angles to it"
+    if name.startswith(("ratio", "turn")):
+        return TUMBLE
+    return "a longer recording, or a given value"
 
 
-def summary(unidentified: Sequence[Unidentified], identified: Sequence[str]) -> str:
-    """The verdict in a sentence or two."""
-    if not unidentified:
-        return "everything that was asked for is identified from this motion"
-    found = ", ".join(identified) or "nothing that was asked for"
-    return f"identified from this motion: {found}; not identified: {', '.join(one.what for one in unidentified)}"
+@dataclass(frozen=True)
+class ResidualCheck:
+    """noise: standard deviation as estimated. by_differences: what neighbouring samples say it is. probability: of
+    white noise looking so (Ljung and Box). outliers: how many samples lie far off.
+    """
+
+    flight: str
+    series: str
+    unit: str
+    samples: int
+    noise: float
+    by_differences: float
+    probability: float
+    outliers: int
+
+    @property
+    def is_white(self) -> bool:
+        """Whether nothing speaks against white noise."""
+        return self.probability >= LEAST_PROBABILITY
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether the residuals are no larger than noise."""
+        return self.is_white or self.noise <= TOO_LARGE * self.by_differences
+
+    @property
+    def remarks(self) -> list[str]:
+        """What it shows, in sentences; empty when all is noise."""
+        where, found = f"{self.series} of {self.flight}", []
+        if self.outliers:
+            found.append(f"{where}: {self.outliers} of {self.samples} samples lie beyond {FAR:g} standard deviations")
+        if not self.is_noise:
+            found.append(
+                f"{where}: the residuals of {self.noise:.3g} {self.unit} aren't white noise, and neighbouring samples"
+                f" differ by {self.by_differences:.3g} only: drag (--fit damping), gravity (--fit gravity), clocks"
+                " (--fit offset), a contact (--from and --to exclude it), or a wrench that isn't in the bag; the"
+                " standard deviations are too small"
+            )
+        return found
+
+
+def check_residuals(flights: Sequence[MeasuredFlight], estimate: Estimate) -> list[ResidualCheck]:
+    """Of every series of every flight."""
+    found = []
+    for flight, segment, start in zip(flights, estimate.problem.segments, estimate.starts, strict=True):
+        for series, residuals in zip(segment.series, residuals_of(segment, start, estimate.values), strict=True):
+            noise = estimate.problem.sigmas[series.name]
+            scaled = residuals / noise
+            outliers = int(np.sum(np.max(np.abs(scaled), axis=1) > FAR))
+            check = flight.name, series.name, UNITS[series.kind], len(residuals), noise
+            found.append(ResidualCheck(*check, noise_by_differences(series), _whiteness(scaled), outliers))
+    return found
+
+
+def _whiteness(scaled: np.ndarray) -> float:
+    """Probability by Ljung and Box (Biometrika 65, 1978) of the three components together."""
+    n = len(scaled)
+    lags = min(LAGS, n // 4)
+    centred = scaled - scaled.mean(axis=0)
+    power = (centred**2).sum(axis=0)
+    if lags < 1 or not np.all(power > 0.0):
+        return 1.0
+    total = 0.0
+    for lag in range(1, lags + 1):
+        correlation = (centred[lag:] * centred[:-lag]).sum(axis=0) / power
+        total += float((correlation**2).sum()) * n * (n + 2) / (n - lag)
+    return float(chi2.sf(total, 3 * lags))

@@ -69,7 +69,6 @@ def test_its_urdf_is_an_inertial(flight: tuple, capsys: pytest.CaptureFixture) -
         (["FLIGHT", "--fit", "mass,colour"], "--fit"),
         (["FLIGHT", "--to", "0.5", "--urdf"], "--urdf"),
         (["FLIGHT", "--pose", "/elsewhere"], "--pose"),
-        (["FLIGHT", "--offset", "pose"], "--offset"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(

@@ -17,7 +17,7 @@ import numpy as np
 
 from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.identify import shooting as sh
-from rigid_proto_ros.identify.fitting import Estimate
+from rigid_proto_ros.identify.fitting import Estimate, Problem
 from rigid_proto_ros.identify.identification import Known, identify
 from rigid_proto_ros.identify.measurements import ACCELERATION, ATTITUDE, POSITION, RATE, MeasuredFlight, topics_of
 from rigid_proto_ros.identify.report import Identification
@@ -73,11 +73,8 @@ class MeasuredThrow:
     def bound(self) -> Estimate:
         """What nobody has: the truth, with its Fisher information."""
         unknowns = make_unknowns(self.fit, topics_of([self.flight]))
-        [segment] = sh.cut([self.flight], np.inf, {one.name: SIGMAS[one.kind] for one in self.flight.series})
-        columns = sh.linearized(segment, self.start, sh.Variations(unknowns, self.truth))
-        assert columns is not None
-        root = sh.compressed(columns, segment, self.start, is_held=False)[sh.START : -1, sh.START : -1]
-        return Estimate(self.truth, unknowns, [segment], [self.start], {}, root, root, 0.0)
+        sigmas = {one.name: SIGMAS[one.kind] for one in self.flight.series}
+        return Estimate(Problem(sh.cut([self.flight], np.inf), sigmas, self.truth, unknowns), self.truth, [self.start])
 
     def error(self, found: Values) -> float:
         """How far a body is from the truth, in standard deviations of the Cramér-Rao bound, root mean square of all ten

@@ -63,11 +63,6 @@ def tumbling(rate=(0.4, 6.0, 0.3), velocity=(0.3, -0.2, 3.0)) -> np.ndarray:
     return np.array([0.1, 0.2, 1.0, 0.0, 0.0, 0.0, 1.0, *velocity, *rate])
 
 
-def without_loads(flight: ms.MeasuredFlight) -> ms.MeasuredFlight:
-    """The same as if nobody had recorded what acted."""
-    return ms.MeasuredFlight(flight.name, flight.series, ms.no_loads(), flight.gravity)
-
-
 def with_imu(
     values, start, rng, seconds=3.0, load=None, offset_s=0.0, place=(0.0, 0.0, 0.0), bias=(0.0, 0.0)
 ) -> ms.MeasuredFlight:
