@@ -146,7 +146,7 @@ def sweep_runs(problem: Problem, accuracy: float):
     batch = Batch(own, np.zeros((0, 4)), setup_of(problem, "auto", 1e-3, accuracy), commands)
     end = np.zeros((13, MEASURE))  # of kind FINAL
     end[:, CODE] = np.arange(13)
-    looks = np.array([round(problem.duration * 1e9)]), np.ones(1, bool), np.zeros((0, 3)), end
+    looks = np.array([round(problem.duration * 1e9)]), end
     found = {}
 
     def run():

@@ -30,7 +30,6 @@ from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.sweep.rows import run_chunk
 from rigid_proto_ros.sweep.study import Study, make_study
 from rigid_proto_ros.sweep.table import cores, run_study
-from rigid_proto_ros.sweep.variation import variation
 
 POKES = [(1.0, 0.1), (4.0, 0.2)]
 """When each poke begins and how long it lasts [s]: multiples of every MuJoCo step below."""
@@ -75,7 +74,7 @@ def reference_attitude(study: Study, row: int) -> np.ndarray:
     """Final attitude xyzw of a row by SciPy, torques fixed in the world."""
     from scipy.integrate import solve_ivp
 
-    own = variation(study, row)
+    own = study.variation(row)
     body = own.scenario.setup.body
     inertia, y = body.inertia, np.array([*own.scenario.setup.initial[3:7], *own.scenario.setup.initial[10:13]])
 
@@ -119,7 +118,7 @@ def loop_time(study: Study, rows: int) -> float:
     """Seconds of a Python loop over the offline run, one row after another."""
     start = time.perf_counter()
     for row in range(rows):
-        own = variation(study, row)
+        own = study.variation(row)
         OfflineRun(own.scenario, own.commands).advance(study.duration_ns)
     return time.perf_counter() - start
 
@@ -132,7 +131,7 @@ class Mujoco:
 
         self.mujoco = mujoco
         self.models, self.starts, self.torques = [], [], []
-        chosen = [variation(study, row) for row in range(rows)]
+        chosen = [study.variation(row) for row in range(rows)]
         body = chosen[0].scenario.setup.body
         I = body.inertia / body.mass
         full = " ".join(repr(float(v)) for v in (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))

@@ -72,13 +72,10 @@ STRUCTURE = {
         "accuracy": {"log_uniform": [1e-12, 1e-5]},
     },
     "reference": {"inertia_model": "solid", "integrator": "auto"},
-    "stop": {"far": {"quantity": "distance", "above": 0.7}},
     "measure": {
         "final": ["position", "orientation"],
-        "difference": ["attitude", "spin"],
-        "max_difference": ["attitude", "position", "velocity"],
+        "difference": ["attitude", "position", "velocity", "spin"],
         "first": {"turned": {"quantity": "turned", "above": 1.0}},
-        "samples": {"at": [0.15, 0.6], "of": ["orientation", "kinetic_energy"]},
         "min": ["potential_energy", "momentum_turned"],
     },
 }

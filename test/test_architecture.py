@@ -104,54 +104,6 @@ def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
     assert 3.6 < first / second < 4.4
 
 
-# A torque −b|ω|ω: of each file a line that is there, and what stands behind it then.
-SPIN_DRAG = {
-    "motion/problem.py": [
-        ('    ("angular_damping", np.float64),  # [N m s]\n', '    ("spin_drag", np.float64),\n'),
-        ("    gyroscopic: bool = True\n", "    spin_drag: float = 0.0\n"),
-        ('        ("damping_angular", np.float64),  # c_ω [N m s]\n', '        ("spin_drag", np.float64),\n'),
-        ("    p.damping_angular = environment.angular_damping\n", "    p.spin_drag = environment.spin_drag\n"),
-    ],
-    "motion/integrators/equations.py": [("    c = p.damping_angular\n", "    c += p.spin_drag * norm(*w)\n")],
-    "scene/parameters.py": [
-        (
-            "    gyroscopic: bool = switch(",
-            '    spin_drag: float = number(0.0, "Drag torque.", "N m s²", lower=0.0, upper=HUGE)\n',
-        ),
-    ],
-}
-
-BRAKE = """
-import json
-from rigid_proto_ros.scene.offline import OfflineRun
-from rigid_proto_ros.scene.scenario import make_scenario
-
-body = {"mesh": "", "inertia_model": "explicit", "explicit_inertia.tensor": [1.0, 0.0, 0.0, 2.0, 0.0, 3.0]}
-values = {**body, "integrator": "rk4", "step": 0.01, "spin_drag": 0.5, "initial.angular_velocity": [0.0, 0.0, 6.0]}
-run = OfflineRun(make_scenario(values))
-assert run.advance(1_000_000_000)
-print(json.dumps(run.simulation.state.angular_velocity.tolist()))
-"""
-
-
-@pytest.mark.slow
-def test_the_steps_for_a_force_add_one(tmp_path: Path) -> None:
-    shutil.copytree(ROOT, tmp_path / ROOT.name, ignore=shutil.ignore_patterns("__pycache__"))
-    for name, changes in SPIN_DRAG.items():
-        file = tmp_path / ROOT.name / name
-        text = file.read_text("utf-8")
-        for line, added in changes:
-            assert text.count(line) == 1, line
-            text = text.replace(line, line + added if line.endswith("\n") else added + line)
-        file.write_text(text, "utf-8")
-    done = subprocess.run(
-        [sys.executable, "-c", BRAKE], cwd=tmp_path, env=_only(tmp_path), capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    # I ω' = −b ω²: ω = ω₀/(1 + b ω₀ t/I).
-    assert json.loads(done.stdout.splitlines()[-1]) == pytest.approx([0.0, 0.0, 3.0], abs=1e-9)
-
-
 def _only(folder: Path) -> dict[str, str]:
     """Nothing is compiled: every kernel of the copy would be, and what is proven here doesn't depend on it."""
     path = os.pathsep.join([str(folder), str(ROOT.parent / "tools")])

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import importlib.util
 import os
 import shutil
@@ -101,19 +100,6 @@ def test_an_environment_that_is_not_whole_or_not_of_this_place_is_made_anew_and_
     assert script.defect(inner, version, here) == "its Python doesn't run any more"
 
 
-def test_tests_and_headers_in_packages_go_and_nothing_else_does(script, monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr(script, "called", lambda *_: (0, ""))
-    site = tmp_path / "lib" / "python3.13" / "site-packages"
-    gone = [site / name for name in ("numpy/_core/tests", "numba/tests", "pyarrow/include")]
-    kept = [site / name for name in ("numpy/testing", "pyarrow/lib", "numpy/_core/include")]
-    for folder in [*gone, *kept]:
-        folder.mkdir(parents=True)
-        (folder / "file").touch()
-    script.remove_what_no_flight_needs("python")
-    assert not [folder for folder in gone if folder.exists()]
-    assert not [folder for folder in kept if not (folder / "file").is_file()]
-
-
 def test_the_set_up_compiles_what_every_scene_lesson_and_script_needs() -> None:
     spec = importlib.util.spec_from_file_location("compile_kernels", SOURCE / "requirements" / "compile_kernels.py")
     module = importlib.util.module_from_spec(spec)
@@ -149,22 +135,6 @@ def test_ctrl_c_ends_the_set_up_in_one_line(tmp_path: Path) -> None:
         told = made.communicate(timeout=60)[1]
     assert made.returncode == 130
     assert told.strip().splitlines() == ["make setup: interrupted; the next make begins anew"]
-
-
-def test_two_makes_at_once_in_one_clone_take_turns(tmp_path: Path) -> None:
-    (tmp_path / "requirements").mkdir()
-    shutil.copy(SCRIPT, tmp_path / "requirements")
-    command = [sys.executable, tmp_path / "requirements" / "make_venv.py", "run"]
-    environment = {**os.environ, "PYTHON": "/nowhere/python", "AMENT_PREFIX_PATH": "/nowhere"}
-    folder = os.open(tmp_path / "requirements", os.O_RDONLY)
-    fcntl.flock(folder, fcntl.LOCK_EX)
-    with subprocess.Popen(
-        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as second:
-        assert second.stdout.readline() == "waiting for another make, which makes .venv\n"
-        os.close(folder)
-        assert "/nowhere/python" in second.communicate(timeout=60)[1]
-    assert second.returncode == 1
 
 
 @pytest.mark.parametrize(

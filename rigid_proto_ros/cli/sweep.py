@@ -70,14 +70,13 @@ def _whole(study: Study, args: argparse.Namespace) -> int:
 
 
 def _one_row(study: Study, args: argparse.Namespace) -> int:
-    from ..sweep.rows import row_summary
-    from ..sweep.variation import variation, write_scene
+    from ..sweep.rows import row_summary, write_scene
 
     if not 0 <= args.row < study.rows:
         raise InputError("row", args.row, f"0 to {study.rows - 1}")
     summary = row_summary(study, args.row)
     if args.as_scene:
-        summary.update(write_scene(study, variation(study, args.row), Path(args.as_scene), summary["time"]))
+        summary.update(write_scene(study, args.row, Path(args.as_scene)))
     if args.json:
         print(json.dumps(summary))
     else:

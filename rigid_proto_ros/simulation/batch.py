@@ -33,7 +33,7 @@ from ..motion.state import fill_initial_row
 from ..motion.string import effective_mass, energy_of, most_yielding, span_of, spring_of
 from . import flight as fl
 from .commands import CLEAR
-from .quantities import CONTEXT, STATE, begin, first_satisfied, measure_flight
+from .quantities import CONTEXT, STATE, begin, measure_flight
 from .setup import Setup
 
 _NUMBERS: list[tuple[Any, ...]] = [
@@ -118,14 +118,11 @@ class Batch:
 
 @dataclass
 class Results:
-    """status (n,): 1 done, 0 the simulation must do it. end_ns (n,), stop (n,): which condition ended it, −1 none.
-    measured (n, k). floors (n, FLOOR_KINDS): what has held the motion to less than its accuracy
-    (simulation/flight.py).
+    """status (n,): 1 done, 0 the simulation must do it. measured (n, k). floors (n, FLOOR_KINDS): what has held the
+    motion to less than its accuracy (simulation/flight.py).
     """
 
     status: NDArray[np.int64]
-    end_ns: NDArray[np.int64]
-    stop: NDArray[np.int64]
     measured: NDArray[np.float64]
     floors: NDArray[np.float64]
 
@@ -133,7 +130,7 @@ class Results:
 def new_results(rows: int, measures: int) -> Results:
     """Empty ones, as failed rows have them."""
     unknown, floors = np.full((rows, measures), np.nan), np.zeros((rows, fl.FLOOR_KINDS))
-    return Results(np.zeros(rows, np.int64), np.zeros(rows, np.int64), np.full(rows, -1), unknown, floors)
+    return Results(np.zeros(rows, np.int64), unknown, floors)
 
 
 # A row's body
@@ -280,22 +277,20 @@ def _fly_row(
     methods: np.ndarray,
     commands: np.ndarray,
     sample_ns: np.ndarray,
-    stops: np.ndarray,
     context: np.ndarray,
     flights: np.ndarray,
     tables: tuple[Any, ...],
     states: np.ndarray,
-) -> tuple[int, int]:
+) -> bool:
     """Row i's flight: fills states (m, STATE) at sample_ns (m,) ascending, each before what acts at that very time.
 
-    stops (k, 3): the flight ends at the first sample at which one holds. context: simulation/quantities.py, filled
-    here. Returns how many samples it reached, and which stop held or −1; 0 samples: the simulation must do it.
+    context: simulation/quantities.py, filled here. False: the simulation must do it.
     """
     due = commands[i if commands.shape[0] > 1 else 0]
     flights[0] = start[0]
     flight, (loads, events, room) = flights[0], tables
     if not _begin(rows[i], ballast, flight, due, loads):
-        return 0, -1
+        return False
     copy_numbers(flight.row, states[0, :13])
     states[0, 13] = _string_energy(flight)
     body = flight.body
@@ -305,13 +300,10 @@ def _fly_row(
         while flight.due_end < due.shape[0] and due[flight.due_end].at_ns < sample_ns[sample]:
             flight.due_end += 1
         if fl.fly(flight, loads, events, methods, room, sample_ns[sample]) != fl.REACHED:
-            return 0, -1
+            return False
         copy_numbers(flight.row, states[sample, :13])
         states[sample, 13] = _string_energy(flight)
-        stop = first_satisfied(stops, states[sample], context)
-        if stop >= 0:
-            return sample + 1, stop
-    return sample_ns.shape[0], -1
+    return True
 
 
 @njit(cache=True, nogil=True, error_model="numpy", allocates=False)
@@ -321,55 +313,49 @@ def _fly_rows(
     has_references: bool,
     notes_floors: bool,
     sample_ns: np.ndarray,
-    watched: np.ndarray,
-    stops: np.ndarray,
     measures: np.ndarray,
     results: tuple[Any, ...],
     room: tuple[Any, ...],
 ) -> None:
     """All rows of a batch, each beside that of the references if there are any."""
-    status, end_ns, stop, measured, floors = results
+    status, measured, floors = results
     context, flights, tables, states, others = room
     # One place that flies, whichever it is: a second one would be compiled a second time.
-    sides, kept, ends = (references, own), (others, states), (stops[:0], stops)
+    sides, kept = (references, own), (others, states)
     for i in range(status.shape[0]):
-        reached = 0
+        came = False
         for side in range(0 if has_references else 1, 2):
-            reached, stop[i] = _fly_row(i, *sides[side], sample_ns, ends[side], context, flights, tables, kept[side])
-            if reached == 0:
+            came = _fly_row(i, *sides[side], sample_ns, context, flights, tables, kept[side])
+            if not came:
                 break
-        if reached == 0:
+        if not came:
             continue
         status[i] = 1
-        end_ns[i] = sample_ns[reached - 1]
         if notes_floors:
             copy_numbers(flights[0].floors, floors[i])
             fl.note_floors(flights[0], own[3], floors[i])
-        measure_flight(measures, states, others, sample_ns, watched, reached, context, measured[i])
+        measure_flight(measures, states, others, sample_ns, context, measured[i])
 
 
 def fly_rows(
     batch: Batch,
     references: Batch | None,
     sample_ns: NDArray[np.int64],
-    watched: NDArray[np.bool_],
-    stops: NDArray[np.float64],
     measures: NDArray[np.float64],
 ) -> Results:
     """Fly all rows, each beside its reference if there are any; those that it can't check have status 0.
 
-    sample_ns (m,) ascending, watched (m,), stops (k, 3), measures (j, MEASURE): simulation/quantities.py.
+    sample_ns (m,) ascending, measures (j, MEASURE): simulation/quantities.py.
     """
     sides = (batch,) if references is None else (batch, references)
     results = new_results(len(batch.rows), len(measures))
-    filled = results.status, results.end_ns, results.stop, results.measured, results.floors
+    filled = results.status, results.measured, results.floors
     loads = max(side.commands.shape[1] for side in sides) + 1
     # The workspace begins a line of the processor's cache.
     work = aligned((1, max(1, *(side.setup.flight_start.room for side in sides))))[0]
     tables = np.zeros(loads, fl.LOAD_ROW), np.zeros(4 * loads + 4, fl.EVENT), work
     states, others = (np.zeros((len(sample_ns), STATE)) for _ in range(2))
     room = np.zeros(CONTEXT), np.zeros(1, fl.FLIGHT), tables, states, others
-    looks = sample_ns, watched, stops, measures
-    has_references = references is not None
-    _fly_rows(batch.arrays, sides[-1].arrays, has_references, batch.notes_floors, *looks, filled, room)
+    arrays = batch.arrays, sides[-1].arrays, references is not None, batch.notes_floors
+    _fly_rows(*arrays, sample_ns, measures, filled, room)
     return results

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scalars of a flight by name, and what is measured of it: what samples hold, what conditions compare.
+"""Scalars of a flight by name, and what is measured of it.
 
 A quantity is a function of the state now and of the start, which is kept as a row (CONTEXT,): mass, tensor, gravity,
 the state row at time 0, its energy and angular momentum. A measure is a row (MEASURE,): a kind, a quantity or
@@ -142,38 +142,17 @@ def difference(code: int, a: np.ndarray, b: np.ndarray) -> float:
     return norm(ax - bx, ay - by, az - bz)
 
 
-STOP_CODE, STOP_SIGN, STOP_LIMIT = range(3)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _is_met(condition: np.ndarray, row: np.ndarray, context: np.ndarray) -> bool:
-    """Whether a condition (code, sign, limit) holds: the quantity is above the limit (sign 1) or below it (−1)."""
-    beyond = quantity(int(condition[STOP_CODE]), row, context) - condition[STOP_LIMIT]
-    return bool(condition[STOP_SIGN] * beyond > 0.0)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def first_satisfied(conditions: np.ndarray, row: np.ndarray, context: np.ndarray) -> int:
-    """Number of the first condition (k, 3) that holds, or −1."""
-    for k in range(conditions.shape[0]):
-        if _is_met(conditions[k], row, context):
-            return k
-    return -1
-
-
 # Measures of a flight
 
-FINAL, SAMPLE, LARGEST, SMALLEST, FIRST, FLIPS, DIFFERENCE, LARGEST_DIFFERENCE = range(8)
+FINAL, LARGEST, SMALLEST, FIRST, FLIPS, DIFFERENCE = range(6)
 KIND, CODE, A, B, C, D, MEASURE = range(7)
-"""SAMPLE: A the sample's number. FIRST: A sign and B limit of the condition. FLIPS: A margin, B to D the axis in the
-body, all zero for that of the first spin.
+"""FIRST: the quantity is above (A 1) or below (A −1) the limit B. FLIPS: A margin, B to D the axis in the body, all
+zero for that of the first spin.
 """
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def count_flips(
-    measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reached: int, context: np.ndarray
-) -> float:
+def count_flips(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> float:
     """How often a body axis turns over: its cosine to where it pointed at the start passes −margin, then margin, ...
 
     The margin keeps an axis that lies across from being counted at each tremble. NaN without an axis.
@@ -187,9 +166,7 @@ def count_flips(
     s = START
     ax, ay, az = rotate(context[s + 3], context[s + 4], context[s + 5], context[s + 6], x / size, y / size, z / size)
     flips, side = 0, 1.0
-    for k in range(reached):
-        if not watched[k]:
-            continue
+    for k in range(states.shape[0]):
         q = states[k]
         bx, by, bz = rotate(q[3], q[4], q[5], q[6], x / size, y / size, z / size)
         if side * (ax * bx + ay * by + az * bz) < -measure[A]:
@@ -199,33 +176,21 @@ def count_flips(
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _extreme(measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reached: int, context: np.ndarray) -> float:
+def _extreme(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> float:
     sign = 1.0 if measure[KIND] == LARGEST else -1.0
     found = -math.inf
-    for k in range(reached):
-        if watched[k]:
-            found = max(found, sign * quantity(int(measure[CODE]), states[k], context))
+    for k in range(states.shape[0]):
+        found = max(found, sign * quantity(int(measure[CODE]), states[k], context))
     return sign * found
 
 
-@njit(cache=True, error_model="numpy")
-def _first(measure: np.ndarray, states: np.ndarray, watched: np.ndarray, reached: int, context: np.ndarray) -> int:
-    """The first watched sample at which the condition of a measure holds, or −1."""
-    condition = np.array([measure[CODE], measure[A], measure[B]])
-    for k in range(reached):
-        if watched[k] and _is_met(condition, states[k], context):
+@njit(cache=True, error_model="numpy", allocates=False)
+def _first(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> int:
+    """The first sample at which the condition of a measure holds, or −1."""
+    for k in range(states.shape[0]):
+        if measure[A] * (quantity(int(measure[CODE]), states[k], context) - measure[B]) > 0.0:
             return k
     return -1
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _largest_difference(code: int, states: np.ndarray, others: np.ndarray, watched: np.ndarray, reached: int) -> float:
-    """Over the watched samples."""
-    largest = 0.0
-    for k in range(reached):
-        if watched[k]:
-            largest = max(largest, difference(code, states[k], others[k]))
-    return largest
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -234,35 +199,28 @@ def measure_flight(
     states: np.ndarray,
     others: np.ndarray,
     sample_ns: np.ndarray,
-    watched: np.ndarray,
-    reached: int,
     context: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Fill out (k,) with the measures (k, MEASURE) of a flight that reached so many of its samples.
+    """Fill out (k,) with the measures (k, MEASURE) of a flight.
 
-    states, others (m, STATE): at sample_ns (m,), of the flight and of its reference. watched (m,): which samples count
-    for extremes and firsts. NaN where there is nothing to say: an event that didn't happen, a sample after the end.
+    states, others (m, STATE): at sample_ns (m,), of the flight and of its reference. NaN for an event that didn't
+    happen.
     """
-    last = states[reached - 1]
+    last = states.shape[0] - 1
     for j in range(measures.shape[0]):
         measure = measures[j]
         kind, code = int(measure[KIND]), int(measure[CODE])
         out[j] = math.nan
         if kind == FINAL:
-            out[j] = quantity(code, last, context)
-        elif kind == SAMPLE:
-            if measure[A] < reached:
-                out[j] = quantity(code, states[int(measure[A])], context)
+            out[j] = quantity(code, states[last], context)
         elif kind in (LARGEST, SMALLEST):
-            out[j] = _extreme(measure, states, watched, reached, context)
+            out[j] = _extreme(measure, states, context)
         elif kind == FIRST:
-            first = _first(measure, states, watched, reached, context)
+            first = _first(measure, states, context)
             if first >= 0:
                 out[j] = sample_ns[first] * 1e-9
         elif kind == FLIPS:
-            out[j] = count_flips(measure, states, watched, reached, context)
-        elif kind == DIFFERENCE:
-            out[j] = difference(code, last, others[reached - 1])
+            out[j] = count_flips(measure, states, context)
         else:
-            out[j] = _largest_difference(code, states, others, watched, reached)
+            out[j] = difference(code, states[last], others[last])

@@ -1,29 +1,190 @@
 # SPDX-License-Identifier: MIT
 """Some rows of a study, flown and measured: what a thread of a sweep does.
 
-Rows that differ in numbers alone go through the compiled batch together. Those that it can't fly or check are flown
-one by one by ``Simulation``, which is what a row is by definition, with the same bits.
+Rows that differ in numbers alone, of parameters and of pokes and wrenches in the script, go through the compiled batch
+together, filled by columns. Those that it can't fly or check are flown one by one by ``Simulation``, which is what a
+row is by definition, with the same bits.
 """
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..base.errors import InputError
+from ..base.errors import InputError, MeshError
+from ..base.files import output_file
+from ..motion.integrators import check_supported
+from ..motion.integrators.integrator import ANGULAR_DAMPING
+from ..motion.loads import FORCE, TORQUE
+from ..scene.declaration import HUGE, Value
 from ..scene.offline import OfflineRun
-from ..scene.scenario import Scenario
-from ..simulation.batch import Results, fly_rows, new_results
+from ..scene.parameters import Parameters, parameter_named, with_mass_of_density
+from ..scene.scenario import BodyMesh, Scenario, build_scenario
+from ..scene.script import MAX_TIME_S, expand_script
+from ..scene.yaml_text import dump_yaml
+from ..simulation import batch
+from ..simulation import flight as fl
+from ..simulation.checks import check_command, check_start
+from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand
 from ..simulation.observables import floor_text
-from ..simulation.quantities import CONTEXT, STATE, begin, first_satisfied, measure_flight
+from ..simulation.quantities import CONTEXT, STATE, begin, measure_flight
+from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
-from .columns import Columns, NotBatchable
-from .sampling import VERTEX, Draw, as_text
-from .study import Study
-from .variation import Variation, apply, body_mesh_of, plain, vertex_number
+from .sampling import Draw, as_text
+from .study import Study, Variation, Vary, body_mesh_of, plain, vertex_number
+from .targets import Target
+
+_LOADS = {"force": FORCE, "impulse": FORCE, "push": FORCE, "torque": TORQUE, "angular_impulse": TORQUE}
+"""Where the numbers of a script's entry stand in its load."""
+
+_BOUNDS = {"at_ns": (0.0, MAX_TIME_S), "duration_ns": (1e-9, MAX_TIME_S), "load": (-HUGE, HUGE)}
+"""Of numbers written into a table of commands [s, N, N m], by its fields."""
+
+
+class NotBatchable(Exception):
+    """The compiled batch can't fly the rows of a study; the simulation can."""
+
+
+def _field_of(parameter: str) -> str:
+    return parameter.replace(".", "_")
+
+
+def batch_row(parameters: Parameters, body_mesh: BodyMesh | None) -> NDArray[np.void]:
+    """The row (1,) batch.ROW of parameters; raises InputError."""
+    row = np.zeros(1, batch.ROW)
+    for name, value in parameters.named().items():
+        if _field_of(name) in batch.PARAMETERS:
+            row[_field_of(name)] = value
+    if body_mesh is not None:
+        row["has_surface"], row["extent"] = True, body_mesh.surface.extent
+    if parameters.inertia_model == "explicit" or body_mesh is None:
+        row["model"] = batch.EXPLICIT
+        return row
+    moments = body_mesh.moments.moments(parameters.inertia_model)
+    try:
+        row["solid_measure"] = body_mesh.moments.moments("solid").measure
+    except MeshError:
+        row["solid_measure"] = np.nan
+    row["model"] = batch.SHELL if parameters.inertia_model == "shell" else batch.ORDINARY
+    places = moments if parameters.inertia_model_com == "model" else body_mesh.moments.moments("solid")
+    row["measure"], row["second"] = moments.measure, moments.second
+    row["reference"], row["center"], row["center_low"] = places.reference, places.center, places.center_low
+    return row
+
+
+class BatchMaker:
+    """Makes batches of a study's rows, or of the flights that it compares with when there is a ``reference``:
+    parameters that those have otherwise. Raises NotBatchable or InputError where the simulation must fly the rows.
+    """
+
+    def __init__(self, study: Study, reference: dict[str, Value] | None) -> None:
+        self._study, self._reference = study, with_mass_of_density(reference or {})
+        for vary in study.vary:
+            parameter = vary.target.parameter
+            if vary.is_random_vertex or (parameter and _field_of(parameter) not in batch.NUMBERS):
+                raise NotBatchable
+        typical = study.applied([vary.form.probes[-1] for vary in study.vary])
+        parameters = study.parameters.replaced({"mass": 0.0} if study.density_decides else {})
+        parameters = parameters.replaced(self._reference)
+        body_mesh = body_mesh_of(parameters)
+        self._setup = setup = build_scenario(parameters, body_mesh).setup
+        check_start(setup)
+        if any(v.target.parameter == "angular_damping" for v in study.vary):
+            check_supported(setup.integrator, frozenset({ANGULAR_DAMPING}))
+        if setup.string.attached and setup.initial_string_mass:
+            raise NotBatchable
+        self._row = batch_row(parameters, body_mesh)
+        self._ballast = np.array([m for m in parameters.point_masses if m[0] > 0.0], dtype=float).reshape(-1, 4)
+        self._table, entries = _commands_of(typical.script, setup)
+        self._written = [_place_of(v, typical.script, entries) if v.target.entry else None for v in study.vary]
+        if any(self._written) and not setup.integrator.supports_loads:
+            raise NotBatchable
+
+    def batch(self, columns: list[np.ndarray], count: int) -> tuple[batch.Batch, NDArray[np.bool_]]:
+        """``count`` rows with these values of what varies, and which of them the batch may check (n,)."""
+        good = np.ones(count, bool)
+        rows = np.repeat(self._row, count)
+        commands = np.repeat(self._table[None], count if any(self._written) else 1, axis=0)
+        for vary, column, place in zip(self._study.vary, columns, self._written, strict=True):
+            if place is not None:
+                _write(commands, place, column, good)
+            elif vary.target.parameter not in self._reference:
+                declared = parameter_named(vary.target.parameter)
+                _keep(good, column > declared.lower if declared.above else column >= declared.lower)
+                _keep(good, column <= declared.upper)
+                own = rows[_field_of(declared.name)]
+                if vary.target.path:
+                    own[:, vary.target.path[0]] = column
+                else:
+                    own[:] = column[:, None] if own.ndim > column.ndim else column
+        # Stable: equal times act in the order of the script.
+        order = np.argsort(commands["at_ns"], axis=1, kind="stable")
+        return batch.Batch(rows, self._ballast, self._setup, np.take_along_axis(commands, order, axis=1)), good
+
+
+def _commands_of(script: list[Any], setup: Setup) -> tuple[NDArray[np.void], list[int]]:
+    """A table (c,) LOAD_ROW of the script's pokes and wrenches in its own order, and the entries (c,) they are of."""
+    commands = sorted(expand_script(script, "script"), key=lambda command: command.entry)
+    table = np.zeros(len(commands), fl.LOAD_ROW)
+    for row, command in zip(table, commands, strict=True):
+        if not isinstance(command, WrenchCommand | ClearWrench):
+            raise NotBatchable
+        pending = Pending(command.stamp_ns, command)
+        if isinstance(command, WrenchCommand):
+            load = check_command(command, setup)
+            if not load:
+                raise NotBatchable  # a ray
+            pending.set_load(command, load, setup)
+            row["load"] = np.frombuffer(load)
+        row["at_ns"], row["duration_ns"] = pending.time_ns, pending.duration_ns
+        row["kind"], row["slot"] = pending.kind, pending.slot
+    return table, [command.entry for command in commands]
+
+
+Place = tuple[int, str, slice | int]
+"""Row of a table of commands, its field, and which numbers of that."""
+
+
+def _place_of(vary: Vary, script: list[Any], entries: list[int]) -> Place:
+    """Where the numbers of what varies in the script stand in its table of commands."""
+    target: Target = vary.target
+    is_number = isinstance(vary.form, Draw) or vary.form.taken(np.zeros(1, np.int64)).dtype == np.float64
+    if entries.count(target.entry) != 1 or "jitter" in script[target.entry - 1] or not is_number:
+        raise NotBatchable
+    name, *component = target.path[1:] if target.path[0] == "wrench" else target.path
+    row = entries.index(target.entry)
+    if name in ("t", "duration"):
+        return row, "at_ns" if name == "t" else "duration_ns", 0
+    if name not in _LOADS:
+        raise NotBatchable
+    first = _LOADS[name]
+    if name == "push":
+        return row, "load", first
+    return row, "load", first + component[0] if component else slice(first, first + 3)
+
+
+def _write(commands: NDArray[np.void], place: Place, column: np.ndarray, good: NDArray[np.bool_]) -> None:
+    row, name, where = place
+    lower, upper = _BOUNDS[name]
+    within = (column >= lower) & (column <= upper)
+    _keep(good, within)
+    values = np.where(within, column, 0.0)
+    if name == "load":
+        commands[name][:, row, where] = values
+    else:
+        # To the nearest nanosecond, halves to even, as round() has it.
+        commands[name][:, row] = np.rint(values * 1e9)
+
+
+def _keep(good: NDArray[np.bool_], within: NDArray[np.bool_]) -> None:
+    """Only rows whose numbers (n,) or (n, k) are within bounds are good any more."""
+    good &= within if within.ndim == 1 else within.all(axis=1)
 
 
 class FailedFlight(Exception):
@@ -48,13 +209,13 @@ class Chunk:
 
 
 @lru_cache(maxsize=16)
-def _sides(study: Study) -> list[Columns]:
+def _sides(study: Study) -> list[BatchMaker]:
     """What makes batches of the study's rows, and then of their references if it has any; none where the simulation
     must fly them.
     """
     try:
-        references = [] if study.reference is None else [Columns(study, dict(study.reference))]
-        return [Columns(study, None), *references]
+        references = [] if study.reference is None else [BatchMaker(study, dict(study.reference))]
+        return [BatchMaker(study, None), *references]
     except (NotBatchable, *_NO_ROW):
         return []
 
@@ -63,18 +224,18 @@ def run_chunk(study: Study, first: int, last: int) -> Chunk:
     """Rows first to last − 1; a row that fails is a row with its reason."""
     rows, measures = np.arange(first, last, dtype=np.int64), study.measures
     columns = study.columns(rows)
-    results = new_results(len(rows), len(measures.table))
+    results = batch.new_results(len(rows), len(measures.table))
     if sides := _sides(study):
-        (batch, good), *beside = [side.batch(columns, len(rows)) for side in sides]
+        (own, good), *beside = [side.batch(columns, len(rows)) for side in sides]
         references = beside[0][0] if beside else None
-        results = fly_rows(batch, references, measures.sample_ns, measures.watched, measures.stops, measures.table)
+        results = batch.fly_rows(own, references, measures.sample_ns, measures.table)
         results.status[~np.logical_and.reduce([good, *(also for _, also in beside)])] = 0
     left = np.flatnonzero(results.status == 0).tolist()
     failures = np.full(len(rows), None, dtype=object)
     for i in left:
-        results.measured[i], results.stop[i] = np.nan, -1
+        results.measured[i] = np.nan
         try:
-            simulate_row(study, apply(study, [column[i] for column in columns]), i, results)
+            simulate_row(study, study.applied([column[i] for column in columns]), i, results)
         except (FailedFlight, *_NO_ROW) as error:
             failures[i] = " ".join(str(error).split())
     return Chunk(_table(study, rows, columns, results, failures), len(left))
@@ -90,51 +251,41 @@ def row_summary(study: Study, row: int) -> dict[str, Any]:
     return found
 
 
-def simulate_row(study: Study, row: Variation, i: int, results: Results) -> None:
+def simulate_row(study: Study, row: Variation, i: int, results: batch.Results) -> None:
     """The row's flight by ``Simulation``, beside its reference if the study has one, into results i; raises
     FailedFlight, InputError.
     """
     measures = study.measures
     states, others = (np.zeros((len(measures.sample_ns), STATE)) for _ in range(2))
-    context, scenario = np.zeros(CONTEXT), row.scenario
+    context, scenario, commands = np.zeros(CONTEXT), row.scenario, row.commands
     if study.reference is not None:
-        reference = scenario.with_changes(study.reference)
-        _simulate(reference, row, study, others, context, measures.stops[:0], "reference: ")
-    simulation, reached, stop = _simulate(scenario, row, study, states, context, measures.stops)
-    results.stop[i], results.end_ns[i] = stop, measures.sample_ns[reached - 1]
+        try:
+            _simulate(scenario.with_changes(study.reference), commands, measures.sample_ns, others, context)
+        except FailedFlight as failed:
+            raise FailedFlight(f"reference: {failed}") from None
+    simulation = _simulate(scenario, commands, measures.sample_ns, states, context)
     results.floors[i] = simulation.floors
-    measure_flight(
-        measures.table, states, others, measures.sample_ns, measures.watched, reached, context, results.measured[i]
-    )
+    measure_flight(measures.table, states, others, measures.sample_ns, context, results.measured[i])
     results.status[i] = 1
 
 
 def _simulate(
-    scenario: Scenario,
-    row: Variation,
-    study: Study,
-    states: np.ndarray,
-    context: np.ndarray,
-    stops: np.ndarray,
-    whose: str = "",
-) -> tuple[Simulation, int, int]:
-    """Fill ``states`` at the sample times, and the context; how many were reached, and which stop held or −1."""
-    simulation, sample_ns = OfflineRun(scenario, row.commands).simulation, study.measures.sample_ns
+    scenario: Scenario, commands: list[Command], sample_ns: np.ndarray, states: np.ndarray, context: np.ndarray
+) -> Simulation:
+    """Fill ``states`` at the sample times, and the context; the simulation at their end."""
+    simulation = OfflineRun(scenario, commands).simulation
     body = simulation.setup.body
     begin(body.mass, body.inertia.ravel(), simulation.setup.gravity, _state(simulation), context)
-    reached, stop = 0, -1
-    while reached < len(sample_ns) and stop < 0:
-        simulation.advance(int(sample_ns[reached]))
+    for state, time_ns in zip(states, sample_ns.tolist(), strict=True):
+        simulation.advance(time_ns)
         if simulation.failure:
-            raise FailedFlight(whose + simulation.failure)
-        states[reached] = _state(simulation)
-        stop = first_satisfied(stops, states[reached], context)
-        reached += 1
+            raise FailedFlight(simulation.failure)
+        state[:] = _state(simulation)
     if simulation.refused:
         # A row whose commands were refused in flight isn't the row that was asked for.
         counts = (f"{count} commands refused: {reason}" for reason, count in simulation.refused.items())
-        raise FailedFlight(whose + "; ".join(counts))
-    return simulation, reached, stop
+        raise FailedFlight("; ".join(counts))
+    return simulation
 
 
 def _state(simulation: Simulation) -> np.ndarray:
@@ -145,11 +296,11 @@ def _state(simulation: Simulation) -> np.ndarray:
 
 
 def _table(
-    study: Study, rows: np.ndarray, columns: list[np.ndarray], results: Results, failures: np.ndarray
+    study: Study, rows: np.ndarray, columns: list[np.ndarray], results: batch.Results, failures: np.ndarray
 ) -> dict[str, np.ndarray]:
     table: dict[str, np.ndarray] = {"row": rows}
     for vary, column in zip(study.vary, columns, strict=True):
-        if isinstance(vary.form, Draw) and vary.form.shape == VERTEX:
+        if vary.is_random_vertex:
             table[f"{vary.target.name}.vertex"] = _vertices(study, columns, column)
         elif column.ndim == 2:
             names = vary.target.component_names(column.shape[1])
@@ -157,12 +308,9 @@ def _table(
         else:
             table[vary.target.name] = _as_objects(column) if column.dtype == object else column
     failed = results.status == 0
-    table["time"] = np.where(failed, np.nan, results.end_ns * 1e-9)
+    table["time"] = np.where(failed, np.nan, study.duration_ns * 1e-9)
     for k, name in enumerate(study.measures.columns):
         table[name] = np.where(failed, np.nan, results.measured[:, k])
-    if study.measures.stop_names:
-        names = np.array([*study.measures.stop_names, None], dtype=object)
-        table["stopped"] = names[results.stop]
     floors = np.full(len(rows), None, dtype=object)
     for i in np.flatnonzero(results.floors.any(axis=1) & ~failed).tolist():
         floors[i] = floor_text(results.floors[i])
@@ -188,3 +336,22 @@ def _vertices(study: Study, columns: list[np.ndarray], uniforms: np.ndarray) -> 
             continue
         numbers[i] = vertex_number(uniform, body_mesh)
     return numbers
+
+
+def write_scene(study: Study, row: int, file: Path) -> dict[str, Any]:
+    """Write a row as a scene, its script beside it as NAME_script.yaml; returns the file and the command that flies
+    it.
+    """
+    variation = study.variation(row)
+    scenario, commands = variation.scenario, variation.commands
+    output_file("--as-scene", file)
+    try:
+        file.write_text(scenario.text, encoding="utf-8")
+        words = ["rigid_proto", "simulate", str(file), "--duration", repr(study.duration_ns / 1e9)]
+        if commands:
+            script = file.with_name(f"{file.stem}_script.yaml")
+            script.write_text(dump_yaml(variation.script), encoding="utf-8")
+            words += ["--script", str(script)]
+    except OSError as error:
+        raise InputError("--as-scene", str(file), f"a file that can be written ({error.strerror})") from None
+    return {"scene": str(file), "fly": shlex.join(words)}

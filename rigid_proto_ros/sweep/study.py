@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import copy
 import math
+from collections import ChainMap
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +23,38 @@ from ..base.errors import InputError, did_you_mean
 from ..scene.declaration import READ_ONLY, Value
 from ..scene.offline import OfflineRun, scene_values
 from ..scene.parameters import Parameters, convert_all, parameter_named, with_mass_of_density
-from ..scene.scenario import make_scenario
+from ..scene.scenario import BodyMesh, Scenario, build_scenario, load_body_mesh, make_scenario
 from ..scene.scene_file import scene_file
 from ..scene.script import expand_script
 from ..scene.yaml_text import load_plain_yaml, read_text
-from ..simulation.commands import nanoseconds
+from ..simulation.commands import Command, nanoseconds
 from .fields import mapping, number, whole
 from .measures import Measures, read_measures
-from .sampling import GRID, LIST, Draw, Points, read_form, row_uniforms
+from .sampling import GRID, LIST, VERTEX, Draw, Points, read_form, row_uniforms
 from .targets import Target, read_target
 
 MAX_ROWS = 10_000_000
-_KEYS = ("scene", "script", "duration", "set", "vary", "reference", "seed", "samples", "watch", "measure", "stop")
+_KEYS = ("scene", "script", "duration", "set", "vary", "reference", "seed", "samples", "watch", "measure")
+MESHES_KEPT = 16
+"""Meshes with their moments that a process keeps."""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """One row: parameters, and the script's entries as YAML gives them."""
+
+    parameters: Parameters
+    script: list[Any]
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario of the parameters; raises InputError where no body or flight has them."""
+        return build_scenario(self.parameters, body_mesh_of(self.parameters))
+
+    @property
+    def commands(self) -> list[Command]:
+        """The script's commands; raises InputError."""
+        return expand_script(self.script, "script")
 
 
 @dataclass(frozen=True)
@@ -41,6 +63,11 @@ class Vary:
 
     target: Target
     form: Points | Draw
+
+    @property
+    def is_random_vertex(self) -> bool:
+        """Whether it chooses a vertex of the row's mesh."""
+        return isinstance(self.form, Draw) and self.form.shape == VERTEX
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +137,50 @@ class Study:
                 found.append(digits[-1] if vary.form.kind == LIST else None)
         return found
 
+    def variation(self, row: int) -> Variation:
+        """A row, by its number."""
+        return self.applied([column[0] for column in self.columns(np.array([row], np.int64))])
+
+    def applied(self, chosen: list[Any]) -> Variation:
+        """The variation with these values of what varies."""
+        changes: dict[str, Value] = {}
+        values, entries = ChainMap(changes, self.parameters.named()), copy.deepcopy(self.script)
+        if self.density_decides:
+            values["mass"] = 0.0
+        pairs = list(zip(self.vary, chosen, strict=True))
+        for vary, value in pairs:
+            if not vary.is_random_vertex:
+                vary.target.put(values, entries, plain(value))
+        parameters = self.parameters.replaced(changes)
+        for vary, value in pairs:
+            if vary.is_random_vertex:
+                vary.target.put(values, entries, {"vertex": vertex_number(value, body_mesh_of(parameters))})
+        return Variation(parameters, entries)
+
+
+def vertex_number(uniform: float, body_mesh: BodyMesh | None) -> int:
+    """Which vertex a uniform number in [0, 1) chooses; 0 without a mesh, which is then refused for want of one."""
+    return int(uniform * len(body_mesh.surface.vertices)) if body_mesh else 0
+
+
+def plain(value: Any) -> object:
+    """A value as YAML has it."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return list(value) if isinstance(value, tuple) else value
+
+
+def body_mesh_of(parameters: Parameters) -> BodyMesh | None:
+    """The mesh that the parameters name, with its moments; read once in a process."""
+    # Only a body without a mesh asks for its model.
+    model = "solid" if parameters.mesh else parameters.inertia_model
+    return _body_mesh(parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback, model)
+
+
+@lru_cache(maxsize=MESHES_KEPT)
+def _body_mesh(mesh: str, repair: bool | str, fallback: str, model: str) -> BodyMesh | None:
+    return load_body_mesh(Parameters(mesh=mesh, mesh_repair=repair, mesh_fallback=fallback, inertia_model=model))
+
 
 def study_file(name: str) -> Path:
     """The file of a study given by path or bundled name."""
@@ -147,7 +218,7 @@ def make_study(spec: Any, name: str = "study", folder: Path = Path()) -> Study:
     duration_s = number(spec["duration"], f"{name}, duration", 1e-9, 1e9)
     seed = whole(spec.get("seed", 0), f"{name}, seed", 0, 1 << 128)
     watch = number(spec.get("watch", 50.0), f"{name}, watch", 1e-6, 1e6)
-    measures = read_measures(spec.get("measure"), spec.get("stop"), watch, duration_s, f"{name}, measure")
+    measures = read_measures(spec.get("measure"), watch, duration_s, f"{name}, measure")
     vary = _vary(spec["vary"], name, base.parameters, script)
     reference = _reference(spec.get("reference"), f"{name}, reference")
     if measures.needs_reference and reference is None:

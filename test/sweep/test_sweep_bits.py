@@ -10,7 +10,6 @@ from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.simulation.batch import new_results
 from rigid_proto_ros.simulation.observables import floor_text
 from rigid_proto_ros.sweep.rows import Chunk, FailedFlight, run_chunk, simulate_row
-from rigid_proto_ros.sweep.variation import variation
 
 
 def same(a: np.ndarray, b: np.ndarray) -> bool:
@@ -26,7 +25,7 @@ def differing_rows(own, chunk: Chunk) -> list[str]:
     for i, row in enumerate(chunk.columns["row"].tolist()):
         alone, reason = new_results(1, len(own.measures.table)), None
         try:
-            simulate_row(own, variation(own, row), 0, alone)
+            simulate_row(own, own.variation(row), 0, alone)
         except (FailedFlight, InputError) as error:
             reason = " ".join(str(error).split())
         measured = np.array([chunk.columns[name][i] for name in own.measures.columns])
@@ -55,7 +54,6 @@ def test_rows_have_the_bits_of_the_simulation_whatever_chunk_they_are_in(spec, i
         # A ballast below zero is a row with its reason.
         reasons = [reason for reason in whole.columns["failure"].tolist() if reason]
         assert 0 < len(reasons) < own.rows / 2 and any("ballast" in reason for reason in reasons)
-        assert "far" in whole.columns["stopped"].tolist() and None in whole.columns["stopped"].tolist()
 
 
 OFTEN = ("free_body", "rk4", "semi_implicit_euler")
@@ -82,14 +80,6 @@ def test_every_integrator_has_its_own_bits_in_a_batch(integrator: str) -> None:
     assert differing_rows(own, chunk) == []
 
 
-def test_loads_that_start_together_act_in_the_order_of_the_script() -> None:
-    script = [{"t": 0.1, "at": "tip", "force": [1.0, 0.3, 0.0]}, {"t": 0.1, "at": "tip", "force": [0.1, 0.7, 0.3]}]
-    script += [{"t": 0.1, "at": "tip", "force": [1e-3, 1e3, 0.1]}]
-    vary = {"script.1.force.x": {"uniform": [-1.0, 1.0]}, "mass": {"uniform": [0.1, 1.0]}}
-    own = study({"scene": "t_handle", "script": script, "duration": 0.2, "samples": 12, "vary": vary})
-    assert differing_rows(own, run_chunk(own, 0, own.rows)) == []
-
-
 def test_a_row_that_is_too_fast_for_auto_is_refused_with_what_its_body_takes() -> None:
     for vary in ({"angular_damping": {"list": [1e-3, 1e6]}}, {"string.frequency": {"list": [10.0, 1e7]}}):
         own = study({**HUNG, "samples": 1, "vary": vary})
@@ -113,9 +103,8 @@ def test_what_the_batch_refuses_is_the_simulations_to_explain() -> None:
         "scene": "t_handle",
         "duration": 0.01,
         "set": {"inertia_model": "explicit", "explicit_inertia.tensor": [1, 0, 0, 1, 0, 1]},
-        "vary": {"explicit_inertia.tensor.izz": {"grid": [0.5, 1.0, 2.0, 2.5, 1e-14]}, "initial.orientation_xyzw.w": {"list": [1.0, 0.0, 1.0, 1.0, 1.0][:1]}},
-    }  # fmt: skip
-    own = study(spec)
-    reasons = run_chunk(own, 0, own.rows).columns["failure"].tolist()
+        "vary": {"explicit_inertia.tensor.izz": {"grid": [0.5, 1.0, 2.0, 2.5, 1e-14]}},
+    }
+    reasons = run_chunk(study(spec), 0, 5).columns["failure"].tolist()
     assert reasons[:3] == [None] * 3
     assert "A + B >= C" in reasons[3] and "at most 1e12" in reasons[4]
