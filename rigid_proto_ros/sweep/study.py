@@ -178,7 +178,7 @@ def body_mesh_of(parameters: Parameters) -> BodyMesh | None:
 
 
 @lru_cache(maxsize=MESHES_KEPT)
-def _body_mesh(mesh: str, repair: bool | str, fallback: str, model: str) -> BodyMesh | None:
+def _body_mesh(mesh: str, repair: bool, fallback: str, model: str) -> BodyMesh | None:
     return load_body_mesh(Parameters(mesh=mesh, mesh_repair=repair, mesh_fallback=fallback, inertia_model=model))
 
 

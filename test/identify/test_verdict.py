@@ -67,7 +67,7 @@ def test_a_known_mass_fixes_the_mass_and_a_known_poke_all() -> None:
 
 def test_what_is_neither_asked_for_nor_given_is_no_number() -> None:
     truth = mf.values_of(0.5, (0.01, -0.02, 0.03), INERTIA, (0.0, 0.0, -9.81))
-    flight = mf.mocap(truth, mf.tumbling(SPIN), np.random.default_rng(1), 1.0)
+    flight = mf.mocap(truth, mf.tumbling(SPIN), np.random.default_rng(1), 3.0)
     found = identify([flight], fit=("com", "inertia"))
     assert found.mass.value is None
     assert all(one.value is not None for one in (*found.center_of_mass, *found.shape))
