@@ -38,6 +38,8 @@ POOR, GOOD = 0.25, 0.75
 SLICE = 128
 """Rows of a QR decomposition at once."""
 FIRST_DAMPING, MOST_DAMPING = 1.0, 1e12
+LONGEST_STEP = 1.0
+"""In what counts as a large change of each unknown: farther away the body may spin so fast that no flight ends."""
 FIRST_ANGLE = 3.0
 """Turn of the first segments [rad], of which the initial estimate's errors of some hundredths aren't much."""
 MOST_SEGMENTS = 40
@@ -142,11 +144,15 @@ class Problem:
         return list(starts)
 
     def step(self, here: Linear, damping: float) -> np.ndarray:
-        """The best step (n,) with a damping, to a body that can exist."""
+        """The best step (n,) with at least this damping, not too long and to a body that can exist."""
         width = len(here.numbers)
-        jacobian = np.vstack([here.jacobian, math.sqrt(damping) * np.eye(width)])
         residuals = np.concatenate([here.residuals, np.zeros(width)])
-        step = -np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
+        while True:
+            jacobian = np.vstack([here.jacobian, math.sqrt(damping) * np.eye(width)])
+            step = -np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
+            if np.linalg.norm(step) <= LONGEST_STEP:
+                break
+            damping *= 10.0
         if "inertia" not in self.unknowns or is_possible(self.values(here.numbers + step).inertia):
             return step
         first = self.unknowns.slots.index(("inertia", 0))
