@@ -4,11 +4,11 @@ squares. No guess of the body is needed, and nothing is integrated.
 
 With R the attitude, c the centre of mass and S the tensor divided by its trace, all measured samples obey
 
-    p + R c = x0 + v0 t + ½ g t² + (1/m) ∬ F dt²,      R S ω = L0 + κ ∫ τ dt,  κ = 1 / tr I,
+    p + R c = x0 + v0 t + ½ g t² + (1/m) ∬ F dt² - (d/m) ∫ p dt,      R S ω = L0 + κ ∫ τ dt - κ a ∫ ω dt,  κ = 1 / tr I,
 
-which are linear in c and 1/m, then in S and κ; x0, v0 and L0 are projected out. The trace of S is 1, so that rates that
-are noise don't make the body small. As the loads' integrals are known, one poke in a long fall tells the mass as well
-as in a short one.
+which are linear in c, 1/m and d/m, then in S, κ and κ a, d and a being damping; x0, v0 and L0 are projected out. The
+trace of S is 1, so that rates that are noise don't make the body small. As the loads' integrals are known, one poke in
+a long fall tells the mass as well as in a short one.
 """
 
 from __future__ import annotations
@@ -154,8 +154,8 @@ class _Poses:
 
 
 def initial_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, values: Values) -> Values:
-    """``values`` with the free ones of mass, centre of mass and tensor as the balance of momentum says, where it
-    does.
+    """``values`` with the free ones of mass, centre of mass, tensor and damping as the balance of momentum says, where
+    it does.
     """
     poses = []
     for flight in flights:
@@ -163,7 +163,16 @@ def initial_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, val
         seconds = 1e-9 * (attitude.times_ns - flight.begin_ns)
         impulses = _impulses_of(flight.load_history, flight.begin_ns, seconds, attitude.values)
         poses.append(_Poses(seconds, position.values, attitude.values, impulses))
-    return _from_turns(poses, unknowns, _from_path(poses, unknowns, values))
+    for _ in range(2 if values.damping[0] > 0.0 or "damping" in unknowns else 1):
+        # Drag is that of the centre of mass, whose path has to be known for it.
+        values = _from_path(poses, unknowns, values)
+    return _from_turns(poses, unknowns, values)
+
+
+def _integral(seconds: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """∫ (n, 3) of vectors (n, 3) from the first time on, by trapezoids."""
+    steps = 0.5 * np.diff(seconds)[:, None] * (vectors[1:] + vectors[:-1])
+    return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
 
 def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: np.ndarray, attitudes: np.ndarray) -> Impulses:
@@ -194,45 +203,51 @@ def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: np.ndarray, at
 
 
 def _from_path(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> Values:
-    """With centre of mass and mass from how the centre of mass moves."""
-    rows = []
+    """With centre of mass, mass and linear damping from how the centre of mass moves."""
+    is_damped, drag, rows = "damping" in unknowns, float(values.damping[0]), []
     for one in poses:
         t = one.seconds[:, None]
         # Columns of the attitude's matrix are its turned axes.
         turns = rot.turned(one.attitudes[:, None], np.eye(3)[None]).transpose(0, 2, 1)
         right = 0.5 * t * t * values.gravity - one.positions
-        columns = [turns, -one.impulses.path(one.seconds)[:, :, None], right[:, :, None]]
+        moved = -_integral(one.seconds, one.positions + turns @ values.center_of_mass - one.positions[0])
+        pushed = one.impulses.path(one.seconds) + (0.0 if is_damped else drag) * moved
+        columns = [turns, -pushed[:, :, None], -moved[:, :, None], right[:, :, None]]
         rows.append(_without(np.hstack([np.ones_like(t), t]), np.concatenate(columns, axis=2)))
-    is_pushed = any(len(one.impulses.seconds) for one in poses)
-    free = np.array(["com" in unknowns] * 3 + ["mass" in unknowns and is_pushed])
-    known = np.append(values.center_of_mass, 1.0 / values.mass)
-    found, sds = _solved(np.concatenate(rows), free, known, np.array([LOOSE * values.size] * 3 + [np.inf]))
+    is_pushed = drag > 0.0 or any(len(one.impulses.seconds) for one in poses)
+    free = np.array(["com" in unknowns] * 3 + ["mass" in unknowns and is_pushed, is_damped])
+    known = np.array([*values.center_of_mass, 1.0 / values.mass, 0.0])
+    found, sds = _solved(np.concatenate(rows), free, known, np.array([LOOSE * values.size] * 3 + [np.inf] * 2))
     mass = 1.0 / float(found[3]) if free[3] and found[3] > TOLD * sds[3] else values.mass
     inertia = values.inertia * (mass / values.mass)
-    return replace(values, mass=mass, inertia=inertia, center_of_mass=found[:3])
+    damping = np.array([max(float(found[4]) * mass, 0.0) if is_damped else drag, values.damping[1]])
+    return replace(values, mass=mass, inertia=inertia, center_of_mass=found[:3], damping=damping)
 
 
 def _from_turns(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> Values:
-    """With the tensor from how the body turns."""
+    """With tensor and angular damping from how the body turns."""
     if "inertia" not in unknowns:
         return values
-    rows = []
+    is_damped, drag, rows = "damping" in unknowns, float(values.damping[1]), []
     for one in poses:
         seconds, attitudes, rates = _rates(one)
         shape = np.stack([rot.turned(attitudes, rates @ basis) for basis in _SHAPES], axis=2)
         pushed = one.impulses.momentum(seconds, one.impulses.about(values.center_of_mass))
-        right = -rot.turned(attitudes, rates) / 3.0
-        columns = np.concatenate([shape, -pushed[:, :, None], right[:, :, None]], axis=2)
-        rows.append(_without(np.ones((len(seconds), 1)), columns))
-    is_pushed = any(len(one.impulses.seconds) for one in poses)
+        turned = rot.turned(attitudes, rates)
+        slowed = -_integral(seconds, turned)
+        pushed = pushed + (0.0 if is_damped else drag) * slowed
+        columns = [shape, -pushed[:, :, None], -slowed[:, :, None], -turned[:, :, None] / 3.0]
+        rows.append(_without(np.ones((len(seconds), 1)), np.concatenate(columns, axis=2)))
+    is_pushed = drag > 0.0 or any(len(one.impulses.seconds) for one in poses)
     trace = float(np.trace(values.inertia))
     before = [np.sum(basis * values.inertia) / trace / np.sum(basis * basis) for basis in _SHAPES]
-    free = np.array([True] * 5 + [is_pushed])
-    found, sds = _solved(np.concatenate(rows), free, np.array([*before, 1.0 / trace]), np.array([LOOSE] * 5 + [np.inf]))
+    free, known = np.array([True] * 5 + [is_pushed, is_damped]), np.array([*before, 1.0 / trace, 0.0])
+    found, sds = _solved(np.concatenate(rows), free, known, np.array([LOOSE] * 5 + [np.inf] * 2))
     tensor = possible_tensor(np.eye(3) / 3.0 + np.tensordot(found[:5], _SHAPES, 1), THIN)
     if is_pushed and found[5] > TOLD * sds[5]:
         trace = 1.0 / float(found[5])
-    return replace(values, inertia=trace * tensor)
+    damping = np.array([values.damping[0], max(float(found[6]) * trace, 0.0) if is_damped else drag])
+    return replace(values, inertia=trace * tensor, damping=damping)
 
 
 def _rates(poses: _Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
