@@ -43,7 +43,7 @@ AGAIN := --reruns 1 --only-rerun "no .* within [0-9.]+ s" -rRs
 test: export PYTHONDONTWRITEBYTECODE :=
 test: setup ## the whole suite; real meshes are found through RIGID_PROTO_MESHES
 	@$(ROS) $(PY) test/warm_kernels.py
-	$(ROS) $(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(AGAIN) -m "not stress and not bench and not soak" $(ARGS)
+	$(ROS) $(PY) -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(AGAIN) -m "not stress and not bench and not soak" $(ARGS)
 
 lint: setup ## ruff and mypy
 	$(PY) -m ruff check .

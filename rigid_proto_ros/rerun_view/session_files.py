@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -49,7 +49,7 @@ def make_recorder(
             return McapObserver(path, node_name, parameters, on_error, simulated_log)
         except ImportError:
             raise InputError("record", is_missing("mcap", "mcap")) from None
-    if find_spec("rerun") is None:
+    if importlib.util.find_spec("rerun") is None:
         raise InputError("record", is_missing("rerun-sdk", "rerun"))
     from .observer import RerunObserver
 
@@ -130,7 +130,7 @@ def _bag_reader() -> ModuleType:
 
 
 def _read_rrd(path: Path) -> RecordedSession:
-    if find_spec("rerun") is None:
+    if importlib.util.find_spec("rerun") is None:
         raise InputError("session", is_missing("rerun-sdk", "rerun"))
     from .rrd_file import read_session
 

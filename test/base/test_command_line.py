@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""What the command lines have in common: examples that are read, and text for people."""
+"""What the command lines have in common: examples that are read."""
 
 import importlib
-import json
 import shlex
 
 import pytest
 
 from rigid_proto_ros.base.command_line import Parser
 from rigid_proto_ros.cli import main as command
-from rigid_proto_ros.cli.inspect_report import shown_zero
 from rigid_proto_ros.ros import arguments, poke_client
 
 
@@ -33,12 +31,3 @@ def test_examples_of_the_node_and_the_client_are_read_by_them():
         arguments.own_arguments(shlex.split(example))
     for example, _ in poke_client.EXAMPLES:
         poke_client._arguments(shlex.split(example)[1:])
-
-
-def test_what_does_not_show_beside_the_rest_is_0_in_text_and_itself_in_json(capsys):
-    assert shown_zero([1.0, -4e-7, 6e-7], 1.0) == [1.0, 0.0, 6e-7]
-    assert command.main(["inspect", "hammer"]) == 0
-    center = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("centre of mass"))
-    assert center.split()[3:6] == ["0.00343475", "0", "0.237056"]
-    assert command.main(["inspect", "hammer", "--json"]) == 0
-    assert 0.0 < abs(json.loads(capsys.readouterr().out)["center_of_mass"][1]) < 1e-9

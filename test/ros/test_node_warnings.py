@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import itertools
 import resource
 import time
 
@@ -67,7 +66,8 @@ def test_a_recording_that_stops_is_told_by_log_diagnostics_and_parameter_until_a
             report = client.diagnostics()
             assert "recording stopped" not in report["message"]
             assert report["recording"] == str(again)
+            # One a period, and none beside it for what has changed; a late one doesn't delay those behind it.
             stamps = [report["stamp_ns"] for report in client.all_diagnostics()]
-            assert 0.95 * REPORT_S < min(b - a for a, b in itertools.pairwise(stamps)) * 1e-9 < 2.0 * REPORT_S
+            assert len(stamps) - 2 <= (stamps[-1] - stamps[0]) * 1e-9 / REPORT_S
     finally:
         assert node.stop() == 0, node.log.read_text()
