@@ -18,9 +18,8 @@ import psutil
 FOLDER = Path(__file__).parent
 sys.path[:0] = [str(FOLDER.parent), str(FOLDER.parent / "test")]
 
-from ros_domain import hold_domain
-
 from rigid_proto_ros.rerun_view.viewers import viewer_program
+from rigid_proto_ros.ros.domain import hold_domain
 
 _held: list[socket.socket] = []
 
@@ -28,7 +27,9 @@ _held: list[socket.socket] = []
 @functools.cache
 def domain() -> str:
     """A ROS domain that no other benchmark or test session on this machine holds."""
-    number, lock = hold_domain()
+    held = hold_domain(range(1, 102))
+    assert held is not None, "all ROS domains 1..101 are held by others"
+    number, lock = held
     _held.append(lock)
     return str(number)
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from ros_domain import hold_domain
+
+from rigid_proto_ros.ros.domain import hold_domain
 
 settings.register_profile("the same examples every time", derandomize=True, deadline=None)
 settings.register_profile("new examples every time", deadline=None)
@@ -72,7 +73,9 @@ def meshes() -> Path:
 @contextmanager
 def held_domain() -> Iterator[int]:
     """A ROS domain in 1..101 that no other test session on this machine holds, whichever checkout it runs from."""
-    domain, lock = hold_domain()
+    held = hold_domain(1 + (os.getpid() + k) % 101 for k in range(101))
+    assert held is not None, "all ROS domains 1..101 are held by others"
+    domain, lock = held
     with lock:
         yield domain
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import subprocess
 import sys
 import time
@@ -52,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fly, and say what happened."""
     from ..base.bundled import example_path, scene_path
+    from ..ros.domain import DOMAINS, hold_domain
     from ..scene.script import read_script
     from .executables import own_executable, text_parameter
 
@@ -64,12 +66,21 @@ def run(args: argparse.Namespace) -> int:
     until_s = max(args.duration, read_script(script)[-1].stamp_ns * 1e-9 + CONFIRM_S)
     print(f"rigid_body_node with {scene}, poke_client with {script}: {until_s:g} s", flush=True)
     with contextlib.ExitStack() as processes:
+        environment = with_this_package()
+        # Pokes of another demo, or for another node, are none of ours.
+        held = None if os.environ.get("ROS_DOMAIN_ID") else hold_domain(DOMAINS)
+        if held is not None:
+            environment["ROS_DOMAIN_ID"] = str(held[0])
+            processes.enter_context(held[1])
+            if held[0]:
+                print(f"domain 0 is in use; this one is in ROS_DOMAIN_ID={held[0]}", flush=True)
         node = _start(
             [*node_executable, "--until", repr(until_s), "--ros-args", "--params-file", str(scene)]
             + [*text_parameter("record", str(session.resolve())), "-p", "start_paused:=true"],
+            environment,
             processes,
         )
-        client = _start([*client_executable, str(script), "--reset", "--timeout", "0"], processes)
+        client = _start([*client_executable, str(script), "--reset", "--timeout", "0"], environment, processes)
         while node.poll() is None and not client.poll():
             time.sleep(0.05)
         for name, process in (("poke_client", client), ("rigid_body_node", node)):
@@ -79,13 +90,11 @@ def run(args: argparse.Namespace) -> int:
     return _report(session)
 
 
-def _start(command: list[str], processes: contextlib.ExitStack) -> subprocess.Popen:
+def _start(command: list[str], environment: dict[str, str], processes: contextlib.ExitStack) -> subprocess.Popen:
     """Start a process that ends when ``processes`` is left, also when this command is ended by a signal. It has a
     session of its own: a Ctrl-C at the terminal reaches this command alone.
     """
-    process = subprocess.Popen(
-        command, start_new_session=True, preexec_fn=end_with_this_thread(), env=with_this_package()
-    )
+    process = subprocess.Popen(command, start_new_session=True, preexec_fn=end_with_this_thread(), env=environment)
     processes.callback(_end, process)
     return process
 

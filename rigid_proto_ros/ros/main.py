@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from ..base.errors import InputError, is_missing
 from ..base.interrupts import leave
 from ..live.shutdown import Shutdown, begin_closing, begin_teardown
+from .domain import hold_own_domain
 
 if TYPE_CHECKING:
     from ..scene.scenario import Scenario
@@ -57,6 +58,8 @@ class NodeProcess(threading.Thread):
         self._argv = argv
         self._request_end = request_end
         self._error: BaseException | None = None
+        # Held until this process ends: what `rigid_proto demo` says to its own node is then said elsewhere.
+        self._domain = hold_own_domain()
         self._crashed = self._ending = False
         self._node: RigidBodyNode | None = None
         self._close_page: Callable[[], None] = lambda: None

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -51,11 +52,21 @@ def check(session, recorded, batches, pokes):
     assert any("load" in entity for entity in arrows), sorted(set(arrows))
 
 
-def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies(ros_environment, tmp_path):
-    session, recorded, batches = fly(ros_environment, tmp_path, "--duration", "10")
-    check(session, recorded, batches, pokes=3)
-    assert recorded.times.max() == recorded.end_ns == 10_000_000_000
-    verified = run("rigid_proto", "replay", session, "--verify", environment=ros_environment)
+def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies_also_beside_another(
+    ros_environment, tmp_path
+):
+    """Two at once, and neither hears the other's pokes."""
+    # As a user's shell, which names no domain.
+    environment = {name: value for name, value in ros_environment.items() if name != "ROS_DOMAIN_ID"}
+    folders = [tmp_path / name for name in "ab"]
+    for folder in folders:
+        folder.mkdir()
+    with ThreadPoolExecutor() as both:
+        flown = list(both.map(lambda folder: fly(environment, folder, "--duration", "10"), folders))
+    for session, recorded, batches in flown:
+        check(session, recorded, batches, pokes=3)
+        assert recorded.times.max() == recorded.end_ns == 10_000_000_000
+    verified = run("rigid_proto", "replay", flown[0][0], "--verify", environment=ros_environment)
     assert verified.returncode == 0, verified.stderr
     assert "reproduced bit for bit" in verified.stdout
 
