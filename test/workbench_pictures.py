@@ -101,13 +101,14 @@ def com(page: Browser) -> tuple[float, float]:
 
 
 def pull(page: Browser, steps: int) -> list[Image.Image]:
-    """Drag the body by the string, the button stays down; a picture a step."""
+    """Drag the body by the string, quickly at first, so that the string is long; the button stays down; a picture a step."""
     x, y = com(page)
     page.page.mouse.move(x, y)
     page.page.mouse.down()
     pictures = []
     for k in range(1, steps + 1):
-        page.page.mouse.move(x - 130.0 * k / steps, y - 60.0 * k / steps)
+        part = min(1.0, 3.0 * k / steps)
+        page.page.mouse.move(x - 130.0 * part, y - 90.0 * part)
         time.sleep(0.6)  # a page says at most every 0.05 s where the pointer is, and a slow one seldom
         pictures += play(page, 1.0 / RATE)
     return pictures
@@ -117,6 +118,8 @@ def draw_moving(page: Browser, file: Path) -> None:
     """The T-handle turns over, its ghost with the box's tensor doesn't; then a poke, and a pull on the string."""
     begin(page, lesson("t_handle"), "bounding_box")
     answer(page)
+    page.flown.page.tools.frequency = 3.0
+    page.flown.live.set_parameters({"poke_duration": 0.3})
     pictures = play(page, 2.2, 22)
     page.click(*com(page))
     time.sleep(0.3)
@@ -131,7 +134,8 @@ def draw_moving(page: Browser, file: Path) -> None:
     sheet = Image.new("RGB", (width, height * len(chosen)))
     for k, each in enumerate(chosen):
         sheet.paste(each, (0, k * height))
-    palette = sheet.quantize(256)
+    # By the range of colours, not by their number: arrow and string are few pixels.
+    palette = sheet.quantize(256, Image.Quantize.MAXCOVERAGE)
     frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=round(1000 / RATE), loop=0, optimize=True)
 
