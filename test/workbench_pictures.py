@@ -134,8 +134,10 @@ def draw_moving(page: Browser, file: Path) -> None:
     sheet = Image.new("RGB", (width, height * len(chosen)))
     for k, each in enumerate(chosen):
         sheet.paste(each, (0, k * height))
-    # By the range of colours, not by their number: arrow and string are few pixels.
-    palette = sheet.quantize(256, Image.Quantize.MAXCOVERAGE)
+    # Most colours by their number, some by their range: arrow and string are few pixels.
+    common, rare = sheet.quantize(208), sheet.quantize(48, Image.Quantize.MAXCOVERAGE)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*common.getpalette()[: 3 * 208], *rare.getpalette()[: 3 * 48]])
     frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=round(1000 / RATE), loop=0, optimize=True)
 
