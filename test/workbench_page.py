@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ctypes.util
 import math
 import os
 import re
@@ -21,8 +22,10 @@ from rigid_proto_ros.workbench.main import Workbench
 
 CHROMIUM = os.environ.get("CHROMIUM", shutil.which("chromium") or shutil.which("chromium-browser")) or None
 """The browser; ``CHROMIUM=`` hides the one that is installed."""
+if ctypes.util.find_library("atomic") is None:
+    CHROMIUM = None  # playwright's own program is linked to it, and not every system has it
 
-NO_CHROMIUM = "there is no browser to drive: sudo apt install chromium"
+NO_CHROMIUM = "there is no browser to drive: sudo apt install chromium libatomic1"
 SOFTWARE_GL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
 
 FLAGS = [*SOFTWARE_GL, "--webgl-antialiasing-mode=none", "--disable-gpu-compositing"]
