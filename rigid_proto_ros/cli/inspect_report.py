@@ -13,6 +13,7 @@ from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mass.inspection import Inspection
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes
+from ..picture.style import without_rounding
 
 
 def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> None:
@@ -46,12 +47,14 @@ def print_report(inspection: Inspection, report: dict) -> None:
         rows.append(("area", f"{report['area']: .9g}", "m²"))
     density = "" if report["density"] is None else f" ({report['density']:.6g} kg/m³)"
     rows.append(("mass", f"{chosen.mass: .9g}", f"kg{density}"))
-    rows.append(("centre of mass", row_of(chosen.center_of_mass), "m"))
+    diagonal = float(np.linalg.norm(size))
+    rows.append(("centre of mass", row_of(chosen.center_of_mass, diagonal), "m"))
     rows += tensor_rows(chosen.inertia)
     moments, axes = principal_axes(chosen.inertia)
     rows.append(("principal moments", row_of(moments), "kg m²"))
     rows += [
-        (f"principal axis {k + 1}", row_of(axes[:, k]), f"of {moment:.6g} kg m²") for k, moment in enumerate(moments)
+        (f"principal axis {k + 1}", row_of(axes[:, k], 1.0), f"of {moment:.6g} kg m²")
+        for k, moment in enumerate(moments)
     ]
     table(rows)
     print()
@@ -71,22 +74,26 @@ def _print_models(inspection: Inspection) -> None:
         cells = [marked, f"{properties.mass:.6g}"]
         if "solid" in inspection.models and name != "solid":
             difference = inspection.difference(name)
-            cells.append(", ".join(f"{100.0 * error:+.3g}" for error in difference.principal_moments) + " %")
-            cells += [f"{math.degrees(difference.axes_turned):.3g}", f"{difference.center_of_mass_offset:.3g}"]
+            errors = (without_rounding(error) for error in difference.principal_moments)
+            offset = difference.center_of_mass_offset
+            cells.append(", ".join(f"{100.0 * error:+.3g}" for error in errors) + " %")
+            cells.append(f"{without_rounding(math.degrees(difference.axes_turned), 1e3):.3g}")
+            cells.append(f"{without_rounding(offset, float(np.linalg.norm(inspection.upper - inspection.lower))):.3g}")
         rows.append(tuple(cells))
     head = ("  model", "mass [kg]", "error of the principal moments", "axes turned by [deg]", "COM offset [m]")
     table(rows, head)
 
 
-def row_of(values: Iterable[float]) -> str:
-    """Numbers side by side, in six digits."""
-    return " ".join(f"{value:< 13.6g}" for value in values).rstrip()
+def row_of(values: Iterable[float], largest: float = 0.0) -> str:
+    """Numbers side by side, in six digits; what rounding leaves beside the ``largest`` is 0."""
+    return " ".join(f"{without_rounding(value, largest):< 13.6g}" for value in values).rstrip()
 
 
 def tensor_rows(inertia: np.ndarray) -> list[tuple[str, ...]]:
     """Rows of a table for a tensor (3, 3)."""
     labels = [("inertia", "kg m², about the centre of mass"), ("", ""), ("", "")]
-    return [(label, row_of(row), unit) for (label, unit), row in zip(labels, inertia, strict=True)]
+    largest = float(np.abs(inertia).max())
+    return [(label, row_of(row, largest), unit) for (label, unit), row in zip(labels, inertia, strict=True)]
 
 
 def print_inertial(args: argparse.Namespace, properties: MassProperties) -> bool:

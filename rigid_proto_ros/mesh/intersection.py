@@ -37,12 +37,17 @@ NEAR = 1e-9
 """Part of a triangle's size, or of the mesh's, within which a hit on an edge, or on the surface itself, isn't
 trusted."""
 _CELLS = 1 << 20  # places along each axis that the curve tells apart
+_SPREADING = ((32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F), (4, 0x10C30C30C30C30C3),
+              (2, 0x1249249249249249))  # fmt: skip  # put two zeros between the bits of a number
 
 # Directions that no mesh is aligned with; the first alone is used unless a ray meets an edge.
 _DIRECTIONS = ((0.8163, 0.3719, 0.4421), (-0.2917, 0.9013, -0.3204), (0.1373, -0.5381, 0.8316))
 # Barycentric coordinates of the sample in its triangle: not on any of its symmetry lines.
 _SAMPLE = (0.4479, 0.3413, 0.2108)
 
+Hierarchy = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Order of the triangles (m,), leaf after leaf; their boxes (m, 6), lower and upper corner, in that order; the nodes'
+boxes (2·leaves − 1, 6)."""
 _Vector = tuple[float, float, float]
 _Triangle = tuple[_Vector, _Vector, _Vector]
 
@@ -77,55 +82,28 @@ def _largest(a: _Vector) -> float:
     return max(abs(a[0]), abs(a[1]), abs(a[2]))
 
 
-@njit(cache=True, nogil=True)
-def _spread(cell: int | np.int64) -> int | np.int64:
-    """The 20 low bits of a number with two zeros between each."""
-    x = cell & 0xFFFFF
-    x = (x | (x << 32)) & 0x1F00000000FFFF
-    x = (x | (x << 16)) & 0x1F0000FF0000FF
-    x = (x | (x << 8)) & 0x100F00F00F00F00F
-    x = (x | (x << 4)) & 0x10C30C30C30C30C3
-    return (x | (x << 2)) & 0x1249249249249249
-
-
-@njit(cache=True, nogil=True)
-def _hierarchy(vertices: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The hierarchy of triangles (m, 3): their order (m,), leaf after leaf; their boxes (m, 6), lower and upper corner,
-    in that order; and the nodes' boxes (2·leaves − 1, 6). An empty node's lower corner lies above its upper one.
-    """
-    own, lower, upper = np.empty((len(corners), 6)), np.full(3, np.inf), np.full(3, -np.inf)
-    for i in range(len(corners)):
-        a, b, c = _triangle(vertices, corners, i)
-        for k in range(3):
-            own[i, k], own[i, 3 + k] = min(a[k], b[k], c[k]), max(a[k], b[k], c[k])
-            lower[k], upper[k] = min(lower[k], own[i, k]), max(upper[k], own[i, 3 + k])
-    places = np.zeros(len(corners), np.int64)
-    for k in range(3):
-        side = upper[k] - lower[k]
-        scale = (_CELLS - 1) / side if side > 1e-290 else 0.0  # one cell where the quotient would overflow
-        for i in range(len(corners)):
-            middle = 0.5 * own[i, k] + 0.5 * own[i, 3 + k]
-            places[i] |= _spread(np.int64((middle - lower[k]) * scale)) << k
-    order = np.argsort(places, kind="mergesort")
-    own = own[order]
-    leaves = 1
+def _hierarchy(vertices: np.ndarray, corners: np.ndarray) -> Hierarchy:
+    """The hierarchy of triangles (m, 3); an empty node's lower corner lies above its upper one."""
+    points = vertices[corners]
+    own = np.concatenate([points.min(axis=1), points.max(axis=1)], axis=1)
+    lower, upper = own[:, :3].min(axis=0), own[:, 3:].max(axis=0)
+    side = np.maximum(upper - lower, 1e-290)  # one cell where the quotient would overflow
+    x = ((0.5 * own[:, :3] + 0.5 * own[:, 3:] - lower) * ((_CELLS - 1) / side)).astype(np.int64)
+    for shift, mask in _SPREADING:
+        x = (x | (x << shift)) & mask
+    order = np.argsort(x[:, 0] | x[:, 1] << 1 | x[:, 2] << 2, kind="stable")
+    own, leaves = own[order], 1
     while leaves * LEAF < len(order):
         leaves *= 2
-    boxes = np.empty((2 * leaves - 1, 6))
-    boxes[:, :3] = np.inf
-    boxes[:, 3:] = -np.inf
-    for i in range(len(order)):
-        _extend(boxes, leaves - 1 + i // LEAF, own, i)
-    for node in range(2 * leaves - 2, 0, -1):
-        _extend(boxes, (node - 1) // 2, boxes, node)
+    level = np.full((leaves * LEAF, 6), [np.inf] * 3 + [-np.inf] * 3)
+    level[: len(own)] = own
+    boxes, size = np.empty((2 * leaves - 1, 6)), LEAF
+    while leaves > 0:
+        level = level.reshape(leaves, size, 6)
+        level = np.concatenate([level[:, :, :3].min(axis=1), level[:, :, 3:].max(axis=1)], axis=1)
+        boxes[leaves - 1 : 2 * leaves - 1] = level
+        leaves, size = leaves // 2, 2
     return order, own, boxes
-
-
-@njit(cache=True, nogil=True)
-def _extend(boxes: np.ndarray, i: int, others: np.ndarray, j: int) -> None:
-    """Make box i contain box j of ``others``."""
-    for k in range(3):
-        boxes[i, k], boxes[i, 3 + k] = min(boxes[i, k], others[j, k]), max(boxes[i, 3 + k], others[j, 3 + k])
 
 
 @njit(cache=True, nogil=True)
@@ -191,13 +169,10 @@ def _share_a_corner(corners: np.ndarray, i: int, j: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def crossings(
-    vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, count: int, limit: int
+def _crossings(
+    vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, count: int, tree: Hierarchy, limit: int
 ) -> tuple[int, np.ndarray, bool]:
-    """Pairs of triangles of one component that cross without sharing a corner; which of ``count`` components cross each
-    other, (k, k); and whether ``limit`` visits sufficed. corners (m, 3): over welded vertices; component (m,).
-    """
-    order, own, boxes = _hierarchy(vertices, corners)
+    order, own, boxes = tree
     inner = len(boxes) // 2
     crossing = np.zeros((count, count), np.bool_)
     within, visits = 0, 0
@@ -230,6 +205,15 @@ def crossings(
     return within, crossing, True
 
 
+def crossings(
+    vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, limit: int = WORK_LIMIT
+) -> tuple[int, np.ndarray, bool]:
+    """Pairs of triangles of one component that cross without sharing a corner; which components cross each other,
+    (k, k); and whether ``limit`` visits sufficed. corners (m, 3): over welded vertices; component (m,).
+    """
+    return _crossings(vertices, corners, component, int(component.max()) + 1, _hierarchy(vertices, corners), limit)
+
+
 @njit(cache=True, nogil=True)
 def _hit(triangle: _Triangle, origin: _Vector, direction: _Vector, reach: float) -> tuple[int, bool]:
     """(sign, sure): +1 where the ray leaves through the triangle, −1 where it enters, 0 for a miss; sure: not near an
@@ -259,8 +243,7 @@ def _shoot(
     vertices: np.ndarray,
     corners: np.ndarray,
     component: np.ndarray,
-    order: np.ndarray,
-    boxes: np.ndarray,
+    tree: Hierarchy,
     own: int,
     origin: _Vector,
     direction: _Vector,
@@ -273,6 +256,7 @@ def _shoot(
     """
     winding[:] = 0
     sure[:] = True
+    order, _, boxes = tree
     inner = len(boxes) // 2
     stack = np.zeros(64, np.int64)
     top, visits = 1, 0
@@ -305,20 +289,17 @@ def _sides(
     vertices: np.ndarray,
     corners: np.ndarray,
     component: np.ndarray,
+    tree: Hierarchy,
     samples: np.ndarray,
     near: np.ndarray,
     reach: float,
-    limit: int,
 ) -> tuple[np.ndarray, np.ndarray, bool]:
-    """How many of each component's samples are outside and inside each other one, (k, k) each, and whether ``limit``
-    visits sufficed.
+    """Which components have samples outside and inside which others, (k, k) each, and whether the work limit sufficed.
 
     samples (s,): triangles in whose middle a ray begins; near (k, k): pairs whose boxes overlap.
     """
-    order, _, boxes = _hierarchy(vertices, corners)
-    count = near.shape[0]
-    outside, inside = np.zeros((count, count), np.int32), np.zeros((count, count), np.int32)
-    winding, sure = np.zeros(count, np.int64), np.ones(count, np.bool_)
+    outside, inside = np.zeros_like(near), np.zeros_like(near)
+    winding, sure = np.zeros(len(near), np.int64), np.ones(len(near), np.bool_)
     visits = 0
     for sample in samples:
         own = component[sample]
@@ -330,13 +311,13 @@ def _sides(
         )
         asked = near[own].copy()
         for direction in _DIRECTIONS:
-            visits += _shoot(vertices, corners, component, order, boxes, own, origin, direction, reach, winding, sure)
-            inside[own] += asked & sure & (winding != 0)
-            outside[own] += asked & sure & (winding == 0)
+            visits += _shoot(vertices, corners, component, tree, own, origin, direction, reach, winding, sure)
+            inside[own] |= asked & sure & (winding != 0)
+            outside[own] |= asked & sure & (winding == 0)
             asked &= ~sure
             if not asked.any():
                 break
-        if visits > limit:
+        if visits > WORK_LIMIT:
             return outside, inside, False
     return outside, inside, True
 
@@ -360,7 +341,8 @@ class Nesting:
 def component_nesting(vertices: np.ndarray, topology: Topology, sums: Components) -> Nesting:
     """How closed components lie to each other, and whether they pass through themselves."""
     component, count = topology.component, topology.components
-    within, found, complete = crossings(vertices, topology.corners, component, count, WORK_LIMIT)
+    tree = _hierarchy(vertices, topology.corners)
+    within, found, complete = _crossings(vertices, topology.corners, component, count, tree, WORK_LIMIT)
     near = np.all((sums.lower[:, None] <= sums.upper[None]) & (sums.lower[None] <= sums.upper[:, None]), axis=2)
     np.fill_diagonal(near, False)
     inside = np.zeros((count, count), dtype=bool)
@@ -370,11 +352,12 @@ def component_nesting(vertices: np.ndarray, topology: Topology, sums: Components
             own[:: -(-len(own) // SAMPLES)] for own, asked in zip(of_each, near.any(axis=1), strict=True) if asked
         ]
         reach = NEAR * float(np.linalg.norm(sums.upper.max(axis=0) - sums.lower.min(axis=0)))
-        chosen = np.concatenate(samples)
-        outside, inner, decided = _sides(vertices, topology.corners, component, chosen, near, reach, WORK_LIMIT)
-        on_both_sides = (outside > 0) & (inner > 0)
+        outside, inner, decided = _sides(
+            vertices, topology.corners, component, tree, np.concatenate(samples), near, reach
+        )
+        on_both_sides = outside & inner
         found = found | on_both_sides | on_both_sides.T
-        inside = (inner > 0) & (outside == 0) & ~found
+        inside = inner & ~outside & ~found
         complete = complete and decided
     pairs = tuple((int(i), int(j)) for i, j in np.argwhere(np.triu(found)))
     return Nesting(inside, pairs, int(within), bool(complete))

@@ -133,6 +133,9 @@ SERIES = {
 }
 """Per plot the names and colours of its scalars, in order. Of energies the last is there with a string alone."""
 
+ROUNDING = 1e-9
+"""Relative: what is smaller comes from the arithmetic, or from the digits of a mesh's coordinates."""
+
 ENERGY_UNIT, OMEGA_UNIT, MOMENTUM_UNIT, ANGLE_UNIT = "J", "rad/s", "kg m²/s", "°"
 
 ENERGY_TITLE = "Energy"
@@ -145,3 +148,8 @@ GHOST_ANGLE_TITLE = "Angle of the ghost to the body"
 def css(colour: Colour) -> str:
     """A colour as browsers write it."""
     return "rgb({},{},{})".format(*colour)
+
+
+def without_rounding(value: float, largest: float = 1.0) -> float:
+    """A number for people to read: 0 for what the arithmetic's rounding leaves beside ``largest``."""
+    return float(value) if abs(value) > ROUNDING * largest else 0.0

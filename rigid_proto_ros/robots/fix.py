@@ -6,7 +6,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from xml.parsers import expat
 
 import numpy as np
 
@@ -22,7 +21,13 @@ from .reading import robot_of
 _WRITERS = {"robot": urdf_inertial, "sdf": sdf_inertial, "mujoco": mjcf_inertial}
 _REPLACED = {"origin", "pose", "mass", "inertia", *("ixx", "ixy", "ixz", "iyy", "iyz", "izz")}
 """Elements of an <inertial> that the new one has, or needs no more."""
-_TAG = re.compile(rb"""<(?:"[^"]*"|'[^']*'|[^"'>])*>""")  # a > between quotes ends none
+_ATTRIBUTES = rb"""(?:"[^"]*"|'[^']*'|[^"'>])*"""  # a > between quotes ends no tag
+_INERTIAL = re.compile(
+    rb"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|"
+    rb"(?P<inertial><inertial(?=[\s/>])" + _ATTRIBUTES + rb"(?:(?<=/)>|>(?:<!--.*?-->|.)*?</inertial\s*>))",
+    re.DOTALL,
+)
+"""An <inertial>, or what may hold one that is no element."""
 
 
 @dataclass(frozen=True)
@@ -40,32 +45,8 @@ class FixedLink:
 
 
 def _places(data: bytes) -> list[tuple[int, int]]:
-    """Where the <inertial> elements begin and end, in the order in which they begin."""
-    found: list[tuple[int, int]] = []
-    skipped = len(b"\xef\xbb\xbf") if data.startswith(b"\xef\xbb\xbf") else 0
-    parser = expat.ParserCreate("iso-8859-1")  # in which every byte is a character: names and signs are in ASCII
-    starts: list[int] = []
-
-    def end_of_tag(start: int) -> int:
-        tag = _TAG.match(data, start)
-        if tag is None:  # expat has read one there
-            raise ValueError(f"no tag at byte {start}")
-        return tag.end()
-
-    def begin(_tag: str, _attributes: dict[str, str]) -> None:
-        starts.append(skipped + parser.CurrentByteIndex)
-
-    def finish(tag: str) -> None:
-        start = starts.pop()
-        end = end_of_tag(start)
-        if not data[start:end].endswith(b"/>"):
-            end = end_of_tag(skipped + parser.CurrentByteIndex)
-        if tag == "inertial":
-            found.append((start, end))
-
-    parser.StartElementHandler, parser.EndElementHandler = begin, finish
-    parser.Parse(data[skipped:], True)
-    return sorted(found)
+    """Where the <inertial> elements begin and end, in the file's order."""
+    return [match.span() for match in _INERTIAL.finditer(data) if match["inertial"]]
 
 
 def _indent(data: bytes, start: int) -> bytes:

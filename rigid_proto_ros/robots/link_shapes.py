@@ -15,7 +15,7 @@ from ..mass.from_mesh import MeshBody, mesh_body
 from ..mass.moments import referenced_vertices, solid_moments
 from ..mass.properties import MassProperties
 from ..mass.tensor import tensor_from_six
-from ..mesh.hull import box_surface, convex_hull
+from ..mesh.hull import convex_hull
 from ..mesh.locate import Search
 from ..mesh.reading import load_mesh
 from .model import Shape
@@ -50,37 +50,23 @@ def primitive_solid(kind: str, size: tuple[float, ...]) -> tuple[float, np.ndarr
 
 def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) and outward triangles (m, 3) of a primitive about its centre, ``size`` as in Shape; round ones
-    are inscribed.
+    are inscribed, with the same bounding box.
     """
+    from trimesh import creation
+
+    # Of unit size, since trimesh takes points closer than 1e-8 for one.
     if kind == "box":
-        half = 0.5 * np.array(size)
-        return box_surface(-half, half)
-    arc = np.linspace(-0.5 * math.pi, 0.5 * math.pi, SEGMENTS // 2 + 1)
-    if kind in ("sphere", "ellipsoid"):
-        vertices, triangles = _revolved(np.cos(arc), np.sin(arc))
-        return vertices * size, triangles
-    r, half_length = size[0], 0.5 * size[1]
-    if kind == "cylinder":
-        return _revolved(np.array([0.0, r, r, 0.0]), half_length * np.array([-1.0, -1.0, 1.0, 1.0]))
-    arc = np.insert(arc, len(arc) // 2, 0.0)
-    return _revolved(r * np.cos(arc), r * np.sin(arc) + np.repeat([-half_length, half_length], len(arc) // 2))
-
-
-def _revolved(radius: np.ndarray, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The closed surface that a profile (k,), from the axis below to the axis above, leaves around z."""
-    angle = 2.0 * math.pi / SEGMENTS * np.arange(SEGMENTS)
-    x, y = (np.outer(radius[1:-1], turn(angle)) for turn in (np.cos, np.sin))
-    rings = np.stack([x, y, np.repeat(height[1:-1, None], SEGMENTS, axis=1)], axis=2)
-    vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, height[0]], [0.0, 0.0, height[-1]]]])
-    near = np.arange(SEGMENTS)
-    far = np.roll(near, -1)
-    last, bottom, top = (len(rings) - 1) * SEGMENTS, len(vertices) - 2, len(vertices) - 1
-    triangles = [np.stack([np.full(SEGMENTS, bottom), far, near], axis=1)]
-    for start in range(0, last, SEGMENTS):
-        a, b, c, d = start + near, start + far, start + SEGMENTS + far, start + SEGMENTS + near
-        triangles += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
-    triangles.append(np.stack([last + near, last + far, np.full(SEGMENTS, top)], axis=1))
-    return vertices, np.concatenate(triangles)
+        made, stretch = creation.box((1.0, 1.0, 1.0)), size
+    elif kind in ("sphere", "ellipsoid"):
+        made, stretch = creation.icosphere(subdivisions=4), size * 3 if kind == "sphere" else size
+    elif kind == "cylinder":
+        made, stretch = creation.cylinder(1.0, 1.0, sections=SEGMENTS), (size[0], *size)
+    else:
+        made, stretch = creation.capsule(2.0, 1.0, count=(SEGMENTS, SEGMENTS // 2)), (size[0],) * 3
+    vertices = np.asarray(made.vertices) - made.bounds.mean(axis=0)
+    shift = 0.5 * size[1] - size[0] if kind == "capsule" else 0.0
+    upward = np.sign(vertices[:, 2:]) * (0.0, 0.0, shift)
+    return vertices * stretch + upward, np.asarray(made.faces, dtype=np.int64)
 
 
 class Meshes:

@@ -27,7 +27,6 @@ from .model import (
     Pose,
     Robot,
     Shape,
-    bare_link,
     parse_xml,
     printed_link,
     rotation_from_wxyz,
@@ -136,7 +135,7 @@ def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int)
 
 def _link(spec: Any, body: Any, name: str, shapes: list[Shape | None], inertial: Element | None) -> Link:
     """A body with the inertial that the file has."""
-    bare = bare_link(name, shapes)
+    bare = Link(name, tuple(filter(None, shapes)))
     if not body.explicitinertial:
         return bare
     if np.isnan(body.fullinertia[0]):
@@ -174,7 +173,7 @@ def _simulated(source: _Source, links: list[Link], names: list[str]) -> list[Lin
     for body, name in list(enumerate(names))[1:]:
         rotation = rotation_from_wxyz(model.body_iquat[body])
         link = replace(
-            known.get(name) or bare_link(name, ()),
+            known.get(name) or Link(name),
             mass=float(model.body_mass[body]),
             center_of_mass=model.body_ipos[body].copy(),
             inertia=rotation @ np.diag(model.body_inertia[body]) @ rotation.T,
@@ -199,9 +198,8 @@ def read_mjcf(root: Element, path: Path) -> Robot:
     shapes: dict[int, list[Shape | None]] = {body: [] for body in range(model.nbody)}
     for raw, placed in zip(spec.geoms, frames.geoms, strict=True):
         shapes[int(model.geom_bodyid[placed.id])].append(_shape(spec, raw, meshes, model, placed.id))
-    links = []
-    for raw, placed in zip(spec.bodies[1:], frames.bodies[1:], strict=True):
-        link = _link(spec, raw, names[placed.id], shapes[placed.id], inertials.get(raw.name) if raw.name else None)
-        if link.shapes or not link.problem:
-            links.append(link)
+    links = [
+        _link(spec, raw, names[placed.id], shapes[placed.id], inertials.get(raw.name) if raw.name else None)
+        for raw, placed in zip(spec.bodies[1:], frames.bodies[1:], strict=True)
+    ]
     return Robot(links, lambda: _poses(model, names), lambda: _simulated(source, links, names))

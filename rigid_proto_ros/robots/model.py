@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -61,18 +61,18 @@ class Shape:
 @dataclass(frozen=True)
 class Link:
     """What a file says of one link: mass [kg], COM (3,) [m] and tensor (3, 3) [kg m²] about it, both in the link's
-    axes; ``problem`` instead when there are none. The steps are half a unit of the last digit printed, for mass, COM
+    axes; ``problem`` says why when it doesn't. The steps are half a unit of the last digit printed, for mass, COM
     (3,) and tensor (3, 3): what a number may be off by for its printing alone. ``element``: the <inertial> that was
     read, None where the file has it from elsewhere. ``computed``: a
     simulator computes the inertial from the collision shapes, for the mass if there is one.
     """
 
     name: str
-    mass: float
-    center_of_mass: np.ndarray
-    inertia: np.ndarray
-    shapes: tuple[Shape, ...]
-    problem: str = ""
+    shapes: tuple[Shape, ...] = ()
+    problem: str = "no <inertial>"
+    mass: float = math.nan
+    center_of_mass: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
+    inertia: np.ndarray = field(default_factory=lambda: np.full((3, 3), math.nan))
     mass_step: float = 0.0
     center_step: np.ndarray = field(default_factory=lambda: np.zeros(3))
     inertia_step: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
@@ -80,7 +80,7 @@ class Link:
     computed: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass
 class Robot:
     """``links``: those with an inertial or a shape, in the file's order. ``poses`` gives the pose of each link by name
     with all joints at 0, in the frame of the root link (URDF), of the model (SDF) or of the world (MJCF), and raises
@@ -90,6 +90,9 @@ class Robot:
     links: list[Link]
     poses: Callable[[], dict[str, Pose]]
     simulated: Callable[[], list[Link]] | None = None
+
+    def __post_init__(self) -> None:
+        self.links = [link for link in self.links if link.shapes or not link.problem]
 
 
 def parse_xml(data: bytes, path: Path) -> Element:
@@ -148,23 +151,13 @@ def floats(text: str | None, default: str, count: int) -> np.ndarray:
 
 
 def printed_steps(words: list[str]) -> np.ndarray:
-    """Half a unit of the last digit of each number of a group, as a printer of fixed decimals or of fixed digits leaves
-    it open: 0.0005 for 0.012 alone. Trailing zeros that such a printer drops count, as the others of the group show
-    them.
-    """
-    values = [float(word) for word in words]
-    if not any(values):
-        return np.zeros(len(words))
-    decimals, digits = [], []
+    """Half a unit of the last digit that a group of numbers is printed with: 0.0005 for 0.012 alone; 0 for zeros."""
+    decimals = []
     for word in words:
         mantissa, _, exponent = word.strip().lower().partition("e")
         decimals.append(len(mantissa.partition(".")[2]) - int(exponent or 0))
-        digits.append(len(mantissa.replace(".", "").lstrip("+-0")))
-    steps = []
-    for value, own in zip(values, decimals, strict=True):
-        leading = math.floor(math.log10(abs(value))) if value and math.isfinite(value) else -400
-        steps.append(0.5 * 10.0 ** max(-max(decimals), min(-own, leading - max(digits) + 1)))
-    return np.array(steps)
+    step = 0.5 * 10.0 ** min(-max(decimals), 300) if any(float(word) for word in words) else 0.0
+    return np.full(len(words), step)
 
 
 def printed_link(
@@ -185,10 +178,3 @@ def printed_link(
         inertia_step=np.abs(rotation) @ step @ np.abs(rotation).T,
         element=element,
     )
-
-
-def bare_link(name: str, shapes: Iterable[Shape | None], problem: str = "no <inertial>") -> Link:
-    """A link of which the file doesn't say the mass or the tensor."""
-    present = tuple(shape for shape in shapes if shape is not None)
-    nothing = math.nan, np.full(3, math.nan), np.full((3, 3), math.nan)
-    return Link(name, *nothing, present, problem)

@@ -15,6 +15,7 @@ from ..base.errors import InputError
 from ..mass.model_difference import model_difference
 from ..mass.properties import MassProperties, explicit_mass_properties
 from ..mass.tensor import principal_axes, six_from_tensor
+from ..picture.style import without_rounding
 from ..scene.scenario import Scenario
 from .controls import TYPING_S, Controls, parse_numbers
 from .flight import Flight
@@ -128,9 +129,6 @@ def _own_mass(scenario: Scenario) -> float:
 
 # The true tensor beside an approximate one
 
-ROUNDING = 1e-9
-"""Relative: what is smaller comes from the arithmetic, or from the digits of the mesh's coordinates."""
-
 TURNED = 1e-6
 """[°] The same of an angle between axes, whose moments may be close to each other."""
 
@@ -222,4 +220,4 @@ def _degrees(angle: float) -> str:
 
 
 def _per_cent(error: float) -> str:
-    return f"{100.0 * error if abs(error) > ROUNDING else 0.0:+.3g}"
+    return f"{100.0 * without_rounding(error):+.3g}"

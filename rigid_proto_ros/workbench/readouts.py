@@ -48,9 +48,6 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 AXES: Any = ({"label": "seconds before now", "labelSize": 14, "size": 30}, {"size": AXIS_PIXELS})
 
-ROUNDING = 1e-9
-"""Relative, and in degrees: what is smaller comes from the arithmetic."""
-
 FLAT_ANGLE = 1.0
 """[°] An angle's plot spans at least this much: rounding isn't blown up to fill it."""
 
@@ -205,25 +202,21 @@ class Readings:
         while self._samples[0][0] < time_s - PLOTTED_S:
             self._samples.popleft()
         spin = float(np.linalg.norm(state.angular_velocity_body))
-        spins = " ".join(f"{x if abs(x) > ROUNDING * spin else 0.0:.3g}" for x in w)
+        spins = " ".join(f"{style.without_rounding(x, spin):.3g}" for x in w)
         self.values = {
-            SPEED: f"{_seen(float(np.linalg.norm(state.linear_velocity))):.4g} m/s",
-            SPIN: f"{_seen(spin):.4g} {style.OMEGA_UNIT}",
+            SPEED: f"{style.without_rounding(float(np.linalg.norm(state.linear_velocity))):.4g} m/s",
+            SPIN: f"{style.without_rounding(spin):.4g} {style.OMEGA_UNIT}",
             SPINS: f"{spins} {style.OMEGA_UNIT}",
             ENERGY: f"{total:.5g} {style.ENERGY_UNIT}",
-            TRANSLATIONAL: f"{_seen(translational):.4g} {style.ENERGY_UNIT}",
-            ROTATIONAL: f"{_seen(rotational):.4g} {style.ENERGY_UNIT}",
+            TRANSLATIONAL: f"{style.without_rounding(translational):.4g} {style.ENERGY_UNIT}",
+            ROTATIONAL: f"{style.without_rounding(rotational):.4g} {style.ENERGY_UNIT}",
             MOMENTUM: f"{length:.5g} {style.MOMENTUM_UNIT}",
-            DRIFT: f"{_seen(angle):.3g}{style.ANGLE_UNIT}",
-            COM_PLACE: " ".join(f"{_seen(x):.4g}" for x in state.position) + " m",
+            DRIFT: f"{style.without_rounding(angle):.3g}{style.ANGLE_UNIT}",
+            COM_PLACE: " ".join(f"{style.without_rounding(x):.4g}" for x in state.position) + " m",
         }
         if ghost is not None:
             apart = float(np.degrees(attitude_angle(np.array(state.orientation_xyzw), ghost[3:7])))
             self.values[GHOST_ANGLE] = f"{apart:.0f}{style.ANGLE_UNIT}"
-
-
-def _seen(value: float) -> float:
-    return value if abs(value) > ROUNDING else 0.0
 
 
 class ReadoutTab:

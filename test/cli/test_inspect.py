@@ -181,6 +181,16 @@ def test_the_printed_report_names_every_model_and_remark(capsys, tmp_path):
         assert words in out
 
 
+def test_what_rounding_leaves_is_0_for_people_and_itself_in_json(capsys):
+    assert main(["inspect", "t_handle"]) == 0
+    told = capsys.readouterr().out
+    assert (
+        "inertia             2.14234e-05   0             0 " in told and "centre of mass      0             0  " in told
+    )
+    assert main(["inspect", "t_handle", "--json"]) == 0
+    assert 0.0 < abs(json.loads(capsys.readouterr().out)["inertia"][0][1]) < 1e-14
+
+
 def test_rerun_and_rclpy_are_not_imported():
     code = (
         "import sys; from rigid_proto_ros.cli.main import main; main(['inspect', 'book', '--json']); "

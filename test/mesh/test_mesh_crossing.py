@@ -11,7 +11,7 @@ from judged_meshes import body, codes
 from mass_solids import box, sphere
 from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES
 
-from rigid_proto_ros.mesh.intersection import WORK_LIMIT, crossings, triangles_cross
+from rigid_proto_ros.mesh.intersection import crossings, triangles_cross
 from rigid_proto_ros.mesh.topology import mesh_topology
 
 
@@ -36,7 +36,7 @@ def exactly_cross(first: np.ndarray, second: np.ndarray) -> bool:
 
 def within_one(points: np.ndarray, corners: np.ndarray) -> int:
     """Pairs of triangles that cross, all being of one component."""
-    return crossings(points, corners, np.zeros(len(corners), np.int64), 1, WORK_LIMIT)[0]
+    return crossings(points, corners, np.zeros(len(corners), np.int64))[0]
 
 
 def soup(count: int, seed: int) -> np.ndarray:
@@ -60,10 +60,10 @@ def test_crossing_triangles_are_those_that_exact_arithmetic_finds():
     expected = np.zeros((40, 40), dtype=bool)
     for i, j in pairs:
         expected[component[i], component[j]] = expected[component[j], component[i]] = component[i] != component[j]
-    within, found, complete = crossings(points, corners, component, 40, WORK_LIMIT)
+    within, found, complete = crossings(points, corners, component)
     assert complete and np.array_equal(found, expected) and found.any() and not found.all()
     assert within == sum(component[i] == component[j] for i, j in pairs)
-    assert not crossings(points, corners, component, 40, 10)[2]
+    assert not crossings(points, corners, component, 10)[2]
 
 
 def test_triangles_that_share_a_corner_do_not_cross():

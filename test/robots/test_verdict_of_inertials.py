@@ -111,7 +111,7 @@ def point_masses(masses, points) -> Link:
     inertia = (masses[:, None, None] * ((r * r).sum(1)[:, None, None] * np.eye(3) - r[:, :, None] * r[:, None, :])).sum(
         0
     )
-    return Link("l", float(masses.sum()), center, inertia, ())
+    return Link("l", (), "", float(masses.sum()), center, inertia)
 
 
 PLACED = st.tuples(
@@ -154,5 +154,5 @@ def test_masses_at_both_ends_of_something_longer_are_found(placed, longer, direc
     ends = middle + np.outer([longer * along.min() - margin, longer * along.max() + margin], axis)
     inertial = point_masses(np.ones(2), ends)
     tiny = 1e-3 * np.trace(inertial.inertia) * np.eye(3)
-    found = Link("l", inertial.mass, inertial.center_of_mass, inertial.inertia + tiny, ())
+    found = Link("l", (), "", inertial.mass, inertial.center_of_mass, inertial.inertia + tiny)
     assert beyond_shapes(found, points)
