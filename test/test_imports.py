@@ -42,13 +42,13 @@ ALLOWED = {
     "trimesh": ("mesh.assembly", "robots.link_shapes"),
     "collada": ("mesh.assembly",),
     "mujoco": ("robots.mjcf",),
-    "manifold3d": ("mesh.union", "bodies.surfaces"),
+    "manifold3d": ("mesh.solids", "bodies.surfaces"),
     "rerun": ("rerun_view",),
     "rerun_bindings": ("rerun_view",),
     "pyarrow": ("rerun_view", "sweep.table", "export.table"),  # comes with rerun, as PIL does
     "PIL": ("rerun_view",),
     "pxr": ("export.usd",),
-    "scipy": ("mesh.hull", "identify"),
+    "scipy": ("mesh.solids", "identify"),
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
     "viser": ("workbench",),
     "websockets": ("workbench",),  # comes with viser

@@ -12,9 +12,8 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..mesh import cache as mesh_cache
-from ..mesh.hull import box_surface, convex_hull
 from ..mesh.reading import Mesh, load_mesh
-from ..mesh.union import can_unite, united_surface
+from ..mesh.solids import box_surface, can_unite, convex_hull, united_surface
 from .moments import referenced_vertices
 from .properties import MeshMoments, Surface
 from .repair import close_surface, repair_surface
@@ -92,7 +91,7 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
 def _stand_in(vertices: np.ndarray, triangles: np.ndarray, fallback: str) -> tuple[np.ndarray, np.ndarray]:
     points = referenced_vertices(vertices, triangles)
     if fallback == "hull":
-        return points, convex_hull(points)
+        return convex_hull(points)
     return box_surface(points.min(axis=0), points.max(axis=0))
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..base.errors import MeshError
 from ..mesh.intersection import Nesting, component_nesting
+from ..mesh.solids import can_unite, united
 from ..mesh.topology import Components, Topology, component_sums, fan, mesh_topology, rims, surplus_copies
-from ..mesh.union import can_unite, united
 from .moments import referenced_vertices, solid_moments
 
 INFO, WARNING, ERROR = "info", "warning", "error"

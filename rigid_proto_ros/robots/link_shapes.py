@@ -15,9 +15,9 @@ from ..mass.from_mesh import MeshBody, mesh_body
 from ..mass.moments import referenced_vertices, solid_moments
 from ..mass.properties import MassProperties
 from ..mass.tensor import tensor_from_six
-from ..mesh.hull import convex_hull
 from ..mesh.locate import Search
 from ..mesh.reading import load_mesh
+from ..mesh.solids import convex_hull
 from .model import Shape
 
 SEGMENTS = 48
@@ -168,7 +168,7 @@ class LinkShapes:
     def hull(self, mass: float) -> MassProperties | None:
         """The convex hull of all as a solid of ``mass`` kg; None when it has no volume."""
         try:
-            hull = solid_moments(self.points, convex_hull(self.points))
+            hull = solid_moments(*convex_hull(self.points))
         except InputError:
             return None
         return _spread(mass, hull.centroid, tensor_from_six((hull.second / hull.measure).tolist()))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..mass.tensor import check_tensor
-from ..mesh.hull import convex_hull
+from ..mesh.solids import convex_hull
 from .model import Link
 
 MARGIN = 1e-3
@@ -83,17 +83,17 @@ def _spread(count: int) -> np.ndarray:
 
 
 def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (n, 3) and normals (m, 3) of the hull; of points in one plane, or without SciPy, all points and none."""
+    """Corners (n, 3) and normals (m, 3) of the hull; of points that have none, or without SciPy, all and none."""
     try:
-        triangles = convex_hull(points)
+        corners, triangles = convex_hull(points)
     except InputError:
         return points, np.zeros((0, 3))
-    a, b, c = (points[triangles[:, k]] for k in range(3))
+    a, b, c = (corners[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     size = np.linalg.norm(normals, axis=1)
     normals = np.unique(np.round(normals[size > 0.0] / size[size > 0.0][:, None], 3), axis=0)
     normals = normals[:: max(1, len(normals) // 1000)]  # a smooth hull has more than are needed
-    return points[np.unique(triangles)], normals / np.linalg.norm(normals, axis=1)[:, None]
+    return corners, normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 def _words(axis: np.ndarray) -> str:

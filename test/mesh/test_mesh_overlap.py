@@ -7,7 +7,7 @@ from judged_meshes import body, codes, volume
 from mass_solids import box, inward, moved, sphere, together
 
 from rigid_proto_ros.mass.inspection import verify_moments
-from rigid_proto_ros.mesh import union
+from rigid_proto_ros.mesh import solids
 
 
 def message(made, code: str) -> str:
@@ -52,7 +52,7 @@ def test_the_union_keeps_a_cavity_and_what_lies_in_it():
 
 
 def test_without_manifold3d_the_overlap_is_told_and_the_sum_is_taken(monkeypatch):
-    monkeypatch.setattr(union, "can_unite", lambda: False)
+    monkeypatch.setattr(solids, "can_unite", lambda: False)
     monkeypatch.setattr("rigid_proto_ros.mass.verdict.can_unite", lambda: False)
     two = body(together(box(), moved(box(), (0.5, 0.1, 0.2))))
     assert "[meshes]" in message(two, "overlapping_components")

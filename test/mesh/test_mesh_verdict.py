@@ -16,8 +16,8 @@ from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.moments import solid_moments
 from rigid_proto_ros.mass.repair import RepairedSurface
 from rigid_proto_ros.mesh import intersection
-from rigid_proto_ros.mesh.hull import convex_hull
 from rigid_proto_ros.mesh.reading import load_mesh
+from rigid_proto_ros.mesh.solids import convex_hull
 from rigid_proto_ros.mesh.topology import mesh_topology
 
 BALL = sphere(10)
@@ -220,11 +220,11 @@ def test_the_hull_is_closed_convex_and_holds_every_point(seed, count, kind, expo
         with pytest.raises(MeshError):
             convex_hull(points)
         return
-    triangles = convex_hull(points)
-    topology = mesh_topology(points, triangles)
+    corners, triangles = convex_hull(points)
+    topology = mesh_topology(corners, triangles)
     assert (len(topology.unbalanced), topology.components) == (0, 1)
-    assert solid_moments(points, triangles).measure > 0.0
-    a, b, c = (points[triangles[:, k]] for k in range(3))
+    assert solid_moments(corners, triangles).measure > 0.0
+    a, b, c = (corners[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     heights = np.einsum("fk,fpk->fp", normals, points[None] - a[:, None])
     volume_scale = spread[0] ** 2 * spread[2]
