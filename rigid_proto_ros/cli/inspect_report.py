@@ -75,7 +75,7 @@ def _print_models(inspection: Inspection) -> None:
         if "solid" in inspection.models and name != "solid":
             difference = inspection.difference(name)
             errors = (without_rounding(error) for error in difference.principal_moments)
-            offset = difference.center_of_mass_offset
+            offset = float(np.linalg.norm(difference.center_of_mass))
             cells.append(", ".join(f"{100.0 * error:+.3g}" for error in errors) + " %")
             cells.append(f"{without_rounding(math.degrees(difference.axes_turned), 1e3):.3g}")
             cells.append(f"{without_rounding(offset, float(np.linalg.norm(inspection.upper - inspection.lower))):.3g}")

@@ -8,6 +8,7 @@ never a part of it.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -19,31 +20,11 @@ CHUNK = 4096
 
 @dataclass(frozen=True)
 class ExactMoments:
-    """volume, centroid (3 numbers) and second moments about the centroid (xx, xy, xz, yy, yz, zz) as Fractions."""
+    """volume, centroid (3 numbers) and inertia (3 rows of 3) at unit density about it, as Fractions."""
 
     volume: Fraction
-    centroid: tuple[Fraction, Fraction, Fraction]
-    second: tuple[Fraction, ...]
-
-    def scaled(self, scale: np.ndarray) -> ExactMoments:
-        """The moments after mesh coordinates are multiplied by ``scale`` (3 doubles, taken exactly), kept outward."""
-        s = [Fraction(float(value)) for value in scale]
-        stretch = abs(s[0] * s[1] * s[2])
-        pairs = [(i, j) for i in range(3) for j in range(i, 3)]
-        second = tuple(stretch * s[i] * s[j] * value for (i, j), value in zip(pairs, self.second, strict=True))
-        x, y, z = self.centroid
-        return ExactMoments(self.volume * stretch, (s[0] * x, s[1] * y, s[2] * z), second)
-
-    def outward(self) -> ExactMoments:
-        """The same solid wound outward."""
-        if self.volume >= 0:
-            return self
-        return ExactMoments(-self.volume, self.centroid, tuple(-value for value in self.second))
-
-    def inertia(self) -> list[list[Fraction]]:
-        """Inertia (3, 3) about the centroid at unit density."""
-        xx, xy, xz, yy, yz, zz = self.second
-        return [[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]]
+    centroid: tuple[Fraction, ...]
+    inertia: tuple[tuple[Fraction, ...], ...]
 
 
 def _as_integers(vertices: np.ndarray) -> tuple[np.ndarray, int]:
@@ -56,8 +37,11 @@ def _as_integers(vertices: np.ndarray) -> tuple[np.ndarray, int]:
     return np.array(flat, dtype=object).reshape(vertices.shape), power
 
 
-def exact_solid_moments(vertices: np.ndarray, triangles: np.ndarray) -> ExactMoments:
-    """Exact signed moments of the solid that triangles (m, 3) over vertices (n, 3) float64 bound.
+def exact_solid_moments(
+    vertices: np.ndarray, triangles: np.ndarray, scale: Iterable[float] = (1.0, 1.0, 1.0)
+) -> ExactMoments:
+    """Exact moments of the solid that triangles (m, 3) over vertices (n, 3) float64 bound, as if wound outward, after
+    its coordinates are multiplied by ``scale`` (3 doubles, taken exactly).
 
     Raises ZeroDivisionError when the volume is zero.
     """
@@ -66,29 +50,29 @@ def exact_solid_moments(vertices: np.ndarray, triangles: np.ndarray) -> ExactMom
     used = np.unique(triangles)
     middle = [sum(whole[used, k].tolist()) // len(used) for k in range(3)]
     points = whole - np.array(middle, dtype=object)
-    raw = [0] * 10
+    zeroth, first, second = 0, [0] * 3, [[0] * 3 for _ in range(3)]
     for start in range(0, len(triangles), CHUNK):
-        part = triangles[start : start + CHUNK]
-        a, b, c = (points[part[:, k]].T for k in range(3))
+        a, b, c = (points[triangles[start : start + CHUNK, k]].T for k in range(3))
         d = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-        s = [a[k] + b[k] + c[k] for k in range(3)]
-        raw[0] += sum(d.tolist())
-        slot = 4
+        s = a + b + c
+        zeroth += sum(d.tolist())
         for i in range(3):
-            raw[1 + i] += sum((d * s[i]).tolist())
-            for j in range(i, 3):
-                raw[slot] += sum((d * (s[i] * s[j] + a[i] * a[j] + b[i] * b[j] + c[i] * c[j])).tolist())
-                slot += 1
-    unit = Fraction(2) ** power
-    volume = Fraction(raw[0], 6) * unit**3
-    offset = [Fraction(raw[1 + k], 24) * unit**4 / volume for k in range(3)]
-    second, slot = [], 4
+            first[i] += sum((d * s[i]).tolist())
+            for j in range(i + 1):
+                second[i][j] += sum((d * (s[i] * s[j] + a[i] * a[j] + b[i] * b[j] + c[i] * c[j])).tolist())
+    unit, stretch = Fraction(2) ** power, [Fraction(float(value)) for value in scale]
+    volume = Fraction(zeroth, 6) * unit**3
+    center = [Fraction(moment, 24) * unit**4 / volume for moment in first]
+    outward = abs(stretch[0] * stretch[1] * stretch[2]) * (1 if volume > 0 else -1)
+    spread = [[Fraction(0)] * 3 for _ in range(3)]
     for i in range(3):
-        for j in range(i, 3):
-            second.append(Fraction(raw[slot], 120) * unit**5 - volume * offset[i] * offset[j])
-            slot += 1
-    centroid = tuple(offset[k] + middle[k] * unit for k in range(3))
-    return ExactMoments(volume, centroid, tuple(second))
+        for j in range(i + 1):
+            moment = Fraction(second[i][j], 120) * unit**5 - volume * center[i] * center[j]
+            spread[i][j] = spread[j][i] = outward * stretch[i] * stretch[j] * moment
+    whole_spread = spread[0][0] + spread[1][1] + spread[2][2]
+    inertia = tuple(tuple((whole_spread if i == j else 0) - spread[i][j] for j in range(3)) for i in range(3))
+    centroid = tuple(stretch[k] * (center[k] + middle[k] * unit) for k in range(3))
+    return ExactMoments(outward * volume, centroid, inertia)
 
 
 def relative_errors(
@@ -96,7 +80,7 @@ def relative_errors(
 ) -> dict[str, float]:
     """How far doubles are from ``exact``: volume_error |ΔV|/V, inertia_error max|ΔI|/max|I| (unit density, about the
     centroid), center_of_mass_error the largest |Δc_k| beyond one ulp of c_k, over the box's ``diagonal``."""
-    truth = exact.inertia()
+    truth = exact.inertia
     largest = max(abs(value) for row in truth for value in row)
     worst = max(abs(Fraction(float(inertia[i, j])) - truth[i][j]) for i in range(3) for j in range(3))
     beyond = max(

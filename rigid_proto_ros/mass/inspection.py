@@ -142,7 +142,7 @@ def verify_moments(body: MeshBody, scale: np.ndarray) -> dict[str, float]:
     """Errors of the solid's volume, centroid and inertia against rational arithmetic on the same vertices."""
     moments = body.moments
     vertices, triangles = moments.solid_surface()  # refuses what bounds no solid
-    exact = exact_solid_moments(vertices, triangles).outward().scaled(scale)
+    exact = exact_solid_moments(vertices, triangles, scale.tolist())
     unit = moments.mass_properties("solid", scale=scale, density=1.0)
     points = referenced_vertices(vertices, triangles) * scale
     diagonal = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))

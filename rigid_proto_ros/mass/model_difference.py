@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 
@@ -17,66 +17,51 @@ from .tensor import degenerate_pairs, principal_axes
 class ModelDifference:
     """principal_moments (3,): relative errors of the moments, in ascending order, each by its own. axes_turned [rad]:
     the smallest turn that brings the principal axes onto the true ones. center_of_mass (3,): offset from the true one
-    [m]. tensor: max|ΔI|/max|I| of the entries.
+    [m].
     """
 
     principal_moments: np.ndarray
     axes_turned: float
     center_of_mass: np.ndarray
-    tensor: float
-
-    @property
-    def center_of_mass_offset(self) -> float:
-        """Distance of the centres of mass [m]."""
-        return float(np.linalg.norm(self.center_of_mass))
 
 
 def model_difference(properties: MassProperties, true: MassProperties) -> ModelDifference:
     """How ``properties`` differ from the true ones."""
     moments, axes = principal_axes(properties.inertia)
     true_moments, true_axes = principal_axes(true.inertia)
-    return ModelDifference(
-        moments / true_moments - 1.0,
-        axes_turned(axes, degenerate_pairs(moments), true_axes, degenerate_pairs(true_moments)),
-        properties.center_of_mass - true.center_of_mass,
-        float(np.abs(properties.inertia - true.inertia).max() / np.abs(true.inertia).max()),
-    )
-
-
-def axes_turned(axes: np.ndarray, equal: tuple, others: np.ndarray, others_equal: tuple) -> float:
-    """The smallest angle [rad] of a rotation that takes one set of principal axes (3, 3), columns, to another.
-
-    An axis has no sign. ``equal`` says that the first and the second moment are the same, or the second and the third:
-    axes within their span are arbitrary, and what turns within it is no difference.
-    """
-    mine, theirs = _symmetry_axis(equal), _symmetry_axis(others_equal)
-    if mine is ANY or theirs is ANY:
-        return 0.0
-    if mine is None and theirs is None:
-        return min(_angle(others @ np.diag((a, b, a * b)) @ axes.T) for a, b in product((1.0, -1.0), repeat=2))
-    if mine is None or theirs is None or mine == theirs:
-        # What is free about one axis leaves only that axis to be brought over.
-        axis = theirs if mine is None else mine
-        return _between_lines(axes[:, axis], others[:, axis])
-    # Mine has to end anywhere across theirs.
-    return 0.5 * math.pi - _between_lines(axes[:, mine], others[:, theirs])
+    turned = _axes_turned(axes, _symmetry_axis(moments), true_axes, _symmetry_axis(true_moments))
+    return ModelDifference(moments / true_moments - 1.0, turned, properties.center_of_mass - true.center_of_mass)
 
 
 ANY = -1
 
 
-def _symmetry_axis(equal: tuple) -> int | None:
-    """The axis about which the tensor is symmetric, None without one, ANY where all moments are the same."""
-    if all(equal):
+def _symmetry_axis(moments: np.ndarray) -> int | None:
+    """The axis about which a tensor is symmetric, None without one, ANY where all moments are the same."""
+    first, last = degenerate_pairs(moments)
+    if first and last:
         return ANY
-    return 2 if equal[0] else 0 if equal[1] else None
+    return 2 if first else 0 if last else None
 
 
-def _angle(R: np.ndarray) -> float:
-    """Of a rotation matrix, accurate for small ones too."""
-    across = np.array([R[j, i] - R[i, j] for i, j in (*pairwise(range(3)), (2, 0))])
-    return math.atan2(float(np.linalg.norm(across)), float(np.trace(R)) - 1.0)
+def _axes_turned(axes: np.ndarray, mine: int | None, others: np.ndarray, theirs: int | None) -> float:
+    """The smallest angle [rad] of a rotation that takes one set of principal axes (3, 3), columns, to another.
 
-
-def _between_lines(a: np.ndarray, b: np.ndarray) -> float:
-    return math.atan2(float(np.linalg.norm(np.cross(a, b))), abs(float(a @ b)))
+    An axis has no sign. Those across an axis of symmetry are arbitrary, and what turns within their span is no
+    difference.
+    """
+    if mine is ANY or theirs is ANY:
+        return 0.0
+    if mine is None and theirs is None:
+        angles = []
+        for a, b in product((1.0, -1.0), repeat=2):
+            R = others @ np.diag((a, b, a * b)) @ axes.T
+            across = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+            angles.append(math.atan2(float(np.linalg.norm(across)), float(np.trace(R)) - 1.0))
+        return min(angles)
+    one = mine if mine is not None else theirs
+    other = theirs if theirs is not None else mine
+    a, b = axes[:, one], others[:, other]
+    between = math.atan2(float(np.linalg.norm(np.cross(a, b))), abs(float(a @ b)))
+    # Where the axes of symmetry are different ones, mine has to end anywhere across theirs.
+    return between if one == other else 0.5 * math.pi - between

@@ -22,7 +22,7 @@ REAL = ("spot.obj", "sword.obj", "sword_quads.obj", "nefertiti_lowres.obj")
 
 
 def errors(vertices, triangles) -> dict[str, float]:
-    exact = exact_solid_moments(vertices, triangles).outward()
+    exact = exact_solid_moments(vertices, triangles)
     properties = MeshMoments(vertices, triangles).mass_properties(density=1.0)
     diagonal = np.linalg.norm(np.ptp(vertices, axis=0))
     return relative_errors(exact, properties.mass, properties.center_of_mass, properties.inertia, diagonal)
