@@ -53,8 +53,7 @@ def run(args: argparse.Namespace) -> int:
     record = FlightRecord()
     OfflineRun(scenario, script, record).advance(duration_ns)
     made, _ = frames(record, source_of_scene(scenario, script), FPS)
-    ghosts = dict(zip(made.ghosts.times_ns, made.ghosts.rows, strict=True))
     with whole_file("--html", args.html) as path:
-        path.write_text(lesson_html(shown, made.changes, made.times_ns, made.rows, ghosts), encoding="utf-8")
+        path.write_text(lesson_html(shown, made), encoding="utf-8")
     print(f"{args.html}: {duration_ns / 1e9:g} s of {args.name}; open it in a browser")
     return 0

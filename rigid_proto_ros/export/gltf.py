@@ -19,11 +19,12 @@ from ..base.errors import InputError
 from ..base.files import whole_file
 from ..mesh.locate import resolve_mesh
 from ..picture import style
+from ..picture.backend import DrawnMesh
 from ..picture.style import Colour
 from ..scene.scene_file import read_scene_text
 from ..simulation.observer import BodyChanged, BodySnapshot, GhostChanged, MeshChanged, Started
 from .flight_record import FlightRecord
-from .tracks import BODIES, MeshSteps, Tracks
+from .tracks import BODIES, MESHES, Tracks
 
 FLOAT, UNSIGNED_INT = 5126, 5125
 VERTICES, INDICES = 34962, 34963
@@ -119,11 +120,14 @@ class Document:
         )
 
     def animate_steps(self, node: int, seconds: np.ndarray, **values: np.ndarray) -> None:
-        """Give a node what holds from time to time, (n, 3) of a path; without an animation where that never changes."""
+        """Give a node what holds from frame to frame, (n, 3) of a path; no animation where that never changes."""
+        # Half-way to the frame, for a player's own rounding of the time.
+        begins = np.append(seconds[:1], 0.5 * (seconds[1:] + seconds[:-1]))
         for path, own in values.items():
             self.lists["nodes"][node][path] = own[0].tolist()
-            if np.ptp(own, axis=0).any():
-                self.animate(node, path, seconds, own, "STEP")
+            changes = np.append(True, np.any(own[1:] != own[:-1], axis=1))
+            if changes[1:].any():
+                self.animate(node, path, begins[changes], own[changes], "STEP")
 
     def binary(self) -> bytes:
         """The file's bytes."""
@@ -148,46 +152,38 @@ def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
     """Write the body, and ghost and string where there are any."""
     document = Document(int(record.times_ns[0]))
     root = document.node("flight", None, rotation=Y_UP, extras={"first_time_s": record.times_ns[0] * 1e-9})
-    for name, part, mesh in BODIES:
-        times_ns, positions, attitudes = tracks.poses(part)
-        if not len(times_ns):
+    for name, part in BODIES.items():
+        track = tracks.track(part)
+        if track is None:
             continue
-        seconds = document.seconds(times_ns)
+        seconds = document.seconds(track.times_ns)
         kind = BodyChanged if name == "body" else GhostChanged
         node = document.node(
             name,
             root,
-            translation=positions[0].tolist(),
-            rotation=attitudes[0].tolist(),
-            extras=_mass_properties(record.bodies(kind)[0][1]),
+            translation=track.positions[0].tolist(),
+            rotation=track.attitudes[0].tolist(),
+            extras=_mass_properties(record.bodies(kind)[0]),
         )
-        document.animate(node, "translation", seconds, positions)
-        document.animate(node, "rotation", seconds, attitudes)
-        steps = tracks.mesh_steps(mesh)
-        if steps is not None:
-            _draw_mesh(document, node, name, steps, style.STYLES[mesh], model_of(record) if name == "body" else None)
+        document.animate(node, "translation", seconds, track.positions)
+        document.animate(node, "rotation", seconds, track.attitudes)
+        if track.surface is not None:
+            below = document.node(f"{name} mesh", node)
+            document.animate_steps(below, seconds, scale=track.mesh_scales, translation=track.mesh_places)
+            model = model_of(record) if name == "body" else None
+            if model is None:
+                _draw_surface(document, below, name, track.surface, style.STYLES[MESHES[part]])
+            else:
+                data, middle = model
+                inner = document.node("model", below, translation=(-middle).tolist())
+                document.lists["nodes"][inner]["children"] = add_model(document, data)
     _draw_string(document, root, tracks.string)
     with whole_file("--gltf", file) as path:
         path.write_bytes(document.binary())
 
 
-def _draw_mesh(
-    document: Document,
-    body: int,
-    name: str,
-    steps: MeshSteps,
-    look: style.Style,
-    model: tuple[bytes, np.ndarray] | None,
-) -> None:
-    """A node below the body's that has its mesh, or the ``model`` as ``model_of`` has it."""
-    node = document.node(f"{name} mesh", body)
-    document.animate_steps(node, document.seconds(steps.times_ns), scale=steps.scales, translation=steps.positions)
-    if model is not None:
-        data, middle = model
-        below = document.node("model", node, translation=(-middle).tolist())
-        document.lists["nodes"][below]["children"] = add_model(document, data)
-        return
-    surface = steps.surface
+def _draw_surface(document: Document, node: int, name: str, surface: DrawnMesh, look: style.Style) -> None:
+    """Give a node this mesh."""
     attributes = {
         "POSITION": document.accessor(surface.vertices, VERTICES, bounds=True),
         "NORMAL": document.accessor(surface.normals, VERTICES),
@@ -252,14 +248,15 @@ def model_of(record: FlightRecord) -> tuple[bytes, np.ndarray] | None:
     return data, 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
 
 
-REFERENCES = (
-    ("accessors", "bufferView", "bufferViews"),
-    ("images", "bufferView", "bufferViews"),
-    ("textures", "sampler", "samplers"),
-    ("textures", "source", "images"),
-    ("nodes", "mesh", "meshes"),
-)
-"""Items of a list, and by which property they name an item of which other one."""
+REFERENCES = {
+    "bufferView": "bufferViews",
+    "indices": "accessors",
+    "material": "materials",
+    "mesh": "meshes",
+    "sampler": "samplers",
+    "source": "images",
+}
+"""Properties that name an item of a list by its number."""
 
 
 def add_model(document: Document, data: bytes) -> list[int]:
@@ -272,45 +269,35 @@ def add_model(document: Document, data: bytes) -> list[int]:
     start = {kind: len(own) for kind, own in document.lists.items()}
     for view in model.get("bufferViews", ()):
         view["byteOffset"] = begin + view.get("byteOffset", 0)
-    for kind, name, named in REFERENCES:
-        for item in model.get(kind, ()):
-            _move(item, name, start[named])
-    for extension in (own for texture in model.get("textures", ()) for own in texture.get("extensions", {}).values()):
-        _move(extension, "source", start["images"])
-    for material in model.get("materials", ()):
-        _move_textures(material, start["textures"])
-    for primitive in (one for mesh in model.get("meshes", ()) for one in mesh["primitives"]):
-        _move_primitive(primitive, start)
     for node in model.get("nodes", ()):
         for left_out in ("skin", "camera"):
             node.pop(left_out, None)
         if "children" in node:
             node["children"] = [child + start["nodes"] for child in node["children"]]
     for kind in LISTS:
-        document.lists[kind] += model.get(kind, [])
+        items = model.get(kind, [])
+        for item in items:
+            _renumber(item, start)
+        document.lists[kind] += items
     for name, own in document.extensions.items():
         own |= set(model.get(name, ()))
     return [root + start["nodes"] for root in model["scenes"][model.get("scene", 0)]["nodes"]]
 
 
-def _move_primitive(primitive: dict[str, Any], start: dict[str, int]) -> None:
-    _move(primitive, "indices", start["accessors"])
-    _move(primitive, "material", start["materials"])
-    for attributes in (primitive["attributes"], *primitive.get("targets", ())):
-        for name in attributes:
-            _move(attributes, name, start["accessors"])
-
-
-def _move(item: dict[str, Any], name: str, by: int) -> None:
-    """Let an item name what stands so many places farther on."""
-    if name in item:
-        item[name] += by
-
-
-def _move_textures(material: dict[str, Any], by: int) -> None:
-    """The same of all textures that a material or an extension of it names."""
-    for name, value in material.items():
-        if isinstance(value, dict):
+def _renumber(item: dict[str, Any], start: dict[str, int]) -> None:
+    """Let an item name what stands so many places farther on in each list."""
+    for name, value in item.items():
+        if name == "extras":
+            continue
+        if name in REFERENCES and isinstance(value, int):
+            item[name] = value + start[REFERENCES[name]]
+        elif name in ("attributes", "targets"):
+            for attributes in [value] if name == "attributes" else value:
+                for attribute in attributes:
+                    attributes[attribute] += start["accessors"]
+        else:
+            for inner in value if isinstance(value, list) else [value]:
+                if isinstance(inner, dict):
+                    _renumber(inner, start)
             if name.endswith("Texture"):
-                _move(value, "index", by)
-            _move_textures(value, by)
+                value["index"] += start["textures"]

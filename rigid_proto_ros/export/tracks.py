@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The picture as tracks: what a file for other tools holds of body, ghost and string, by time."""
+"""The picture as tracks: what a file for other tools holds of body, ghost and string at each frame."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,35 +13,27 @@ from ..picture import style
 from ..picture.backend import Backend, DrawnMesh
 from ..picture.picture import Picture
 from ..picture.style import Colour
-from ..simulation.observer import BodyChanged, GhostChanged, MeshChanged, StringChanged
 from .flight_record import FlightRecord
 
-BODIES = (("body", style.BODY, style.BODY_MESH), ("ghost", style.GHOST, style.GHOST_MESH))
-"""Names of what moves, the part of the picture that it is, and that of its mesh."""
+BODIES = {"body": style.BODY, "ghost": style.GHOST}
+"""Parts of the picture that move, by their names in a file."""
+MESHES = {style.BODY: style.BODY_MESH, style.GHOST: style.GHOST_MESH}
 
 WANTED = frozenset({style.GHOST, style.GHOST_MESH, style.STRING})
 
 
-@dataclass
-class _Track:
-    """A part's frame at times_ns (n,): positions (n, 3) [m], attitudes (n, 4) xyzw, and scales (n, 3) of those that are
-    given one.
+@dataclass(frozen=True)
+class Track:
+    """A body at times_ns (n,): its positions (n, 3) [m] and unit quaternions (n, 4); its mesh, None without one, and
+    that mesh's places [m] and scales (n, 3) in its frame.
     """
 
-    times_ns: list[np.ndarray] = field(default_factory=list)
-    positions: list[np.ndarray] = field(default_factory=list)
-    attitudes: list[np.ndarray] = field(default_factory=list)
-    scales: list[np.ndarray] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class MeshSteps:
-    """The mesh of a part: from each of times_ns (n,) on it has the scales and positions (n, 3)."""
-
-    surface: DrawnMesh
     times_ns: np.ndarray
-    scales: np.ndarray
     positions: np.ndarray
+    attitudes: np.ndarray
+    mesh_places: np.ndarray
+    mesh_scales: np.ndarray
+    surface: DrawnMesh | None
 
 
 class Tracks(Backend):
@@ -52,8 +44,9 @@ class Tracks(Backend):
     def __init__(self) -> None:
         self.size = 0.0
         self.string: dict[int, np.ndarray | None] = {}
-        self._places: dict[str, _Track] = {}
-        self._meshes: dict[str, DrawnMesh] = {}
+        self._surfaces: dict[str, DrawnMesh] = {}
+        self._mesh_in_force: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._drawn: dict[str, list[tuple[np.ndarray, ...]]] = {}
         self._times = np.zeros(0, np.int64)
 
     def begin(self, times_ns: np.ndarray) -> None:
@@ -66,9 +59,7 @@ class Tracks(Backend):
 
     def mesh(self, name: str, surface: DrawnMesh | None) -> None:
         """Keep the mesh; raises InputError for another one in flight."""
-        if surface is None:
-            return
-        if self._meshes.setdefault(name, surface) is not surface:
+        if surface is not None and self._surfaces.setdefault(name, surface) is not surface:
             reason = f"the mesh changes at {self._times[0] / 1e9:.9g} s"
             raise InputError("session", reason, "a flight of one mesh, for --gltf and --usd")
 
@@ -79,15 +70,15 @@ class Tracks(Backend):
         attitudes: np.ndarray | None = None,
         scale: np.ndarray | None = None,
     ) -> None:
-        """Keep the part's frame."""
-        track = self._places.setdefault(name, _Track())
-        track.times_ns.append(self._times)
-        if positions is not None:
-            track.positions.append(positions)
-        if attitudes is not None:
-            track.attitudes.append(attitudes)
-        if scale is not None:
-            track.scales.append(np.tile(scale, (len(self._times), 1)))
+        """Keep where a mesh lies in its body, or the body's frames."""
+        if name in MESHES.values() and positions is not None and scale is not None:
+            self._mesh_in_force[name] = positions[0], scale
+        elif name in MESHES and positions is not None and attitudes is not None:
+            in_force = self._mesh_in_force.get(MESHES[name], (np.zeros(3), np.ones(3)))
+            meshes = [np.tile(value, (len(positions), 1)) for value in in_force]
+            unit = attitudes / np.linalg.norm(attitudes, axis=1, keepdims=True)
+            self._drawn.setdefault(name, []).append((self._times, positions, unit, *meshes))
+            self.string |= dict.fromkeys(self._times.tolist()) if name == style.BODY else {}
 
     def lines(
         self,
@@ -102,23 +93,11 @@ class Tracks(Backend):
             for time_ns, count in zip(self._times.tolist(), counts.tolist(), strict=True):
                 self.string[time_ns] = next(rest)[[0, -1]] if count else None
 
-    def poses(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Times (n,) [ns], positions (n, 3) and unit quaternions (n, 4) of a body; of none there are none."""
-        track = self._places.get(name)
-        if track is None:
-            return np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 4))
-        times_ns, positions, attitudes = map(np.concatenate, (track.times_ns, track.positions, track.attitudes))
-        return times_ns, positions, attitudes / np.linalg.norm(attitudes, axis=1, keepdims=True)
-
-    def mesh_steps(self, name: str) -> MeshSteps | None:
-        """The mesh of a part; None of a body without one."""
-        if name not in self._meshes:
+    def track(self, part: str) -> Track | None:
+        """What a file holds of a part in BODIES; None where it isn't drawn."""
+        if part not in self._drawn:
             return None
-        track = self._places[name]
-        times_ns, positions, scales = map(np.concatenate, (track.times_ns, track.positions, track.scales))
-        # Of several at one time the last counts.
-        last = np.append(times_ns[1:] > times_ns[:-1], True)
-        return MeshSteps(self._meshes[name], times_ns[last], scales[last], positions[last])
+        return Track(*map(np.concatenate, zip(*self._drawn[part], strict=True)), self._surfaces.get(MESHES[part]))
 
 
 def tracks_of(record: FlightRecord) -> Tracks:
@@ -127,20 +106,21 @@ def tracks_of(record: FlightRecord) -> Tracks:
     """
     tracks = Tracks()
     picture = Picture(tracks, WANTED.__contains__, rate=1_000_000_000)
-    start_ns, drawn_ns = int(record.times_ns[0]), -1.0
-
-    def draw(until_ns: float) -> None:
-        picture.draw(*record.states.between(drawn_ns, until_ns))
-        if picture.ghost is not None:
-            picture.draw_ghost(*record.ghosts.between(drawn_ns, until_ns))
-
-    for event in record.changes:
-        if event.time_ns > start_ns:
-            if isinstance(event, StringChanged):
-                event = event._replace(time_ns=event.time_ns + 1)
-            elif isinstance(event, MeshChanged | BodyChanged | GhostChanged):
-                draw(event.time_ns)
-                drawn_ns = event.time_ns
-        picture.on(event)
-    draw(np.inf)
+    times_ns, rows = record.times_ns, record.rows
+    ghost_times_ns = np.array(list(record.ghosts), np.int64)
+    ghost_rows = np.array(list(record.ghosts.values())).reshape(-1, 13)
+    drawn = ghosts_drawn = 0
+    for event in [*record.changes, None]:
+        last_ns = np.inf if event is None else event.time_ns
+        if last_ns > times_ns[0]:
+            end, ghosts_end = (
+                np.searchsorted(times_ns, last_ns, "right"),
+                np.searchsorted(ghost_times_ns, last_ns, "right"),
+            )
+            picture.draw(times_ns[drawn:end], rows[drawn:end])
+            if picture.ghost is not None:
+                picture.draw_ghost(ghost_times_ns[ghosts_drawn:ghosts_end], ghost_rows[ghosts_drawn:ghosts_end])
+            drawn, ghosts_drawn = end, ghosts_end
+        if event is not None:
+            picture.on(event)
     return tracks

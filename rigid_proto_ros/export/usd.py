@@ -7,7 +7,6 @@ tensor are the prim's own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +20,7 @@ from ..picture.backend import DrawnMesh
 from ..simulation.observer import BodyChanged
 from . import check_library
 from .flight_record import FlightRecord
-from .tracks import BODIES, MeshSteps, Tracks
+from .tracks import BODIES, MESHES, Track, Tracks
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdGeom
@@ -43,39 +42,33 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
     UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
     stage.SetTimeCodesPerSecond(fps)
     stage.SetFramesPerSecond(fps)
-    clock = _Clock(int(record.times_ns[0]), fps)
+    start_ns = int(record.times_ns[0])
+
+    def codes(times_ns: np.ndarray) -> list[float]:
+        return (np.maximum(times_ns - start_ns, 0) * 1e-9 * fps).tolist()
+
     stage.SetStartTimeCode(0.0)
-    stage.SetEndTimeCode(clock.code(int(record.times_ns[-1])))
+    stage.SetEndTimeCode(codes(record.times_ns)[-1])
     root = UsdGeom.Xform.Define(stage, "/flight")
     stage.SetDefaultPrim(root.GetPrim())
-    for name, part, mesh in BODIES:
-        times_ns, positions, attitudes = tracks.poses(part)
-        if not len(times_ns):
+    for name, part in BODIES.items():
+        track = tracks.track(part)
+        if track is None:
             continue
         prim = UsdGeom.Xform.Define(stage, f"/flight/{name}")
-        _animate(prim, [clock.code(t) for t in times_ns.tolist()], positions, attitudes)
-        steps = tracks.mesh_steps(mesh)
-        if steps is not None:
-            _draw_mesh(stage, prim, style.STYLES[mesh], steps, clock)
+        _animate(prim, codes(track.times_ns), track.positions, track.attitudes)
+        if track.surface is not None:
+            mesh = UsdGeom.Mesh.Define(stage, prim.GetPath().AppendChild("mesh"))
+            _fill(mesh, track.surface, style.STYLES[MESHES[part]])
+            _place_mesh(mesh, codes(track.times_ns), track)
     changed = _add_physics(stage, record)
-    _draw_string(stage, tracks.string, clock, STRING_WIDTH * tracks.size)
+    _draw_string(stage, tracks.string, codes(np.array(list(tracks.string), np.int64)), STRING_WIDTH * tracks.size)
     with whole_file("--usd", file) as path:
         # The library takes an empty file for a damaged one.
         path.unlink()
         if not stage.GetRootLayer().Export(str(path)):
             raise InputError("--usd", file, "a file that can be written")
     return ["mass or tensor change: the body's are those of the start"] if changed else []
-
-
-@dataclass(frozen=True)
-class _Clock:
-    """Time codes of simulated times; start_ns [ns] is that of code 0."""
-
-    start_ns: int
-    rate: float
-
-    def code(self, time_ns: int) -> float:
-        return max(0, time_ns - self.start_ns) * 1e-9 * self.rate
 
 
 def _animate(prim: UsdGeom.Xform, codes: list[float], positions: np.ndarray, attitudes: np.ndarray) -> None:
@@ -89,28 +82,18 @@ def _animate(prim: UsdGeom.Xform, codes: list[float], positions: np.ndarray, att
         attitude.Set(Gf.Quatd(w, x, y, z), code)
 
 
-def _show(prim: UsdGeom.Imageable, shown: bool, time_code: float) -> None:
-    from pxr import UsdGeom
-
-    prim.CreateVisibilityAttr().Set(UsdGeom.Tokens.inherited if shown else UsdGeom.Tokens.invisible, time_code)
-
-
-def _draw_mesh(stage: Usd.Stage, body: UsdGeom.Xform, look: style.Style, steps: MeshSteps, clock: _Clock) -> None:
-    """A prim for the mesh below the body's; values that change do so from one instant to the next."""
+def _place_mesh(prim: UsdGeom.Mesh, codes: list[float], track: Track) -> None:
+    """Where the mesh lies in its body: once, or at each frame where that changes in flight."""
     from pxr import Gf, UsdGeom
 
-    prim = UsdGeom.Mesh.Define(stage, body.GetPath().AppendChild("mesh"))
-    _fill(prim, steps.surface, look)
     place = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)
     size = prim.AddScaleOp(UsdGeom.XformOp.PrecisionDouble)
-    for op, values in ((place, steps.positions.tolist()), (size, steps.scales.tolist())):
-        if len(values) == 1:
-            op.Set(Gf.Vec3d(*values[0]))
+    for op, values in ((place, track.mesh_places), (size, track.mesh_scales)):
+        if not np.ptp(values, axis=0).any():
+            op.Set(Gf.Vec3d(*values[0].tolist()))
             continue
-        op.Set(Gf.Vec3d(*values[0]), 0.0)
-        for time_ns, before, after in zip(steps.times_ns[1:].tolist(), values, values[1:], strict=False):
-            op.Set(Gf.Vec3d(*before), clock.code(time_ns))
-            op.Set(Gf.Vec3d(*after), clock.code(time_ns + 1))
+        for code, value in zip(codes, values.tolist(), strict=True):
+            op.Set(Gf.Vec3d(*value), code)
 
 
 def _fill(prim: UsdGeom.Mesh, surface: DrawnMesh, look: style.Style) -> None:
@@ -136,7 +119,7 @@ def _add_physics(stage: Usd.Stage, record: FlightRecord) -> bool:
     """
     from pxr import Gf, UsdPhysics
 
-    (_, body), *later = record.bodies(BodyChanged)
+    body, *later = record.bodies(BodyChanged)
     row = record.rows[0]
     prim = stage.GetPrimAtPath("/flight/body")
     rigid = UsdPhysics.RigidBodyAPI.Apply(prim)
@@ -154,10 +137,10 @@ def _add_physics(stage: Usd.Stage, record: FlightRecord) -> bool:
     pull = float(np.linalg.norm(body.gravity))
     scene.CreateGravityMagnitudeAttr(pull)
     scene.CreateGravityDirectionAttr(Gf.Vec3f(*(body.gravity / pull if pull else [0.0, 0.0, -1.0])))
-    return any(own.mass != body.mass or not np.array_equal(own.inertia, body.inertia) for _, own in later)
+    return any(own.mass != body.mass or not np.array_equal(own.inertia, body.inertia) for own in later)
 
 
-def _draw_string(stage: Usd.Stage, string: dict[int, np.ndarray | None], clock: _Clock, width: float) -> None:
+def _draw_string(stage: Usd.Stage, string: dict[int, np.ndarray | None], codes: list[float], width: float) -> None:
     """A straight curve from the free end to the knot, seen while a string is tied."""
     from pxr import Gf, UsdGeom, Vt
 
@@ -169,13 +152,9 @@ def _draw_string(stage: Usd.Stage, string: dict[int, np.ndarray | None], clock: 
     curve.CreateWidthsAttr([width])
     curve.SetWidthsInterpolation(UsdGeom.Tokens.constant)
     curve.CreateDisplayColorAttr([Gf.Vec3f(*(np.array(style.STRING_COLOUR) / 255.0).tolist())])
-    points, extent = curve.CreatePointsAttr(), curve.CreateExtentAttr()
-    shown = None
-    for time_ns, own in string.items():
-        code = clock.code(time_ns)
-        if shown != (own is not None):
-            shown = own is not None
-            _show(curve, shown, code)
+    points, extent, shown = curve.CreatePointsAttr(), curve.CreateExtentAttr(), curve.CreateVisibilityAttr()
+    for code, own in zip(codes, string.values(), strict=True):
+        shown.Set(UsdGeom.Tokens.invisible if own is None else UsdGeom.Tokens.inherited, code)
         if own is not None:
             ends, reach = own.astype(np.float32), np.float32(0.5 * width)
             points.Set(Vt.Vec3fArray.FromNumpy(ends), code)

@@ -14,6 +14,7 @@ from html import escape
 import numpy as np
 import viser
 
+from ..export.flight_record import FlightRecord
 from ..picture import style
 from ..picture.picture import Picture
 from ..scene.lessons import Lesson
@@ -47,21 +48,13 @@ small {{ color: #666; }}
 """The player beside the words; on a narrow screen above them."""
 
 
-def lesson_html(
-    lesson: Lesson,
-    changes: Sequence[Event],
-    times_ns: np.ndarray,
-    rows: np.ndarray,
-    ghosts: dict[int, np.ndarray],
-) -> str:
-    """The file's text. changes: the flight's events that aren't states; rows (n, 13): its states at times_ns (n,), as
-    far apart as they are to be played; ghosts: the ghost's states by time.
-    """
+def lesson_html(lesson: Lesson, record: FlightRecord) -> str:
+    """The file's text. record: the flight, with states as far apart as they are to be played."""
     # Its greeting would stand between the lines that the command prints.
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", verbose=False)
     try:
-        player = _recorded(server, changes, times_ns, rows, ghosts)
+        player = _recorded(server, record)
     finally:
         stop_server(server)
     # viser 1.1 leaves the canvas of a recording nearly transparent where it has begun to fade it in.
@@ -78,14 +71,9 @@ def lesson_html(
     )
 
 
-def _recorded(
-    server: viser.ViserServer,
-    changes: Sequence[Event],
-    times_ns: np.ndarray,
-    rows: np.ndarray,
-    ghosts: dict[int, np.ndarray],
-) -> str:
+def _recorded(server: viser.ViserServer, record: FlightRecord) -> str:
     """The player with the motion in it."""
+    changes, times_ns, rows, ghosts = record.changes, record.times_ns, record.rows, record.ghosts
     room = Room(server)
     shown = set(SHOWN)
     falls = any(isinstance(event, BodyChanged) and np.any(event.body.gravity) for event in changes)

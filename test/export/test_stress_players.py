@@ -13,7 +13,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from test_gltf import CHANGES, THROWN
+from test_animations import CHANGES, THROWN
 
 from rigid_proto_ros.cli.main import main
 
