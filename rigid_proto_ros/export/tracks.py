@@ -97,7 +97,9 @@ class Tracks(Backend):
         """What a file holds of a part in BODIES; None where it isn't drawn."""
         if part not in self._drawn:
             return None
-        return Track(*map(np.concatenate, zip(*self._drawn[part], strict=True)), self._surfaces.get(MESHES[part]))
+        times_ns, *rest = map(np.concatenate, zip(*self._drawn[part], strict=True))
+        positions, attitudes, places, scales = rest
+        return Track(times_ns, positions, attitudes, places, scales, self._surfaces.get(MESHES[part]))
 
 
 def tracks_of(record: FlightRecord) -> Tracks:
