@@ -63,7 +63,7 @@ def drawn_string_ms(flown) -> list[float]:
     """From a move of the hand to another end of the string in what the browsers are sent."""
     from rigid_proto_ros.picture import style
 
-    page, found = flown.page, []
+    page, loop, found = flown.page, flown.server.get_event_loop(), []
 
     async def moved(x: float) -> float:
         hand = page.backend._nodes.get(style.HAND)
@@ -76,21 +76,21 @@ def drawn_string_ms(flown) -> list[float]:
     async def grab() -> None:
         page.pointer.grab(1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
-    asyncio.run_coroutine_threadsafe(grab(), page.loop).result(30.0)
+    asyncio.run_coroutine_threadsafe(grab(), loop).result(30.0)
     for k in range(MOVES):
         time.sleep(random.uniform(0.2, 0.24))  # the end has come to the target before, which takes 0.1 s
-        found.append(asyncio.run_coroutine_threadsafe(moved(0.2 + 1e-3 * k), page.loop).result(30.0))
-    page.loop.call_soon_threadsafe(page.pointer.let_go)
+        found.append(asyncio.run_coroutine_threadsafe(moved(0.2 + 1e-3 * k), loop).result(30.0))
+    loop.call_soon_threadsafe(page.pointer.let_go)
     return found
 
 
 def memory_mb(flown, minutes: float) -> list[float]:
     """Of this process, ten times, while it is poked every second and reset now and then."""
-    page, found = flown.page, []
+    page, loop, found = flown.page, flown.server.get_event_loop(), []
     end = time.monotonic() + 60.0 * minutes
     for k in range(10):
         while time.monotonic() < end - 60.0 * minutes * (9 - k) / 10:
-            page.loop.call_soon_threadsafe(page.flight.do, {"at": "com", "torque": [1e-3, 0.0, 0.0]})
+            loop.call_soon_threadsafe(page.flight.do, {"at": "com", "torque": [1e-3, 0.0, 0.0]})
             time.sleep(1.0)
         if k % 3 == 2:
             flown.live.reset()

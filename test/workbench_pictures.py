@@ -118,8 +118,7 @@ def draw_moving(page: Browser, file: Path) -> None:
     """The T-handle turns over, its ghost with the box's tensor doesn't; then a poke, and a pull on the string."""
     begin(page, lesson("t_handle"), "bounding_box")
     answer(page)
-    page.flown.page.tools.frequency = 3.0
-    page.flown.live.set_parameters({"poke_duration": 0.3})
+    page.flown.live.set_parameters({"string.frequency": 3.0, "poke_duration": 0.3})
     pictures = play(page, 2.2, 22)
     page.click(*com(page))
     time.sleep(0.3)

@@ -303,7 +303,7 @@ class Picture:
     def _draw_string(self, string: StringRows, rows: np.ndarray) -> None:
         assert self.body is not None and self.shape is not None
         backend, tied, counts = self.backend, string.tied, string.tied.astype(int)
-        directions, pulls = string.directions, string.tensions > 0.0
+        directions, pulls = string.directions, string.pulls
         distances = np.linalg.norm(np.cross(directions, rows[tied, 0:3] - string.free), axis=1)
         if self._wanted(style.STRING):
             slack = np.linalg.norm(string.knots - string.free, axis=1) < string.lengths
@@ -322,10 +322,9 @@ class Picture:
             ends = string.knots + LINE_SIZES * self.shape.size * directions
             backend.lines(style.STRING_LINE, pulling, list(np.stack([string.knots, ends], axis=1)[pulls]))
         if self._wanted("plots"):
-            for name, values in ((style.STRING_TENSION, string.tensions), (style.STRING_LINE_DISTANCE, distances)):
-                plotted = np.zeros((len(rows), 1))
-                plotted[tied, 0] = values
-                backend.scalars(name, plotted)
+            plotted = np.zeros((len(rows), 1))
+            plotted[tied, 0] = distances
+            backend.scalars(style.STRING_LINE_DISTANCE, plotted)
 
     def draw_ghost(self, times_ns: np.ndarray, rows: np.ndarray) -> None:
         """States (n, 13) of the ghost, after the body's of the same times."""

@@ -38,22 +38,18 @@ def string_curves(free: np.ndarray, knots: np.ndarray, lengths: np.ndarray, grav
     return straight + low[:, np.newaxis, np.newaxis] * bulge
 
 
-NO_DIRECTION = 1e-12
-"""In rest lengths: a string shorter than this has no direction to pull in."""
-
-
 @dataclass(frozen=True)
 class StringRows:
     """The string at those m of n states at which one is tied: tied (n,) says which. free and knots (m, 3) [m, world];
-    lengths (m,) [m] of a slack one, 0 of one that is always straight; tensions (m,) [N]; energies (m,) [J].
+    lengths (m,) [m] of a slack one, 0 of one that is always straight; energies (m,) [J]; pulls (m,): it is taut.
     """
 
     tied: np.ndarray
     free: np.ndarray
     knots: np.ndarray
     lengths: np.ndarray
-    tensions: np.ndarray
     energies: np.ndarray
+    pulls: np.ndarray
 
     @property
     def directions(self) -> np.ndarray:
@@ -96,48 +92,21 @@ class Strings:
 
     def rows(self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray) -> StringRows:
         """The string at times (n,), ascending, of states (n, 13) with attitudes R (n, 3, 3)."""
-        found = StringRows(np.zeros(len(rows), dtype=bool), *np.zeros((2, len(rows), 3)), *np.zeros((3, len(rows))))
+        tied, pulls = np.zeros((2, len(rows)), dtype=bool)
+        found = StringRows(tied, *np.zeros((2, len(rows), 3)), *np.zeros((2, len(rows))), pulls)
         for at, string in self._spells(times_ns):
             attach = np.asarray(string.attach, dtype=float)
-            arm = R[at] @ attach
-            velocity = rows[at, 7:10] + np.einsum("nij,nj->ni", R[at], np.cross(rows[at, 10:13], attach))
             found.tied[at] = True
             found.free[at] = string.free_end(times_ns[at])
-            found.knots[at] = rows[at, 0:3] + arm
+            found.knots[at] = rows[at, 0:3] + R[at] @ attach
             found.lengths[at] = 0.0 if string.bilateral else string.rest_length
-            span = found.knots[at] - found.free[at]
-            stretch = np.linalg.norm(span, axis=1) - string.rest_length
-            found.tensions[at] = _tension(string, span, velocity - _hand_velocity(string, times_ns[at]))
+            stretch = np.linalg.norm(found.knots[at] - found.free[at], axis=1) - string.rest_length
+            found.pulls[at] = string.bilateral | (stretch > 0.0)
             stretch = stretch if string.bilateral else np.maximum(stretch, 0.0)
             found.energies[at] = 0.5 * string.stiffness * stretch**2
-        tied = found.tied
         return StringRows(tied, *(getattr(found, name)[tied] for name in list(vars(found))[1:]))
 
     def forget_before(self, time_ns: int) -> None:
         """Keep what later states need."""
         while len(self._changes) > 1 and self._changes[1][0] <= time_ns:
             self._changes.pop(0)
-
-
-def _hand_velocity(string: ShownString, times_ns: np.ndarray) -> np.ndarray:
-    """Velocity (n, 3) [m/s] of the free end."""
-    lasts_ns = string.end_ns - string.begin_ns
-    if lasts_ns <= 0:
-        return np.zeros((len(times_ns), 3))
-    speed = (np.asarray(string.target, dtype=float) - string.origin) / (1e-9 * lasts_ns)
-    return (times_ns < string.end_ns)[:, np.newaxis] * speed
-
-
-def _tension(string: ShownString, span: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """Tension (n,) [N]: k x + c ẋ, and nothing for a string that would have to push. span, velocity (n, 3): from the
-    free end to the knot, and how fast that changes.
-    """
-    if string.rest_length == 0.0:
-        return np.linalg.norm(string.stiffness * span + string.damping * velocity, axis=1)
-    distance = np.linalg.norm(span, axis=1)
-    direction = span / np.maximum(distance, np.finfo(float).tiny)[:, np.newaxis]
-    stretch = distance - string.rest_length
-    tension = string.stiffness * stretch + string.damping * np.einsum("ij,ij->i", direction, velocity)
-    if not string.bilateral:
-        tension = np.where(stretch > 0.0, np.maximum(tension, 0.0), 0.0)
-    return np.where(distance < NO_DIRECTION * string.rest_length, 0.0, tension)

@@ -113,7 +113,6 @@ ANGULAR_VELOCITY_PRINCIPAL = "plots/angular_velocity_principal"
 POSITION = "plots/position"
 GHOST_ANGLE = "plots/ghost_angle"
 STRING_LINE_DISTANCE = "plots/string_line_distance"
-STRING_TENSION = "plots/string_tension"
 
 ENERGY_SERIES = (("translational", BLUE), ("rotational", ORANGE), ("gravity", GREEN))
 TOTAL_ENERGY_SERIES, STRING_ENERGY_SERIES = (("total", GREY),), (("string", YELLOW),)
@@ -128,7 +127,6 @@ SERIES = {
     ANGULAR_VELOCITY_PRINCIPAL: OMEGA_SERIES,
     POSITION: (("x", RED), ("y", GREEN), ("z", BLUE)),
     GHOST_ANGLE: (("ghost to body", GHOST_COLOUR),),
-    STRING_TENSION: (("string", ORANGE),),
     STRING_LINE_DISTANCE: (("COM to the string's line", YELLOW),),
 }
 """Per plot the names and colours of its scalars, in order. Of energies the last is there with a string alone."""

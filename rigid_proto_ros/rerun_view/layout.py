@@ -52,7 +52,6 @@ TITLES = {
     style.ANGULAR_MOMENTUM_ANGLE: f"{style.MOMENTUM_ANGLE_TITLE} [{style.ANGLE_UNIT}]",
     style.GHOST_ANGLE: f"{style.GHOST_ANGLE_TITLE} [{style.ANGLE_UNIT}]",
     style.POSITION: "Position of the COM [m]",
-    style.STRING_TENSION: "Tension of the string [N]",
     style.STRING_LINE_DISTANCE: "Distance of the COM from the string's line [m]",
 }
 
@@ -81,7 +80,7 @@ class Subject:
         if self.dropped_term:
             return [style.ANGULAR_MOMENTUM_ANGLE, style.ANGULAR_MOMENTUM, style.ENERGY]
         if self.tied:
-            return [style.STRING_LINE_DISTANCE, style.STRING_TENSION, style.ENERGY]
+            return [style.STRING_LINE_DISTANCE, style.ANGULAR_VELOCITY_PRINCIPAL, style.ENERGY]
         if self.falls:
             return [style.POSITION, style.ANGULAR_VELOCITY_PRINCIPAL, style.ENERGY]
         return [style.ANGULAR_VELOCITY_PRINCIPAL, style.ANGULAR_MOMENTUM, style.ENERGY]
@@ -133,19 +132,10 @@ def value_axis(low: float, high: float, least: float = 0.0) -> tuple[float, floa
     span = max(high - low, NARROWEST * max(abs(low), abs(high)), least) or 2.0
     middle = 0.5 * (low + high)
     low, high = min(low, middle - 0.5 * span), max(high, middle + 0.5 * span)
+    # The ends are numbered ticks, and no curve lies on the frame.
     step = 10.0 ** math.ceil(math.log10((1.0 + 2.0 * ROOM) * (high - low) / NUMBERED_TICKS_MAX))
-    first, last = math.ceil(low / step), math.floor(high / step)
-    if last < first:
-        low, high = step * last, step * first
-    elif last == first:
-        # One tick: up or down to the next one, whichever is nearer.
-        up, down = step * (first + 1), step * (first - 1)
-        low, high = (low, up) if up - high <= low - down else (down, high)
+    low, high = step * math.floor(low / step), step * math.ceil(high / step)
     room = ROOM * (high - low)
-    # A tick that the room would reach has room of its own.
-    below, above = step * math.floor(low / step), step * math.ceil(high / step)
-    low = below if below >= low - room else low
-    high = above if above <= high + room else high
     return low - room, high + room
 
 

@@ -157,61 +157,45 @@ def model_properties(scenario: Scenario, model: str, com: str = "") -> MassPrope
 
 
 def comparison(scenario: Scenario) -> str:
-    """The true tensor and the one in force, or the bounding box's where that is the true one: what counts for the
-    motion in a sentence, and a table of the numbers.
+    """The true tensor and the one in force, or the bounding box's where that is the true one, as a table.
 
     Errors are relative to each moment.
     """
     flying = str(scenario.parameters.inertia_model)
     other = "bounding_box" if flying == "solid" else flying
     try:
-        true = model_properties(scenario, "solid")
-    except InputError as error:
-        return f"Simulating: **{flying}**. No true tensor: {error}"
-    try:
-        approximate = model_properties(scenario, other)
+        true, approximate = model_properties(scenario, "solid"), model_properties(scenario, other)
         own = model_properties(scenario, other, com="model")
     except InputError as error:
-        return f"Simulating: **{flying}**. No {other} to compare with: {error}"
+        return f"Simulating: **{flying}**. Nothing to compare with: {error}"
     difference = model_difference(approximate, true)
-    title = TITLES.get(other, other)
-    what = f"Simulating: **{TITLES.get(flying, flying)}**. "
-    what += f"The {title} would have" if flying == "solid" else "Compared with the true solid, it has"
-    percents = ", ".join(_per_cent(error) for error in difference.principal_moments)
+    title, surface = TITLES.get(other, other), scenario.setup.surface
+    size = 1.0 if surface is None else float(np.linalg.norm(surface.extent * scenario.setup.body.scale))
+    away = float(np.linalg.norm(own.center_of_mass - true.center_of_mass))
+    masses = f"{true.mass:.5g} | {approximate.mass:.5g} | {_per_cent(approximate.mass / true.mass - 1.0)} %"
     lines = [
-        what,
-        "",
-        f"- principal moments off by **{percents} %**",
-        f"- principal axes turned by **{_degrees(difference.axes_turned)}**",
-        f"- {_com_text(scenario, difference.center_of_mass, own.center_of_mass - true.center_of_mass)}",
+        f"Simulating: **{TITLES.get(flying, flying)}**",
         "",
         f"|  | {TITLES['solid']} | {title} | error |",
         "| --- | --- | --- | --- |",
+        *(
+            f"| I{'₁₂₃'[k]} [kg m²] | {a:.5g} | {b:.5g} | **{_per_cent(error)} %** |"
+            for k, (a, b, error) in enumerate(
+                zip(
+                    principal_axes(true.inertia)[0],
+                    principal_axes(approximate.inertia)[0],
+                    difference.principal_moments,
+                    strict=True,
+                )
+            )
+        ),
+        f"| principal axes turned by | | | **{_degrees(difference.axes_turned)}** |",
+        f"| mass [kg] | {masses} |",
+        f"| COM of its own, off by | | {away:.3g} m | **{100.0 * away / size:.2g} % of the size** |",
     ]
-    moments = zip(
-        principal_axes(true.inertia)[0],
-        principal_axes(approximate.inertia)[0],
-        difference.principal_moments,
-        strict=True,
-    )
-    lines += [
-        f"| I{'₁₂₃'[k]} [kg m²] | {a:.5g} | {b:.5g} | {_per_cent(error)} % |" for k, (a, b, error) in enumerate(moments)
-    ]
-    lines.append(
-        f"| mass [kg] | {true.mass:.5g} | {approximate.mass:.5g} | {_per_cent(approximate.mass / true.mass - 1.0)} % |"
-    )
+    if np.linalg.norm(difference.center_of_mass) < 1e-9 * size < away:
+        lines += ["", "It is simulated with the COM of the solid."]
     return "\n".join(lines)
-
-
-def _com_text(scenario: Scenario, off: np.ndarray, own: np.ndarray) -> str:
-    surface = scenario.setup.surface
-    size = 1.0 if surface is None else float(np.linalg.norm(surface.extent * scenario.setup.body.scale))
-    away, own_away = float(np.linalg.norm(off)), float(np.linalg.norm(own))
-    text = f"COM offset **{away:.3g} m**, {100.0 * away / size:.2g} % of the size"
-    if away < 1e-9 * size < own_away:
-        share = f"{100.0 * own_away / size:.2g} % of the size"
-        return f"COM of the solid; the model's own is {own_away:.3g} m off, {share}"
-    return text
 
 
 def _degrees(angle: float) -> str:

@@ -191,7 +191,7 @@ class Page:
     def close(self) -> None:
         """Leave nothing on the disk."""
         self.flight.close()
-        self.body_tab.upload.uploads.close()
+        self.body_tab.upload.close()
 
     # Browsers come and go
 

@@ -48,8 +48,6 @@ class ForcesTab:
                 suits = "Of a poke by a click; times a force that suits the body's mass and size"
                 force: Any = log_slider(gui, "Force ×", FORCE_DECADES, suits)
                 self._force = gui.add_html("")
-                hint = "Frequency of the string that a drag ties: light and heavy bodies respond alike"
-                strength = gui.add_slider("String [rad/s]", 1.0, 40.0, 0.5, tools.frequency, hint=hint)
             with gui.add_folder("Motion"):
                 controls.numbers("initial.angular_velocity", "Initial spin [rad/s]", 3)
                 controls.checkbox("gyroscopic", "Gyroscopic term ω × Iω")
@@ -63,12 +61,6 @@ class ForcesTab:
             if event.client is not None:
                 tools.force = float(f"{tools.usual_force * 10.0 ** force.value[0]:.3g}")
                 self.show_force()
-
-        @strength.on_update
-        async def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:
-                tools.frequency = float(strength.value)
-                flight.set({"string.frequency": tools.frequency})
 
         @gravity.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:

@@ -27,6 +27,9 @@ HOLD_S = 0.2
 is short.
 """
 
+FREQUENCY = 8.0
+"""[rad/s] Of a string whose scene has none, on the effective mass: light and heavy bodies respond alike."""
+
 POKE_TRAVEL = 0.3
 """Body sizes a second: what the suggested poke gives the body."""
 
@@ -36,13 +39,10 @@ MODIFIERS: tuple[Any, ...] = (None, "shift")
 
 @dataclass
 class Tools:
-    """What the panel says about the pointer. force [N], usual_force: one that suits the body. frequency [rad/s]: of the
-    string, on the effective mass.
-    """
+    """What the panel says about the pointer. force [N], usual_force: one that suits the body."""
 
     force: float = 1.0
     usual_force: float = 1.0
-    frequency: float = 8.0
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Pointer:
 
     def grab(self, client_id: int, start: Iterable[float], end: Iterable[float]) -> None:
         """Tie the string where the body was grabbed, and take its free end to the pointer."""
-        scenario, tools = self._flight.scenario, self._tools
+        scenario = self._flight.scenario
         if self.dragging:
             return
         body, surface = scenario.setup.body, scenario.setup.surface
@@ -178,8 +178,8 @@ class Pointer:
         if seen is None:
             return
         entries: list[Entry] = []
-        if scenario.parameters.string.frequency != tools.frequency:
-            entries.append({"set": {"string.frequency": tools.frequency}})
+        if scenario.parameters.string.frequency <= 0.0:
+            entries.append({"set": {"string.frequency": FREQUENCY}})
         point = (0.0, 0.0, 0.0) if surface is None else numbers(seen.body_point(start))
         entries.append({"string": {"attach": numbers(body.mesh_point(point))}})
         self._drag = _Drag(client_id, seen.world_point(end), seen, now)

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Meshes that come from a browser: judged as ``inspect`` judges files, asked for unit and up axis, and flown.
 
-A body reads its mesh by path, so the file lies in a folder of this process, under a name made here, for as long as it
-flies; a saved take carries it.
+A body reads its mesh by path, so the file lies in a folder made here, for as long as it flies; a saved take carries it.
 """
 
 from __future__ import annotations
@@ -36,13 +35,13 @@ ACCEPTED = (*OWN_FORMATS, "glb")
 Y_UP = ("glb", "obj")
 """glTF says so, and most tools write .obj like that; what it says itself, in a comment ``# z up``, comes first."""
 
-UP_COMMENT = re.compile(rb"^#.*\b([xyz])[ -]?(?:axis )?(?:is )?up\b", re.IGNORECASE | re.MULTILINE)
+Z_UP_COMMENT = re.compile(rb"^#.*\bz[ -]?(?:axis )?(?:is )?up\b", re.IGNORECASE | re.MULTILINE)
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 """Metres, by the name of what a file's numbers may be in."""
 
 HALF = math.sqrt(0.5)
-UPRIGHT = {"z": [0.0, 0.0, 0.0, 1.0], "y": [HALF, 0.0, 0.0, HALF], "x": [0.0, -HALF, 0.0, HALF]}
+UPRIGHT = {"z": [0.0, 0.0, 0.0, 1.0], "y": [HALF, 0.0, 0.0, HALF]}
 """Attitudes xyzw that turn a file's up axis to the world's z."""
 
 ROOM_SIZE = 20.0
@@ -56,8 +55,8 @@ SENSIBLE_DENSITY = 1000.0
 
 @dataclass(frozen=True)
 class Upload:
-    """name: as shown. path: for the parameter ``mesh``. up: which of its axes points up most likely. inspection: what
-    is known of it.
+    """name: as shown. path: for the parameter ``mesh``. up: which of its axes points up, as far as is known.
+    inspection: what is known of it.
     """
 
     name: str
@@ -76,6 +75,16 @@ class Upload:
         """Which of UNITS it is most likely in."""
         return "m" if self.name.endswith(".glb") or float(self.sides.max()) <= ROOM_SIZE else "mm"
 
+    @property
+    def refusal(self) -> str:
+        """Why it can't fly as a solid as it is, or empty."""
+        return "" if self.inspection.refusal is None else str(self.inspection.refusal)
+
+    @property
+    def verdict(self) -> list[str]:
+        """One line a remark, the severity first."""
+        return [f"{finding.severity}: {finding.message}" for finding in self.inspection.findings]
+
     def size_and_mass(self, unit: str) -> str:
         """Its size and mass in one line, its numbers being in this unit and its density SENSIBLE_DENSITY."""
         metres = UNITS[unit]
@@ -85,73 +94,38 @@ class Upload:
             return f"{sides} m"
         return f"{sides} m, {SENSIBLE_DENSITY * volume * metres**3:.3g} kg at {SENSIBLE_DENSITY:g} kg/m³"
 
-    def scene(self, unit: str, up: str, stand_in: dict[str, object]) -> dict[str, object]:
+    def scene(self, unit: str, stand_in: dict[str, object]) -> dict[str, object]:
         """Parameters of a scene of this body alone, at rest; stand_in: how one that isn't closed flies."""
         return {
             "mesh": self.path,
             "scale": [UNITS[unit]] * 3,
             "density": SENSIBLE_DENSITY,
-            "initial.orientation_xyzw": UPRIGHT[up],
+            "initial.orientation_xyzw": UPRIGHT[self.up],
             **stand_in,
         }
 
-    @property
-    def verdict(self) -> list[str]:
-        """One line a remark, the severity first."""
-        return [f"{finding.severity}: {finding.message}" for finding in self.inspection.findings]
 
-    @property
-    def refusal(self) -> str:
-        """Why it can't fly as a solid as it is, or empty."""
-        return "" if self.inspection.refusal is None else str(self.inspection.refusal)
+def take_upload(file_name: str, data: bytes) -> Upload:
+    """Judge a file and keep it in a folder of its own; a body that is told the same path again sees no change.
 
-
-class Uploads:
-    """The files of one page; ``close`` leaves nothing on the disk, and so does the end of the process."""
-
-    def __init__(self) -> None:
-        self._home: tempfile.TemporaryDirectory[str] | None = None
-        self._count = 0
-
-    def take(self, file_name: str, data: bytes) -> Upload:
-        """Judge a file and keep it. A readable mesh that bounds no solid is kept too; its ``refusal`` says why. Raises
-        MeshError for what is no mesh, and keeps nothing of it.
-        """
-        name, suffix = shown_name(file_name)
-        if suffix not in ACCEPTED:
-            raise MeshError("upload", name, f"a file named .{', .'.join(ACCEPTED)}")
-        if len(data) > MAX_BYTES:
-            limit = f"at most {MAX_BYTES} are accepted, so name a larger file by its path"
-            raise MeshError("upload", f"{name} has {len(data)} bytes; {limit}")
-        if self._home is None:
-            self._home = tempfile.TemporaryDirectory(prefix=PASSING)
-        # Another folder each time: a body that is told the same path again sees no change.
-        self._count += 1
-        path = Path(self._home.name) / str(self._count) / name
-        try:
-            path.parent.mkdir()
-            path.write_bytes(data)
-            body = mesh_body(load_mesh(str(path)))
-            inspection = inspect_mesh(body)
-        except InputError:
-            shutil.rmtree(path.parent)
-            raise
-        said = UP_COMMENT.search(data[:4096]) if suffix == "obj" else None
-        up = said[1].decode().lower() if said else "y" if suffix in Y_UP else "z"
-        return Upload(name, str(path), up, inspection)
-
-    def keep(self, paths: Sequence[str]) -> None:
-        """Remove all but these files."""
-        kept = {Path(path).parent for path in paths}
-        for folder in Path(self._home.name).iterdir() if self._home is not None else ():
-            if folder not in kept:
-                shutil.rmtree(folder, ignore_errors=True)
-
-    def close(self) -> None:
-        """Remove all of it."""
-        if self._home is not None:
-            self._home.cleanup()
-            self._home = None
+    A readable mesh that bounds no solid is kept too; its ``refusal`` says why. Raises MeshError for what is no mesh,
+    and keeps nothing of it.
+    """
+    name, suffix = shown_name(file_name)
+    if suffix not in ACCEPTED:
+        raise MeshError("upload", name, f"a file named .{', .'.join(ACCEPTED)}")
+    if len(data) > MAX_BYTES:
+        limit = f"at most {MAX_BYTES} are accepted, so name a larger file by its path"
+        raise MeshError("upload", f"{name} has {len(data)} bytes; {limit}")
+    path = Path(tempfile.mkdtemp(prefix=PASSING)) / name
+    try:
+        path.write_bytes(data)
+        inspection = inspect_mesh(mesh_body(load_mesh(str(path))))
+    except InputError:
+        shutil.rmtree(path.parent)
+        raise
+    z_up = suffix == "obj" and Z_UP_COMMENT.search(data[:4096])
+    return Upload(name, str(path), "y" if suffix in Y_UP and not z_up else "z", inspection)
 
 
 def shown_name(file_name: str) -> tuple[str, str]:
@@ -164,7 +138,8 @@ def shown_name(file_name: str) -> tuple[str, str]:
 
 class UploadFolder:
     """viser's upload button, and what is asked before a file flies. fly(values) begins a scene of these parameters;
-    show_verdict(lines) says what is found of a file.
+    show_verdict(lines) says what is found of a file. Files lie on the disk for as long as they may fly; ``close``
+    removes all.
     """
 
     def __init__(
@@ -177,8 +152,8 @@ class UploadFolder:
         self._flight = flight
         self._fly_scene = fly
         self._show_verdict = show_verdict
-        self.uploads = Uploads()
         self.present: Upload | None = None
+        self._taken: list[str] = []
         with gui.add_folder("Upload"):
             button = gui.add_upload_button(
                 "Upload a mesh",
@@ -188,12 +163,6 @@ class UploadFolder:
             )
             self._unit: Any = gui.add_dropdown(
                 "Its unit", tuple(UNITS), visible=False, hint="Unit of the file's coordinates (scale)"
-            )
-            self._up: Any = gui.add_dropdown(
-                "Its up axis",
-                tuple(UPRIGHT),
-                visible=False,
-                hint="The file's axis that points up (initial.orientation_xyzw)",
             )
             self._size = gui.add_markdown("", visible=False)
             self._as_it_is = gui.add_button("Simulate it", visible=False)
@@ -216,14 +185,22 @@ class UploadFolder:
             repaired = self._stand_in.value == "it repaired"
             await self._fly({"mesh_repair": True} if repaired else {"mesh_fallback": "hull"})
 
+    def close(self, kept: str = "") -> None:
+        """Remove all files but this one."""
+        for path in self._taken:
+            if path != kept:
+                shutil.rmtree(Path(path).parent, ignore_errors=True)
+        self._taken = [path for path in self._taken if path == kept]
+
     async def take(self, name: str, content: bytes) -> None:
         """Judge a file, and say what is found of it."""
-        self.uploads.keep([self._flight.scenario.parameters.mesh])
+        self.close(self._flight.scenario.parameters.mesh)
         try:
-            upload = await asyncio.to_thread(self.uploads.take, name, content)
+            upload = await asyncio.to_thread(take_upload, name, content)
         except InputError as error:
             self._show([f"refused: {error}"], None)
             return
+        self._taken.append(upload.path)
         lines = [*upload.verdict, *([f"refused: {upload.refusal}"] if upload.refusal else [])]
         self._show([f"{upload.name}:", *lines] if lines else [f"{upload.name}: no problems found"], upload)
 
@@ -232,10 +209,9 @@ class UploadFolder:
         self.present = upload
         self._show_verdict(lines)
         if upload is not None:
-            self._unit.value, self._up.value = upload.likely_unit, upload.up
+            self._unit.value = upload.likely_unit
             self._show_size()
-        for handle in (self._unit, self._up, self._size):
-            handle.visible = upload is not None
+        self._unit.visible = self._size.visible = upload is not None
         self._as_it_is.visible = upload is not None and not upload.refusal
         self._stand_in.visible = upload is not None and bool(upload.refusal)
 
@@ -245,5 +221,5 @@ class UploadFolder:
 
     async def _fly(self, stand_in: dict[str, object]) -> None:
         upload = self.present
-        if upload is not None and await self._fly_scene(upload.scene(self._unit.value, self._up.value, stand_in)):
+        if upload is not None and await self._fly_scene(upload.scene(self._unit.value, stand_in)):
             self._show([f"{upload.name}: simulated"], None)

@@ -212,10 +212,7 @@ def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let
     picture.draw(times(60), rows)
     strips = drawn.rows(style.STRING)
     assert [t for t, own in strips.items() if own] == times(50).tolist()
-    tensions = np.ravel(list(drawn.rows(style.STRING_TENSION).values()))
     stretch = 0.8 - 0.1 - rows[:50, 2] - 0.4
-    assert np.allclose(tensions[:50], np.maximum(50.0 * stretch, 0.0), atol=1e-12)
-    assert not tensions[50:].any()
     energies = np.array(list(drawn.rows(style.ENERGY).values()))
     assert np.allclose(energies[:50, 4], 25.0 * np.maximum(stretch, 0.0) ** 2, atol=1e-12)
     assert np.allclose(energies[:, 3], energies[:, :3].sum(axis=1) + energies[:, 4], rtol=1e-14)
@@ -230,7 +227,7 @@ def test_without_a_string_the_energies_are_three_and_their_total():
     picture, drawn = pictured()
     picture.draw(times(20), flight.rows(20))
     assert {len(own) for own in drawn.rows(style.ENERGY).values()} == {4}
-    assert style.STRING_TENSION not in drawn.parts
+    assert style.STRING_LINE_DISTANCE not in drawn.parts
 
 
 def test_the_drawn_ellipsoid_touches_the_drawn_plane_where_the_spin_ends():

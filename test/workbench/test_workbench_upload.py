@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import struct
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+import viser
 
 from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
@@ -20,7 +23,7 @@ from rigid_proto_ros.mesh import cache as mesh_cache
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.picture.surface import BOX_CORNERS, BOX_TRIANGLES
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.workbench.upload import MAX_BYTES, Uploads
+from rigid_proto_ros.workbench.upload import MAX_BYTES, UploadFolder, take_upload
 
 BOOK = resolve_mesh("book").read_bytes()
 OPEN = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\n"
@@ -42,19 +45,17 @@ def files(folder: Path) -> list[Path]:
 
 
 def test_an_upload_gets_the_verdict_that_inspect_gives(place: Path, capsys: pytest.CaptureFixture) -> None:
-    uploads = Uploads()
-    upload = uploads.take("my book.obj", BOOK)
+    upload = take_upload("my book.obj", BOOK)
     assert main(["inspect", upload.path, "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(as_json(upload.inspection)))
     assert upload.refusal == ""
     assert upload.name == "my_book.obj" == Path(upload.path).name
-    broken = uploads.take("broken.obj", OPEN)
+    broken = take_upload("broken.obj", OPEN)
     assert main(["inspect", broken.path, "--json"]) == 2
     assert json.loads(capsys.readouterr().out)["verdict"] == as_json(broken.inspection)["verdict"]
     assert "open" in broken.refusal
     assert any("edge" in line for line in broken.verdict)
     assert broken.size_and_mass("cm") == "0.01 × 0.01 × 0.01 m"
-    uploads.close()
 
 
 @pytest.mark.parametrize(
@@ -71,12 +72,8 @@ def test_an_upload_gets_the_verdict_that_inspect_gives(place: Path, capsys: pyte
     ],
 )
 def test_what_is_no_mesh_is_refused_and_nothing_is_kept_of_it(place: Path, name: str, data: bytes) -> None:
-    uploads = Uploads()
-    flown = uploads.take("flown.obj", BOOK)
     with pytest.raises(InputError):
-        uploads.take(name, data)
-    assert files(place) == [Path(flown.path)]
-    uploads.close()
+        take_upload(name, data)
     assert not list(place.iterdir())
 
 
@@ -91,19 +88,15 @@ def bust_in_millimetres() -> bytes:
 def test_a_bust_in_millimetres_is_said_to_weigh_24_kg_before_it_flies_and_not_as_much_as_a_mountain(
     place: Path,
 ) -> None:
-    uploads = Uploads()
-    upload = uploads.take("bust.obj", bust_in_millimetres())
+    upload = take_upload("bust.obj", bust_in_millimetres())
     assert (upload.likely_unit, upload.up) == ("mm", "y")
     assert upload.size_and_mass("mm") == "0.2 × 0.25 × 0.48 m, 24 kg at 1000 kg/m³"
     assert upload.size_and_mass("m") == "200 × 250 × 480 m, 2.4e+10 kg at 1000 kg/m³"
-    values = upload.scene("mm", "y", {})
+    values = upload.scene("mm", {})
     body = make_scenario(values).setup
     assert body.body.mass == pytest.approx(24.0, rel=1e-12)
     # Its y is up now.
     assert matrix_from_quaternion(values["initial.orientation_xyzw"])[:, 1] == pytest.approx([0.0, 0.0, 1.0])
-    assert matrix_from_quaternion(upload.scene("mm", "x", {})["initial.orientation_xyzw"])[:, 0] == pytest.approx(
-        [0, 0, 1]
-    )
     assert not body.initial[7:13].any()
 
 
@@ -114,8 +107,7 @@ def test_a_glb_is_taken_in_metres_with_y_up_and_one_that_names_other_files_is_re
     box = document.mesh("box", {"POSITION": corners}, triangles, TRIANGLES, document.material("box", (1, 2, 3)))
     document.node("box", None, mesh=box, scale=[0.5, 1.0, 1.5])
     data = document.binary()
-    uploads = Uploads()
-    upload = uploads.take("Box.glb", data)
+    upload = take_upload("Box.glb", data)
     assert (upload.likely_unit, upload.up, upload.refusal) == ("m", "y", "")
     assert upload.size_and_mass("m") == "1 × 2 × 3 m, 6e+03 kg at 1000 kg/m³"
     length = struct.unpack_from("<I", data, 12)[0]
@@ -127,7 +119,7 @@ def test_a_glb_is_taken_in_metres_with_y_up_and_one_that_names_other_files_is_re
         rest = data[20 + length :]
         other = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest
         with pytest.raises(InputError):
-            uploads.take("Other.glb", other)
+            take_upload("Other.glb", other)
     assert files(place) == [Path(upload.path)]
 
 
@@ -139,9 +131,8 @@ class Large(bytes):
 
 
 def test_500_megabytes_are_refused_unwritten_and_unread(place: Path) -> None:
-    uploads = Uploads()
     with pytest.raises(MeshError, match="500000000 bytes"):
-        uploads.take("large.stl", Large())
+        take_upload("large.stl", Large())
     assert not files(place)
     assert MAX_BYTES < 500_000_000
 
@@ -150,24 +141,26 @@ def test_500_megabytes_are_refused_unwritten_and_unread(place: Path) -> None:
     "name", ["../../../etc/passwd.obj", r"..\..\x.obj", "x\0y.obj", "..obj", "é" * 300 + ".OBJ", "<script>.obj"]
 )
 def test_a_name_leads_nowhere(place: Path, name: str) -> None:
-    uploads = Uploads()
-    path = Path(uploads.take(name, BOOK).path)
-    assert path.resolve() == path and path.parent.parent.parent == place
+    path = Path(take_upload(name, BOOK).path)
+    assert path.resolve() == path and path.parent.parent == place
     assert re.fullmatch(r"[A-Za-z0-9_-]{1,40}\.obj", path.name)
-    uploads.close()
 
 
-def test_uploads_that_fly_no_more_are_removed(place: Path) -> None:
-    uploads = Uploads()
-    taken = [uploads.take(f"part {k}.obj", OPEN) for k in range(20)]
-    uploads.keep([taken[5].path])
-    assert files(place) == [Path(taken[5].path)]
-    uploads.close()
-    assert not list(place.iterdir())
+def test_an_upload_that_flies_no_more_is_removed_and_nothing_of_it_is_cached(place: Path) -> None:
+    scenario = SimpleNamespace(parameters=SimpleNamespace(mesh=""))
+    server = viser.ViserServer(host="127.0.0.1", verbose=False)
+    folder = UploadFolder(server.gui, SimpleNamespace(scenario=scenario), None, lambda _: None)
+    for k in range(3):
+        asyncio.run(folder.take(f"part {k}.obj", OPEN))
+        scenario.parameters.mesh = folder.present.path if k == 0 else scenario.parameters.mesh
+    assert {path.name for path in files(place)} == {"part_0.obj", "part_2.obj"}
+    folder.close()
+    server.stop()
+    assert not files(place)
     assert mesh_cache.folder() is not None
     assert not mesh_cache.folder().exists()
 
 
-@pytest.mark.parametrize(("head", "up"), [(b"", "y"), (b"# z up\n", "z"), (b"# made by hand\n# Z-up\n", "z")])
+@pytest.mark.parametrize(("head", "up"), [(b"", "y"), (b"# made by hand\n# Z-up\n", "z")])
 def test_an_obj_is_y_up_unless_it_says_otherwise(place: Path, head: bytes, up: str) -> None:
-    assert Uploads().take("book.obj", head + BOOK).up == up
+    assert take_upload("book.obj", head + BOOK).up == up
