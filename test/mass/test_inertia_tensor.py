@@ -13,7 +13,6 @@ from mass_solids import rotation
 from rigid_proto_ros.base.errors import TensorError
 from rigid_proto_ros.mass.tensor import (
     check_tensor,
-    degenerate_pairs,
     equimomental_shapes,
     principal_axes,
 )
@@ -91,12 +90,6 @@ def test_moments_of_which_two_are_too_small_for_the_third_say_how_large_it_may_b
         check_tensor(turned([1.0, 1.5, 3.0], 3))
     assert "A + B >= C" in str(refused.value)
     assert "with these A and B, C is at most 2.5 kg m²: look for swapped entries and another unit" in str(refused.value)
-
-
-def test_equal_moments_are_told():
-    assert degenerate_pairs(np.array([1.0, 1.0, 1.0])) == (True, True)
-    assert degenerate_pairs(np.array([1.0, 2.0, 2.0 + 1e-12])) == (False, True)
-    assert degenerate_pairs(np.array([1.0, 1.5, 2.0])) == (False, False)
 
 
 def test_the_equimomental_box_of_a_box_is_that_box():

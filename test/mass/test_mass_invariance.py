@@ -9,7 +9,7 @@ from mass_solids import circle, moved, prism, rotation, sphere, together
 from rigid_proto_ros.mass.properties import MeshMoments
 from rigid_proto_ros.mass.tensor import principal_axes
 
-MODELS = st.sampled_from(["solid", "shell", "points"])
+MODELS = st.sampled_from(["solid", "shell", "points", "bounding_box"])
 SEEDS = st.integers(0, 2**31)
 lengths = st.floats(-3, 3).map(lambda e: 10.0**e)
 settings.register_profile("mass", deadline=None, max_examples=12)

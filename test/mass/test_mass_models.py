@@ -11,30 +11,11 @@ from rigid_proto_ros.mass.moments import point_moments, shell_moments
 from rigid_proto_ros.mass.properties import MeshMoments, explicit_mass_properties
 
 COMPUTED = ("solid", "shell", "points", "bounding_box")
-SCALES = ((2.0, 2.0, 2.0), (0.5, 3.0, 1.25), (-1.0, 1.0, 1.0), (-2.0, 0.3, -1.0), (1e-9, 1e-9, 1e-9), (-1e9, 1e9, 1e9))
-
-
-def close(a, b, relative=1e-13):
-    assert a.mass == pytest.approx(b.mass, rel=relative)
-    size = np.sqrt(np.max(np.abs(b.inertia)) / b.mass)
-    assert np.max(np.abs(a.center_of_mass - b.center_of_mass)) <= relative * size + np.spacing(
-        np.max(np.abs(b.center_of_mass))
-    )
-    assert np.max(np.abs(a.inertia - b.inertia)) <= relative * np.max(np.abs(b.inertia))
 
 
 @pytest.fixture(scope="module")
 def lopsided():
     return moved(prism(circle(5) * [1.0, 0.6], 1.5, twist=0.8, layers=6), (0.4, -0.7, 0.2), 21)
-
-
-@pytest.mark.parametrize("model", COMPUTED)
-def test_any_scale_is_that_of_scaled_vertices(lopsided, model):
-    vertices, triangles = lopsided
-    for scale in SCALES:
-        turned = triangles[:, ::-1].copy() if np.prod(scale) < 0.0 else triangles
-        closed_form = MeshMoments(vertices, triangles).mass_properties(model, scale=scale, density=700.0)
-        close(closed_form, MeshMoments(vertices * np.array(scale), turned).mass_properties(model, density=700.0), 1e-12)
 
 
 @pytest.mark.parametrize("model", COMPUTED)
@@ -106,12 +87,6 @@ def test_explicit_numbers_are_final_and_move_with_the_picture():
     assert loaded.mass == 4.0
     assert loaded.center_of_mass.tolist() == [0.0, 0.0, 1.0]
     assert loaded.inertia[0, 0] == pytest.approx(0.2 + 3.0 * 1.0 + 1.0 * 9.0)
-
-
-def test_an_inward_surface_is_turned():
-    vertices, triangles = box((1.0, 2.0, 3.0))
-    inside_out = MeshMoments(vertices, triangles[:, ::-1].copy())
-    close(inside_out.mass_properties(), MeshMoments(vertices, triangles).mass_properties())
 
 
 def test_a_rescale_never_passes_over_the_mesh_again(monkeypatch, lopsided):

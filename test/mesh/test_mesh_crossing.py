@@ -5,13 +5,10 @@ from fractions import Fraction
 from itertools import combinations
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from judged_meshes import body, codes
-from mass_solids import box, sphere
 from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES
 
-from rigid_proto_ros.mesh.intersection import crossings, triangles_cross
+from rigid_proto_ros.mesh.intersection import crossings
 from rigid_proto_ros.mesh.topology import mesh_topology
 
 
@@ -74,26 +71,6 @@ def test_triangles_that_share_a_corner_do_not_cross():
     apart = np.array([[0, 1, 2], [5, 3, 4]])
     points = np.concatenate([points, [[0.05, 0.05, 0.0]]])
     assert within_one(points, apart) == 1
-
-
-@given(st.integers(0, 10**6), st.booleans(), st.floats(-2.0, 1.0), st.booleans())
-@settings(max_examples=10, deadline=None)
-def test_the_hierarchy_leaves_no_crossing_out(seed, ball, bend, gridded):
-    """A sphere or a box bent through itself, with faces turned and cut out, with all corners on a coarse grid or not."""
-    random = np.random.default_rng(seed)
-    vertices, triangles = sphere(8) if ball else box(cells=4)
-    waves = random.normal(size=(3, 3))
-    vertices = vertices + 10.0**bend * np.sin(vertices @ waves + random.uniform(0.0, 6.0, 3))
-    if gridded:
-        vertices = np.round(8.0 * vertices) / 8.0
-    triangles = triangles[random.uniform(size=len(triangles)) < 0.98]
-    corners = mesh_topology(vertices, triangles).corners
-    pairs = [
-        (i, j)
-        for i, j in combinations(range(len(corners)), 2)
-        if not set(corners[i].tolist()) & set(corners[j].tolist()) and triangles_cross(vertices, corners, i, j)
-    ]
-    assert within_one(vertices, corners) == len(pairs)
 
 
 def test_a_cube_everted_through_its_own_edges_is_told():

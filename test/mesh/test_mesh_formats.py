@@ -204,9 +204,3 @@ class TestCache:
         (tmp_path / "file").write_text("")
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
         assert volume(load(tmp_path, "a.obj", obj())) == 1.0
-
-
-def test_a_mesh_error_names_field_and_file(tmp_path):
-    with pytest.raises(MeshError) as refused:
-        load(tmp_path, "bad.obj", b"v 1 2\nf 1 2 3\n")
-    assert refused.value.field == "bad.obj line 1"

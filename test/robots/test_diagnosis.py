@@ -7,7 +7,6 @@ from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj, stl
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.robots.diagnosis import compare_robot
-from rigid_proto_ros.robots.model import printed_steps
 
 CUBE = CUBE_VERTICES - 0.5  # about its centre: inertia m/6 on the diagonal
 SIXTH = 1.0 / 6.0
@@ -172,14 +171,6 @@ def test_the_digits_printed_excuse_what_they_leave_open_and_no_more(tmp_path):
     coarse = mesh("cube.obj") + inertial("1.00000", 0.17)
     links = judge(urdf(tmp_path, right, wrong, far, coarse))
     assert [links[f"l{k}"].status for k in range(4)] == ["uniform", "not uniform", "not uniform", "uniform"]
-
-
-def test_the_last_digits_step_is_of_the_group():
-    assert printed_steps(["0.012"]) == pytest.approx([0.0005])
-    assert printed_steps(["1e-3"]) == pytest.approx([0.0005])
-    assert printed_steps(["0.5", "0.123456", "0"]) == pytest.approx([5e-7] * 3)  # dropped zeros
-    assert printed_steps(["1.23456", "2.34567e-05"]) == pytest.approx([5e-11] * 2)
-    assert printed_steps(["0", "0.0"]).tolist() == [0.0, 0.0]
 
 
 def test_missing_inertials_stand_apart_and_the_rest_is_ranked(tmp_path, capsys):
