@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import InputError
-from ..mesh import cache as mesh_cache
 from ..mesh.reading import Mesh, load_mesh
-from ..mesh.solids import box_surface, can_unite, convex_hull, united_surface
+from ..mesh.solids import box_surface, convex_hull, united_surface
 from .moments import referenced_vertices
 from .properties import MeshMoments, Surface
 from .repair import close_surface, repair_surface
 from .verdict import NESTED, WARNING, Finding, Verdict, check_surface
+from .verdict_cache import check_mesh
 
 FALLBACKS = ("", "hull", "box")
 """What stands in for a surface that bounds no solid: nothing (refuse), its convex hull, or its bounding box."""
@@ -59,7 +58,7 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
         raise InputError("--accept-open", accept_open, "a number from 0 to 1: part of volume and tensor")
     if isinstance(mesh, str):
         mesh = load_mesh(mesh)
-    verdict = _verdict(mesh)
+    verdict = check_mesh(mesh)
     vertices, triangles, polygon_starts = mesh.vertices, mesh.triangles, mesh.polygon_starts
     nested = any(finding.code == NESTED for finding in verdict.findings)
     if repair and verdict.usable and (not verdict.closed or nested):
@@ -93,20 +92,3 @@ def _stand_in(vertices: np.ndarray, triangles: np.ndarray, fallback: str) -> tup
     if fallback == "hull":
         return convex_hull(points)
     return box_surface(points.min(axis=0), points.max(axis=0))
-
-
-def _verdict(mesh: Mesh) -> Verdict:
-    """The verdict on the mesh, from the cache or anew."""
-    keep = mesh_cache.PASSING not in mesh.path
-    key = f"{mesh.sha256}-{mesh.path.rpartition('.')[2].lower()}-{'united' if can_unite() else 'body'}"
-    kept = mesh_cache.load_json(key) if keep else None
-    if kept is not None:
-        try:
-            findings = [Finding(**finding) for finding in kept.pop("findings")]
-            return Verdict(findings=findings, **kept)
-        except (KeyError, TypeError, ValueError, AttributeError):
-            pass
-    verdict = check_surface(mesh.vertices, mesh.triangles)
-    if keep:
-        mesh_cache.store_json(key, dataclasses.asdict(verdict))
-    return verdict

@@ -80,33 +80,29 @@ def resolve_mesh(name: str, search: Search = NOWHERE_ELSE) -> Path:
 
     Raises MeshError when there is none, with the bundled names and the one most like it.
     """
+    scheme, colon, rest = name.partition("://")
     try:
-        return _found_mesh(name, search)
-    except MeshError:
-        raise
+        if colon and scheme in ("package", "model"):
+            return _in_package(name, *rest.partition("/")[::2], search)
+        if colon and scheme not in ("file", ""):
+            raise MeshError("mesh", name, "a path, file://, package://, model:// or a bundled name")
+        return _at_path(rest if colon else name, search)
     except (OSError, RuntimeError, ValueError) as error:
+        if isinstance(error, MeshError):
+            raise
         # a name too long or with a NUL, a folder that may not be read, a user's home unknown
         reason = getattr(error, "strerror", None) or str(error).rstrip(".")
-        raise MeshError(
-            "mesh", name, f"a file that can be read, package://<package>/<path>, or a bundled name ({reason})"
-        ) from None
+        accepted = f"a file that can be read, package://<package>/<path>, or a bundled name ({reason})"
+        raise MeshError("mesh", name, accepted) from None
 
 
-def _found_mesh(name: str, search: Search) -> Path:
-    scheme, colon, rest = name.partition("://")
-    if colon and scheme in ("package", "model"):
-        return _in_package(name, *rest.partition("/")[::2], search)
-    if colon and scheme not in ("file", ""):
-        raise MeshError("mesh", name, "a path, file://, package://, model:// or a bundled name")
-    name = rest if colon else name
+def _at_path(name: str, search: Search) -> Path:
     path = Path(name).expanduser()
-    if search.near is not None and (search.near / path).is_file():
-        return (search.near / path).resolve()
-    if path.is_file():
-        return path.resolve()
     bundled = BODIES / f"{name}.obj"
-    if name and "/" not in name and bundled.is_file():
-        return bundled.resolve()
+    places = [search.near / path] if search.near is not None else []
+    for place in (*places, path, *([bundled] if name and "/" not in name else [])):
+        if place.is_file():
+            return place.resolve()
     if path.is_dir():
         raise MeshError("mesh", f"{name!r} is a folder, not a mesh file")
     names = body_names()

@@ -58,7 +58,7 @@ def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[np.ndarray, n
     if kind == "box":
         made, stretch = creation.box((1.0, 1.0, 1.0)), size
     elif kind in ("sphere", "ellipsoid"):
-        made, stretch = creation.icosphere(subdivisions=4), size * 3 if kind == "sphere" else size
+        made, stretch = creation.icosphere(subdivisions=3), size * 3 if kind == "sphere" else size
     elif kind == "cylinder":
         made, stretch = creation.cylinder(1.0, 1.0, sections=SEGMENTS), (size[0], *size)
     else:

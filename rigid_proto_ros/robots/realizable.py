@@ -21,8 +21,8 @@ MARGIN = 1e-3
 """Part of the shapes' diagonal by which they may be larger than they are drawn."""
 MAX_ROUNDING = 0.05
 """A number printed with one digit is right to 50 %, which would excuse anything: this much is excused at most."""
-DIRECTIONS = 2000
-"""Axes tried over all directions, 2 to 3 degrees apart, besides those of the link, of the tensor and of the hull."""
+DIRECTIONS = 1000
+"""Axes tried over all directions, about 5 degrees apart, besides those of the link, of the tensor and of the hull."""
 
 
 def impossible_inertial(link: Link) -> str:

@@ -22,7 +22,7 @@ import viser
 from ..base.errors import InputError, MeshError
 from ..mass.from_mesh import mesh_body
 from ..mass.inspection import Inspection, inspect_mesh
-from ..mesh.cache import PASSING
+from ..mass.verdict_cache import PASSING
 from ..mesh.reading import OWN_FORMATS, load_mesh
 from .flight import Flight
 

@@ -12,8 +12,8 @@ from mesh_files import CUBE_QUADS, CUBE_TRIANGLES, CUBE_VERTICES, obj, off, ply,
 
 from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.base.errors import MeshError
+from rigid_proto_ros.mass import verdict_cache
 from rigid_proto_ros.mass.from_mesh import mesh_body
-from rigid_proto_ros.mesh import cache as mesh_cache
 from rigid_proto_ros.mesh.ascii_floats import as_numbers
 from rigid_proto_ros.mesh.reading import load_mesh
 
@@ -190,13 +190,13 @@ class TestCache:
         def never(*_args, **_options):
             raise AssertionError("done again")
 
-        monkeypatch.setattr("rigid_proto_ros.mass.from_mesh.check_surface", never)
+        monkeypatch.setattr("rigid_proto_ros.mass.verdict_cache.check_surface", never)
         assert mesh_body(load_mesh(str(tmp_path / "a.obj"))).verdict == first.verdict
 
     @pytest.mark.parametrize("damage", [b"", b"{", b"[1, 2]", b'{"findings": 3}'])
     def test_a_damaged_entry_is_done_again(self, tmp_path, damage):
         assert volume(load(tmp_path, "a.obj", obj())) == 1.0
-        for path in mesh_cache.folder().iterdir():
+        for path in verdict_cache.folder().iterdir():
             path.write_bytes(damage)
         assert volume(load_mesh(str(tmp_path / "a.obj"))) == 1.0
 

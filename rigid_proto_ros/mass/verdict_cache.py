@@ -7,6 +7,7 @@ that can't be written or read is no error: the work is then done again. ``RIGID_
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import hashlib
 import json
@@ -15,6 +16,9 @@ import tempfile
 from pathlib import Path
 
 from ..base.compilation import INTERPRETED
+from ..mesh.reading import Mesh
+from ..mesh.solids import can_unite
+from .verdict import Finding, Verdict, check_surface
 
 PASSING = "rigid_proto_upload_"
 """In the paths of files that are gone tomorrow: nothing of them is kept."""
@@ -41,27 +45,27 @@ def code_tag() -> str:
     return digest.hexdigest()[:16]
 
 
-def load_json(key: str) -> dict | None:
-    """The JSON object kept under ``key``, or None."""
-    base = folder()
-    try:
-        value = json.loads((base / f"{key}-{code_tag()}.json").read_bytes()) if base else None
-    except (OSError, ValueError):
-        return None
-    return value if isinstance(value, dict) else None
-
-
-def store_json(key: str, value: dict) -> None:
-    """Keep a JSON object under ``key``; floats keep all their digits."""
-    base = folder()
+def check_mesh(mesh: Mesh) -> Verdict:
+    """The verdict on a mesh, from the cache or anew."""
+    base = None if PASSING in mesh.path else folder()
     if base is None:
-        return
+        return check_surface(mesh.vertices, mesh.triangles)
+    suffix, also = mesh.path.rpartition(".")[2].lower(), "united" if can_unite() else "body"
+    path = base / f"{mesh.sha256}-{suffix}-{also}-{code_tag()}.json"
+    try:
+        kept = json.loads(path.read_bytes())
+        findings = [Finding(**finding) for finding in kept.pop("findings")]
+        return Verdict(findings=findings, **kept)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        pass
+    verdict = check_surface(mesh.vertices, mesh.triangles)
     try:
         base.mkdir(parents=True, exist_ok=True)
         # Moved to its name once it is whole, so that no reader sees half an entry.
         handle, new = tempfile.mkstemp(dir=base, prefix=".new-")
         with os.fdopen(handle, "w") as stream:
-            stream.write(json.dumps(value))
-        os.replace(new, base / f"{key}-{code_tag()}.json")
+            stream.write(json.dumps(dataclasses.asdict(verdict)))
+        os.replace(new, path)
     except OSError:
         pass
+    return verdict
