@@ -93,18 +93,17 @@ class Strings:
     def rows(self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray) -> StringRows:
         """The string at times (n,), ascending, of states (n, 13) with attitudes R (n, 3, 3)."""
         tied, pulls = np.zeros((2, len(rows)), dtype=bool)
-        found = StringRows(tied, *np.zeros((2, len(rows), 3)), *np.zeros((2, len(rows))), pulls)
+        (free, knots), (lengths, energies) = np.zeros((2, len(rows), 3)), np.zeros((2, len(rows)))
         for at, string in self._spells(times_ns):
             attach = np.asarray(string.attach, dtype=float)
-            found.tied[at] = True
-            found.free[at] = string.free_end(times_ns[at])
-            found.knots[at] = rows[at, 0:3] + R[at] @ attach
-            found.lengths[at] = 0.0 if string.bilateral else string.rest_length
-            stretch = np.linalg.norm(found.knots[at] - found.free[at], axis=1) - string.rest_length
-            found.pulls[at] = string.bilateral | (stretch > 0.0)
-            stretch = stretch if string.bilateral else np.maximum(stretch, 0.0)
-            found.energies[at] = 0.5 * string.stiffness * stretch**2
-        return StringRows(tied, *(getattr(found, name)[tied] for name in list(vars(found))[1:]))
+            tied[at] = True
+            free[at] = string.free_end(times_ns[at])
+            knots[at] = rows[at, 0:3] + R[at] @ attach
+            lengths[at] = 0.0 if string.bilateral else string.rest_length
+            stretch = np.linalg.norm(knots[at] - free[at], axis=1) - string.rest_length
+            pulls[at] = string.bilateral | (stretch > 0.0)
+            energies[at] = 0.5 * string.stiffness * np.where(pulls[at], stretch, 0.0) ** 2
+        return StringRows(tied, free[tied], knots[tied], lengths[tied], energies[tied], pulls[tied])
 
     def forget_before(self, time_ns: int) -> None:
         """Keep what later states need."""

@@ -13,7 +13,7 @@ import viser
 from ..base.bundled import body_names
 from ..base.errors import InputError
 from ..mass.model_difference import model_difference
-from ..mass.properties import MassProperties, explicit_mass_properties
+from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
 from ..picture.style import without_rounding
 from ..scene.scenario import Scenario
@@ -139,21 +139,9 @@ def model_properties(scenario: Scenario, model: str, com: str = "") -> MassPrope
     """Mass properties of the scenario's body under a model; raises InputError where that can't be had. com: one of
     MODEL_COMS, as the scenario has it where it is empty.
     """
-    parameters = scenario.parameters
-    ballast = parameters.point_masses
-    if model == "explicit":
-        given = parameters.explicit_inertia
-        return explicit_mass_properties(given.mass, given.center_of_mass, given.tensor, ballast, parameters.scale)
-    if scenario.body_mesh is None:
-        raise InputError("mesh", "a mesh is needed")
-    return scenario.body_mesh.moments.mass_properties(
-        model,
-        scale=parameters.scale,
-        mass=parameters.mass,
-        density=parameters.density,
-        ballast=ballast,
-        com=com or parameters.inertia_model_com,
-    )
+    changes = {"inertia_model": model, "inertia_model_com": com or scenario.parameters.inertia_model_com}
+    body = scenario.with_changes(changes).setup.body
+    return MassProperties(body.mass, body.center_of_mass, body.inertia)
 
 
 def comparison(scenario: Scenario) -> str:
