@@ -95,7 +95,7 @@ def _surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, n
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
     if triangles.shape[0] == 0 or vertices.shape[0] == 0:
         raise MeshError("mesh", "there are no faces; a surface has at least one triangle")
-    if int(triangles.min()) < 0 or int(triangles.max()) >= vertices.shape[0]:
+    if int(triangles.view(np.uint64).max()) >= vertices.shape[0]:  # a negative number is a huge one
         raise MeshError("mesh", f"a face uses a vertex outside 0 to {vertices.shape[0] - 1}")
     return vertices, triangles
 
