@@ -35,9 +35,8 @@ from rigid_proto_ros.motion.integrators.integrator import (
     STRING,
     WORLD_TORQUE,
 )
-from rigid_proto_ros.scene.declaration import LIVE, READ_ONLY, Parameter
 from rigid_proto_ros.scene.lessons import lesson, lessons
-from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS
+from rigid_proto_ros.scene.parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "benchmarks"))

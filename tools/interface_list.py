@@ -71,9 +71,7 @@ def topics_and_services() -> Iterator[str]:
 
 def script_keys() -> Iterator[str]:
     """Keys of the entries of a script."""
-    for kind, keys in script.ENTRY_KEYS.items():
-        for key in keys:
-            yield f"script {kind} {key}"
+    yield from (f"script {key}" for key in sorted(script.ENTRY_KEYS))
 
 
 def json_keys() -> Iterator[str]:

@@ -6,6 +6,7 @@ The node adds topics, services and ROS parameters to this; the interactive page 
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -13,11 +14,11 @@ from typing import Any
 
 from ..base.errors import CommandRefused, InputError
 from ..motion.state import State
-from ..scene.command_codec import entry_of, frame_names
+from ..scene.command_codec import frame_names
 from ..scene.offline import notify_start
 from ..scene.parameters import with_mass_of_density
 from ..scene.scenario import Scenario
-from ..scene.yaml_text import flow
+from ..scene.script import entry_of
 from ..simulation.commands import Change, ClearWrench, Command, ReleaseString
 from ..simulation.observer import Observer, Observers, SceneChanged
 from .command_receiver import COUNTED_BY, CommandReceiver
@@ -117,7 +118,7 @@ class LiveSimulation:
         if topic is not None:
             self.call(lambda: self.commands.receive(topic, lambda: command))
             return
-        self.schedule(flow({"t": command.stamp_ns / 1e9, **entry_of(command)}, quoted=True))
+        self.schedule(json.dumps({"t": command.stamp_ns / 1e9, **entry_of(command)}))
 
     def schedule(self, text: str) -> None:
         """Take an entry of a script, or a list of entries, as YAML, ``t`` in simulated seconds; a list is taken or

@@ -16,8 +16,15 @@ from rclpy.parameter import Parameter as RosParameter
 
 from ..base.errors import InputError
 from ..live.live_simulation import LiveSimulation
-from ..scene.declaration import LIVE, READ_ONLY, Parameter
-from ..scene.parameters import PARAMETERS, is_ros_parameter, parameter_named, with_mass_of_density
+from ..scene.parameters import (
+    LIVE,
+    PARAMETERS,
+    READ_ONLY,
+    Parameter,
+    is_ros_parameter,
+    parameter_named,
+    with_mass_of_density,
+)
 from .publishers import StatePublisher
 
 _TYPES = {

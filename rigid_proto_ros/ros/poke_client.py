@@ -32,12 +32,13 @@ def main(argv: list[str] | None = None) -> int:
     argv = sys.argv[1:] if argv is None else argv
     own = argv[: argv.index("--ros-args")] if "--ros-args" in argv else argv
     try:
+        from ..scene.script import schedules
+
         args = _arguments(own)
         # Read before a node is looked for: a mistake in it is told at once.
         script = _script(args)
         if args.dry_run:
-            _print_plan(script)
-            print(end="", flush=True)  # in here: what can't be written is told
+            print("\n".join(text for _, _, text in schedules(script)), flush=True)  # in here: what fails is told
             return 0
         # Half a second, in which there is nothing to close yet.
         importlib.import_module(".script_sender", __package__)
@@ -132,24 +133,6 @@ def _point(text: str) -> str | dict:
 
 def _three(text: str) -> list[float]:
     return [float(number) for number in text.split(",")]
-
-
-def _print_plan(script: list[Command]) -> None:
-    from ..simulation.commands import Change, MoveString, TieString, WrenchCommand
-
-    for command in script:
-        match command:
-            case WrenchCommand():
-                text = f"{command.frame_id}  force {list(command.force)}  torque {list(command.torque)}"
-            case MoveString():
-                text = f"{command.frame_id}  {list(command.point)}"
-            case TieString():
-                text = f"{command.frame_id}  {command.contact or list(command.point)}"
-            case Change():
-                text = str(command.content)
-            case _:
-                text = ""
-        print(f"{command.stamp_ns / 1e9:12.6f} s  {command.kind:14s} {text}".rstrip())
 
 
 def _send(script: list[Command], args: argparse.Namespace, argv: list[str]) -> int:

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,22 +21,12 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_msgs.msg import String
 
-from ..base.rotation import rotate
 from ..live.pacing import Stamps
 from ..motion.state import State
 from ..scene import cdr
 from ..scene.parameters import Parameters
-from ..scene.sensor_noise import (
-    ACCELEROMETER,
-    ANGULAR_VELOCITY,
-    GYROSCOPE,
-    LINEAR_VELOCITY,
-    ORIENTATION,
-    POSITION,
-    SensorNoise,
-    sensor_noise,
-)
-from ..session.messages import applied_bytes
+from ..scene.sensor_noise import ImuNoise, imu_noise
+from ..session.messages import PROJECTIONS, applied_bytes
 from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Refused, SceneChanged
 from . import qos
 
@@ -66,9 +57,9 @@ class StatePublisher:
         self._frames = frames
         self._imu_frame = frames[1]
         self._topics: Topics = [
-            (_publisher(node, PoseStamped, "pose", qos.STATE), self._pose_message),
-            (_publisher(node, TwistStamped, "twist", qos.STATE), self._twist_message),
-            (_publisher(node, Odometry, "odom", qos.STATE), self._odom_message),
+            (_publisher(node, PoseStamped, "pose", qos.STATE), partial(self._in_world, PROJECTIONS["pose"])),
+            (_publisher(node, TwistStamped, "twist", qos.STATE), partial(self._in_world, PROJECTIONS["twist"])),
+            (_publisher(node, Odometry, "odom", qos.STATE), self._odometry),
             (_publisher(node, Imu, "imu", qos.STATE), self._imu_message),
         ]
         self._clock: Publisher | None = None
@@ -76,13 +67,13 @@ class StatePublisher:
         self._tf_message: Any = None
         self._silent: tuple[Publisher | None, ...] = ()
         self._wanted: Topics = []
-        self._noise: SensorNoise | None = None
+        self._noise: ImuNoise | None = None
 
     def configure(self, parameters: Parameters) -> None:
         """Switch /clock, /tf and noise on and off, and put the IMU where it is mounted; on the executor's thread."""
         contact = parameters.imu_contact
         self._imu_frame = f"{self._frames[1]}/{contact}" if contact else self._frames[1]
-        self._noise = sensor_noise(parameters)
+        self._noise = imu_noise(parameters)
         if parameters.publish_clock and self._clock is None:
             self._clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
             self._topics = [(self._clock, lambda time_ns, _: cdr.time(time_ns)), *self._topics]
@@ -126,38 +117,12 @@ class StatePublisher:
         for _, message in self._topics:
             message(state.time_ns, state.row.tolist())
 
-    def _stamp_ns(self, time_ns: int) -> int:
-        return time_ns + self._stamps.offset_ns
+    def _in_world(self, project: Callable[[list[float]], list[float]], time_ns: int, row: list[float]) -> bytes:
+        return cdr.stamped_doubles(time_ns + self._stamps.offset_ns, self._frames[0], project(row))
 
-    def _with_noise(self, topic: str, time_ns: int, row: list[float]) -> list[float]:
-        """The state (13,) with its noise."""
-        return row if self._noise is None else self._noise.measured(topic, time_ns, row)
-
-    def _pose_message(self, time_ns: int, row: list[float]) -> bytes:
-        row = self._with_noise("pose", time_ns, row)
-        return cdr.stamped_doubles(self._stamp_ns(time_ns), self._frames[0], row[:7])
-
-    def _twist_message(self, time_ns: int, row: list[float]) -> bytes:
-        row = self._with_noise("twist", time_ns, row)
-        twist = (*row[7:10], *rotate(*row[3:7], *row[10:13]))
-        return cdr.stamped_doubles(self._stamp_ns(time_ns), self._frames[0], twist)
-
-    def _odom_message(self, time_ns: int, row: list[float]) -> bytes:
+    def _odometry(self, time_ns: int, row: list[float]) -> bytes:
         # An Odometry's twist is in the child frame: body axes.
-        row = self._with_noise("odom", time_ns, row)
-        twist = (*rotate(-row[3], -row[4], -row[5], row[6], *row[7:10]), *row[10:13])
-        covariances = (
-            self._covariance(POSITION, ORIENTATION),
-            self._covariance(LINEAR_VELOCITY, ANGULAR_VELOCITY),
-        )
-        return cdr.odometry(self._stamp_ns(time_ns), self._frames, row[:7], twist, covariances)
-
-    def _covariance(self, linear: int, angular: int) -> Sequence[float]:
-        """Of a pose or twist (36,), from the variances of two sensors."""
-        if self._noise is None:
-            return cdr.NO_COVARIANCE
-        variances = [self._noise.variance(sensor) for sensor in (linear, angular)]
-        return np.diag(np.repeat(variances, 3)).ravel().tolist()
+        return cdr.odometry(time_ns + self._stamps.offset_ns, self._frames, PROJECTIONS["odom"](row))
 
     def _imu_message(self, time_ns: int, row: list[float]) -> Imu:
         """Attitude, angular velocity and specific force, both in body axes, at the contact that was chosen."""
@@ -165,13 +130,13 @@ class StatePublisher:
         message.header.stamp.sec, message.header.stamp.nanosec = self._stamps.of(time_ns)
         message.header.frame_id = self._imu_frame
         o, rate, felt = message.orientation, message.angular_velocity, message.linear_acceleration
-        o.x, o.y, o.z, o.w = self._with_noise("pose", time_ns, row)[3:7]
+        o.x, o.y, o.z, o.w = row[3:7]
         noise, turns, force = self._noise, row[10:13], self._specific_force().tolist()
         if noise is not None:
-            turns, force = noise.imu(time_ns, turns, force)
-            message.orientation_covariance = _isotropic(noise.variance(ORIENTATION))
-            message.angular_velocity_covariance = _isotropic(noise.variance(GYROSCOPE))
-            message.linear_acceleration_covariance = _isotropic(noise.variance(ACCELEROMETER))
+            turns, force = noise.measured(time_ns, turns, force)
+            covariances = (message.angular_velocity_covariance, message.linear_acceleration_covariance)
+            for covariance, sigma in zip(covariances, noise.sigma.tolist(), strict=True):
+                covariance[[0, 4, 8]] = sigma * sigma
         rate.x, rate.y, rate.z = turns
         felt.x, felt.y, felt.z = force
         return message
@@ -181,14 +146,8 @@ class StatePublisher:
         transform.header.stamp.sec, transform.header.stamp.nanosec = self._stamps.of(time_ns)
         transform.header.frame_id, transform.child_frame_id = self._frames
         t, r = transform.transform.translation, transform.transform.rotation
-        # Where the body is drawn: without noise.
         t.x, t.y, t.z, r.x, r.y, r.z, r.w = row[:7]
         return self._tf_message(transforms=[transform])
-
-
-def _isotropic(variance: float) -> list[float]:
-    """A covariance (9,) alike in all directions."""
-    return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
 
 
 class EventPublisher(Observer):

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Sending an expanded script: stamped ahead, never faster than the node confirms, and counted at the end."""
+"""Sending a script to a node: as entries of its schedule, ahead of time, never faster than the node confirms, and
+counted at the end.
+"""
 
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import InertiaStamped, PointStamped, PoseStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.node import Node
@@ -19,10 +22,8 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ..base.errors import InputError
-from ..scene.command_codec import TOPICS, outgoing
-from ..scene.parameters import PARAMETERS
-from ..scene.script import with_contacts
-from ..simulation.commands import Command, TieString, nanoseconds
+from ..scene.script import schedules
+from ..simulation.commands import Command, nanoseconds
 from . import qos
 
 MAX_UNCONFIRMED = 500
@@ -32,8 +33,6 @@ SEND_AHEAD_NS = 60 * 1_000_000_000
 """Commands to a node that runs go out at most this far ahead of simulated time, so that a client that is ended leaves
 little behind; before it resumes it gets all that its schedule_horizon lets in.
 """
-
-DEFAULT_HORIZON_S = float(str(PARAMETERS["schedule_horizon"].default))
 
 STALLED_S = 15.0
 """A node that confirms nothing for this long is gone, or receives nothing."""
@@ -46,7 +45,7 @@ stands.
 
 @dataclass(frozen=True)
 class Report:
-    """sent: messages by topic. late, refused: what the node's counters rose by until ``reached_ns``; reasons: refused
+    """sent: commands by kind. late, refused: what the node's counters rose by until ``reached_ns``; reasons: refused
     ones by reason. last_ns: when the last command acts.
     """
 
@@ -65,11 +64,11 @@ class Report:
     @property
     def text(self) -> str:
         """One line for the terminal."""
-        parts = ", ".join(f"{count} {topic}" for topic, count in self.sent.items() if count) or "nothing"
+        parts = ", ".join(f"{count} {kind}" for kind, count in self.sent.items()) or "nothing"
         why = ", ".join(f"{count} {reason}" for reason, count in self.reasons.items())
         refused = f"{self.refused} refused{f' ({why})' if why else ''}"
         text = f"sent {parts}; {self.late} late, {refused}; the last acts at {self.last_ns / 1e9:.6g} s"
-        if sum(self.sent.values()) and self.reached_ns <= self.last_ns:
+        if self.sent and self.reached_ns <= self.last_ns:
             text += f", but simulated time stands still at {self.reached_ns / 1e9:.6g} s"
         return text
 
@@ -84,53 +83,41 @@ class ScriptSender(Node):
         self.target = node_name if node_name.startswith("/") else f"/{node_name}"
         self._counters: dict[str, str] = {}
         self._reports = 0
+        self._schedule = self.create_publisher(String, f"{self.target}/schedule", qos.COMMAND)
         self._get_parameters = self.create_client(GetParameters, f"{self.target}/get_parameters")
-        publisher = self.create_publisher
-        self._topics = {
-            "wrench": publisher(WrenchStamped, f"{self.target}/wrench", qos.COMMAND),
-            "poke": publisher(WrenchStamped, f"{self.target}/poke", qos.COMMAND),
-            "schedule": publisher(String, f"{self.target}/schedule", qos.COMMAND),
-            "string/target": publisher(PointStamped, f"{self.target}/string/target", qos.COMMAND),
-            "string/attach": publisher(PointStamped, f"{self.target}/string/attach", qos.COMMAND),
-            "inertia/set": publisher(InertiaStamped, f"{self.target}/inertia/set", qos.COMMAND),
-        }
         self._reset_client = self.create_client(Trigger, f"{self.target}/reset")
         self._pause_client = self.create_client(SetBool, f"{self.target}/pause")
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
         self._wait_for_node(timeout_s)
 
     def send(self, script: list[Command], reset: bool = False, lead_s: float = 0.2) -> Report:
-        """Send all commands, each stamped with the simulated time at which it acts, and wait until all have acted."""
-        script = with_contacts(script, self._contacts(script))
+        """Send all commands, each for the simulated time at which it acts, and wait until all have acted."""
         before = dict(self._counters)
         self._received_before = int(before["commands_received"])
+        start_ns = 0
         if reset:
             self._call(self._pause_client, SetBool.Request(data=True))
             self._call(self._reset_client, Trigger.Request())
-            start_ns = 0
-        if self.parameter("use_sim_time"):
-            # It stamps by a /clock, by another offset since the reset.
-            reports = self._reports
-            self._spin_until(lambda: self._reports >= reports + 2, f"reports of {self.target}")
-        offset_ns = int(self._counters.get("stamp_offset_ns", 0))
-        if not reset:
-            start_ns = self._now_ns() - offset_ns + nanoseconds(lead_s)
-        sent = dict.fromkeys(self._topics, 0)
-        horizon_s = self.parameter("schedule_horizon")
-        horizon_ns = nanoseconds(DEFAULT_HORIZON_S if horizon_s is None else float(horizon_s))
-        paused = reset
-        number = 0
-        for message in outgoing(script, start_ns, offset_ns):
-            if paused and message.time_ns > horizon_ns:
+        else:
+            if self._parameter("use_sim_time"):
+                # States are stamped by a /clock: by how far it is ahead, a report says that comes after them.
+                reports = self._reports
+                self._spin_until(lambda: self._reports >= reports + 2, f"reports of {self.target}")
+            start_ns = self._stamp_ns() - int(self._counters.get("stamp_offset_ns", 0)) + nanoseconds(lead_s)
+        horizon_ns = nanoseconds(float(self._parameter("schedule_horizon") or 0.0))
+        paused, number = reset, 0
+        for time_ns, count, text in schedules(script, start_ns):
+            if paused and time_ns > horizon_ns:
                 self._confirm(number)
                 self._call(self._pause_client, SetBool.Request(data=False))
                 paused = False
-            self._hold_back(number, message.time_ns, horizon_ns if paused else min(horizon_ns, SEND_AHEAD_NS))
-            self._topics[message.topic].publish(message.data)
-            number += len(message.commands)
-            for command in message.commands:
-                sent[TOPICS.get(command.kind, "schedule")] += 1
-        self._confirm(len(script))
+            if number + count - self._confirmed() > MAX_UNCONFIRMED:
+                self._confirm(min(number, number + count - MAX_UNCONFIRMED))
+            while time_ns > self._reached_ns() + (horizon_ns if paused else min(horizon_ns, SEND_AHEAD_NS)):
+                rclpy.spin_once(self, timeout_sec=0.5)
+            self._schedule.publish(String(data=text))
+            number += count
+        self._confirm(number)
         if paused:
             self._call(self._pause_client, SetBool.Request(data=False))
         last_ns = start_ns + (script[-1].stamp_ns if script else 0)
@@ -141,35 +128,24 @@ class ScriptSender(Node):
         refused = rose.pop("refused_total")
         reasons = {key.removeprefix("refused_"): count for key, count in rose.items() if count}
         late = int(self._counters["late"]) - int(before["late"])
-        return Report(sent, late, refused, reasons, last_ns, self._reported_ns())
+        return Report(Counter(command.kind for command in script), late, refused, reasons, last_ns, self._reached_ns())
 
-    def _contacts(self, script: list[Command]) -> dict[str, tuple]:
-        """The contacts that the script ties strings to, as the node has them."""
-        names = {command.contact for command in script if isinstance(command, TieString) and command.contact}
-        return {name: tuple(point) for name in names if len(point := self.parameter(f"contacts.{name}") or ()) == 3}
-
-    def parameter(self, name: str) -> Any:
+    def _parameter(self, name: str) -> Any:
         """The node's value of a parameter; None where it has none of that name."""
-        client = self._get_parameters
-        self._spin_until(client.service_is_ready, f"the service {client.srv_name}")
-        future = client.call_async(GetParameters.Request(names=[name]))
-        self._spin_until(future.done, f"an answer of {client.srv_name}")
-        values = future.result().values
-        return parameter_value_to_python(values[0]) if values else None
+        answer = self._answer(self._get_parameters, GetParameters.Request(names=[name]))
+        return parameter_value_to_python(answer.values[0]) if answer.values else None
 
     def _wait_for_node(self, timeout_s: float) -> None:
         deadline = time.monotonic() + timeout_s
-        ready = False
-        while not ready:
+        clients = (self._get_parameters, self._reset_client, self._pause_client)
+        while not (
+            self._counters
+            and self._schedule.get_subscription_count()
+            and all(client.service_is_ready() for client in clients)
+        ):
             if timeout_s and time.monotonic() > deadline:
                 raise InputError("--node", self.target, f"a running rigid_body node within {timeout_s:g} s")
             rclpy.spin_once(self, timeout_sec=0.1)
-            ready = (
-                bool(self._counters)
-                and self._reset_client.service_is_ready()
-                and self._pause_client.service_is_ready()
-                and all(p.get_subscription_count() for p in self._topics.values())
-            )
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -177,7 +153,7 @@ class ScriptSender(Node):
                 self._counters = {v.key: v.value for v in status.values}
                 self._reports += 1
 
-    def _now_ns(self) -> int:
+    def _stamp_ns(self) -> int:
         """The stamp of a state published from now on."""
         stamps: list[int] = []
 
@@ -189,13 +165,6 @@ class ScriptSender(Node):
         self._spin_until(lambda: stamps, f"a state on {self.target}/pose")
         self.destroy_subscription(subscription)
         return stamps[0]
-
-    def _hold_back(self, number: int, stamp_ns: int, ahead_ns: int) -> None:
-        """Wait while too much is unconfirmed, or the command lies further ahead than ``ahead_ns``."""
-        if number - self._confirmed() >= MAX_UNCONFIRMED:
-            self._confirm(number - MAX_UNCONFIRMED + 1)
-        while stamp_ns > self._reported_ns() + ahead_ns:
-            rclpy.spin_once(self, timeout_sec=0.5)
 
     def _confirmed(self) -> int:
         return int(self._counters["commands_received"]) - self._received_before
@@ -209,19 +178,22 @@ class ScriptSender(Node):
         simulated time doesn't get there.
         """
         reached_ns, since = -1, time.monotonic()
-        while self._reported_ns() <= last_ns and time.monotonic() < since + STANDSTILL_S:
+        while self._reached_ns() <= last_ns and time.monotonic() < since + STANDSTILL_S:
             rclpy.spin_once(self, timeout_sec=0.1)
-            if self._reported_ns() != reached_ns:
-                reached_ns, since = self._reported_ns(), time.monotonic()
+            if self._reached_ns() != reached_ns:
+                reached_ns, since = self._reached_ns(), time.monotonic()
 
-    def _reported_ns(self) -> int:
+    def _reached_ns(self) -> int:
         """Simulated time of the last report."""
         return int(self._counters["sim_time_ns"])
 
-    def _call(self, client: Client, request: Any) -> None:
+    def _answer(self, client: Client, request: Any) -> Any:
         future = client.call_async(request)
         self._spin_until(future.done, f"an answer of {client.srv_name}")
-        answer = future.result()
+        return future.result()
+
+    def _call(self, client: Client, request: Any) -> None:
+        answer = self._answer(client, request)
         if not answer.success:
             raise InputError(client.srv_name, answer.message, "success")
 

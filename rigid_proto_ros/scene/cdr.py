@@ -46,15 +46,9 @@ def _stamped_layout(length: int, count: int, child_length: int = 0) -> struct.St
     return struct.Struct(f"<4siII{strings}{-end % 8}x{count}d")
 
 
-def odometry(
-    stamp_ns: int,
-    frames: tuple[str, str],
-    pose: Sequence[float],
-    twist: Sequence[float],
-    covariances: tuple[Sequence[float], Sequence[float]] = (NO_COVARIANCE, NO_COVARIANCE),
-) -> bytes:
-    """A nav_msgs/Odometry: pose (7,) in the first frame, twist (6,) in the second; covariances (36,) of both."""
-    doubles = (*pose, *covariances[0], *twist, *covariances[1])
+def odometry(stamp_ns: int, frames: tuple[str, str], row: Sequence[float]) -> bytes:
+    """A nav_msgs/Odometry, exact: row (13,) is the pose in the first frame, then the twist in the second."""
+    doubles = (*row[:7], *NO_COVARIANCE, *row[7:], *NO_COVARIANCE)
     return stamped_doubles(stamp_ns, frames[0], doubles, frames[1])
 
 

@@ -36,8 +36,9 @@ def scene_values(
 ) -> dict[str, object]:
     """The parameters that a scene file gives a node; unknown names as ``read_scene`` has it."""
     scene = read_scene_file(path, node_name)
-    if warning := scene.warning(path, node_name):
-        warn(warning)
+    if scene.unused and not scene.has_section:
+        there = ", ".join(scene.unused[:5])
+        warn(f"{path}: no section is for /{node_name.lstrip('/')} (it has {there}); /** is for every node")
     values: dict[str, object] = {}
     for parameter, value in scene.values.items():
         if is_ros_parameter(parameter):

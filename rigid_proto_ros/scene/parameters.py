@@ -5,47 +5,170 @@ docs come from here.
 
 from __future__ import annotations
 
+import dataclasses
+import math
+import re
+from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import Any
 
+import numpy as np
+
 from ..base.errors import CommandRefused, InputError, did_you_mean
 from ..mass import INERTIA_MODELS, MODEL_COMS
 from ..motion import INTEGRATOR_FILES
 from ..motion.frames import check_contact_name
-from .declaration import (
-    AT_RESET,
-    HUGE,
-    READ_ONLY,
-    Parameter,
-    Value,
-    declared,
-    number,
-    numbers,
-    port,
-    switch,
-    text,
-    whole,
-)
+
+LIVE, AT_RESET, READ_ONLY = "live", "at the next reset", "read-only"
+
+HUGE = 1e100
+"""Bound of positions, speeds and forces: squares stay finite."""
+
+Value = bool | int | float | str | list[float]
+"""A parameter's value as files and ROS have it."""
 
 Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
-PointMass = tuple[float, float, float, float]
-ThrusterNumbers = tuple[float, ...]
-Noise = tuple[float, float, float, float]
+Four = tuple[float, float, float, float]
 Tensor = tuple[float, float, float, float, float, float]
 
 ZERO = (0.0, 0.0, 0.0)
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
+
+# What is declared of a parameter
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """type: ``double``, ``doubles``, ``integer``, ``bool`` or ``string``, one of the ``choices``. lower
+    and upper are inclusive unless ``above``: then values must lie above lower. lengths: accepted
+    lengths of ``doubles``. changes: LIVE, AT_RESET or READ_ONLY. default: None where the name is the user's choice.
+    """
+
+    name: str
+    type: str
+    default: Value | None
+    description: str
+    unit: str = ""
+    lower: float = -math.inf
+    upper: float = math.inf
+    above: bool = False
+    lengths: tuple[int, ...] = ()
+    choices: tuple[str, ...] = ()
+    changes: str = LIVE
+
+    @property
+    def accepted(self) -> str:
+        """What the parameter accepts, in words."""
+        if self.choices:
+            return ", ".join(repr(c) if c == "" else c for c in self.choices)
+        if self.type == "bool":
+            return "true or false"
+        if self.type == "string":
+            return "text"
+        words = {"double": "a finite number", "integer": "a whole number"}.get(self.type)
+        if words is None:
+            words = f"{' or '.join(str(n) for n in self.lengths)} finite numbers"
+        if self.lower > -math.inf:
+            words += f" {'>' if self.above else '>='} {self.lower:g}"
+        if self.upper < math.inf:
+            words += f"{' and' if self.lower > -math.inf else ''} <= {self.upper:g}"
+        return f"{words} [{self.unit}]" if self.unit else words
+
+    def convert(self, value: object) -> Value:
+        """The value in the parameter's own type, checked; raises InputError.
+
+        Numbers are numbers: whole numbers and text that reads as a number, or as a list of numbers, are converted.
+        """
+        converted = self._typed(value)
+        if converted is None or not self._within_bounds(converted):
+            hint = did_you_mean(str(value), filter(None, self.choices))
+            received = value.tolist() if isinstance(value, array) else value
+            text = repr(received)
+            received = received if len(text) <= 80 else text[:77] + "..."
+            raise InputError(self.name, received, "; ".join(filter(None, [self.accepted, hint])))
+        return converted
+
+    def _typed(self, value: object) -> Value | None:
+        if self.type in ("bool", "string"):
+            return value if isinstance(value, bool if self.type == "bool" else str) else None
+        if self.type == "doubles":
+            return _to_doubles(value)
+        number = _to_double(value)
+        if self.type == "double" or number is None:
+            return number
+        return int(number) if math.isfinite(number) and number == int(number) else None
+
+    def _within_bounds(self, value: Value) -> bool:
+        if isinstance(value, bool):
+            return True
+        if isinstance(value, str):
+            return not self.choices or value in self.choices
+        numbers = value if isinstance(value, list) else [value]
+        if self.lengths and len(numbers) not in self.lengths:
+            return False
+        above = all(n > self.lower if self.above else n >= self.lower for n in numbers)
+        return above and all(math.isfinite(n) and n <= self.upper for n in numbers)
+
+
+def _to_double(value: object) -> float | None:
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, (int, float)):
+        try:
+            return float(value)
+        except OverflowError:
+            return None
+    if isinstance(value, str) and _NUMBER.match(value.strip()):
+        return float(value)
+    return None
+
+
+def _to_doubles(value: object) -> list[float] | None:
+    if isinstance(value, str):
+        text = value.strip()
+        if text.startswith("[") and text.endswith("]"):
+            value = [item.strip(" '\"") for item in text[1:-1].split(",")]
+        elif len(items := text.replace(",", " ").split()) > 1:
+            value = items
+    alone = _to_double(value)
+    if alone is not None:
+        return [alone]
+    if not isinstance(value, (list, tuple, array, np.ndarray)):
+        return None
+    numbers = [number for item in value if (number := _to_double(item)) is not None]
+    return numbers if len(numbers) == len(value) else None
+
+
+def declare(default: Any, description: str, unit: str = "", **rules: Any) -> Any:
+    """A field of a dataclass that declares a parameter of the default's type. rules: as in Parameter; doubles are as
+    many as the default has, and within HUGE, unless these say otherwise.
+    """
+    kinds = {bool: "bool", int: "integer", float: "double", str: "string", tuple: "doubles"}
+    kind = kinds[type(default)]
+    if kind == "doubles":
+        rules = {"lower": -HUGE, "upper": HUGE, "lengths": (len(default),), **rules}
+    own = list(default) if kind == "doubles" else default
+    return field(default=default, metadata={"declaration": Parameter("", kind, own, description, unit, **rules)})
+
+
+def _port(default: int, description: str) -> Any:
+    """A port of this machine, set at start."""
+    return declare(default, description, lower=1, upper=65535, changes=READ_ONLY)
+
+
+# The parameters
 
 
 @dataclass(frozen=True, slots=True)
 class ExplicitInertia:
     """The body by numbers, for ``inertia_model`` explicit."""
 
-    mass: float = number(1.0, "Mass of the explicit model.", "kg", lower=0.0, upper=HUGE, above=True)
-    center_of_mass: Vector = numbers(ZERO, "Centre of mass of the explicit model, in mesh coordinates.", "mesh units")
-    tensor: Tensor = numbers(
+    mass: float = declare(1.0, "Mass of the explicit model.", "kg", lower=0.0, upper=HUGE, above=True)
+    center_of_mass: Vector = declare(ZERO, "Centre of mass of the explicit model, in mesh coordinates.", "mesh units")
+    tensor: Tensor = declare(
         (1.0, 0.0, 0.0, 1.0, 0.0, 1.0),
         "Tensor of the explicit model about its centre of mass: ixx ixy ixz iyy iyz izz.",
         "kg m²",
@@ -56,12 +179,12 @@ class ExplicitInertia:
 class ThrusterRules:
     """What holds for all thrusters."""
 
-    bidirectional: bool = switch(
+    bidirectional: bool = declare(
         False,
         "Thrusters push both ways, up to their limit of either sign; else from 0 to their limit.",
         changes=READ_ONLY,
     )
-    minimum_on_time: float = number(
+    minimum_on_time: float = declare(
         0.0, "Once on, a thruster pushes at least so long.", "s", lower=0.0, upper=1e9, changes=READ_ONLY
     )
 
@@ -70,15 +193,15 @@ class ThrusterRules:
 class InitialState:
     """What the body does at time 0."""
 
-    position: Vector = numbers(ZERO, "Position of the centre of mass at time 0, world axes.", "m", changes=AT_RESET)
-    orientation_xyzw: Quaternion = numbers(
+    position: Vector = declare(ZERO, "Position of the centre of mass at time 0, world axes.", "m", changes=AT_RESET)
+    orientation_xyzw: Four = declare(
         (0.0, 0.0, 0.0, 1.0), "Attitude at time 0, body to world; normalized.", changes=AT_RESET
     )
-    linear_velocity: Vector = numbers(
+    linear_velocity: Vector = declare(
         ZERO, "Velocity of the centre of mass at time 0, world axes.", "m/s", changes=AT_RESET
     )
-    angular_velocity: Vector = numbers(ZERO, "Angular velocity at time 0, world axes.", "rad/s", changes=AT_RESET)
-    string_mass: float = number(
+    angular_velocity: Vector = declare(ZERO, "Angular velocity at time 0, world axes.", "rad/s", changes=AT_RESET)
+    string_mass: float = declare(
         0.0,
         "Effective mass that stiffness and damping of a string tied at time 0 are taken from; 0 is that of the body as "
         "it lies then.",
@@ -93,11 +216,11 @@ class InitialState:
 class StringParameters:
     """The string."""
 
-    attached: bool = switch(False, "The string is tied from the start, without a timeout.")
-    attach: Vector = numbers(ZERO, "Where it is tied, in mesh coordinates.", "mesh units")
-    target: Vector = numbers(ZERO, "Where its free end is while it is tied from the start, world axes.", "m")
-    stiffness: float = number(50.0, "Stiffness of the string.", "N/m", lower=0.0, upper=1e30)
-    frequency: float = number(
+    attached: bool = declare(False, "The string is tied from the start, without a timeout.")
+    attach: Vector = declare(ZERO, "Where it is tied, in mesh coordinates.", "mesh units")
+    target: Vector = declare(ZERO, "Where its free end is while it is tied from the start, world axes.", "m")
+    stiffness: float = declare(50.0, "Stiffness of the string.", "N/m", lower=0.0, upper=1e30)
+    frequency: float = declare(
         0.0,
         "Above 0 it takes precedence over stiffness: angular frequency of the effective mass on the string, so that "
         "light and heavy bodies respond alike.",
@@ -105,33 +228,26 @@ class StringParameters:
         lower=0.0,
         upper=1e15,
     )
-    damping_ratio: float = number(0.1, "Damping of the string relative to critical.", lower=0.0, upper=1e6)
-    rest_length: float = number(0.0, "Length up to which the string doesn't pull.", "m", lower=0.0, upper=1e30)
-    bilateral: bool = switch(False, "The string pushes too, as a spring does.")
-    timeout: float = number(
+    damping_ratio: float = declare(0.1, "Damping of the string relative to critical.", lower=0.0, upper=1e6)
+    rest_length: float = declare(0.0, "Length up to which the string doesn't pull.", "m", lower=0.0, upper=1e30)
+    bilateral: bool = declare(False, "The string pushes too, as a spring does.")
+    timeout: float = declare(
         1.0, "The string is released this long after the last target message; 0 never.", "s", lower=0.0, upper=1e9
     )
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseParameters:
-    """What published messages err; the motion stays exact."""
+    """How ~/imu errs; the motion and all other topics stay exact."""
 
-    imu: Noise = numbers(
+    imu: Four = declare(
         (0.0, 0.0, 0.0, 0.0),
         "Errors in ~/imu: densities of white noise of angular velocity and specific force [per √Hz], then the standard "
         "deviations of their biases.",
         "rad/s, m/s²",
         lower=0.0,
     )
-    state: Noise = numbers(
-        (0.0, 0.0, 0.0, 0.0),
-        "Densities of white noise [per √Hz] of position, attitude, velocity and angular velocity in ~/pose, ~/twist, "
-        "~/odom; the attitude's in ~/imu too.",
-        "m, rad, m/s, rad/s",
-        lower=0.0,
-    )
-    seed: int = whole(
+    seed: int = declare(
         0, "Seed of the noise: the same seed gives the same errors at the same stamps.", lower=0, upper=2**62
     )
 
@@ -140,13 +256,13 @@ class NoiseParameters:
 class GhostParameters:
     """What differs of the ghost; it is shown where one is given."""
 
-    inertia_model: str = text(
+    inertia_model: str = declare(
         "",
         "Show a ghost beside the body, from time 0 or the next reset on, that gets the same commands under this "
         "inertia model.",
         choices=("", *INERTIA_MODELS),
     )
-    integrator: str = text(
+    integrator: str = declare(
         "",
         "Show a ghost, from time 0 or the next reset on, that gets the same commands under this integrator.",
         choices=("", *INTEGRATOR_FILES),
@@ -163,17 +279,17 @@ class Parameters:
     coordinates.
     """
 
-    mesh: str = text(
+    mesh: str = declare(
         "t_handle",
         "Mesh of the body: a path, a package:// URI or a bundled name; empty only with the explicit inertia model.",
     )
-    mesh_repair: bool = switch(False, "Orient, weld and cap a mesh that isn't closed, as with inspect --repair.")
-    mesh_fallback: str = text(
+    mesh_repair: bool = declare(False, "Orient, weld and cap a mesh that isn't closed, as with inspect --repair.")
+    mesh_fallback: str = declare(
         "",
         "Fallback shape for a mesh that encloses no volume, as with inspect --fallback.",
         choices=("", "hull", "box"),
     )
-    scale: tuple[float, ...] = numbers(
+    scale: tuple[float, ...] = declare(
         (1.0, 1.0, 1.0),
         "Mesh coordinates times scale are metres; one number or one per axis, a negative one mirrors.",
         "m per mesh unit",
@@ -181,44 +297,44 @@ class Parameters:
         upper=1e9,
         lengths=(1, 3),
     )
-    mass: float = number(
+    mass: float = declare(
         0.0,
         "Mass; above 0 it takes precedence over density and doesn't change with scale.",
         "kg",
         lower=0.0,
         upper=HUGE,
     )
-    density: float = number(
+    density: float = declare(
         1000.0, "Density of the solid; setting it sets mass to 0.", "kg/m³", lower=0.0, upper=HUGE, above=True
     )
-    inertia_model: str = text(
+    inertia_model: str = declare(
         "solid",
         "Model of the mass distribution, from which the inertia tensor follows.",
         choices=INERTIA_MODELS,
     )
-    inertia_model_com: str = text(
+    inertia_model_com: str = declare(
         "model",
         "Where the model's centre of mass lies: where the model has it, or where the true solid has it, so that what "
         "the tensor does is seen alone; explicit numbers keep theirs.",
         choices=MODEL_COMS,
     )
     explicit_inertia: ExplicitInertia = ExplicitInertia()
-    gyroscopic: bool = switch(True, "Keep the term ω × Iω; without it the motion isn't that of a rigid body.")
-    gravity: Vector = numbers(ZERO, "Acceleration of gravity, world axes.", "m/s²")
-    linear_damping: float = number(
+    gyroscopic: bool = declare(True, "Keep the term ω × Iω; without it the motion isn't that of a rigid body.")
+    gravity: Vector = declare(ZERO, "Acceleration of gravity, world axes.", "m/s²")
+    linear_damping: float = declare(
         0.0, "Damping force at the centre of mass per velocity.", "N s/m", lower=0.0, upper=HUGE
     )
-    angular_damping: float = number(0.0, "Damping torque per angular velocity.", "N m s", lower=0.0, upper=HUGE)
+    angular_damping: float = declare(0.0, "Damping torque per angular velocity.", "N m s", lower=0.0, upper=HUGE)
     initial: InitialState = InitialState()
-    integrator: str = text(
+    integrator: str = declare(
         "auto",
         "Integrator of the motion; auto picks the cheapest that meets accuracy.",
         choices=tuple(INTEGRATOR_FILES),
     )
-    step: float = number(
+    step: float = declare(
         0.001, "Step of fixed-step integrators, rounded to the nearest nanosecond.", "s", lower=1e-9, upper=1e5
     )
-    accuracy: float = number(
+    accuracy: float = declare(
         1e-9,
         "Local error a second that auto allows: angle, displacement per half diagonal, relative velocities.",
         "1/s",
@@ -226,52 +342,52 @@ class Parameters:
         upper=1.0,
         above=True,
     )
-    publish_rate: float = number(100.0, "States published per simulated second.", "1/s", lower=1e-6, upper=1e4)
-    real_time_factor: float = number(
+    publish_rate: float = declare(100.0, "States published per simulated second.", "1/s", lower=1e-6, upper=1e4)
+    real_time_factor: float = declare(
         1.0, "Simulated seconds per second of the wall clock; 0 runs as fast as possible.", lower=0.0, upper=1e6
     )
-    lockstep: bool = switch(
+    lockstep: bool = declare(
         False,
         "While paused, each message taken from ~/wrench or ~/thrusters steps the simulation, as ~/step does; "
         "without its round trip.",
     )
-    start_paused: bool = switch(False, "Start paused.", changes=READ_ONLY)
-    wrench_timeout: float = number(
+    start_paused: bool = declare(False, "Start paused.", changes=READ_ONLY)
+    wrench_timeout: float = declare(
         1.5,
         "A held wrench ends this long after its last message; 0 holds it until it is replaced.",
         "s",
         lower=0.0,
         upper=1e9,
     )
-    poke_duration: float = number(0.05, "Duration of a poke that states none.", "s", lower=1e-9, upper=1e9)
-    schedule_horizon: float = number(
+    poke_duration: float = declare(0.05, "Duration of a poke that states none.", "s", lower=1e-9, upper=1e9)
+    schedule_horizon: float = declare(
         3600.0, "How far ahead of simulated time a command's stamp may lie.", "s", lower=0.0, upper=1e9
     )
     string: StringParameters = StringParameters()
-    publish_clock: bool = switch(False, "Publish simulated time on /clock.")
-    publish_tf: bool = switch(False, "Publish the body's frame on /tf (where tf2_msgs is installed).")
-    imu_contact: str = text("", "Contact at which ~/imu measures; empty means the centre of mass.")
+    publish_clock: bool = declare(False, "Publish simulated time on /clock.")
+    publish_tf: bool = declare(False, "Publish the body's frame on /tf (where tf2_msgs is installed).")
+    imu_contact: str = declare("", "Contact at which ~/imu measures; empty means the centre of mass.")
     noise: NoiseParameters = NoiseParameters()
     ghost: GhostParameters = GhostParameters()
-    world_frame: str = text("world", "Name of the world frame in published messages.", changes=READ_ONLY)
-    body_frame: str = text(
+    world_frame: str = declare("world", "Name of the world frame in published messages.", changes=READ_ONLY)
+    body_frame: str = declare(
         "", "Name of the body's frame in published messages; empty means the node's name.", changes=READ_ONLY
     )
-    record: str = text("", "Record the session to this .rrd (Rerun) or .mcap (bag) file; empty records nothing.")
-    viewer: str = text(
+    record: str = declare("", "Record the session to this .rrd (Rerun) or .mcap (bag) file; empty records nothing.")
+    viewer: str = declare(
         "none",
         "Show the motion live: web in Rerun in the browser, native in Rerun's own window, workbench on the "
         "interactive page.",
         choices=("none", "web", "native", "workbench"),
         changes=READ_ONLY,
     )
-    rerun_port: int = port(9876, "Port on which the live view is served, on this machine only.")
-    web_port: int = port(9090, "Port of the browser's viewer page, on this machine only.")
-    workbench_port: int = port(8080, "Port of the interactive page, on this machine only.")
+    rerun_port: int = _port(9876, "Port on which the live view is served, on this machine only.")
+    web_port: int = _port(9090, "Port of the browser's viewer page, on this machine only.")
+    workbench_port: int = _port(8080, "Port of the interactive page, on this machine only.")
     thruster: ThrusterRules = ThrusterRules()
     contacts: Mapping[str, Vector] = field(default_factory=dict)
-    ballast: Mapping[str, PointMass] = field(default_factory=dict)
-    thrusters: Mapping[str, ThrusterNumbers] = field(default_factory=dict)
+    ballast: Mapping[str, Four] = field(default_factory=dict)
+    thrusters: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def replaced(self, changes: Mapping[str, object]) -> Parameters:
         """With these changed, by name, each converted and checked by its declaration; raises InputError.
@@ -298,47 +414,51 @@ class Parameters:
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     @property
-    def point_masses(self) -> list[PointMass]:
+    def point_masses(self) -> list[Four]:
         """The ballast in the order in which it is added to the body: sums depend on it."""
         return [mass for _, mass in sorted(self.ballast.items())]
 
 
-PARAMETERS: dict[str, Parameter] = declared(Parameters())
+def _declared(group: Any, prefix: str = "") -> dict[str, Parameter]:
+    """The parameters that a dataclass instance declares, by dotted name: those of an inner dataclass
+    below its field's name.
+    """
+    found: dict[str, Parameter] = {}
+    for own in dataclasses.fields(group):
+        name = f"{prefix}{own.name}"
+        value = getattr(group, own.name)
+        if "declaration" in own.metadata:
+            found[name] = replace(own.metadata["declaration"], name=name)
+        elif dataclasses.is_dataclass(value):
+            found |= _declared(value, f"{name}.")
+    return found
+
+
+PARAMETERS: dict[str, Parameter] = _declared(Parameters())
 _VALUE_OF = {name: attrgetter(name) for name in PARAMETERS}
 
+
+def _pattern(name: str, description: str, unit: str, lengths: tuple[int, ...], changes: str = LIVE) -> Parameter:
+    return Parameter(name, "doubles", None, description, unit, -HUGE, HUGE, lengths=lengths, changes=changes)
+
+
 PATTERNS: dict[str, Parameter] = {
-    "contacts.": Parameter(
-        "contacts.<name>",
-        "doubles",
-        None,
-        "A named point of the body, in mesh coordinates.",
-        "mesh units",
-        -HUGE,
-        HUGE,
-        lengths=(3,),
-        changes=READ_ONLY,
+    "contacts.": _pattern(
+        "contacts.<name>", "A named point of the body, in mesh coordinates.", "mesh units", (3,), READ_ONLY
     ),
-    "ballast.": Parameter(
+    "ballast.": _pattern(
         "ballast.<name>",
-        "doubles",
-        None,
         "A point mass added to the body: kg, then x, y, z in mesh coordinates.",
         "kg, mesh units",
-        -HUGE,
-        HUGE,
-        lengths=(4,),
+        (4,),
     ),
-    "thrusters.": Parameter(
+    "thrusters.": _pattern(
         "thrusters.<name>",
-        "doubles",
-        None,
         "A thruster on the body, commanded by ~/thrusters: x, y, z and the direction of its force in mesh coordinates; "
         "behind them, where wanted, the largest force (0 for any).",
         "mesh units, N",
-        -HUGE,
-        HUGE,
-        lengths=(6, 7),
-        changes=READ_ONLY,
+        (6, 7),
+        READ_ONLY,
     ),
 }
 """Parameters with a name of the user's choice."""

@@ -29,8 +29,7 @@ from ..simulation.checks import check_start
 from ..simulation.commands import nanoseconds
 from ..simulation.setup import Setup
 from ..simulation.thrusters import make_thruster
-from .declaration import READ_ONLY, Value
-from .parameters import Parameters, convert_all, parameter_named
+from .parameters import READ_ONLY, Parameters, Value, convert_all, parameter_named
 from .yaml_text import yaml_value
 
 _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)

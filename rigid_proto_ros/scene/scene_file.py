@@ -17,15 +17,11 @@ import yaml
 
 from ..base.bundled import scene_names, scene_path
 from ..base.errors import InputError, did_you_mean
-from .yaml_text import compose_yaml, read_text, scalar
-
-KINDS: dict[type[yaml.Node], str] = {yaml.SequenceNode: "list", yaml.MappingNode: "mapping"}
-"""What a value is that is no single one, in a refusal."""
-
+from .yaml_text import compose_yaml, key_of, read_text, refused, typed
 
 GONE = re.compile(
     r"(imu_noise\..*|pose_noise\..*|noise\.(gyroscope|accelerometer|position|orientation|(linear|angular)_velocity)"
-    r"|noise_seed|step_until|step_periods|frames|initial\.flight)\Z"
+    r"|noise\.state|noise_seed|step_until|step_periods|frames|initial\.flight)\Z"
 )
 """Parameters of earlier versions."""
 
@@ -58,68 +54,53 @@ class SceneFile:
     has_section: bool = False
     unused: list[str] = field(default_factory=list)
 
-    def warning(self, path: str | Path, node_name: str) -> str:
-        """What to say of a file that has sections, and none for this node; else empty."""
-        if self.has_section or not self.unused:
-            return ""
-        names = ", ".join(self.unused[:5])
-        return f"{path}: no section is for /{node_name.lstrip('/')} (it has {names}); /** is for every node"
-
 
 def read_scene_file(path: str | Path, node_name: str = "rigid_body") -> SceneFile:
     """Read the sections for this node, given with its namespace, later ones winning; raises InputError naming file,
     line and remedy.
     """
-    return _read_sections(compose_yaml(read_text(Path(path), "a YAML file"), str(path)), str(path), node_name)
+    return read_scene_text(read_text(Path(path), "a YAML file"), str(path), node_name)
 
 
 def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body") -> SceneFile:
     """As ``read_scene_file``, from text; ``name`` stands in errors."""
-    return _read_sections(compose_yaml(text, name), name, node_name)
-
-
-def _read_sections(root: yaml.Node | None, path: str, node_name: str) -> SceneFile:
     scene = SceneFile()
+    root = compose_yaml(text, name)
     if root is None:
         return scene
-    if not isinstance(root, yaml.MappingNode):
-        raise _refused(path, root, "a mapping such as rigid_body: {ros__parameters: {...}}")
     full_name = f"/{node_name.lstrip('/')}"
     named: set[str] = set()
-    for name, parameters in _sections(path, root, ""):
-        values: dict[str, object] = {}
-        _collect(path, parameters, "", values)
+    for section, parameters in _sections(name, root, ""):
+        values = dict(_values(name, parameters, ""))
         # A section without a namespace is for a node of that name in any.
-        if name != f"/{full_name.rpartition('/')[2]}" and not _section_form(name).match(full_name):
-            scene.unused.append(name)
+        if section != f"/{full_name.rpartition('/')[2]}" and not _section_form(section).match(full_name):
+            scene.unused.append(section)
             continue
         scene.has_section = True
         scene.values.update(values)
-        if name != "/**":
+        if section != "/**":
             named |= values.keys()
-    for name in [name for name in scene.values if GONE.match(name)]:
-        value = scene.values.pop(name)
+    for parameter in [parameter for parameter in scene.values if GONE.match(parameter)]:
+        value = scene.values.pop(parameter)
         # A recorded scene holds all parameters of its version: what had no effect is left out.
-        if any(value) if isinstance(value, list) else value not in (0, "", GONE_DEFAULTS.get(name)):
-            raise InputError(f"{path}, {name}", "a parameter of an earlier version; this one has no such parameter")
+        if any(value) if isinstance(value, list) else value not in (0, "", GONE_DEFAULTS.get(parameter)):
+            raise InputError(f"{name}, {parameter}", "a parameter of an earlier version, which this one hasn't")
     scene.wildcard = scene.values.keys() - named
     return scene
 
 
-def _sections(path: str, tree: yaml.MappingNode, namespace: str) -> Iterator[tuple[str, yaml.Node]]:
+def _sections(path: str, tree: yaml.Node, namespace: str) -> Iterator[tuple[str, yaml.Node]]:
     """The nodes' names, with the namespaces that they are nested in, and what stands under their ros__parameters."""
-    for key, section in tree.value:
-        name = f"{namespace}/{_name(path, key).strip('/')}"
-        if not isinstance(section, yaml.MappingNode):
-            raise _refused(path, section, "a section such as rigid_body: {ros__parameters: {...}}")
-        for inner, content in section.value:
-            if _name(path, inner) == "ros__parameters":
-                yield name, content
-            elif not isinstance(content, yaml.MappingNode):
-                raise _refused(path, inner, "ros__parameters: under the node's name")
-        nested = [pair for pair in section.value if _name(path, pair[0]) != "ros__parameters"]
-        if nested:
-            yield from _sections(path, yaml.MappingNode(section.tag, nested, section.start_mark), name)
+    if not isinstance(tree, yaml.MappingNode):
+        raise refused(tree, path, "a mapping such as rigid_body: {ros__parameters: {...}}")
+    for key, content in tree.value:
+        name = key_of(key, path)
+        if name == "ros__parameters" and namespace:
+            yield namespace, content
+        elif namespace and not isinstance(content, yaml.MappingNode):
+            raise refused(key, path, "ros__parameters: under the node's name")
+        else:
+            yield from _sections(path, content, f"{namespace}/{name.strip('/')}")
 
 
 def _section_form(name: str) -> re.Pattern[str]:
@@ -137,50 +118,32 @@ def typed_value(text: str, name: str) -> object:
         return _sequence(name, node)
     if not isinstance(node, yaml.ScalarNode):
         raise InputError(name, text, "a plain value or a list")
-    return _typed(node)
+    return typed(node)
 
 
-def _collect(path: str, node: yaml.Node, prefix: str, values: dict[str, object]) -> None:
+def _values(path: str, node: yaml.Node, prefix: str) -> Iterator[tuple[str, object]]:
+    """The parameters by name that stand in a mapping, those of an inner one below its name."""
     if not isinstance(node, yaml.MappingNode):
-        raise _refused(path, node, "name: value lines under ros__parameters")
+        raise refused(node, path, "name: value lines under ros__parameters")
     for key, value in node.value:
-        name = f"{prefix}{_name(path, key)}"
+        name = f"{prefix}{key_of(key, path)}"
         if isinstance(value, yaml.MappingNode):
-            _collect(path, value, f"{name}.", values)
+            yield from _values(path, value, f"{name}.")
         elif isinstance(value, yaml.SequenceNode):
-            values[name] = _sequence(path, value)
+            yield name, _sequence(path, value)
         elif not value.style and value.value == "":
-            raise _refused(path, key, f"a value behind {name}:")
+            raise refused(key, path, f"a value behind {name}:")
         else:
-            values[name] = _typed(value)
-
-
-def _name(path: str, key: yaml.Node) -> str:
-    if not isinstance(key, yaml.ScalarNode):
-        raise _refused(path, key, "a name")
-    return key.value
-
-
-def _typed(node: yaml.ScalarNode) -> bool | int | float | str:
-    return node.value if node.style else scalar(node.value)
+            yield name, typed(value)
 
 
 def _sequence(path: str, node: yaml.SequenceNode) -> list:
     items: list[object] = []
     for item in node.value:
         if isinstance(item, yaml.MappingNode):
-            raise _refused(path, item, "a list of plain values")
+            raise refused(item, path, "a list of plain values")
         # rcl reads nested lists as one long list.
-        items.extend(_sequence(path, item) if isinstance(item, yaml.SequenceNode) else [_typed(item)])
+        items.extend(_sequence(path, item) if isinstance(item, yaml.SequenceNode) else [typed(item)])
     if len({type(item) for item in items}) > 1:
-        raise _refused(path, node, "a list of one type: write whole numbers with a point too, as in [0.0, 0.0, -9.81]")
+        raise refused(node, path, "a list of one type: write whole numbers with a point too, as in [0.0, 0.0, -9.81]")
     return items
-
-
-def _refused(path: str, node: yaml.Node, accepted: str) -> InputError:
-    received = node.value if isinstance(node, yaml.ScalarNode) else f"a {KINDS[type(node)]}"
-    if isinstance(node, yaml.SequenceNode) and all(isinstance(item, yaml.ScalarNode) for item in node.value):
-        received = "[" + ", ".join(str(item.value) for item in node.value) + "]"
-    # A value from the command line has no lines to count.
-    where = path if str(path).startswith("-") else f"{path}, line {node.start_mark.line + 1}"
-    return InputError(str(where), received, accepted)

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Poke scripts: a YAML list of timed commands, expanded to the very messages that go over the topics.
+"""Poke scripts: a YAML list of timed entries, read as commands, and commands written as entries again.
 
-``poke_client`` sends them and ``simulate`` applies them, from one expansion, so that both give one motion.
+``poke_client`` sends a script's commands and ``simulate`` applies them, from one reading, so that both give one motion.
 """
 
 from __future__ import annotations
 
+import json
 import random
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import replace
+from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from ..base.errors import CommandRefused, InputError, did_you_mean
 from ..base.vectors import Vector
@@ -29,18 +31,21 @@ from ..simulation.commands import (
     WrenchCommand,
     nanoseconds,
 )
-from .command_codec import MAX_SCHEDULED, MESH_FRAME
 from .parameters import ZERO
-from .yaml_text import load_json, load_plain_yaml, read_text
+from .yaml_text import load_json, load_yaml, read_text
 
 Stamp = dict[str, Any]
 """A command's stamp_ns and entry."""
 
-Result = TypeVar("Result")
+MESH_FRAME = "body/mesh"
+"""Frame of a point in mesh coordinates, where the body frame's own name isn't known."""
 
 MAX_TIME_S = 1e9
 MAX_ENTRIES = 1_000_000
 """Commands a script may expand to: beyond it a mistyped duration is likelier than a wish."""
+
+MAX_SCHEDULED = 5000
+"""Commands that a message on the schedule topic may stand for."""
 
 MAX_SCHEDULE_LENGTH = 1_000_000
 """Characters of a message on the schedule topic: 5000 entries and some."""
@@ -48,13 +53,13 @@ MAX_SCHEDULE_LENGTH = 1_000_000
 MAX_YAML_LENGTH = 10_000
 """Of a message that isn't JSON, which is read a hundred times as fast: the body would wait."""
 
-_FORCES = ("force", "push", "impulse")
-_POKE_KEYS = {"at", *_FORCES, "torque", "angular_impulse", "axes", "duration", "slot"}
 _REPEATING = {"repeat", "every", "jitter"}
 _TIMING_KEYS = {"t", "seed"} | _REPEATING
 _WRENCH_KEYS = {"at", "force", "push", "torque", "axes", "duration", "slot"}
+_POKE_KEYS = _TIMING_KEYS | _WRENCH_KEYS | {"impulse", "angular_impulse"}
 _STRING_KEYS = {"attach", "target"}
-_WHOLE_POKE_KEYS = _TIMING_KEYS | _POKE_KEYS
+
+# Read
 
 
 def read_script(path: str | Path) -> list[Command]:
@@ -64,22 +69,19 @@ def read_script(path: str | Path) -> list[Command]:
 
 def parse_script(text: str, name: str = "script") -> list[Command]:
     """As ``read_script``, from text."""
-    return expand_script(load_plain_yaml(text, name), name)
+    return expand_script(load_yaml(text, name), name)
 
 
 def read_schedule(text: str) -> dict | list:
     """What a message on the schedule topic says: an entry, or a list of entries. JSON, which is YAML, may be longer and
     is read faster. Raises InputError.
     """
-    if len(text) > MAX_SCHEDULE_LENGTH:
-        raise InputError("schedule", f"{len(text)} characters", f"at most {MAX_SCHEDULE_LENGTH}")
-    entries = load_json(text)
+    entries = load_json(text) if len(text) <= MAX_SCHEDULE_LENGTH else None
     if entries is None:
         if len(text) > MAX_YAML_LENGTH:
-            raise InputError(
-                "schedule", f"{len(text)} characters", f"JSON, or at most {MAX_YAML_LENGTH} characters of other YAML"
-            )
-        entries = load_plain_yaml(text, "schedule")
+            accepted = f"{MAX_SCHEDULE_LENGTH} characters of JSON, or {MAX_YAML_LENGTH} of other YAML, at most"
+            raise InputError("schedule", f"{len(text)} characters", accepted)
+        entries = load_yaml(text, "schedule")
     if not entries or not isinstance(entries, (dict, list)):
         raise InputError("schedule", text[:80], "an entry such as {t: 0.5, force: [0, 0, 1]}, or a list of entries")
     return entries
@@ -89,7 +91,7 @@ def expand_schedule(entries: dict | list) -> list[Command]:
     """The commands of what ``read_schedule`` gives, in the order in which they are listed; raises InputError."""
     commands = expand_script(entries if isinstance(entries, list) else [entries], "schedule", MAX_SCHEDULED)
     # As listed, which only matters among those that act at once because their time is past.
-    return sorted(commands, key=lambda command: command.entry)
+    return sorted(commands, key=attrgetter("entry"))
 
 
 def expand_script(
@@ -104,32 +106,23 @@ def expand_script(
         raise InputError(name, type(entries).__name__, "a list of entries such as - {t: 0.5, force: [0, 0, 1]}")
     commands: list[Command] = []
     for number, entry in enumerate(entries, 1):
+        key = ""
         try:
-            for t_ns in _times_ns(entry, number, max_commands):
-                commands += _expand(entry, {"stamp_ns": start_ns + t_ns, "entry": number})
+            times_ns = _times_ns(entry, number, max_commands)
+            key = min(entry.keys() & _READERS.keys(), default="")
+            _check_keys(entry, _TIMING_KEYS | {key} if key else _POKE_KEYS, set() if key else _READERS.keys())
+            for t_ns in times_ns:
+                stamp = {"stamp_ns": start_ns + t_ns, "entry": number}
+                commands += _READERS[key](entry[key], stamp) if key else [_load(False, entry, stamp)]
             if len(commands) > max_commands:
                 raise InputError("", f"more than {max_commands} commands")
         except CommandRefused:
             raise
         except InputError as error:
-            raise _named(f"{name}, entry {number}", error) from None
+            place = ", ".join(filter(None, (f"{name}, entry {number}", key, error.field)))
+            raise InputError(place, error.received, error.accepted) from None
     commands.sort(key=attrgetter("stamp_ns"))
     return commands
-
-
-def _named(where: str, error: InputError) -> InputError:
-    """An error of a field that stands there."""
-    return InputError(", ".join(filter(None, (where, error.field))), error.received, error.accepted)
-
-
-def _within(where: str, function: Callable[..., Result], *arguments: Any) -> Result:
-    """What a function returns; where it raises, the field is said to stand there."""
-    try:
-        return function(*arguments)
-    except CommandRefused:
-        raise
-    except InputError as error:
-        raise _named(where, error) from None
 
 
 def _times_ns(entry: Any, number: int, max_commands: int) -> list[int]:
@@ -158,16 +151,6 @@ def _times_ns(entry: Any, number: int, max_commands: int) -> list[int]:
     return [max(0, time_ns + nanoseconds(shift)) for time_ns, shift in zip(times_ns, shifts, strict=True)]
 
 
-def _expand(entry: dict, stamp: Stamp) -> list[Command]:
-    kinds = entry.keys() & _READERS.keys()
-    if not kinds:
-        _check_keys(entry, _WHOLE_POKE_KEYS, _READERS.keys())
-        return [_load(False, entry, stamp)]
-    key = min(kinds)
-    _check_keys(entry, _TIMING_KEYS | {key})
-    return _within(key, _READERS[key], entry[key], stamp)
-
-
 def _held_wrench(entry: Any, stamp: Stamp) -> list[Command]:
     if not isinstance(entry, dict):
         raise InputError("", entry, "{at, force or push, torque, axes, duration}")
@@ -185,25 +168,18 @@ def _state(values: Any, stamp: Stamp) -> list[Command]:
     if not isinstance(values, dict) or not values:
         raise InputError("", values, "any of " + ", ".join(STATE_VALUES))
     _check_keys(values, STATE_VALUES.keys())
-    state = {}
-    for name, numbers in values.items():
-        if not isinstance(numbers, list) or len(numbers) != STATE_VALUES[name]:
-            raise InputError(name, numbers, f"{STATE_VALUES[name]} numbers")
-        state[name] = tuple(_number(number, name) for number in numbers)
-    return [SetState(state, **stamp)]
+    return [SetState({name: _numbers(numbers, name, STATE_VALUES[name]) for name, numbers in values.items()}, **stamp)]
 
 
 def _string(entry: Any, stamp: Stamp) -> list[Command]:
     if entry == "release":
         return [ReleaseString(**stamp)]
-    accepted = "release, or {attach: contact or [x, y, z] in mesh coordinates, target: [x, y, z] in the world}"
     if not isinstance(entry, dict) or not entry or not entry.keys() <= _STRING_KEYS:
+        accepted = "release, or {attach: contact or [x, y, z] in mesh coordinates, target: [x, y, z] in the world}"
         raise InputError("", entry, accepted)
     commands: list[Command] = []
     if "attach" in entry:
         attach = entry["attach"]
-        if isinstance(attach, dict) and set(attach) == {"point"}:
-            attach = attach["point"]
         contact = attach if isinstance(attach, str) and CONTACT_NAME.match(attach) else ""
         point = ZERO if contact else _vector(attach, "attach")
         commands.append(TieString("mesh", point, MESH_FRAME, contact, **stamp))
@@ -237,27 +213,8 @@ _READERS: Mapping[str, Callable[[Any, Stamp], list[Command]]] = {
 }
 """By the key that says what an entry is; one without any is a poke."""
 
-ENTRY_KEYS: Mapping[str, Set[str]] = {
-    "timing": _TIMING_KEYS,
-    "poke": _POKE_KEYS,
-    "wrench": _WRENCH_KEYS,
-    "string": _STRING_KEYS | {"release"},
-    "other": _READERS.keys(),
-}
-"""The keys that a script may hold, by the kind of entry."""
-
-
-def with_contacts(script: list[Command], contacts: Mapping[str, Vector]) -> list[Command]:
-    """The script with the names of contacts that strings are tied to replaced by their points (mesh coordinates)."""
-    resolved: list[Command] = []
-    for command in script:
-        if isinstance(command, TieString) and command.contact:
-            if command.contact not in contacts:
-                known = ", ".join(sorted(contacts)) or "none"
-                raise InputError("string, attach", command.contact, f"a contact of the body ({known}) or [x, y, z]")
-            command = replace(command, point=contacts[command.contact], contact="")
-        resolved.append(command)
-    return resolved
+ENTRY_KEYS: Set[str] = _POKE_KEYS | _READERS.keys()
+"""The keys that an entry may have."""
 
 
 def _load(held: bool, entry: dict, stamp: Stamp) -> WrenchCommand:
@@ -279,24 +236,22 @@ def _load(held: bool, entry: dict, stamp: Stamp) -> WrenchCommand:
     force_key, torque_key = ("impulse", "angular_impulse") if impulse else ("force", "torque")
     force = _vector(entry[force_key], force_key) if force_key in entry else ZERO
     torque = _vector(entry[torque_key], torque_key) if torque_key in entry else ZERO
-    point = _at(entry.get("at", "com"))
+    point = _point(entry.get("at", "com"))
     if "push" in entry:
-        if "force" in entry:
-            raise InputError("", ["force", "push"], "one of force, push, impulse")
-        if "axes" in entry or "torque" in entry:
-            raise InputError("", sorted(entry), "push without axes and torque: it acts along the inward normal")
+        if "force" in entry or "axes" in entry or "torque" in entry:
+            raise InputError("", sorted(entry), "push without force, axes and torque: it acts along the inward normal")
         if point == ("com",):
             raise InputError("at", "com", "a point of the surface, which has a normal, such as {vertex: 0}")
         axes, force = "normal", (_number(entry["push"], "push"), 0.0, 0.0)
     return WrenchCommand(held, Frame(axes, point, duration_s, impulse, slot), force, torque, **stamp)
 
 
-def _at(at: object) -> tuple:
+def _point(at: object) -> tuple:
     if isinstance(at, str) and (at in FIXED_POINTS or (CONTACT_NAME.match(at) and at not in RESERVED_WORDS)):
         return (at,) if at in FIXED_POINTS else ("contact", at)
     if isinstance(at, dict) and len(at) == 1:
         ((word, value),) = at.items()
-        if word == "vertex" and isinstance(value, int) and not isinstance(value, bool) and value >= 0:
+        if word == "vertex" and type(value) is int and value >= 0:
             return "vertex", value
         if word == "point":
             return "point", _vector(value, "at, point")
@@ -313,27 +268,19 @@ def _check_keys(entry: dict, known: Set[str], others: Set[str] = frozenset()) ->
     """others: keys of other kinds of entries, one of which may be meant."""
     if entry.keys() <= known:
         return
-    unknown = [str(key) for key in entry if key not in known]
-    if unknown:
-        hint = did_you_mean(unknown[0], known | others)
-        keys = f"the keys here are {', '.join(sorted(known))}"
-        keys += f"; other entries have {', '.join(sorted(others))}" if others else ""
-        raise InputError("", f"there is no key {', '.join(unknown)}; {' '.join(filter(None, [hint, keys]))}")
+    unknown = [key for key in entry if key not in known]
+    hint = did_you_mean(unknown[0], known | others)
+    keys = f"the keys here are {', '.join(sorted(known))}"
+    keys += f"; other entries have {', '.join(sorted(others))}" if others else ""
+    raise InputError("", f"there is no key {', '.join(unknown)}; {' '.join(filter(None, [hint, keys]))}")
 
 
 def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
     if type(value) is float and lower <= value <= upper:
         return value  # as most are: a script may have thousands
-    number: Any = value
-    if isinstance(value, str):
-        # YAML reads 1e-3 without a point as text.
-        try:
-            number = float(value)
-        except ValueError:
-            pass
-    if isinstance(number, bool) or not isinstance(number, (int, float)) or not lower <= number <= upper:
+    if type(value) not in (int, float) or not lower <= value <= upper:
         raise InputError(field, value, f"a number from {lower:g} to {upper:g}")
-    return float(number)
+    return float(value)
 
 
 def _vector(value: Any, field: str) -> Vector:
@@ -341,3 +288,99 @@ def _vector(value: Any, field: str) -> Vector:
         raise InputError(field, value, "three numbers [x, y, z]")
     x, y, z = value
     return _number(x, field), _number(y, field), _number(z, field)
+
+
+def _numbers(values: Any, field: str, count: int) -> tuple[float, ...]:
+    if not isinstance(values, list) or len(values) != count:
+        raise InputError(field, values, f"{count} numbers")
+    return tuple(_number(value, field) for value in values)
+
+
+def with_contacts(script: list[Command], contacts: Mapping[str, Vector]) -> list[Command]:
+    """The script with the names of contacts that strings are tied to replaced by their points (mesh coordinates)."""
+    resolved: list[Command] = []
+    for command in script:
+        if isinstance(command, TieString) and command.contact:
+            if command.contact not in contacts:
+                known = ", ".join(sorted(contacts)) or "none"
+                raise InputError("string, attach", command.contact, f"a contact of the body ({known}) or [x, y, z]")
+            command = replace(command, point=contacts[command.contact], contact="")
+        resolved.append(command)
+    return resolved
+
+
+# Written
+
+
+def entry_of(command: Command) -> dict:
+    """The command as an entry of a script, without its time.
+
+    Raises InputError for what no entry can say: an impulse along a normal, an inertia message, a knot in other than
+    mesh coordinates.
+    """
+    match command:
+        case WrenchCommand():
+            entry = _load_entry(command)
+            return {"wrench": entry} if command.held else entry
+        case MoveString():
+            return {"string": {"target": list(command.point)}}
+        case TieString(axes="mesh"):
+            return {"string": {"attach": command.contact or list(command.point)}}
+        case ReleaseString():
+            return {"string": "release"}
+        case ThrusterCommand():
+            return {"thrusters": list(command.forces)}
+        case SetState():
+            return {"state": command.content}
+        case Change(kind="set"):
+            return {"set": dict(command.content)}
+        case ClearWrench():
+            return {"service": "clear_wrench"}
+    raise _no_entry(command)
+
+
+def _no_entry(command: Command) -> InputError:
+    frame_id = command.content.get("frame_id")
+    return InputError("script", f"{command.kind} in {frame_id!r}", "a command that a script entry can express")
+
+
+def _load_entry(command: WrenchCommand) -> dict:
+    frame = command.frame
+    match frame.point:
+        case ("vertex" | "point" as word, place):
+            at: object = {word: place if word == "vertex" else list(place)}
+        case ("ray", origin, direction):
+            at = {"ray": {"origin": list(origin), "direction": list(direction)}}
+        case (*_, name):  # a contact, com or origin
+            at = name
+    entry: dict = {"at": at}
+    force, torque = list(map(float, command.force)), list(map(float, command.torque))
+    if frame.axes == "normal":
+        if frame.impulse or any(force[1:]) or any(torque):
+            raise _no_entry(command)
+        entry["push"] = force[0]
+    else:
+        words = ("impulse", "angular_impulse") if frame.impulse else ("force", "torque")
+        entry |= {word: numbers for word, numbers in zip(words, (force, torque), strict=True) if any(numbers)}
+        if len(entry) == 1:
+            entry[words[0]] = force
+        if frame.axes == "body":
+            entry["axes"] = "body"
+    if frame.duration_s is not None:
+        entry["duration"] = frame.duration_s
+    if frame.slot:
+        entry["slot"] = frame.slot
+    return entry
+
+
+def schedules(script: list[Command], start_ns: int = 0) -> Iterator[tuple[int, int, str]]:
+    """The messages on the schedule topic that a script is sent by, in order of time: when its commands act [ns], how
+    many they are, and its text. Commands of one instant are one list, so that they act in its order. Raises InputError.
+    """
+    for t_ns, commands in groupby(script, key=attrgetter("stamp_ns")):
+        time_ns = start_ns + t_ns
+        entries = [{"t": time_ns / 1e9, **entry_of(command)} for command in commands]
+        if len(entries) > MAX_SCHEDULED:
+            accepted = f"at most {MAX_SCHEDULED}, all in one message"
+            raise InputError("script", f"{len(entries)} commands at {time_ns / 1e9:.9g} s", accepted)
+        yield time_ns, len(entries), json.dumps(entries)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""YAML as people write it and as rcl types it: read from files of bounded size, without aliases, of which a few grow to
-gigabytes or never end, and written with all digits of a double.
+"""YAML as people write it, typed as rcl types it: read from files of bounded size, without aliases, of which a few grow
+to gigabytes or never end, and written with all digits of a double.
 """
 
 from __future__ import annotations
@@ -20,43 +20,19 @@ from ..base.files import read_bounded
 MAX_BYTES = 16 << 20
 """Larger than any scene or script; a mesh given by mistake stops here instead of in the YAML reader."""
 
+MAX_DEPTH = 100
+"""Of lists and mappings in each other: libyaml's reader ends the process in deeper ones."""
+
 _TRUE = {"Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
 _FALSE = {"N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
 _INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|\d+)\Z", re.ASCII)
 _DOUBLE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z", re.ASCII)
 _SPECIAL = re.compile(r"[+-]?\.?(inf|infinity|nan)\Z", re.IGNORECASE)
-_HEX_DOUBLE = re.compile(r"[+-]?0[xX][0-9a-fA-F]*\.?[0-9a-fA-F]*([pP][+-]?\d+)?\Z")
 _WORD = re.compile(r"(?!null\Z)[a-z_]{3,}\Z")
 """Text that stands in YAML without quotes, unless it reads as true or false."""
 
-
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """libyaml's, ten times as fast, where it is installed."""
-MAX_DEPTH = 100
-"""Of lists and mappings in each other: libyaml's reader ends the process in deeper ones."""
-
-
-def _check_nodes(text: str, plain: bool) -> None:
-    """Raise MarkedYAMLError for an alias, which rcl doesn't read either, and where only ``plain`` values are read for
-    anchors and tags, too.
-    """
-    depth = 0
-    for event in yaml.parse(text, Loader=_LOADER):
-        problem = ""
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-        if depth > MAX_DEPTH:
-            problem = f"more than {MAX_DEPTH} lists and mappings in each other"
-        elif isinstance(event, yaml.AliasEvent):
-            problem = f"the alias *{event.anchor}"
-        elif plain and isinstance(event, yaml.NodeEvent):
-            anchor, tag = event.anchor, getattr(event, "tag", None)
-            problem = f"the anchor &{anchor}" if anchor else f"the tag {tag}" if tag else ""
-        if problem:
-            mark: Any = event.start_mark
-            raise yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
 
 
 def read_text(path: Path, kind: str) -> str:
@@ -71,10 +47,23 @@ def read_text(path: Path, kind: str) -> str:
 def compose_yaml(text: str, name: str) -> yaml.Node | None:
     """The YAML tree of a text, with its lines; raises InputError, where ``name`` stands."""
     try:
-        _check_nodes(text, plain=False)
+        depth = 0
+        for event in yaml.parse(text, Loader=_LOADER):
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            problem = ""
+            if depth > MAX_DEPTH:
+                problem = f"more than {MAX_DEPTH} lists and mappings in each other"
+            elif isinstance(event, yaml.AliasEvent):
+                problem = f"the alias *{event.anchor}"  # rcl doesn't read them either
+            if problem:
+                mark: Any = event.start_mark
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
         return yaml.compose(text, Loader=_LOADER)
     except yaml.YAMLError as error:
-        raise _unreadable(error, name, "valid YAML without aliases") from None
+        mark = getattr(error, "problem_mark", None)
+        problem = getattr(error, "problem", None) or (str(error).splitlines() or ["text"])[0]
+        place = f"{name}, line {mark.line + 1}" if mark else name
+        raise InputError(place, problem, "valid YAML without aliases") from None
 
 
 def load_json(text: str) -> Any:
@@ -89,36 +78,40 @@ def _no_number(text: str) -> NoReturn:
     raise ValueError(text)
 
 
-def load_plain_yaml(text: str, name: str) -> Any:
-    """What a text says as values, lists and mappings; raises InputError with ``name`` and the line for
-    anything else.
+def load_yaml(text: str, name: str) -> Any:
+    """What a text says as values, lists and mappings; raises InputError with ``name`` and the line for what is no YAML.
+    Tags are left aside.
     """
     if (said := load_json(text)) is not None:
         return said
-    try:
-        _check_nodes(text, plain=True)
-        return yaml.load(text, Loader=_LOADER)
-    except (yaml.YAMLError, ValueError, OverflowError) as error:
-        raise _unreadable(error, name, "plain YAML") from None
+    node = compose_yaml(text, name)
+    return None if node is None else _value(node, name)
 
 
-def _unreadable(error: Exception, name: str, accepted: str) -> InputError:
-    mark = getattr(error, "problem_mark", None)
-    problem = getattr(error, "problem", None) or (str(error).splitlines() or ["text"])[0]
-    return InputError(f"{name}, line {mark.line + 1}" if mark else name, problem, accepted)
+def _value(node: yaml.Node, name: str) -> Any:
+    if isinstance(node, yaml.ScalarNode):
+        return typed(node)
+    if isinstance(node, yaml.SequenceNode):
+        return [_value(item, name) for item in node.value]
+    return {key_of(key, name): _value(item, name) for key, item in node.value}
 
 
-def dump_yaml(value: object) -> str:
-    """Values, lists and mappings as people would write them: the innermost on one line."""
-    return yaml.safe_dump(value, sort_keys=False, default_flow_style=None, width=120)
+def key_of(key: yaml.Node, name: str) -> str:
+    """A mapping's key as text; raises InputError for one that is a list or a mapping."""
+    if not isinstance(key, yaml.ScalarNode):
+        raise refused(key, name, "a name")
+    return key.value
+
+
+def typed(node: yaml.ScalarNode) -> bool | int | float | str:
+    """A single value as rcl types it: a quoted one is text."""
+    return node.value if node.style else scalar(node.value)
 
 
 def scalar(text: str) -> bool | int | float | str:
     """A plain YAML scalar as rcl types it."""
-    if text in _TRUE:
-        return True
-    if text in _FALSE:
-        return False
+    if text in _TRUE or text in _FALSE:
+        return text in _TRUE
     if _INTEGER.match(text):
         digits = text.lstrip("+-")
         base = 16 if digits[:2] in ("0x", "0X") else 8 if digits[0] == "0" and len(digits) > 1 else 10
@@ -130,43 +123,43 @@ def scalar(text: str) -> bool | int | float | str:
     if _DOUBLE.match(text):
         value = float(text)
         return text if math.isinf(value) else value  # out of a double's range: rcl keeps the text
-    if _SPECIAL.match(text):
-        return float(text.replace(".", ""))
-    if _HEX_DOUBLE.match(text):
-        try:
-            return float.fromhex(text)
-        except ValueError:
-            return text
-    return text
+    return float(text.replace(".", "")) if _SPECIAL.match(text) else text
+
+
+def refused(node: yaml.Node, name: str, accepted: str) -> InputError:
+    """What stands there isn't ``accepted``."""
+    received = node.value
+    if isinstance(node, yaml.MappingNode):
+        received = "a mapping"
+    elif isinstance(node, yaml.SequenceNode):
+        plain = all(isinstance(item, yaml.ScalarNode) for item in node.value)
+        received = "[" + ", ".join(str(item.value) for item in node.value) + "]" if plain else "a list"
+    # A value from the command line has no lines to count.
+    return InputError(name if name.startswith("-") else f"{name}, line {node.start_mark.line + 1}", received, accepted)
+
+
+def dump_yaml(value: object) -> str:
+    """Values, lists and mappings as people would write them: the innermost on one line."""
+    return yaml.safe_dump(value, sort_keys=False, default_flow_style=None, width=120)
 
 
 def yaml_value(value: object) -> str:
     """A parameter's value as it stands in a YAML file, with all its digits."""
     # JSON is YAML; repr keeps all digits, and a double keeps its point so that it is read back as one.
-    if isinstance(value, bool):
-        return "true" if value else "false"
     if isinstance(value, float):
-        return yaml_double(value)
-    if isinstance(value, list):
-        return "[" + ", ".join(yaml_double(v) for v in value) + "]"
+        text = repr(value)
+        return text if any(c in text for c in ".n") else text.replace("e", ".0e")
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(yaml_value(item) for item in value) + "]"
     return json.dumps(value)
 
 
-def yaml_double(value: float) -> str:
-    """A double as YAML 1.1 and rcl read it back as one."""
-    text = repr(value)
-    return text if any(c in text for c in ".n") else text.replace("e", ".0e")
-
-
-def flow(value: object, quoted: bool = False) -> str:
-    """Plain data as YAML on one line; doubles keep all their digits. quoted: as JSON, which is YAML too
-    and is read faster.
-    """
+def flow(value: object) -> str:
+    """Plain data as YAML on one line; doubles keep all their digits."""
     if isinstance(value, Mapping):
-        pairs = ((json.dumps(key) if quoted else key, flow(item, quoted)) for key, item in value.items())
-        return "{" + ", ".join(f"{key}: {item}" for key, item in pairs) + "}"
+        return "{" + ", ".join(f"{key}: {flow(item)}" for key, item in value.items()) + "}"
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(flow(item, quoted) for item in value) + "]"
-    if isinstance(value, str) and not quoted and _WORD.match(value) and isinstance(scalar(value), str):
+        return "[" + ", ".join(flow(item) for item in value) + "]"
+    if isinstance(value, str) and _WORD.match(value) and isinstance(scalar(value), str):
         return value
-    return yaml_double(value) if isinstance(value, float) else yaml_value(value)
+    return yaml_value(value)

@@ -16,7 +16,6 @@ from ..scene.parameters import Parameters, convert_all
 from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
 from ..scene.scenario_run import ScenarioRun
 from ..scene.scene_file import read_scene_text
-from ..scene.sensor_noise import sensor_noise
 from ..simulation.commands import Change, Command
 from ..simulation.observer import BodyChanged, Observer, Published, snapshot
 from ..simulation.setup import Setup
@@ -28,16 +27,6 @@ def recorded_parameters(session: RecordedSession) -> Parameters:
     """The parameters that the session began with; those of the default where it has no scene."""
     scene = read_scene_text(session.scene, "the recorded scene").values if session.scene else {}
     return Parameters().replaced(scene)
-
-
-def as_published(
-    session: RecordedSession, parameters: Parameters, topic: str, time_ns: int, row: np.ndarray
-) -> np.ndarray:
-    """A state row (13,) as the session has it of a topic: our own recordings are exact, a bag that was recorded of the
-    node's topics has their noise.
-    """
-    noise = sensor_noise(parameters) if topic and not session.made_with else None
-    return row if noise is None else np.array(noise.measured(topic, time_ns, row.tolist()))
 
 
 def session_scenario(session: RecordedSession) -> Scenario:

@@ -15,9 +15,10 @@ from ..base.vectors import vector
 from ..motion.body import Body
 from ..motion.frames import Frame
 from ..motion.loads import Load
-from ..scene.command_codec import MARKS, entry_of, frame_names, of_event
+from ..scene.command_codec import MARKS, frame_names, of_event
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, nanoseconds, scene_text
+from ..scene.script import entry_of
 from ..scene.yaml_text import flow
 from ..simulation.commands import TieString, WrenchCommand
 from ..simulation.observer import Applied, Event, Logged, Observer

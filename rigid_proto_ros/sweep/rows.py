@@ -22,9 +22,8 @@ from ..base.files import output_file
 from ..motion.integrators import check_supported
 from ..motion.integrators.integrator import ANGULAR_DAMPING
 from ..motion.loads import FORCE, TORQUE
-from ..scene.declaration import HUGE, Value
 from ..scene.offline import OfflineRun
-from ..scene.parameters import Parameters, parameter_named, with_mass_of_density
+from ..scene.parameters import HUGE, Parameters, Value, parameter_named, with_mass_of_density
 from ..scene.scenario import BodyMesh, Scenario, build_scenario
 from ..scene.script import MAX_TIME_S, expand_script
 from ..scene.yaml_text import dump_yaml

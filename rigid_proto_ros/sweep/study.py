@@ -20,13 +20,19 @@ import numpy as np
 
 from ..base.bundled import example_names, example_path, study_names, study_path
 from ..base.errors import InputError, did_you_mean
-from ..scene.declaration import READ_ONLY, Value
 from ..scene.offline import OfflineRun, scene_values
-from ..scene.parameters import Parameters, convert_all, parameter_named, with_mass_of_density
+from ..scene.parameters import (
+    READ_ONLY,
+    Parameters,
+    Value,
+    convert_all,
+    parameter_named,
+    with_mass_of_density,
+)
 from ..scene.scenario import BodyMesh, Scenario, build_scenario, load_body_mesh, make_scenario
 from ..scene.scene_file import scene_file
 from ..scene.script import expand_script
-from ..scene.yaml_text import load_plain_yaml, read_text
+from ..scene.yaml_text import load_yaml, read_text
 from ..simulation.commands import Command, nanoseconds
 from .fields import mapping, number, whole
 from .measures import Measures, read_measures
@@ -197,7 +203,7 @@ def study_file(name: str) -> Path:
 
 
 def _yaml(path: Path) -> Any:
-    return load_plain_yaml(read_text(path, "a YAML file"), str(path))
+    return load_yaml(read_text(path, "a YAML file"), str(path))
 
 
 def read_study(name: str) -> Study:

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..base.errors import InputError, one_of
-from ..scene.declaration import READ_ONLY, Parameter, Value
-from ..scene.parameters import parameter_named
+from ..scene.parameters import READ_ONLY, Parameter, Value, parameter_named
 from ..scene.script import ENTRY_KEYS
 
 _COMPONENTS = {3: "x y z", 4: "x y z w", 6: "ixx ixy ixz iyy iyz izz"}
 _BALLAST = "mass x y z"
-_SCRIPT_FIELDS = sorted(ENTRY_KEYS["timing"] | ENTRY_KEYS["poke"] | ENTRY_KEYS["other"])
+_SCRIPT_FIELDS = sorted(ENTRY_KEYS)
 
 
 @dataclass(frozen=True)

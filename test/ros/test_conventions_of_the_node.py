@@ -7,8 +7,7 @@ import yaml
 from command_rig import COMMANDS, LATCHED, TYPES, NodeProcess, RosClient, wrench_message
 from conftest import held_domain
 
-from rigid_proto_ros.scene.declaration import READ_ONLY
-from rigid_proto_ros.scene.parameters import PARAMETERS, is_ros_parameter
+from rigid_proto_ros.scene.parameters import PARAMETERS, READ_ONLY, is_ros_parameter
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
 

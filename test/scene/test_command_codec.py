@@ -7,25 +7,22 @@ import json
 from dataclasses import replace
 
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.frames import Frame
-from rigid_proto_ros.scene.command_codec import (
-    MARKS,
-    TOPICS,
+from rigid_proto_ros.scene import cdr
+from rigid_proto_ros.scene.command_codec import MARKS, of_event, of_message
+from rigid_proto_ros.scene.script import (
     entry_of,
-    in_words,
-    message,
-    of_event,
-    of_message,
-    outgoing,
+    expand_schedule,
+    expand_script,
+    parse_script,
+    read_schedule,
+    schedules,
 )
-from rigid_proto_ros.scene.script import expand_schedule, expand_script, read_schedule
 from rigid_proto_ros.scene.yaml_text import flow
-from rigid_proto_ros.session.messages import read_string
 from rigid_proto_ros.simulation.commands import (
     Change,
     ClearWrench,
@@ -115,50 +112,27 @@ def test_a_command_comes_back_from_its_line_in_the_log(command: Command) -> None
         assert again.stamp_ns == command.stamp_ns
 
 
-@given(commands)
-def test_a_command_comes_back_from_the_message_on_its_topic(command: Command) -> None:
-    topic, data = TOPICS.get(command.kind, "schedule"), message(command, command.stamp_ns)
-    if topic == "schedule":
-        assert expand_schedule(read_schedule(read_string(data, "schedule"))) == [command]
-    else:
-        assert of_message(topic, data) == command
+@given(st.sampled_from(["wrench", "poke"]), times, st.sampled_from(["", "top@tip", "map"]), triples, triples)
+def test_a_message_and_the_line_that_tells_of_it_are_one_command(topic, time_ns, frame_id, force, torque) -> None:
+    command = of_message(topic, cdr.wrench_stamped(time_ns, frame_id, force, torque), NODE)
+    assert command.content == {"stamp_ns": time_ns, "frame_id": frame_id, "force": list(force), "torque": list(torque)}
+    assert of_event(topic, command.content, NODE) == command
 
 
 @given(st.one_of(loads(), others).filter(can_be_an_entry))
 def test_a_command_comes_back_from_its_entry_in_a_script(command: Command) -> None:
     entry = {"t": command.stamp_ns / 1e9, **entry_of(command)}
-    for text in (flow(entry), flow(entry, quoted=True), yaml.safe_dump(entry)):
-        assert expand_script([yaml.safe_load(text)]) == [command]
-    assert json.loads(flow(entry, quoted=True)) == entry
+    assert expand_script([entry]) == [command]
+    for text in (flow([entry]), json.dumps([entry])):
+        assert parse_script(text) == [command]
 
 
-@given(st.lists(commands, max_size=8))
-def test_a_script_is_sent_as_it_is_listed_and_each_instant_in_one_message_as_far_as_entries_say_it(listed) -> None:
+@given(st.lists(st.one_of(loads(), others).filter(can_be_an_entry), max_size=8))
+def test_a_script_is_sent_as_it_is_listed_each_instant_in_one_message(listed) -> None:
     script = sorted(listed, key=lambda command: command.stamp_ns)
-    sent = list(outgoing(script))
-    assert [command for each in sent for command in each.commands] == script
-    for each in sent:
-        if len(each.commands) > 1:
-            again = expand_schedule(read_schedule(read_string(each.data, "schedule")))
-            assert again == list(each.commands)
-
-
-@given(commands)
-def test_the_names_of_a_nodes_frames_become_words_that_every_node_reads(command: Command) -> None:
-    def named(text: str) -> str:
-        place, *rest = text.split(";")
-        axes, *point = place.split("@")
-        named = {"world": "map", "body": "top", "body/mesh": "top/mesh"}.get(axes, axes)
-        return ";".join(["@".join([named, *point]), *rest])
-
-    content = {name: named(value) if name == "frame_id" else value for name, value in command.content.items()}
-    theirs = of_event(command.kind, content, NODE)
-    words = in_words(theirs)
-    assert all(name not in str(words.content.get("frame_id")) for name in NODE)
-    again = of_event(words.kind, words.content)
-    assert replace(again, stamp_ns=theirs.stamp_ns) == words
-    if isinstance(command, WrenchCommand):
-        assert words.frame == command.frame
+    sent = [(time_ns, expand_schedule(read_schedule(text))) for time_ns, _, text in schedules(script)]
+    assert [command for _, commands in sent for command in commands] == script
+    assert [time_ns for time_ns, _ in sent] == sorted({command.stamp_ns for command in script})
 
 
 def test_a_poke_in_the_frame_of_the_nodes_own_name_is_read_as_the_node_reads_it() -> None:

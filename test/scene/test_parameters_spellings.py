@@ -10,9 +10,8 @@ from command_rig import RosClient
 from ros_process import running_node
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.scene.declaration import READ_ONLY, Parameter
 from rigid_proto_ros.scene.offline import read_scene, scene_values
-from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS
+from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS, READ_ONLY, Parameter
 
 NUMERIC = [p for p in (*PARAMETERS.values(), *PATTERNS.values()) if p.type in ("double", "doubles")]
 IDS = [p.name for p in NUMERIC]

@@ -8,12 +8,11 @@ from hand_session import SCENE, HandSession, random_hand_session
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.scene.command_codec import of_event, outgoing
+from rigid_proto_ros.scene.command_codec import of_event
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_text
-from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule
-from rigid_proto_ros.session.messages import read_string
+from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule, schedules
 from rigid_proto_ros.session.script_of_session import SavedScript, script_of_session
 
 SECOND = 10**9
@@ -60,9 +59,8 @@ def test_what_was_done_in_one_paused_instant_is_one_message_to_a_node_in_the_ord
     hand.load(False, "normal@tip;impulse", [1e-4, 0.0, 0.0])
     hand.wait(SECOND)
     script = parse_script(assert_flies_again(hand).script)
-    (message,) = outgoing(script)
-    assert message.topic == "schedule"
-    assert expand_schedule(read_schedule(read_string(message.data, "schedule"))) == script
+    ((_, count, text),) = schedules(script)
+    assert count == len(script) and expand_schedule(read_schedule(text)) == script
     assert [c.content["ballast.tip"][0] for c in script[:200]] == [0.0001 * k for k in range(200)]
 
 

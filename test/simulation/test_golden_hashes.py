@@ -31,7 +31,7 @@ from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.script import parse_script
-from rigid_proto_ros.scene.sensor_noise import sensor_noise
+from rigid_proto_ros.scene.sensor_noise import imu_noise
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.sweep.rows import run_chunk
 from rigid_proto_ros.sweep.sampling import row_uniforms
@@ -88,7 +88,6 @@ BY_AUTO = {
 NOISY = {
     "noise.seed": 3,
     "noise.imu": [0.01, 0.0, 0.1, 0.0],
-    "noise.state": [0.001, 0.001, 0.0, 0.01],
 }
 
 DRAWN = {
@@ -208,14 +207,10 @@ def rows() -> str:
 
 
 def noise() -> str:
-    """Hash of what the sensors tell of a state, by white noise and bias."""
-    parameters = Parameters().replaced(NOISY)
-    sensors = sensor_noise(parameters)
-    row = [0.1, -0.2, 0.3, 0.1, -0.2, 0.3, 0.9273618495495704, 1.0, 2.0, 3.0, -1.0, 0.5, 2.5]
-    times = [k * 37_000_001 for k in range(40)]
-    told = [sensors.measured(topic, t, row) for t in times for topic in ("pose", "twist", "odom")]
-    felt = [[*rate, *force] for rate, force in (sensors.imu(t, row[10:], row[7:10]) for t in times)]
-    return digest(np.array(told), np.array(felt))
+    """Hash of what an IMU tells of a state, by white noise and bias."""
+    imu = imu_noise(Parameters().replaced(NOISY))
+    told = [imu.measured(k * 37_000_001, [-1.0, 0.5, 2.5], [1.0, 2.0, 3.0]) for k in range(40)]
+    return digest(np.array(told))
 
 
 def computations() -> dict[str, Callable[[], str]]:
@@ -229,7 +224,7 @@ def computations() -> dict[str, Callable[[], str]]:
         found[f"by {name}"] = partial(flight, {"integrator": name}, POKES + STRING, POKES, BODY_WRENCH, IMPULSES)
     for name, (changes, script) in BY_AUTO.items():
         found[f"auto: {name}"] = partial(flight, changes, script or "[]")
-    found["noise of sensors"] = noise
+    found["noise of the IMU"] = noise
     found["rows of a sweep"] = rows
     return found
 
