@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.errors import InputError
-from ..session.mailbox import Mailbox
+from ..session.mailbox import BATCH, Mailbox
 from ..simulation.observer import (
     AccuracyFloor,
     BodyChanged,
@@ -150,15 +150,11 @@ class RerunObserver(Observer):
 
     def on(self, event: Event) -> None:
         """Take an event from the stepping thread; states and meshes are copied."""
-        if isinstance(event, (Published, GhostPublished)):
-            self._mailbox.put(event.time_ns, event.row, isinstance(event, GhostPublished))
-        elif type(event) in self.takes:
+        if type(event) in self.takes:
             if isinstance(event, (Started, MeshChanged)):
                 vertices, triangles = (None if a is None else np.array(a) for a in (event.vertices, event.triangles))
                 event = event._replace(vertices=vertices, triangles=triangles)
-            self._mailbox.note(event)
-            if isinstance(event, (Started, Reset)):
-                self._mailbox.hurry()
+            self._mailbox.put(event)
 
     @property
     def stalled(self) -> str:
@@ -201,14 +197,12 @@ class RerunObserver(Observer):
         self._finish()
 
     def _flush(self) -> None:
-        """Send the blocks that wait and what has been put since; not what arrives meanwhile, a few rows a time."""
+        """Send what waits; not what arrives meanwhile, a few rows a time."""
         more = True
         while more:
-            block = self._mailbox.take()
-            if block is None:
-                break
-            more = block.handed_over
-            self._writer.write(block, self._next_run)
+            events = self._mailbox.take()
+            more = len(events) == BATCH
+            self._writer.write(events, self._next_run)
         for stream in list(self._writer.streams):
             try:
                 stream.flush()

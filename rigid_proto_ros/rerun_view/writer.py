@@ -11,14 +11,16 @@ import rerun as rr
 
 from ..picture import style
 from ..picture.picture import Picture
-from ..session.mailbox import Block
+from ..session.mailbox import Noted
 from ..simulation.observer import (
     AccuracyFloor,
     Event,
+    GhostPublished,
     LoadBegan,
     LoadEnded,
     Logged,
     MeshChanged,
+    Published,
     Refused,
     Reset,
     SceneChanged,
@@ -94,32 +96,32 @@ class SceneWriter:
 
     # What happens in it
 
-    def write(self, block: Block, next_run: Callable[[], None]) -> None:
-        """Send a block; at a reset ``next_run`` is called."""
-        sent = 0
-        for note in block.notes:
-            event = note.event
-            time_ns = getattr(event, "time_ns", 0)
+    def write(self, events: list[Noted], next_run: Callable[[], None]) -> None:
+        """Send what happened; at a reset ``next_run`` is called."""
+        states: list[Noted] = []
+        for wall_ns, event in events:
+            time_ns = event.time_ns
             self._last_time_ns = max(self._last_time_ns, time_ns)
             match event:
+                case Published() | GhostPublished():
+                    states.append((wall_ns, event))
                 case LoadBegan() | LoadEnded() | StringChanged():
                     self._picture.on(event)
                 case SceneChanged(_, scene):
                     self._scene_in_force = scene
                 case Logged(_, line):
-                    self._lines.setdefault(e.EVENTS, []).append((time_ns, note.wall_ns, line, "INFO"))
+                    self._lines.setdefault(e.EVENTS, []).append((time_ns, wall_ns, line, "INFO"))
                 case Refused(_, reason, message):
                     line = f"refused ({reason}): {message}"
-                    self._lines.setdefault(e.REFUSALS, []).append((time_ns, note.wall_ns, line, "WARN"))
+                    self._lines.setdefault(e.REFUSALS, []).append((time_ns, wall_ns, line, "WARN"))
                 case AccuracyFloor(_, floor):
-                    self._lines.setdefault(e.ACCURACY, []).append((time_ns, note.wall_ns, floor, "WARN"))
+                    self._lines.setdefault(e.ACCURACY, []).append((time_ns, wall_ns, floor, "WARN"))
                 case _:
                     # What changes the meaning of the states that follow.
-                    self._write_upto(block, sent, note.after_rows)
-                    sent = note.after_rows
-                    self._change(event, time_ns, note.wall_ns, next_run)
-        self._write_upto(block, sent, block.count)
-        self._rows_since_repeat += block.count
+                    self._write_states(states)
+                    states = []
+                    self._change(event, time_ns, wall_ns, next_run)
+        self._write_states(states)
         if self._rows_since_repeat >= REPEATED_ROWS:
             # The live server drops the oldest, so what was said long ago is lost on viewers that come late.
             self._rows_since_repeat = 0
@@ -140,8 +142,9 @@ class SceneWriter:
             self._scene = event.scene
             self._send_scene(self._listening())
 
-    def _write_upto(self, block: Block, begin: int, end: int) -> None:
-        """Exact states and picture of rows begin..end, which all belong to the present body, and what happened."""
+    def _write_states(self, states: list[Noted]) -> None:
+        """Exact states and picture, which all belong to the present body, and what happened."""
+        self._rows_since_repeat += len(states)
         streams = self._backend.streams = self._listening()
         # What happened comes first: a file that is cut behind it has every line that acted on its states.
         self._commanded = self._commanded or bool(self._lines)
@@ -151,20 +154,19 @@ class SceneWriter:
             self._backend.begin(np.array(times_ns))
             self._backend.send(entity, rr.TextLog.columns(text=texts, level=levels))
         self._lines.clear()
-        for ghost in (False, True):
-            chosen = block.ghosts[begin:end] == ghost
-            if not chosen.any():
+        for kind in (Published, GhostPublished):
+            chosen = [(state.time_ns, wall_ns, state.row) for wall_ns, state in states if isinstance(state, kind)]
+            if not chosen:
                 continue
-            times, walls, rows = (own[begin:end][chosen] for own in (block.times, block.walls, block.rows))
-            self._last_time_ns = max(self._last_time_ns, int(times[-1]))
+            times, walls, rows = (np.array(column) for column in zip(*chosen, strict=True))
             self._backend.clock(times, walls)
-            if ghost:
+            if kind is GhostPublished:
                 self._picture.draw_ghost(times, rows)
                 continue
             self._backend.begin(times)
             self._backend.send(e.STATE, scalar_columns(rows))
             self._picture.draw(times, rows)
-        if begin < end and self._picture.body is not None:
+        if states and self._picture.body is not None:
             for stream in streams:
                 stream.send_layout(self._subject())
 

@@ -26,7 +26,7 @@ from ..motion.state import State
 from ..scene import cdr
 from ..scene.parameters import Parameters
 from ..scene.sensor_noise import ImuNoise, imu_noise
-from ..session.messages import PROJECTIONS, applied_bytes
+from ..session.messages import PROJECTIONS, applied_bytes, inertia_bytes
 from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Refused, SceneChanged
 from . import qos
 
@@ -179,11 +179,7 @@ class EventPublisher(Observer):
                 # All parameters, and the mesh's hash in a comment, as a parameter file.
                 self._scene.publish(cdr.string(scene))
             case BodyChanged(time_ns, body):
-                # COM in scaled mesh coordinates, tensor about it in mesh axes.
-                (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = body.inertia.tolist()
-                numbers = (body.mass, *body.center_of_mass.tolist(), ixx, ixy, ixz, iyy, iyz, izz)
-                stamp_ns = time_ns + self.stamps.offset_ns
-                self._inertia.publish(cdr.stamped_doubles(stamp_ns, f"{self._body_frame}/mesh", numbers))
+                self._inertia.publish(inertia_bytes(time_ns + self.stamps.offset_ns, self._body_frame, body))
             case Applied(time_ns) if self._applied.get_subscription_count():
                 # About the COM in the body's frame, which TF knows. What its sender said of point, axes, slot and
                 # duration stands in its event.

@@ -37,8 +37,8 @@ from ..simulation.observer import (
     SceneChanged,
     Started,
 )
-from . import messages as session_messages
-from .mailbox import Block, Mailbox, Note
+from .mailbox import BATCH, Mailbox
+from .messages import DEFINITIONS, FLOOR, LATCHED, MADE_WITH, PROJECTIONS, TOPICS, applied_bytes, inertia_bytes
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -83,7 +83,6 @@ class McapObserver(Observer):
         try:
             self._file = output_file("record", path)
             self._stream = open(self._file, "wb")  # noqa: SIM115 (closed by the thread)
-            self._inode = self._file.stat().st_ino
             self._writer = self._begin(node_name)
         except OSError as error:
             accepted = f"a file that can be written ({error.strerror})"
@@ -99,12 +98,8 @@ class McapObserver(Observer):
 
     def on(self, event: Event) -> None:
         """Take an event from the stepping thread: a state is copied, others wait to be written."""
-        if isinstance(event, Published):
-            self._mailbox.put(event.time_ns, event.row)
-        elif type(event) in self.takes:
-            self._mailbox.note(event)
-            if isinstance(event, (Started, Reset)):
-                self._mailbox.hurry()
+        if type(event) in self.takes:
+            self._mailbox.put(event)
 
     def close(self) -> None:
         """Write what is buffered and finish the file."""
@@ -122,20 +117,20 @@ class McapObserver(Observer):
         writer = Writer(self._stream)
         writer.start(profile="ros2")
         began = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-        writer.add_metadata(session_messages.MADE_WITH, {"cpu": cpu(), **versions("mcap"), "began": began})
+        writer.add_metadata(MADE_WITH, {"cpu": cpu(), **versions("mcap"), "began": began})
         schemas = {
             message_type: writer.register_schema(message_type, "ros2msg", definition.encode())
-            for message_type, definition in session_messages.DEFINITIONS.items()
-            if message_type in session_messages.TOPICS.values()
+            for message_type, definition in DEFINITIONS.items()
+            if message_type in TOPICS.values()
         }
         self._channels = {
             name: writer.register_channel(
                 f"/{node_name.strip('/')}/{name}",
                 "cdr",
                 schemas[message_type],
-                {"offered_qos_profiles": _offered(name in session_messages.LATCHED)},
+                {"offered_qos_profiles": _offered(name in LATCHED)},
             )
-            for name, message_type in session_messages.TOPICS.items()
+            for name, message_type in TOPICS.items()
         }
         self._stream.flush()
         return writer
@@ -160,58 +155,45 @@ class McapObserver(Observer):
 
     def _write_what_waits(self) -> None:
         """Empty the mailbox into the file; without one, throw away what is in it."""
-        more = True
-        while more:
-            block = self._mailbox.take()
-            if block is None:
+        while events := self._mailbox.take():
+            if self._writer is not None:
+                for wall_ns, event in events:
+                    self._write(self._writer, wall_ns, event)
+            if len(events) < BATCH:
                 break
-            more = block.handed_over
-            if (writer := self._writer) is not None:
-                sent = 0
-                for note in block.notes:
-                    self._write_rows(writer, block, sent, note.after_rows)
-                    sent = note.after_rows
-                    self._write_note(writer, note)
-                self._write_rows(writer, block, sent, block.count)
         if self._writer is not None:
-            self._end_chunk(self._writer)
-
-    def _end_chunk(self, writer: Writer) -> None:
-        """Put on disk what was written; raises OSError also where the file is no longer at its place."""
-        if self._file.stat().st_ino != self._inode:
-            raise OSError(None, "another file took its place")
-        writer.flush()
+            self._writer.flush()
 
     def _write_message(self, writer: Writer, name: str, log_time: int, data: bytes) -> None:
         writer.add_message(self._channels[name], log_time, data, log_time)
 
-    def _log_time(self, simulated_ns: int, wall_ns: int) -> int:
-        log_time = self._run_begins_ns + simulated_ns if self._simulated_log else wall_ns
-        self._latest_log_ns = max(self._latest_log_ns, log_time)
-        return log_time
-
-    def _write_note(self, writer: Writer, note: Note) -> None:
-        event = note.event
+    def _write(self, writer: Writer, wall_ns: int, event: Event) -> None:
         if isinstance(event, Reset):
             self._run_begins_ns = self._latest_log_ns + 1
             self._run += 1
             return
-        log_time = self._log_time(event.time_ns, note.wall_ns)
+        log_time = self._run_begins_ns + event.time_ns if self._simulated_log else wall_ns
+        self._latest_log_ns = max(self._latest_log_ns, log_time)
         match event:
+            case Published(time_ns, state):
+                if time_ns // CHUNK_NS != self._chunk:
+                    self._chunk = time_ns // CHUNK_NS
+                    writer.flush()
+                row = state.tolist()
+                for name in ("pose", "twist"):
+                    data = cdr.stamped_doubles(time_ns, self._world, PROJECTIONS[name](row))
+                    self._write_message(writer, name, log_time, data)
             case Logged(_, line):
                 self._write_message(writer, "events", log_time, cdr.string(line))
             case Applied(time_ns, _, load, body, attitude):
-                data = session_messages.applied_bytes(time_ns, self._body_frame, load, body, attitude)
+                data = applied_bytes(time_ns, self._body_frame, load, body, attitude)
                 self._write_message(writer, "applied", log_time, data)
             case BodyChanged(time_ns, body):
-                I = body.inertia
-                numbers = (body.mass, *body.center_of_mass, I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2])
-                data = cdr.stamped_doubles(time_ns, f"{self._body_frame}/mesh", numbers)
-                self._write_message(writer, "inertia", log_time, data)
+                self._write_message(writer, "inertia", log_time, inertia_bytes(time_ns, self._body_frame, body))
             case AccuracyFloor(time_ns, floor):
                 # It only rises within a run: the last one says all.
-                self._end_chunk(writer)
-                writer.add_metadata(session_messages.FLOOR.format(self._run), {"time_ns": str(time_ns), "floor": floor})
+                writer.flush()
+                writer.add_metadata(FLOOR.format(self._run), {"time_ns": str(time_ns), "floor": floor})
             case Started(scene=scene) | SceneChanged(scene=scene):
                 self._write_scene(writer, log_time, scene)
 
@@ -233,19 +215,8 @@ class McapObserver(Observer):
         # A file that was changed since it was loaded isn't the one that flies.
         if hashlib.sha256(data).hexdigest() == sha256:
             # The chunk before it declares the topics: from there on a cut file can be read.
-            self._end_chunk(writer)
+            writer.flush()
             writer.add_attachment(0, log_time, path.name, "application/octet-stream", data)
-
-    def _write_rows(self, writer: Writer, block: Block, begin: int, end: int) -> None:
-        times, walls = block.times[begin:end].tolist(), block.walls[begin:end].tolist()
-        for time_ns, wall_ns, row in zip(times, walls, block.rows[begin:end].tolist(), strict=True):
-            if time_ns // CHUNK_NS != self._chunk:
-                self._chunk = time_ns // CHUNK_NS
-                self._end_chunk(writer)
-            log_time = self._log_time(time_ns, wall_ns)
-            for name in ("pose", "twist"):
-                data = cdr.stamped_doubles(time_ns, self._world, session_messages.PROJECTIONS[name](row))
-                self._write_message(writer, name, log_time, data)
 
     def _lost(self, reason: str) -> None:
         if self._writer is not None:

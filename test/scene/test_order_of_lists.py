@@ -5,27 +5,20 @@ from __future__ import annotations
 
 import itertools
 import random
-from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
 from flights import SECOND, EventLines
 
-from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import Ghost
 from rigid_proto_ros.scene.script import expand_script
-from rigid_proto_ros.session.recorded_session import RecordedSession, decode_event
-from rigid_proto_ros.session.replay import resimulation
+from rigid_proto_ros.session.recorded_session import decode_event
 from rigid_proto_ros.simulation.commands import Command
 from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation
 
 SCENE = {"mesh": "t_handle", "density": 7850.0, "integrator": "rk4", "initial.angular_velocity": [0.5, -2.0, 3.0]}
-BEFORE_LISTS = Path(__file__).parents[1] / "recorded" / "before_lists.mcap"
-"""With rk4."""
 DONE = [
     {"at": {"vertex": 3}, "impulse": [0.0, 0.0, 0.001]},
     {"set": {"density": 9000.0}},
@@ -106,30 +99,3 @@ def test_loads_are_summed_in_the_order_in_which_they_began_to_act() -> None:
     run.advance(SECOND)
     kinds = [acting.load.force for acting in run.simulation.acting]
     assert kinds == [(0.1, 0.2, 0.3), (0.7, -0.1, 0.05), (-0.3, 0.11, 0.01)]
-
-
-def test_a_session_recorded_before_lists_acts_in_its_own_order() -> None:
-    (session,) = read_runs(BEFORE_LISTS)
-    at_one_instant = [kind for t, kind, _ in (decode_event(line, 1) for line in session.lines) if t == SECOND // 10]
-    assert at_one_instant == ["set", "poke", "poke", "poke"]
-    told = EventLines()
-    again = resimulation(session, told)
-    for time_ns, recorded in zip(session.times.tolist(), session.rows, strict=True):
-        # The last digits are of the version: measured 2e-13, at 20 rad/s.
-        assert np.abs(again.advance(time_ns) - recorded).max() <= 1e-11
-    assert told.lines == session.lines
-
-
-def test_a_session_of_a_node_of_another_name_is_sent_in_words_that_every_node_reads() -> None:
-    pytest.importorskip("rclpy")
-    from rigid_proto_ros.ros.replay_publisher import session_commands
-
-    lines = EventLines()
-    run = Simulation(make_scenario({**SCENE, "contacts.tip": [0.0, 0.0, 0.07]}).setup, lines)
-    poke = {"at": "tip", "axes": "body", "impulse": [1e-4, 0.0, 0.0]}
-    (command,) = expand_script([{"t": 0.5, **poke}])
-    run.submit(replace(command, sent="spinning_top@tip;impulse"), SECOND // 2)
-    run.advance(SECOND)
-    scene = make_scenario({**SCENE, "contacts.tip": [0.0, 0.0, 0.07]}).text
-    events = [(SECOND // 2, line) for line in lines.lines]
-    assert session_commands(RecordedSession(scene=scene, events=events, node_name="lab/spinning_top")) == [command]

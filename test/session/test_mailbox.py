@@ -7,36 +7,30 @@ import numpy as np
 import pytest
 
 from rigid_proto_ros.session import mailbox
-from rigid_proto_ros.session.mailbox import BLOCK_ROWS, BLOCKS_WAITING_MAX, Mailbox
+from rigid_proto_ros.session.mailbox import BATCH, MOST_WAITING, Mailbox
+from rigid_proto_ros.simulation.observer import Published, Reset
 
 
-def test_rows_and_notes_come_out_in_the_order_in_which_they_went_in():
-    box = Mailbox()
-    for k in range(BLOCK_ROWS + 3):
-        box.put(k, np.full(13, float(k)))
-        if k in (1, BLOCK_ROWS):
-            box.note(k)
-    first, second = box.take(), box.take()
-    assert (first.count, second.count) == (BLOCK_ROWS, 3)
-    assert [(n.after_rows, n.event) for n in first.notes + second.notes] == [(2, 1), (1, BLOCK_ROWS)]
-    times = np.concatenate([first.times, second.times[:3]])
-    rows = np.concatenate([first.rows, second.rows[:3]])
-    assert (times == np.arange(BLOCK_ROWS + 3)).all() and (rows[:, 12] == times).all()
-    assert box.take() is None
+def test_events_come_out_in_the_order_in_which_they_went_in_and_states_are_copied():
+    box, row = Mailbox(), np.zeros(13)
+    for k in range(BATCH + 3):
+        row[:] = k
+        box.put(Reset(k) if k in (1, BATCH) else Published(k, row))
+    events = [event for events in iter(box.take, []) for _, event in events]
+    assert [event.time_ns for event in events] == list(range(BATCH + 3))
+    assert [event.time_ns for event in events if isinstance(event, Reset)] == [1, BATCH]
+    assert all((event.row == event.time_ns).all() for event in events if isinstance(event, Published))
 
 
 def test_a_recorder_that_is_stuck_is_given_up_and_what_waits_has_no_gap(monkeypatch):
     monkeypatch.setattr(mailbox, "PATIENCE_S", 0.02)
     given_up = []
     box = Mailbox(lambda: given_up.append(True))
-    row = np.zeros(13)
-    for k in range(2 * BLOCKS_WAITING_MAX * BLOCK_ROWS + 5):
-        box.put(k, row)
+    for k in range(MOST_WAITING + 5):
+        box.put(Reset(k))
     assert given_up == [True]
-    taken = []
-    while (block := box.take()) is not None:
-        taken.append(block.times[: block.count].copy())
-    assert (np.concatenate(taken) == np.arange(BLOCKS_WAITING_MAX * BLOCK_ROWS)).all()
+    taken = [event.time_ns for events in iter(box.take, []) for _, event in events]
+    assert taken == list(range(MOST_WAITING))
 
 
 class Consumer:

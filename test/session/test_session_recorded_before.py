@@ -13,18 +13,8 @@ from rigid_proto_ros.base.provenance import versions
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.session.check import Difference, made_with_table
-from rigid_proto_ros.session.recorded_session import RecordedSession, decode_event
-from rigid_proto_ros.session.replay import resimulation
 
 RECORDED = Path(__file__).parents[1] / "recorded"
-
-
-def recorded(integrator: str) -> RecordedSession:
-    (session,) = read_runs(RECORDED / f"string_and_changes_{integrator}.mcap")
-    kinds = [decode_event(line, number)[1] for number, line in enumerate(session.lines, 1)]
-    assert {"poke", "set", "string_attach", "string_target", "wrench"} <= set(kinds)
-    assert len(session.times) == 21
-    return session
 
 
 @pytest.mark.parametrize("name", ["pokes_and_changes", "string", "jitter"])
@@ -36,14 +26,6 @@ def test_a_session_is_verified_to_the_bit_for_as_long_as_the_motion_has_the_bits
     was, here = session.made_with["motion"], versions()["motion"]
     assert main(["replay", str(path), "--verify"]) == (0 if was == here else 1)
     assert was == here or f"motion differs: {was} recorded, {here} here" in capsys.readouterr().err
-
-
-def test_a_session_recorded_before_by_auto_moves_as_it_did() -> None:
-    # Its series on a string are others since: the same motion within its accuracy of 1e-9 a second, not the same bits.
-    session = recorded("auto")
-    again = resimulation(session)
-    for time_ns, row in zip(session.times.tolist(), session.rows, strict=True):
-        assert again.advance(time_ns)[:10] == pytest.approx(row[:10], abs=1e-8), time_ns
 
 
 @pytest.mark.parametrize("ending", [".mcap", ".rrd"])
