@@ -166,7 +166,7 @@ def given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
 
 
 def _branch(session: RecordedSession, args: argparse.Namespace) -> None:
-    from ..session.branch import branch_at
+    from ..session.as_script import branch_at
     from ..simulation.commands import nanoseconds
 
     if session.missing:

@@ -24,7 +24,7 @@ from ..live.live_simulation import LiveSimulation
 from ..scene.parameters import parameter_named
 from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
 from ..scene.scene_file import read_scene_text
-from ..session.branch import branch_at
+from ..session.as_script import branch_at
 from ..session.recorded_session import RecordedSession
 from ..simulation.observer import Event, Logged, Observer, Published, Reset, SceneChanged
 

@@ -17,8 +17,8 @@ from ..base.errors import InputError
 from ..export.flight_record import FlightRecord, frames, source_of_session
 from ..export.gltf import write_gltf
 from ..export.tracks import tracks_of
+from ..session.as_script import script_of_session
 from ..session.replay import play
-from ..session.script_of_session import script_of_session
 from .flight import Flight
 
 STEP_S = 0.05
@@ -121,7 +121,7 @@ class SessionTab:
                 scene = scene.replace(mesh.mesh.path, name)
             archive.writestr("scene.yaml", scene)
             archive.writestr("script.yaml", saved.script)
-        note = f"{saved.commands} commands. Unpack, then:\n\n`rigid_proto simulate scene.yaml --script script.yaml`"
+        note = f"{len(saved.entries)} commands. Unpack, then:\n\n`rigid_proto simulate scene.yaml --script script.yaml`"
         return packed.getvalue(), note
 
     def _motion(self, rate: float) -> tuple[bytes, str]:

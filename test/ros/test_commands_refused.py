@@ -18,40 +18,13 @@ SECOND = 10**9
 HUGE = (1e15, 0.0, 0.0)
 NAN, INF = math.nan, math.inf
 
+WORDS = "nowhere world@nowhere @com world@ world@com@com com@world WORLD vertex vertex/-1 vertex/99999999 right@"
+POINTS = "point/1,2 point/nan,0,0 point/1,2,three ray/0,0,0 ray/0,0,0/0,0,0 normal normal@com body/mesh tip/0"
+OPTIONS = "world;duration world;duration=0 world;duration=inf world;impulse;duration=0.1 world;impuls world; ;"
 FRAMES = (
-    *[
-        "nowhere",
-        "world@nowhere",
-        "@com",
-        "world@",
-        "world@com@com",
-        "com@world",
-        "WORLD",
-        "vertex",
-        "vertex/-1",
-        "vertex/99999999",
-        "right@",
-    ],
-    *[
-        "point/1,2",
-        "point/nan,0,0",
-        "point/1,2,three",
-        "ray/0,0,0",
-        "ray/0,0,0/0,0,0",
-        "normal",
-        "normal@com",
-        "body/mesh",
-        "tip/0",
-    ],
-    *[
-        "world;duration",
-        "world;duration=0",
-        "world;duration=inf",
-        "world;impulse;duration=0.1",
-        "world;impuls",
-        "world;",
-        ";",
-    ],
+    *WORDS.split(),
+    *POINTS.split(),
+    *OPTIONS.split(),
     *(" world", "point/1, 2, 3", "\x01", "w" * 10_000, "日本"),
 )
 REFUSED = {
@@ -267,34 +240,12 @@ def random_number(numbers: random.Random) -> float:
 
 
 def random_frame(numbers: random.Random) -> str:
-    pieces = [
-        "world",
-        "body",
-        "normal",
-        "@",
-        "com",
-        "origin",
-        "vertex/",
-        "point/",
-        "ray/",
-        ";",
-        "duration=",
-        "impulse",
-        "tip",
-        "/mesh",
-        ",",
-        "/",
-        "0",
-        "1e308",
-        "-1",
-        "nan",
-        "é",
-    ]
+    pieces = "world body normal @ com origin vertex/ point/ ray/ ; duration= impulse tip /mesh , / 0 1e308 -1 nan é"
     kind = numbers.randrange(4)
     if kind == 0:
         return numbers.choice(FRAMES)
     if kind == 1:
-        return "".join(numbers.choice(pieces) for _ in range(numbers.randrange(12)))
+        return "".join(numbers.choice(pieces.split()) for _ in range(numbers.randrange(12)))
     if kind == 2:
         return "".join(chr(numbers.randrange(1, 0xD7FF)) for _ in range(numbers.randrange(40)))
     triple = ",".join(repr(random_number(numbers)) for _ in range(3))

@@ -13,53 +13,13 @@ from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
 from rigid_proto_ros.scene.yaml_text import scalar
 
+NUMBERS = "1 -1 +1 0 007 010 0x10 -0x1F 1. 1.0 .5 -.5 +2.5 1e3 1e-3 1.5E+2 1e400 1_000 0b1 0o7 09 1e e5 --1 1:30"
+TEXTS = "true True TRUE yes no y N on Off false tRUE ja .inf -.inf .nan .NaN inf nan abc 1abc 2020-01-01"
 SCALARS = (
-    *[
-        "1",
-        "-1",
-        "+1",
-        "0",
-        "007",
-        "010",
-        "0x10",
-        "-0x1F",
-        "1.",
-        "1.0",
-        ".5",
-        "-.5",
-        "+2.5",
-        "1e3",
-        "1e-3",
-        "1.5E+2",
-        "1e400",
-    ],
-    *[
-        "true",
-        "True",
-        "TRUE",
-        "yes",
-        "no",
-        "y",
-        "N",
-        "on",
-        "Off",
-        "false",
-        "tRUE",
-        "ja",
-        ".inf",
-        "-.inf",
-        ".nan",
-        ".NaN",
-        "inf",
-        "nan",
-        "abc",
-        "1abc",
-        "1_000",
-        "0b1",
-        "0o7",
-    ],
-    *["1:30", "2020-01-01", "09", '"1"', "'true'", "1e", "e5", "--1", "9223372036854775807", "-9223372036854775808"],
-    *('"a b"', "[1, 2]", "[1.0, 2.0]", "[a, b]", "[true, false]", '["1", "2"]'),
+    *NUMBERS.split(),
+    *TEXTS.split(),
+    *("9223372036854775807", "-9223372036854775808", '"1"', "'true'", '"a b"'),
+    *("[1, 2]", "[1.0, 2.0]", "[a, b]", "[true, false]", '["1", "2"]'),
 )
 
 

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: MIT
+"""A session as a scene and a poke script: all of it, which gives the same motion bit for bit, or what goes on from a
+moment of it.
+
+The events of a run say all that acted on the body, and when. The run is computed anew, and each event becomes a script
+entry as it acts. Entries of one time act in the order in which the script lists them, so what was done in one instant
+acts again as it did. A what-if from a moment is a session of its own: its time begins at 0, and its steps with it, so
+that it follows the session it left within ``accuracy``, and not to the very bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.vectors import vector
+from ..motion.body import Body
+from ..motion.frames import Frame
+from ..motion.loads import Load
+from ..scene.command_codec import MARKS, frame_names, of_event
+from ..scene.parameters import PARAMETERS
+from ..scene.scenario import Scenario, make_scenario, scene_text
+from ..scene.script import entry_of
+from ..scene.yaml_text import flow
+from ..simulation.commands import HELD_WRENCH, UNNAMED_SLOT, TieString, WrenchCommand, slot_name
+from ..simulation.flight import NEVER
+from ..simulation.observer import Applied, Event, Logged, Observer
+from ..simulation.simulation import Simulation
+from ..simulation.string_control import mesh_point
+from .messages import PROJECTIONS
+from .recorded_session import RecordedSession, decode_event
+from .replay import Resimulation, resimulation
+
+NOT_OF_THE_MOTION = frozenset({"record", "viewer", "rerun_port", "web_port", "workbench_port", "start_paused"})
+"""Parameters of a running node that a scene to keep or to send doesn't carry."""
+
+Entry = dict[str, object]
+
+
+@dataclass(frozen=True)
+class SceneAndScript:
+    """scene: parameter-file text; entries: of a poke script."""
+
+    scene: str
+    entries: list[Entry]
+
+    @property
+    def script(self) -> str:
+        """The entries as a poke script's text, an empty list where nothing acts."""
+        return "".join(f"- {flow(entry)}\n" for entry in self.entries) or "[]\n"
+
+
+# The whole run
+
+
+def script_of_session(session: RecordedSession) -> SceneAndScript:
+    """The run as a scene and a script; ``simulate --script`` and ``poke_client --reset`` fly it again.
+
+    Raises InputError for events that can't be decoded or taken, which is what an incomplete record of the run gives.
+    """
+    writer = _Writer()
+    again = writer.again = resimulation(session, writer)
+    scenario = writer.last = again.scenario
+    if session.events:
+        again.advance(max(time_ns for time_ns, _ in session.events) + 1)
+    if writer.lines != session.lines:
+        raise InputError("events", f"{len(session.lines)} lines", "all lines of the log since the start or a reset")
+    # What differs from the defaults, without what belongs to the running node.
+    values = {
+        name: value
+        for name, value in scenario.parameters.named().items()
+        if name not in NOT_OF_THE_MOTION and (name not in PARAMETERS or value != PARAMETERS[name].default)
+    }
+    values["mesh"] = scenario.parameters.mesh
+    mesh_sha256 = scenario.body_mesh.mesh.sha256 if scenario.body_mesh else ""
+    return SceneAndScript(scene_text(values, mesh_sha256), writer.entries)
+
+
+class _Writer(Observer):
+    """Turns what acts on a body computed anew into script entries.
+
+    lines: the log's lines as they come out again. entries: of a script, in the order of acting. again: the simulation;
+    last: its scenario before the latest change.
+    """
+
+    takes = frozenset({Applied, Logged})
+
+    again: Resimulation
+    last: Scenario
+    _applied: tuple[WrenchCommand, Load, Body]
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.entries: list[Entry] = []
+
+    def on(self, event: Event) -> None:
+        """A wrench or poke takes effect, and its line follows; or anything else has acted."""
+        if isinstance(event, Applied):
+            self._applied = event.command, event.load, event.body
+        elif isinstance(event, Logged):
+            self._write(event.time_ns, event.line)
+
+    def _write(self, time_ns: int, line: str) -> None:
+        self.lines.append(line)
+        _, kind, content = decode_event(line, len(self.lines))
+        if kind in MARKS:
+            return
+        if kind in ("set", "inertia"):
+            self._change(time_ns, content if kind == "set" else {})
+            return
+        again = self.again
+        frames = frame_names(again.scenario.parameters, again.node_name)
+        command = of_event(kind, content, frames)
+        assert command is not None
+        if isinstance(command, WrenchCommand):
+            command = _forward(command, self._applied)
+        elif isinstance(command, TieString):
+            # In mesh coordinates, not yet taken onto the surface: that happens again.
+            simulation = again.simulation
+            point = mesh_point(command, simulation.setup.body, simulation.state)
+            command = replace(command, axes="mesh", point=vector(point))
+        self.entries.append({"t": time_ns / 1e9, **entry_of(command)})
+
+    def _change(self, time_ns: int, content: dict) -> None:
+        before, after = self.last, self.again.scenario
+        self.last = after
+        changes = {name: value for name, value in content.items() if name not in NOT_OF_THE_MOTION}
+        if not content:
+            earlier = before.parameters.named()
+            changes = {name: value for name, value in after.parameters.named().items() if value != earlier.get(name)}
+        if not changes:
+            # It cut the motion's steps all the same.
+            changes = {"poke_duration": after.parameters.poke_duration}
+        self.entries.append({"t": time_ns / 1e9, "set": changes})
+
+
+def _forward(command: WrenchCommand, applied: tuple[WrenchCommand, Load, Body]) -> WrenchCommand:
+    """The command as an entry can say it: a push is a force, so an impulse along a normal is given in body axes."""
+    _, load, body = applied
+    if command.frame.axes != "normal" or not command.frame.impulse:
+        return command
+    frame = Frame("body", ("point", load.mesh_point), impulse=True)
+    return replace(command, frame=frame, force=vector(load.own_force(body)))
+
+
+# From a moment on
+
+
+def branch_at(session: RecordedSession, time_ns: int) -> SceneAndScript:
+    """The scene that begins with the session's state at ``time_ns``, to its last bit, and what still acts there, for
+    the time that is left.
+
+    Commands that act at that very time or later are left out. Raises InputError where the session doesn't reach it.
+    """
+    last_ns = max([session.end_ns, *(event_ns for event_ns, _ in session.events)])
+    if not 0 <= time_ns <= last_ns:
+        raise InputError("--at", time_ns / 1e9, f"a time of the session, 0 to {last_ns / 1e9:.9g} s")
+    again = resimulation(session)
+    row = again.advance(time_ns)
+    simulation = again.simulation
+    if simulation.failure:
+        raise InputError("--at", time_ns / 1e9, f"a time before the motion failed: {simulation.failure}")
+    entries = [*_load_entries(simulation), *_thruster_entries(simulation), *_string_entries(simulation)]
+    return SceneAndScript(_scene(again, row).text, entries)
+
+
+def _scene(again: Resimulation, row: np.ndarray) -> Scenario:
+    """The scene that begins with this state, and with the string as it is."""
+    numbers, scenario, tied = row.tolist(), again.scenario, again.simulation.string
+    velocities = PROJECTIONS["twist"](numbers)
+    values = {
+        **scenario.parameters.named(),
+        "initial.position": numbers[0:3],
+        "initial.orientation_xyzw": numbers[3:7],
+        "initial.linear_velocity": velocities[:3],
+        "initial.angular_velocity": velocities[3:],
+        "record": "",
+        "string.attached": tied is not None,
+        "string.attach": list(again.simulation.attach if tied is None else tied.attach),
+    }
+    if tied is not None:
+        values["string.target"] = tied.free_end(again.simulation.time_ns).tolist()
+        values["initial.string_mass"] = tied.effective_mass
+    return make_scenario(values, scenario.body_mesh.mesh if scenario.body_mesh else None)
+
+
+def _string_entries(simulation: Simulation) -> Iterator[Entry]:
+    tied, now_ns = simulation.string, simulation.time_ns
+    if tied is None:
+        return
+    if tied.end_ns > now_ns:
+        # A target is reached over the time since the one before it, here since time 0: so when it would have been.
+        yield {"t": (tied.end_ns - now_ns) // 2 / 1e9, "string": {"target": tied.target.tolist()}}
+    if tied.release_ns is not None:
+        yield {"t": (tied.release_ns - now_ns) / 1e9, "string": "release"}
+
+
+def _load_entries(simulation: Simulation) -> Iterator[Entry]:
+    timeout_ns, now_ns = simulation.setup.wrench_timeout_ns, simulation.time_ns
+    for acting in simulation.acting:
+        endless = acting.kind == HELD_WRENCH and not timeout_ns
+        if acting.thruster >= 0 or not (endless or acting.end_ns > now_ns):
+            continue
+        load = acting.load
+        entry: Entry = {"at": "com" if load.mesh_point is None else {"point": list(load.mesh_point)}}
+        if load.axes == "normal":
+            entry["push"] = load.force[0]
+        else:
+            entry |= {"force": list(load.force), "torque": list(load.torque), "axes": load.axes}
+        if acting.slot > UNNAMED_SLOT:
+            entry["slot"] = slot_name(acting.slot)
+        if not endless:
+            entry["duration"] = (acting.end_ns - now_ns) / 1e9
+        held = acting.kind == HELD_WRENCH or acting.slot == UNNAMED_SLOT
+        yield {"t": 0.0, "wrench": entry} if held else {"t": 0.0, **entry}
+
+
+def _thruster_entries(simulation: Simulation) -> Iterator[Entry]:
+    """What the thrusters push with, and again without those that stop by their least on-time or the timeout."""
+    control, now_ns = simulation.thrusters, simulation.time_ns
+    pushes = control.pushes
+    if not any(push.force for push in pushes):
+        return
+    ends = [push.off_ns for push in pushes]
+    if control.times_out:
+        ends = [min(end_ns, control.last_ns + simulation.setup.wrench_timeout_ns) for end_ns in ends]
+    for time_ns in (now_ns, *sorted({end_ns for end_ns in ends if end_ns != NEVER})):
+        forces = [push.force if end_ns > time_ns else 0.0 for push, end_ns in zip(pushes, ends, strict=True)]
+        yield {"t": (time_ns - now_ns) / 1e9, "thrusters": forces}
