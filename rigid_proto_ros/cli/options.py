@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""Arguments that several commands have, declared once."""
+"""Options that several commands have, declared once; those that write the motion for other tools with what they do."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ..base.errors import InputError
+from ..base.files import output_file
+from ..base.progress import Progress
+
+if TYPE_CHECKING:
+    from ..export.flight_record import FlightRecord, Source
 
 
 def add_scene(parser: argparse.ArgumentParser, help: str, nargs: str | None = None, default: str | None = None) -> None:
@@ -40,3 +48,88 @@ def number_from(lower: float, upper: float) -> Callable[[str], float]:
         return value
 
     return number
+
+
+# The motion for other tools
+
+EXPORTS = {
+    "csv": ((".csv",), "write the states as a table"),
+    "parquet": ((".parquet",), "write the states as a table"),
+    "gltf": ((".glb",), "write the motion for Blender, Unreal, three.js and others that read glTF"),
+    "usd": ((".usda", ".usdc"), "write the motion, with mass properties, for Omniverse, Houdini and others"),
+}
+"""Options that take a file, how its name may end, and their help."""
+
+ANIMATIONS = ("gltf", "usd")
+"""Files that ``--fps`` is of."""
+
+DEFAULT_FPS = 30.0
+
+
+def add_exports(parser: argparse.ArgumentParser) -> None:
+    """Declare the options that write the motion for other tools."""
+    group = parser.add_argument_group("for other tools")
+    for name, (endings, help) in EXPORTS.items():
+        group.add_argument(f"--{name}", metavar=f"FILE{endings[0]}", help=help)
+    group.add_argument(
+        "--fps",
+        type=number_from(1e-3, 1e5),
+        metavar="N",
+        help=f"with --gltf or --usd: frames a second (default {DEFAULT_FPS:g})",
+    )
+
+
+def asked(args: argparse.Namespace) -> dict[str, str]:
+    """The files that are asked for, by option."""
+    return {name: file for name in EXPORTS if (file := getattr(args, name))}
+
+
+def check_exports(args: argparse.Namespace) -> None:
+    """Refuse what can't be written before any work is done; raises InputError."""
+    files = asked(args)
+    for name, file in files.items():
+        endings, _ = EXPORTS[name]
+        if not file.lower().endswith(endings):
+            raise InputError(f"--{name}", file, f"a file that ends in {' or '.join(endings)}")
+        output_file(f"--{name}", file)
+    if args.fps is not None and not set(ANIMATIONS) & set(files):
+        raise InputError("--fps", "needs --gltf or --usd")
+    from ..export import check_library
+
+    for name in files:
+        check_library(f"--{name}")
+
+
+def write_exports(
+    args: argparse.Namespace, record: FlightRecord, source: Source | None, say: Callable[[str], None]
+) -> None:
+    """Write what is asked for, and ``say`` a line of each file; raises InputError."""
+    files = asked(args)
+    if "csv" in files or "parquet" in files:
+        from ..export import table
+
+        columns = table.state_columns(record)
+        for name, write in (("csv", table.write_csv), ("parquet", table.write_parquet)):
+            if name in files:
+                with Progress(f"writing {files[name]}"):
+                    write(files[name], columns)
+                say(f"{files[name]}: {len(record.times_ns)} states")
+    if not set(ANIMATIONS) & set(files):
+        return
+    from ..export.flight_record import frames
+    from ..export.tracks import tracks_of
+
+    fps = args.fps or DEFAULT_FPS
+    made, report = frames(record, source, fps)
+    tracks = tracks_of(made)
+    if "gltf" in files:
+        from ..export.gltf import write_gltf
+
+        write_gltf(files["gltf"], made, tracks)
+        say(f"{files['gltf']}: {report}")
+    if "usd" in files:
+        from ..export.usd import write_usd
+
+        changed = write_usd(files["usd"], made, tracks, fps)
+        for line in (report, *changed):
+            say(f"{files['usd']}: {line}")

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.progress import Progress
-from .exports import add_exports, asked, check_exports, write_exports
-from .options import add_session, number_from
+from .options import add_exports, add_session, asked, check_exports, number_from, write_exports
 
 if TYPE_CHECKING:
     from ..scene.scenario import Scenario

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 from ..base.command_line import Parser
 from ..base.errors import InputError
 from ..base.files import output_file
-from .exports import add_exports, asked, check_exports, write_exports
-from .options import add_json, add_scene, number_from
+from .options import add_exports, add_json, add_scene, asked, check_exports, number_from, write_exports
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord

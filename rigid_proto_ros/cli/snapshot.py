@@ -10,7 +10,6 @@ from pathlib import Path
 
 from ..base.errors import InputError, is_missing
 from ..base.progress import Progress
-from .options import add_session
 
 EXAMPLES = (("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "what the viewer shows at 4 s"),)
 
@@ -21,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Write a .png of a recording as the viewer shows it at one simulated time. Needs no display, but a Vulkan "
         "driver; mesa-vulkan-drivers has one that needs no GPU."
     )
-    add_session(parser, node="the body, in a bag with several")
+    parser.add_argument("session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of one body")
     parser.add_argument("--at", metavar="T", type=float, required=True, help="simulated time [s]")
     parser.add_argument("-o", "--output", metavar="X.png", required=True, help="the picture to write")
     parser.add_argument("--size", metavar="WxH", default="1600x900", help="pixels of the picture (default %(default)s)")
@@ -37,9 +36,6 @@ def run(args: argparse.Namespace) -> int:
             raise InputError("snapshot", is_missing(package, "rerun"))
     size = _pixels(args.size, 200)
     if not is_bag(Path(args.session)):
-        for option in ("scene", "node"):
-            if value := getattr(args, option):
-                raise InputError(f"--{option}", value, "a bag: an .rrd recording has its own scene and one body")
         _draw(args, args.session, size)
         return 0
     with tempfile.TemporaryDirectory() as folder:
@@ -59,16 +55,14 @@ def _drawn(args: argparse.Namespace, folder: Path) -> Path:
     """The last run of a bag as a recording for the viewer."""
     from ..rerun_view.session_files import read_runs, record
     from ..rerun_view.snapshot import check_picture, check_time
-    from .replay import given_scene
 
-    session = read_runs(args.session, args.node)[-1]
-    given = given_scene(args.scene, session)
+    session = read_runs(args.session)[-1]
     # What is refused is refused before the long work.
     check_time(session, args.at)
     check_picture(args.output)
     path = folder / "session.rrd"
     with Progress("reading the bag") as progress:
-        record([session], path, given, progress.fraction)
+        record([session], path, progress=progress.fraction)
     return path
 
 

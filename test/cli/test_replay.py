@@ -31,5 +31,3 @@ def test_a_node_that_a_recording_does_not_hold_is_refused(tmp_path, capsys):
     capsys.readouterr()
     assert main(["replay", session, "--node", "other"]) == 2
     assert "accepted: rigid_body" in capsys.readouterr().err
-    assert main(["snapshot", session, "--at", "0.1", "-o", str(tmp_path / "x.png"), "--node", "other"]) == 2
-    assert "an .rrd recording has its own scene" in capsys.readouterr().err
