@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
     from ..rerun_view.session_files import Recorder
     from ..scene.parameters import Parameters
-    from ..simulation.observer import Refused
 
 DURATION_NS = 10_000_000_000
 AFTER_SCRIPT_NS = 1_000_000_000
@@ -68,7 +67,6 @@ def _instead_of(option: str) -> str:
 def run(args: argparse.Namespace) -> int:
     """Run the scene and print its end."""
     from ..scene.offline import OfflineRun, parse_setting, read_scene, run_with_progress, summary
-    from ..scene.scenario_run import Refusals
     from ..scene.script import read_script
     from ..simulation.commands import nanoseconds
     from ..simulation.observer import Observers
@@ -96,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     watching = [*recorders.values(), *filter(None, [record])]
     try:
         # Only who records has a ghost.
-        flight = OfflineRun(scenario, script, Observers(*watching, Refusals(_warn_of_ghost)) if watching else None)
+        flight = OfflineRun(scenario, script, Observers(*watching) if watching else None)
         wall_time = run_with_progress(flight, duration_ns)
         result = summary(flight, wall_time)
     finally:
@@ -105,6 +103,8 @@ def run(args: argparse.Namespace) -> int:
     recorded = [file for file, recorder in recorders.items() if not recorder.error]
     for reason, count in flight.simulation.refused.items():
         _warn(f"{count} commands refused: {reason}")
+    if flight.ghost is not None and flight.ghost.refusal:
+        _warn(flight.ghost.refusal)
     if args.json:
         print(json.dumps(result))
     else:
@@ -148,14 +148,6 @@ def _recorders(files: list[str], parameters: Parameters) -> dict[str, Recorder]:
             recorder.close()
         raise
     return opened
-
-
-def _warn_of_ghost(refusal: Refused) -> None:
-    """What the ghost goes without; other refusals are counted at the end."""
-    from ..scene.scenario_run import GHOST
-
-    if refusal.reason == GHOST:
-        _warn(f"at {refusal.time_ns / 1e9:.9g} s {refusal.message}")
 
 
 def _warn(message: str) -> None:

@@ -8,7 +8,7 @@ has none.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from ..base.errors import InputError
 from ..mesh.reading import Mesh
@@ -18,34 +18,24 @@ from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
 from .scenario import BodyMesh, Scenario, check_inertia
 
-GHOST = "ghost"
-"""The reason of a refusal that is the ghost's alone."""
 
-
-class Refusals(Observer):
-    """Hears of commands that were refused when they came to act: on_refusal(event)."""
+class Ghost(Observer):
+    """The simulation of ``Scenario.ghost``; follows another one's commands (Simulation.follower). The observer is told
+    of what the ghost doesn't support, once until the next reset; ``refusal`` keeps it.
+    """
 
     takes = frozenset({Refused})
 
-    def __init__(self, on_refusal: Callable[[Refused], None]) -> None:
-        self._on_refusal = on_refusal
-
-    def on(self, event: Event) -> None:
-        """A command was refused."""
-        if isinstance(event, Refused):
-            self._on_refusal(event)
-
-
-class Ghost:
-    """The simulation of ``Scenario.ghost``; follows another one's commands (Simulation.follower). The observer is told
-    of what the ghost doesn't support, once until the next reset.
-    """
-
     def __init__(self, setup: Setup, observer: Observer) -> None:
-        self.simulation = Simulation(setup, Refusals(lambda event: self._goes_without(event.message)))
+        self.simulation = Simulation(setup, self)
+        self.refusal = ""
         self._observer = observer
         self._shown = True
-        self._refused = False
+
+    def on(self, event: Event) -> None:
+        """A command was refused when it came to act."""
+        if isinstance(event, Refused):
+            self._goes_without(event.message)
 
     def announce(self) -> None:
         """Tell the observer what the ghost is."""
@@ -70,10 +60,9 @@ class Ghost:
             self._goes_without(str(error))
 
     def _goes_without(self, reason: str) -> None:
-        if self._shown and not self._refused:
-            self._refused = True
-            text = f"the ghost continues without a command: {reason}"
-            self._observer.on(Refused(self.simulation.time_ns, GHOST, text))
+        if self._shown and not self.refusal:
+            self.refusal = f"the ghost continues without a command: {reason}"
+            self._observer.on(Refused(self.simulation.time_ns, "ghost", self.refusal))
 
     def change(self, time_ns: int, scenario: Scenario, listed: Listed | None = None) -> None:
         """The followed scenario changed at ``time_ns``, at this place in a list; one without a ghost leaves this one
@@ -88,7 +77,7 @@ class Ghost:
     def reset(self, scenario: Scenario) -> None:
         """Time 0 and the initial state."""
         self.simulation.reset(scenario.ghost)
-        self._refused = False
+        self.refusal = ""
         self.announce()
 
     def advance(self, until_ns: int) -> None:
@@ -96,16 +85,6 @@ class Ghost:
         state = self.simulation.advance(until_ns)
         if self._shown and not self.simulation.failure:
             self._observer.on(GhostPublished(until_ns, state.row))
-
-
-def ghost_of(scenario: Scenario, simulation: Simulation, observer: Observer | None) -> Ghost | None:
-    """The ghost that a scenario asks for, following the simulation; None when nobody would see it."""
-    if scenario.ghost is None or observer is None:
-        return None
-    ghost = Ghost(scenario.ghost, observer)
-    simulation.follower = ghost.submit
-    ghost.announce()
-    return ghost
 
 
 class ScenarioRun:
@@ -120,7 +99,10 @@ class ScenarioRun:
 
     def begin_ghost(self) -> None:
         """Begin the ghost that the scenario asks for; it gets all commands that are submitted from now on."""
-        self.ghost = ghost_of(self.scenario, self.simulation, self.observer)
+        self.ghost = Ghost(self.scenario.ghost, self.observer) if self.scenario.ghost is not None else None
+        if self.ghost is not None:
+            self.simulation.follower = self.ghost.submit
+            self.ghost.announce()
 
     def check_change(self, scenario: Scenario) -> None:
         """Raises InputError where this scenario can't follow the present one."""

@@ -9,10 +9,9 @@ from flights import SECOND
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.scene.scenario_run import ghost_of
+from rigid_proto_ros.scene.scenario_run import ScenarioRun
 from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.simulation.observer import GhostChanged, GhostPublished, Observer, Published, Refused
-from rigid_proto_ros.simulation.simulation import Simulation
 
 MOVING = {
     "initial.linear_velocity": [1.0, 0.0, 0.0],
@@ -55,8 +54,9 @@ def test_a_ghost_that_cannot_carry_the_scene_is_refused_by_its_own_name():
 def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset():
     watcher = Watcher()
     scenario = make_scenario({"ghost.integrator": "free_body"})
-    simulation = Simulation(scenario.setup, watcher)
-    ghost = ghost_of(scenario, simulation, watcher)
+    run = ScenarioRun(scenario, watcher)
+    run.begin_ghost()
+    simulation, ghost = run.simulation, run.ghost
     push = WrenchCommand(False, parse_frame("world@com"), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "")
 
     def fly() -> None:
