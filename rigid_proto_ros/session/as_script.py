@@ -20,7 +20,7 @@ from ..base.vectors import vector
 from ..motion.body import Body
 from ..motion.frames import Frame
 from ..motion.loads import Load
-from ..scene.command_codec import MARKS, frame_names, of_event
+from ..scene.command_codec import MARKS, of_event
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, make_scenario, scene_text
 from ..scene.script import entry_of
@@ -111,15 +111,13 @@ class _Writer(Observer):
         if kind in ("set", "inertia"):
             self._change(time_ns, content if kind == "set" else {})
             return
-        again = self.again
-        frames = frame_names(again.scenario.parameters, again.node_name)
-        command = of_event(kind, content, frames)
+        command = of_event(kind, content, self.again.frames)
         assert command is not None
         if isinstance(command, WrenchCommand):
             command = _forward(command, self._applied)
         elif isinstance(command, TieString):
             # In mesh coordinates, not yet taken onto the surface: that happens again.
-            simulation = again.simulation
+            simulation = self.again.simulation
             point = mesh_point(command, simulation.setup.body, simulation.state)
             command = replace(command, axes="mesh", point=vector(point))
         self.entries.append({"t": time_ns / 1e9, **entry_of(command)})

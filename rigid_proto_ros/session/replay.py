@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from operator import itemgetter
 
 import numpy as np
 
@@ -62,7 +63,8 @@ def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
 
 
 class Resimulation(ScenarioRun):
-    """A session's simulation; its commands are submitted when their time has come, as they were then.
+    """A session's simulation; its commands are submitted when their time has come, as they were then. Raises InputError
+    for events that can't be decoded.
 
     mesh_of(name) gives the mesh that a change names, or None to load it.
     """
@@ -78,56 +80,43 @@ class Resimulation(ScenarioRun):
         super().__init__(scenario, observer)
         # Its own are recorded like all events, and those of recordings from before there were such ones aren't.
         self.simulation.logs_timeouts = False
+        self.frames = frame_names(scenario.parameters, node_name)
         self._mesh_of = mesh_of
         self._changes_ns = -1
-        self._taken = 0
-        self.node_name = node_name
-        self._waiting: deque[tuple[int, str, dict, Command | None, int]] = deque()
+        waiting: list[tuple[int, str, dict, Command | None, int]] = []
         for number, line in enumerate(event_lines, 1):
-            self.take(*decode_event(line, number))
+            time_ns, kind, content = decode_event(line, number)
+            try:
+                if kind == "set":
+                    convert_all(content)
+                command = of_event(kind, content, self.frames)
+            except InputError as error:
+                raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
+            waiting.append((time_ns, kind, content, command, number))
         # Stable: what happened at one instant keeps its order.
-        self._waiting = deque(sorted(self._waiting, key=lambda event: event[0]))
-
-    def take(self, time_ns: int, kind: str, content: dict) -> None:
-        """Take the log's next event, which comes after all that were taken; raises InputError for one that can't be
-        decoded.
-        """
-        self._taken += 1
-        self._waiting.append((time_ns, kind, content, self._command(kind, content, self._taken), self._taken))
+        self._waiting = deque(sorted(waiting, key=itemgetter(0)))
 
     def advance(self, until_ns: int) -> np.ndarray:
         """Advance the body to ``until_ns``; returns its state row, before what acts at that very time.
 
         Raises CommandRefused for a recorded command that can't be taken.
         """
-        while self._waiting and self._waiting[0][0] < until_ns:
-            self._submit_next()
         # Marks at the time asked for were made before anything else could act there.
-        while self._waiting and self._waiting[0][0] == until_ns and self._waiting[0][3] is None:
-            self._submit_next()
-        return self.simulation.advance(until_ns).row
-
-    def _submit_next(self) -> None:
-        time_ns, kind, content, command, number = self._waiting.popleft()
-        self.simulation.advance(max(time_ns, self.simulation.time_ns))
-        if command is None:
-            self.simulation.log(kind, content)
-        else:
+        while self._waiting and (
+            self._waiting[0][0] < until_ns or (self._waiting[0][0] == until_ns and self._waiting[0][3] is None)
+        ):
+            time_ns, kind, content, command, number = self._waiting.popleft()
+            self.simulation.advance(max(time_ns, self.simulation.time_ns))
+            if command is None:
+                self.simulation.log(kind, content)
+                continue
             if isinstance(command, Change):
                 self._changes_ns = time_ns
             # What acts under a change of its own instant can't be checked before that acts.
             checked = (b"", self.simulation.setup) if self._changes_ns == time_ns else None
             # What acted at one instant acts in the order of the log, whatever rule made it.
             self.simulation.submit(command, time_ns, (0, number), checked)
-
-    def _command(self, kind: str, content: dict, number: int) -> Command | None:
-        frames = frame_names(self.scenario.parameters, self.node_name)
-        try:
-            if kind == "set":
-                convert_all(content)
-            return of_event(kind, content, frames)
-        except InputError as error:
-            raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
+        return self.simulation.advance(until_ns).row
 
     def setup_of(self, command: Change) -> Setup:
         """Put in force what a change says, with the mesh that was flown then."""
@@ -153,46 +142,34 @@ def play(
     given: the scene of a session that lacks it; then states alone are told. Raises InputError for events that can't be
     decoded, and for a session without a scene.
     """
+    again = None
     if given is not None or session.missing:
-        _play_states(session, observer, given)
-        return
-    again = resimulation(session, observer)
-    notify_start(observer, again.scenario)
-    again.simulation.announce()
-    again.begin_ghost()
-    for count, (time_ns, row) in enumerate(sorted_states(session)):
+        if given is None:
+            raise InputError("session", ", ".join(session.missing), "--scene FILE, to draw it")
+        notify_start(observer, given)
+        observer.on(BodyChanged(0, snapshot(given.setup)))
+    else:
+        again = resimulation(session, observer)
+        notify_start(observer, again.scenario)
+        again.simulation.announce()
+        again.begin_ghost()
+    for count, k in enumerate(np.argsort(session.times, kind="stable").tolist()):
         progress(count, len(session.times))
+        time_ns, row = int(session.times[k]), session.rows[k]
+        if again is None:
+            observer.on(Published(time_ns, row))
+            continue
         try:
             computed = again.advance(time_ns)
         except InputError:
             # A command that is refused here: from now on only the recorded states are shown.
             computed = row
-        observer.on(Published(time_ns, computed if _published_alike(session, computed, row) else row))
+        # A bag holds of a state what was published of it, and no more.
+        alike = bool(session.published) and all(
+            np.allclose(PROJECTIONS[name](computed.tolist()), PROJECTIONS[name](row.tolist()), rtol=1e-12, atol=1e-12)
+            for name in session.published
+        )
+        observer.on(Published(time_ns, computed if alike else row))
         again.simulation.notify_floor()
         if again.ghost is not None:
             again.ghost.advance(time_ns)
-
-
-def sorted_states(session: RecordedSession) -> Iterator[tuple[int, np.ndarray]]:
-    """(time_ns, row) of every state in the order of time."""
-    for k in np.argsort(session.times, kind="stable").tolist():
-        yield int(session.times[k]), session.rows[k]
-
-
-def _published_alike(session: RecordedSession, computed: np.ndarray, row: np.ndarray) -> bool:
-    """Whether a computed state is the recorded one, of which a bag holds what was published, and no more."""
-    if not session.published:
-        return False
-    return all(
-        np.allclose(PROJECTIONS[name](computed.tolist()), PROJECTIONS[name](row.tolist()), rtol=1e-12, atol=1e-12)
-        for name in session.published
-    )
-
-
-def _play_states(session: RecordedSession, observer: Observer, given: Scenario | None) -> None:
-    if given is None:
-        raise InputError("session", ", ".join(session.missing), "--scene FILE, to draw it")
-    notify_start(observer, given)
-    observer.on(BodyChanged(0, snapshot(given.setup)))
-    for time_ns, row in sorted_states(session):
-        observer.on(Published(time_ns, row))

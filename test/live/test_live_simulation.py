@@ -88,7 +88,13 @@ def test_commands_act_and_are_counted_and_a_refusal_is_raised(live):
     with pytest.raises(CommandRefused, match="t"):
         live.schedule("[{t: -1, force: [1, 0, 0]}]")
     assert live.commands.received == {"poke": 1, "wrench": 1, "schedule": 3}
-    assert live.call(lambda: dict(live.loop.simulation.refused)) == {"frame": 1, "schedule": 1}
+    # Too many forces and an attitude that is none aren't frames that are none.
+    with pytest.raises(CommandRefused, match="2 numbers"):
+        live.schedule("{t: 0, thrusters: [1, 0]}")
+    with pytest.raises(CommandRefused, match="all zero"):
+        live.schedule("{t: 0, state: {orientation_xyzw: [0, 0, 0, 0]}}")
+    counted = {"frame": 1, "schedule": 1, "thrusters": 1, "state": 1}
+    assert live.call(lambda: dict(live.loop.simulation.refused)) == counted
 
 
 def test_time_runs_pauses_steps_and_starts_anew(live, watcher):

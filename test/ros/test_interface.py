@@ -41,7 +41,7 @@ OF_RCLPY = {
 def graph(ros_environment: dict[str, str], tmp_path_factory) -> Iterator[dict[str, dict[str, str]]]:
     """Names and types by direction of a running node with everything on request switched on."""
     switches = sorted({i.on_request for i in INTERFACES if i.on_request})
-    values = {"thrusters": "thrusters.tail:=[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]"}
+    values = {"thrusters": "thrusters.tail:=[0, 0, 0, 1, 0, 0]"}
     arguments = [word for name in switches for word in ("-p", values.get(name, f"{name}:=true"))]
     log = tmp_path_factory.mktemp("listed") / "node"
     # A first start compiles its kernels.

@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 import pytest
-from conftest import ENDINGS, MISSING, needs_rerun
+from conftest import ENDINGS, MISSING
 
 pytest.importorskip("rclpy")
 pytest.importorskip("mcap")
@@ -22,10 +22,6 @@ from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.session.messages import read_state
-
-QUICK_ENDINGS = pytest.mark.parametrize(
-    "ending", [".mcap", pytest.param(".rrd", marks=[needs_rerun, pytest.mark.stress])]
-)
 
 
 def flown_session(folder, *settings: str):
@@ -93,9 +89,8 @@ def clock_client(ros_environment):
         yield client
 
 
-@QUICK_ENDINGS
-def test_states_go_out_with_their_stamps_to_the_bit(session, clock_client, ending):
-    messages, clock = heard_states(clock_client, session.with_suffix(ending), "--speed", "4")
+def test_states_go_out_with_their_stamps_to_the_bit(session, clock_client):
+    messages, clock = heard_states(clock_client, session, "--speed", "4")
     (recorded,) = read_runs(session)
     assert {t["sec"] * SECOND + t["nanosec"] for t in clock} <= set(recorded.times.tolist())
     for name in ("pose", "twist"):
@@ -195,11 +190,10 @@ def hammer(ros_environment, tmp_path_factory):
         yield client
 
 
-@QUICK_ENDINGS
 def test_a_recording_switched_on_in_flight_is_shown_and_verified_from_the_next_reset_on(
-    hammer, ros_environment, tmp_path, ending
+    hammer, ros_environment, tmp_path
 ):
-    path, client = tmp_path / f"session{ending}", hammer
+    path, client = tmp_path / "session.mcap", hammer
     client.publish("poke", wrench_message(0, "body@com;impulse", (0.0, 0.3, 0.0)))
     client.set(record=str(path))
     client.forget("pose")
