@@ -32,7 +32,7 @@ run: $(FOR_RUN) ## fly a bundled body, or MESH=path/to.obj, for 10 s; leaves out
 up: $(FOR_RUN) ## node and viewer; stays until Ctrl-C
 	@$(ROS) .venv/bin/rigid_proto up $(if $(MESH),--mesh "$(MESH)") || [ $$? = 130 ]
 
-workbench: $(FOR_WORKBENCH) ## node and interactive page; stays until Ctrl-C
+workbench: $(FOR_WORKBENCH) ## body and interactive page, without ROS; stays until Ctrl-C
 	@$(ROS) .venv/bin/rigid_proto workbench $(if $(MESH),--mesh "$(MESH)") || [ $$? = 130 ]
 
 # A wait that has run out says that the machine was busy or that a process wasn't discovered, and nothing about values: such a

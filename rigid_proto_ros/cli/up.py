@@ -12,6 +12,7 @@ from .options import add_mesh, add_scene
 EXAMPLES = (
     ("rigid_proto up", "the T-handle, with a live view"),
     ("rigid_proto up hammer --viewer web", "another scene, shown in the browser"),
+    ("rigid_proto up hammer --viewer workbench", "with the interactive page beside the topics"),
     ("rigid_proto up --mesh part.obj", "your own mesh"),
 )
 
@@ -22,9 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_mesh(parser)
     parser.add_argument(
         "--viewer",
-        choices=("auto", "web", "native", "none"),
+        choices=("auto", "web", "native", "workbench", "none"),
         default="auto",
-        help="where it is shown; auto: native where there is a display, else web",
+        help="where it is shown: Rerun in the browser or in a window, or the interactive page; auto: native where there is a "
+        "display, else web",
     )
 
 
