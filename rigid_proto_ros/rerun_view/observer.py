@@ -202,7 +202,7 @@ class RerunObserver(Observer):
         while more:
             events = self._mailbox.take()
             more = len(events) == BATCH
-            self._writer.write(events, self._next_run)
+            self._writer.write(events, self._next_run, self._mailbox.moved)
         for stream in list(self._writer.streams):
             try:
                 stream.flush()

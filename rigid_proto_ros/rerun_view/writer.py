@@ -96,10 +96,11 @@ class SceneWriter:
 
     # What happens in it
 
-    def write(self, events: list[Noted], next_run: Callable[[], None]) -> None:
-        """Send what happened; at a reset ``next_run`` is called."""
+    def write(self, events: list[Noted], next_run: Callable[[], None], moved: Callable[[], None]) -> None:
+        """Send what happened; at a reset ``next_run`` is called, and ``moved`` at every event: there may be thousands."""
         states: list[Noted] = []
         for wall_ns, event in events:
+            moved()
             time_ns = event.time_ns
             self._last_time_ns = max(self._last_time_ns, time_ns)
             match event:
