@@ -25,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--viewer",
         choices=("auto", "web", "native", "workbench", "none"),
         default="auto",
-        help="where it is shown: Rerun in the browser or in a window, the interactive page; auto: native where there is "
-        "a display, else web",
+        help="where it is shown: Rerun in the browser or in a window, the interactive page; auto: native where there "
+        "is a display, else web",
     )
 
 

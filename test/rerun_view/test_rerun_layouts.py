@@ -110,6 +110,7 @@ def test_an_axis_has_two_numbers_that_can_be_read_and_no_curve_on_its_frame(ends
     # Drawn at the end of the axis, a number lies on those of the time axis.
     assert (numbered > low + 0.9 * margin).all() and (numbered < high - 0.9 * margin).all()
     assert np.ptp(value_axis(*ends, 1.0)) >= 1.0  # rounding of an angle isn't blown up
+    assert high - low <= 5.0 * max(ends[1] - ends[0], 0.05 * np.abs(ends).max()) or ends == (0.0, 0.0)
 
 
 def test_a_legend_lies_beside_the_curves_and_never_over_them() -> None:
