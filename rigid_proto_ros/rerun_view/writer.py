@@ -97,7 +97,7 @@ class SceneWriter:
     # What happens in it
 
     def write(self, events: list[Noted], next_run: Callable[[], None], moved: Callable[[], None]) -> None:
-        """Send what happened; at a reset ``next_run`` is called, and ``moved`` at every event: there may be thousands."""
+        """Send what happened; at a reset ``next_run`` is called, ``moved`` at every event: there may be thousands."""
         states: list[Noted] = []
         for wall_ns, event in events:
             moved()
