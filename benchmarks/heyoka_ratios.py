@@ -26,8 +26,7 @@ from motion_measures import errors
 from problem_references import reference_row
 from problems import PROBLEMS, Problem
 from result_table import ResultTable
-from rigid_proto_ros.base.compilation import njit
-from rigid_proto_ros.base.function_pointers import entry_of
+from rigid_proto_ros.base.compilation import entry_of, njit
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion import loads as ld
 from rigid_proto_ros.motion.integrators.integrator import ADAPTIVE

@@ -37,7 +37,7 @@ finally:
         del sys.modules[_name]
 arraymath._HAVE_BLAS = importlib.util.find_spec("scipy") is not None  # noqa: SLF001  # for kernels of others
 
-__all__ = ["INTERPRETED", "intrinsic", "njit", "notify_when_compiling", "source_stamp"]
+__all__ = ["INTERPRETED", "entry_of", "intrinsic", "njit", "notify_when_compiling", "source_stamp"]
 
 _CONFIG: Any = config  # its settings are made when it is imported
 Emitted = tuple[Any, Any]
@@ -168,6 +168,18 @@ def njit(*signature: Any, allocates: bool = True, **options: Any) -> Callable[[_
             _CONFIG.CACHE_LOCATOR_CLASSES = before
 
     return decorated
+
+
+def entry_of(kernel: Callable[..., Any], signature: Any) -> Callable[..., Any]:
+    """The compiled function itself for this signature: called without looking at its arguments' types.
+
+    A call through numba's dispatcher looks them up each time, which costs more than a short kernel takes.
+    """
+    if INTERPRETED:
+        return kernel
+    kernel.compile(signature)  # type: ignore[attr-defined]  # numba's
+    entry: Callable[..., Any] = kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]  # numba's
+    return entry
 
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from llvmlite import ir
 from numba import types
 
 from .compilation import INTERPRETED, Emitted, intrinsic, njit
-from .exact_arithmetic import fast_two_sum, pair_add, pair_divide, pair_multiply, two_product, two_sum
+from .exact_arithmetic import fast_two_sum, pair_add, two_product, two_sum
 
 BIAS, MANTISSA_BITS = 1023, 52
 MANTISSA = (1 << MANTISSA_BITS) - 1
@@ -246,26 +246,20 @@ def exponential_of(x: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _expm1(x: float) -> tuple[float, float]:
-    """eˣ − 1 as a pair, |x| < 709."""
-    n, r, t, t_low = _exponential_parts(x)
-    if n == 0:
-        high, low = two_sum(r, t)
-        return fast_two_sum(high, low + t_low)
-    s, e = fast_two_sum(1.0, r)
-    s, f = fast_two_sum(s, t)
-    high, low = two_sum(_scaled(s, n), -1.0)
-    return fast_two_sum(high, low + _scaled(e + f + t_low, n))
-
-
-@njit(cache=True, error_model="numpy")
 def expm1(x: float) -> float:
     """eˣ − 1, without cancellation for small x."""
     if not -40.0 < x < 709.0:
         return -1.0 if x < 0.0 else exponential_of(x)
     if abs(x) < 1e-17:
         return x
-    return _expm1(x)[0]
+    n, r, t, t_low = _exponential_parts(x)
+    if n == 0:
+        high, low = two_sum(r, t)
+        return high + (low + t_low)
+    s, e = fast_two_sum(1.0, r)
+    s, f = fast_two_sum(s, t)
+    high, low = two_sum(_scaled(s, n), -1.0)
+    return high + (low + _scaled(e + f + t_low, n))
 
 
 @njit(cache=True, error_model="numpy")
@@ -281,17 +275,13 @@ def _logarithm(x: float) -> tuple[float, float]:
     s = f / (2.0 + f)
     square, square_low = two_product(f, f)
     z = s * s
+    zz = z * z
+    c = _ATANH
+    artanh = ((c[0] + z * c[1]) + zz * (c[2] + z * c[3])) + zz * zz * ((c[4] + z * c[5]) + zz * c[6])
     high, low = two_sum(float(n) * _LN2_1, f)
     high, lost = two_sum(high, -0.5 * square)
-    rest = s * (0.5 * square + 2.0 * z * _artanh_tail(z)) + float(n) * _LN2_2 - 0.5 * square_low
+    rest = s * (0.5 * square + 2.0 * z * artanh) + float(n) * _LN2_2 - 0.5 * square_low
     return high, (low + lost) + rest
-
-
-@njit(cache=True, error_model="numpy")
-def _artanh_tail(z: float) -> float:
-    c = _ATANH
-    zz = z * z
-    return ((c[0] + z * c[1]) + zz * (c[2] + z * c[3])) + zz * zz * ((c[4] + z * c[5]) + zz * c[6])
 
 
 @njit(cache=True, error_model="numpy")
@@ -307,50 +297,6 @@ def logarithm(x: float) -> float:
         return total + (lost + low - 100.0 * _LN2_2)
     high, low = _logarithm(x)
     return high + low
-
-
-@njit(cache=True, error_model="numpy")
-def hyperbolic_tangent(x: float) -> float:
-    """tanh x = (e²ˣ − 1)/(e²ˣ + 1)."""
-    size = abs(x)
-    if not size < 22.0:
-        return math.copysign(1.0, x) if size > 0.0 else x
-    if size < _AS_ITSELF:
-        return x
-    high, low = _expm1(2.0 * size)
-    below, below_low = pair_add(high, low, 2.0, 0.0)
-    return math.copysign(pair_divide(high, low, below, below_low)[0], x)
-
-
-@njit(cache=True, error_model="numpy")
-def hyperbolic_secant(x: float) -> float:
-    """1/cosh x = 2 e⁻ˣ/(1 + e⁻²ˣ)."""
-    size = abs(x)
-    if not size < 40.0:
-        return 2.0 * exponential_of(-size)
-    n, r, t, t_low = _exponential_parts(-size)
-    high, low = fast_two_sum(1.0, r)
-    high, lost = fast_two_sum(high, t)
-    high, low = fast_two_sum(_scaled(high, n), _scaled(low + lost + t_low, n))
-    below, below_low = pair_multiply(high, low, high, low)
-    below, below_low = pair_add(below, below_low, 1.0, 0.0)
-    return pair_divide(2.0 * high, 2.0 * low, below, below_low)[0]
-
-
-@njit(cache=True, error_model="numpy")
-def inverse_hyperbolic_tangent(x: float) -> float:
-    """artanh x, |x| ≤ 1: ½ log (1 + x)/(1 − x)."""
-    size = abs(x)
-    if size < 0.17:
-        z = x * x
-        return x + x * z * _artanh_tail(z)
-    if not size < 1.0:
-        return math.copysign(math.inf, x) if size == 1.0 else math.nan
-    above, above_low = two_sum(1.0, size)
-    below, below_low = two_sum(1.0, -size)
-    ratio, ratio_low = pair_divide(above, above_low, below, below_low)
-    high, low = _logarithm(ratio)
-    return math.copysign(0.5 * (high + (low + ratio_low / ratio)), x)
 
 
 @njit(cache=True, error_model="numpy")

@@ -19,9 +19,8 @@ from ..base.rotation import norm
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
 from ..motion.integrators.equations import accelerations, parts_of, tension_margin
-from ..motion.integrators.error_measure import FLOOR
 from ..motion.integrators.integrator import ADAPTIVE, NOTHING, ONE_STEP
-from ..motion.integrators.series_steps import CONTROL, begin_control
+from ..motion.integrators.series_steps import CONTROL, FLOOR, begin_control
 from ..motion.integrators.stepping import commit, is_provided, reach
 from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
 from ..motion.problem import PROBLEM, STRING, begin_problem, begin_string
@@ -65,7 +64,7 @@ FLIGHT = record_type(
         ("taken", np.int64),  # steps of the segment, but for those that an adaptive kernel counts
         ("steps_before", np.int64),
         ("evaluations_before", np.int64),
-        ("floors", np.float64, 5),  # (FLOOR_KINDS,) the most that rounding, and not the accuracy, has set since time 0
+        ("floors", np.float64, 4),  # (FLOOR_KINDS,) the most that rounding, and not the accuracy, has set since time 0
         # Rows of the table of loads: those that act are 0 to acting − 1, in the order in which they began; the commands
         # that are to act next, in their order, due to due_end − 1.
         ("acting", np.int64),
@@ -107,10 +106,10 @@ APPLIED, BEGAN, ENDED, DONE, TIMED_OUT = range(5)
 wrench has ended so.
 """
 
-STEP_FLOOR, PASSAGE_FLOOR, SPIN_FLOOR, TENSOR_FLOOR, PLACE_FLOOR, FLOOR_KINDS = range(6)
-"""Why the motion is held to less than its accuracy. An error rate [1/s] of steps too short for it; passages of a knot
-by its hand; rates [rad/s] at which the rounding of a spin, or of a tensor given in other axes than its own, turns the
-attitude; the rounding of a place far from the world's origin, in lengths of the body.
+STEP_FLOOR, SPIN_FLOOR, TENSOR_FLOOR, PLACE_FLOOR, FLOOR_KINDS = range(5)
+"""Why the motion is held to less than its accuracy. An error rate [1/s] of steps too short for it; rates [rad/s] at
+which the rounding of a spin, or of a tensor given in other axes than its own, turns the attitude; the rounding of a
+place far from the world's origin, in lengths of the body.
 """
 
 ROUNDINGS = 2.0
@@ -298,7 +297,6 @@ def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> N
     """
     accuracy, control, body, row = flight.accuracy, flight.control, flight.body, flight.row
     floors[STEP_FLOOR] = max(floors[STEP_FLOOR], control.floor_rate)
-    floors[PASSAGE_FLOOR] += control.passages
     rate = ROUNDINGS * 2.0**-52 * norm(row[10], row[11], row[12])
     method = methods[flight.method]
     if method.way in (NOTHING, ONE_STEP) and not method.sleeps and rate > accuracy:

@@ -27,7 +27,6 @@ from .thrusters import ThrusterControl
 
 FLOORS = (
     "rounding of 32 units in the last place a step, in steps that short, comes to {:.2g} a second",
-    "the string's knot came within nanoseconds of its free end, where no accuracy is kept, {:.0f} times",
     "rounding of the spin turns the attitude by up to {:.2g} rad a second",
     "rounding of a slender tensor given in axes other than its own turns the attitude by up to {:.2g} rad a second",
     "rounding of a position far from the world's origin is {:.2g} of the body's size",

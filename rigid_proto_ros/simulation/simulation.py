@@ -443,6 +443,8 @@ class Simulation(Observables):
         self.time_ns, self.state = arrays.time_ns, arrays.state
         when = f"{int(self.flight.committed_ns) * 1e-9:.9g} s"
         self.failure = f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}"
+        if self.string is not None and self.string.bilateral and self.string.rest_length:
+            self.failure += "; a string that pushes has no direction where its knot meets its free end"
         arrays.call(FINISH)
         return self.state
 

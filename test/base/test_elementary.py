@@ -41,9 +41,6 @@ FUNCTIONS: dict[str, tuple[Callable[[float], float], Callable, Arguments]] = {
         mpmath.log,
         lambda random, count: 1.0 + spread(-16.0, math.log10(0.9))(random, count),
     ),
-    "hyperbolic_tangent": (el.hyperbolic_tangent, mpmath.tanh, spread(TINY, 2.0)),
-    "hyperbolic_secant": (el.hyperbolic_secant, mpmath.sech, spread(TINY, math.log10(700.0))),
-    "inverse_hyperbolic_tangent": (el.inverse_hyperbolic_tangent, mpmath.atanh, spread(TINY, -1e-9)),
     "inverse_tangent": (el.inverse_tangent, mpmath.atan, spread(TINY, HUGE)),
 }
 
@@ -95,7 +92,7 @@ def test_beyond_all_use_an_angle_is_still_one() -> None:
 
 def test_zeros_infinities_and_what_is_no_number() -> None:
     inf, nan = math.inf, math.nan
-    for f in (el.sine, el.hyperbolic_tangent, el.inverse_tangent, el.expm1):
+    for f in (el.sine, el.inverse_tangent, el.expm1):
         assert f(0.0) == 0.0 and math.copysign(1.0, f(-0.0)) == -1.0
     for f, x, y in (
         (el.sine, inf, nan),
@@ -112,10 +109,6 @@ def test_zeros_infinities_and_what_is_no_number() -> None:
         (el.logarithm, inf, inf),
         (el.logarithm, -1.0, nan),
         (el.logarithm, 5e-324, math.log(5e-324)),
-        (el.hyperbolic_tangent, -inf, -1.0),
-        (el.hyperbolic_secant, inf, 0.0),
-        (el.inverse_hyperbolic_tangent, 1.0, inf),
-        (el.inverse_hyperbolic_tangent, 1.5, nan),
         (el.inverse_tangent, -inf, -0.5 * math.pi),
     ):
         assert f(x) == y or (math.isnan(y) and math.isnan(f(x))), (f, x)

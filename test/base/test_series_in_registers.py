@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Vector registers and rough logarithms: what series are computed with."""
+"""Sums of powers and rough logarithms: what series are computed with."""
 
 import numpy as np
 import pytest
 from numba import njit
 
-from rigid_proto_ros.base.simd import aligned, filled, largest, load
-from rigid_proto_ros.motion.integrators.series import SPIN_COLUMNS, power_sum
+from rigid_proto_ros.base.simd import filled, largest
+from rigid_proto_ros.motion.integrators.series import power_sum
 from rigid_proto_ros.motion.integrators.series_steps import fast_exp2, fast_log2
 
 
@@ -15,32 +15,12 @@ def sum_of_four(c, at, degree, h):
     return largest(power_sum(c, at, c.shape[1], degree, h, filled(0.0, 4)))
 
 
-@njit
-def largest_of(row):
-    return largest(load(row, 0, filled(0.0, 16)))
-
-
 @pytest.mark.parametrize("degree", range(4, 27))
 def test_a_sum_of_powers_takes_every_coefficient_once(degree):
     c = np.zeros((degree + 1, 8))
     c[:, 4] = np.random.default_rng(degree).uniform(0.5, 1.0, degree + 1)
     known = sum(float(a) * 0.7**k for k, a in enumerate(c[:, 4]))
     assert abs(sum_of_four(c, 4, degree, 0.7) / known - 1.0) < 1e-15 * degree
-
-
-def test_what_is_no_number_is_larger_than_all():
-    row = np.array([0.0, -3.0, 2.0, -0.0] * 4)
-    assert largest_of(row) == 3.0
-    row[7] = -np.inf
-    assert largest_of(row) == np.inf
-    row[9] = np.nan
-    assert np.isnan(largest_of(row))
-
-
-def test_a_workspace_begins_a_line_of_the_cache():
-    for rows in range(1, 30):
-        work = aligned((rows, SPIN_COLUMNS))
-        assert work.ctypes.data % 64 == 0 and work.flags.c_contiguous and not work.any()
 
 
 def test_rough_logarithms_and_powers_are_right_to_two_digits():

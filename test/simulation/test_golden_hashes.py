@@ -162,17 +162,16 @@ def rounded_cube(n: int) -> MeshMoments:
 
 
 @cache
-def arguments() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of elementary functions, (600,) each: of every size, near 0, and in −1 to 1."""
+def arguments() -> tuple[np.ndarray, np.ndarray]:
+    """Of elementary functions, (600,) each: of every size, and near 0."""
     u = row_uniforms(5, np.zeros(1, np.int64), 1200).reshape(2, 600)
     far = np.ldexp(u[0] + 0.5, (u[1] * 1800.0 - 900.0).astype(int))
-    return far, np.ldexp(u[0] - 0.5, (u[1] * 60.0 - 50.0).astype(int)), 2.0 * u[0] - 1.0
+    return far, np.ldexp(u[0] - 0.5, (u[1] * 60.0 - 50.0).astype(int))
 
 
 OF_ONE = {
     **dict.fromkeys(("sine", "cosine", "inverse_tangent", "logarithm"), 0),
-    **dict.fromkeys(("exponential_of", "expm1", "hyperbolic_tangent", "hyperbolic_secant"), 1),
-    "inverse_hyperbolic_tangent": 2,
+    **dict.fromkeys(("exponential_of", "expm1"), 1),
 }
 """Elementary functions of one argument, and which of ``arguments`` they are given."""
 
@@ -184,7 +183,7 @@ def function_of_one(name: str) -> str:
 
 def angles() -> str:
     """Hash of the angles of points, all around."""
-    far, near, _ = arguments()
+    far, near = arguments()
     pairs = zip(far.tolist(), far[::-1].tolist(), near.tolist(), strict=True)
     return digest(np.array([el.inverse_tangent_of(a if c > 0.0 else -a, b) for a, b, c in pairs]))
 

@@ -38,7 +38,7 @@ from .integrator import (
     Integrator,
     Method,
 )
-from .series_steps import motion_steps, motion_workspace, spin_steps, spin_workspace
+from .series_steps import series_steps, series_workspace
 
 FASTEST = 5e5
 """rad/s of a string's swing, and 1/s of damping, that a core can follow in real time: 3.3e5 steps a second, each 2 to 3
@@ -105,11 +105,11 @@ def kind_of_segment(p: np.record, y: np.ndarray) -> int:
     return ANY_LOADS if p.has_world_torque else TURNING_LOADS
 
 
-_SERIES_OF_MOTION = Method(
+_SERIES = Method(
     ADAPTIVE,
-    motion_steps,
+    series_steps,
     "auto: taylor of degree {degree_of_motion}, loads that depend on the attitude",
-    workspace=motion_workspace,
+    workspace=series_workspace,
 )
 
 _BY_KIND = {
@@ -117,13 +117,8 @@ _BY_KIND = {
     COASTING: Method(NOTHING, None, "auto: closed form, nothing turns the body"),
     STEADY: Method(ONE_STEP, steady_steps, "auto: closed form, nothing changes the spin", 1),
     FREE: Method(ONE_STEP, free_body_steps, "auto: free_body, free rotation, exact", 1),
-    TURNING_LOADS: Method(
-        ADAPTIVE,
-        spin_steps,
-        "auto: taylor of degree {degree}, the loads turn with the body",
-        workspace=spin_workspace,
-    ),
-    ANY_LOADS: _SERIES_OF_MOTION,
+    TURNING_LOADS: replace(_SERIES, choice="auto: taylor of degree {degree}, the loads turn with the body"),
+    ANY_LOADS: _SERIES,
     SLACK_AT_REST: Method(
         NOTHING,
         None,
@@ -132,7 +127,7 @@ _BY_KIND = {
         on_string=True,
     ),
     ON_STRING: replace(
-        _SERIES_OF_MOTION,
+        _SERIES,
         choice="auto: taylor of degree {degree_of_motion}, a string of up to {swing:.3g} rad/s",
         on_string=True,
     ),

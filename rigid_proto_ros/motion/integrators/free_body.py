@@ -18,12 +18,11 @@ inverted and no division vanishes: with D = 1 − β sn² and β = B|B−A| w₂
     w₁⁺ = (w₁ c − (C−B)/A w₂w₃ S d)/D,  w₂⁺ = (w₂ c d + (C−A)/B w₁w₃ S)/D,  w₃⁺ = (w₃ d − (B−A)/C w₁w₂ S c)/D.
 
 The attitude is R = R_L R_z(ψ) B(M), B(M) the shortest turn that takes the angular momentum M = (Aw₁, Bw₂, Cw₃) to the
-third axis and ψ' = (2E + L w₃)/(L + C w₃): all terms positive. A short step integrates ψ' by Gauss's rule, a long one
-in closed form: with dn = (1 − κs²)/(1 + κs²), s = sn of modulus κ = (1 − √m₁)/(1 + √m₁) (Gauss's transformation), ψ'
-becomes f_a + f_b s²/(1 + νs²), whose integral from the start of a period is Carlson's R_J, every argument positive. The
-integral from any other phase on is that over the time alone plus an arc tangent (addition theorem of the third kind): a
-difference of two incomplete integrals would cancel where both are large, near a middle axis that the body leaves or
-comes to.
+third axis and ψ' = (2E + L w₃)/(L + C w₃): all terms positive. With dn = (1 − κs²)/(1 + κs²), s = sn of modulus κ =
+(1 − √m₁)/(1 + √m₁) (Gauss's transformation), ψ' becomes f_a + f_b s²/(1 + νs²), whose integral from the start of a
+period is Carlson's R_J, every argument positive. The integral from any other phase on is that over the time alone plus
+an arc tangent (addition theorem of the third kind): a difference of two incomplete integrals would cancel where both
+are large, near a middle axis that the body leaves or comes to.
 
 Sources: Whittaker, A Treatise on the Analytical Dynamics of Particles and Rigid Bodies (1937), section 69; van Zon and
 Schofield, J. Comput. Phys. 225 (2007) 145; Celledoni, Fassò, Säfström and Zanna, SIAM J. Sci. Comput. 30 (2008) 2084;
@@ -47,30 +46,15 @@ from .elliptic import carlson_rj, complete_quarter_period, sn_cn_dn
 from .equations import parts_of, undamped_torque
 from .integrator import ANGULAR_DAMPING, LOADS, ONE_STEP, Integrator, Method
 
-SHORT = 0.4
-"""u = ω_p h below which ψ' is integrated by Gauss's rule; beyond it the closed form is cheaper."""
-
-FARTHEST_ON_SEPARATRIX = 300.0
-"""u at which a body on the separatrix lies on its middle axis to 1e-130; beyond it sech² would leave the doubles."""
+ON_SEPARATRIX = 1e-290
+"""m₁ of a start that lies on the separatrix to all digits: it stays by the middle axis for 670/ω_p, and leaves it then;
+a start that is known to rounding alone does so after 40/ω_p.
+"""
 
 NO_SPIN = 1e-140
 """Part of the largest ω below which a component is taken as none: its square times a ratio of moments
 would leave the doubles.
 """
-
-# Gauss-Legendre nodes and weights on (0, 1); ψ' has its poles at least about 1.2 from the real u axis.
-_NODES_3 = (0.11270166537925831, 0.5, 0.8872983346207417)
-_WEIGHTS_3 = (0.2777777777777778, 0.4444444444444444, 0.2777777777777778)
-_NODES_5 = (0.046910077030668004, 0.23076534494715845, 0.5, 0.7692346550528415, 0.953089922969332)
-_WEIGHTS_5 = (0.11846344252809454, 0.23931433524968324, 0.28444444444444444, 0.23931433524968324, 0.11846344252809454)
-_NODES_8 = (
-    *(0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751),
-    *(0.591717321247825, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681),
-)
-_WEIGHTS_8 = (
-    *(0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.181341891689181),
-    *(0.181341891689181, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813),
-)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -117,7 +101,7 @@ def free_step(q: Quaternion, w: Vector, moments: Vector, h: float) -> tuple[Quat
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector]:
-    """The turn r xyzw (not normalized) over h, and w after it."""
+    """The turn r xyzw (not normalized) over h, and w after it; names as above."""
     A, B, C = moments
     w1, w2, w3 = w
     gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
@@ -125,140 +109,71 @@ def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector
     Q = A * gca * w1 * w1 + B * gcb * w2 * w2
     rate = math.sqrt(gcb * P / (A * B * C))
     if rate == 0.0 or Q == 0.0 or (w1 == 0.0 and w3 == 0.0):
-        return _even_turn(w, h), w
-    u = rate * h
-    if abs(u) <= SHORT:
-        m = gba * Q / (gcb * P)
-        v, psi = _short(moments, w, P, rate, m, h)
-    else:
-        v, psi = _long(moments, w, P, Q, rate, h)
-    M1, M2, M3 = A * w1, B * w2, C * w3
-    L = norm(M1, M2, M3)
-    s, c = sine_cosine(0.5 * psi)
-    turned = multiply(-M2, M1, 0.0, L + M3, 0.0, 0.0, s, c)
-    return multiply(*turned, B * v[1], -A * v[0], 0.0, L + C * v[2]), v
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _even_turn(w: Vector, h: float) -> Quaternion:
-    """Turn by |w| h about w."""
-    size = norm(*w)
-    s, c = sine_cosine(0.5 * size * h)
-    s /= size
-    return w[0] * s, w[1] * s, w[2] * s, c
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _third(w3: float, twist: float, beta: float, rate: float, m: float, t: float) -> float:
-    """w₃ after t, from the short-time sn, cn, dn; ``twist`` is (B−A)/C w₁w₂."""
-    s, c, d = sn_cn_dn(rate * t, m, 1.0)
-    return (w3 * d - twist * (s / rate) * c) / (1.0 - beta * s * s)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _short(moments: Vector, w: Vector, P: float, rate: float, m: float, h: float) -> tuple[Vector, float]:
-    """w and ψ after a short h; w as increments, which keeps energy and momentum from drifting."""
-    A, B, C = moments
-    w1, w2, w3 = w
-    beta = B * abs(B - A) * w2 * w2 / P
-    s, c, d = sn_cn_dn(rate * h, m, 1.0)
-    S, bottom = s / rate, 1.0 - beta * s * s
-    # c − D, d − D and cd − D without cancellation.
-    ss = s * s
-    less_c, less_d = ss / (1.0 + c), m * ss / (1.0 + d)
-    twist = (B - A) / C * w1 * w2
-    d1 = (w1 * (beta * ss - less_c) - (C - B) / A * w2 * w3 * S * d) / bottom
-    d2 = (w2 * (beta * ss - less_c - c * less_d) + (C - A) / B * w1 * w3 * S) / bottom
-    d3 = (w3 * (beta * ss - less_d) - twist * S * c) / bottom
-    # Roundings of S, c and d are the same every step; what they do to Q and P is taken out, lest it add up.
-    gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
-    Q = A * gca * w1 * w1 + B * gcb * w2 * w2
-    excess = 0.5 * (A * gca * d1 * (2.0 * w1 + d1) + B * gcb * d2 * (2.0 * w2 + d2)) / Q
-    d1, d2 = d1 - excess * (w1 + d1), d2 - excess * (w2 + d2)
-    share = C * gca * w3 * w3
+        # Evenly about w.
+        size = norm(w1, w2, w3)
+        s, c = sine_cosine(0.5 * size * h)
+        s /= size
+        return (w1 * s, w2 * s, w3 * s, c), w
+    m = gba * Q / (gcb * P)
+    m1 = max(gca * abs(_side_of_separatrix(A, B, C, w1, w3)) / (gcb * P), ON_SEPARATRIX)
+    # Less whole half turns, after which sn and cn change their signs.
+    u, K = rate * h, complete_quarter_period(m1)
+    whole = float(round(0.5 * u / K))
+    odd = whole % 2.0 != 0.0
+    s, c, d = sn_cn_dn(u - 2.0 * K * whole, m, m1)
+    if odd:
+        s, c = -s, -c
+    S = s / rate
+    D = (C * gca * w3 * w3 + B * gba * w2 * w2 * c * c) / P
+    v1 = (w1 * c - (C - B) / A * w2 * w3 * S * d) / D
+    v2 = (w2 * c * d + (C - A) / B * w1 * w3 * S) / D
+    v3 = (w3 * d - (B - A) / C * w1 * w2 * S * c) / D
+    # Roundings of S, c and d are the same in steps alike; what they do to Q and P is taken out, lest it add up.
+    excess = 0.5 * (A * gca * (v1 - w1) * (v1 + w1) + B * gcb * (v2 - w2) * (v2 + w2)) / Q
+    v1, v2 = v1 - excess * v1, v2 - excess * v2
+    share = C * gca * v3 * v3
     # Where the third axis has a small share in P, Q keeps P as well.
     if share > 0.5 * P:
-        d3 -= 0.5 * (B * gba * d2 * (2.0 * w2 + d2) + C * gca * d3 * (2.0 * w3 + d3)) / share * (w3 + d3)
+        v3 -= 0.5 * (B * gba * (v2 - w2) * (v2 + w2) + C * gca * (v3 - w3) * (v3 + w3)) / share * v3
+    # ψ' = f_a + f_b s²/(1 + νs²); W: the largest w₃, E2: 2E, modulus1: 1 − κ².
     M1, M2, M3 = A * w1, B * w2, C * w3
-    L = norm(M1, M2, M3)
-    E2 = w1 * M1 + w2 * M2 + w3 * M3
-    u = abs(rate * h)
-    total = 0.0
-    if u < 0.01:
-        for j in range(3):
-            x = _third(w3, twist, beta, rate, m, _NODES_3[j] * h)
-            total += _WEIGHTS_3[j] * ((E2 + L * x) / (L + C * x))
-    elif u < 0.1:
-        for j in range(5):
-            x = _third(w3, twist, beta, rate, m, _NODES_5[j] * h)
-            total += _WEIGHTS_5[j] * ((E2 + L * x) / (L + C * x))
-    else:
-        for j in range(8):
-            x = _third(w3, twist, beta, rate, m, _NODES_8[j] * h)
-            total += _WEIGHTS_8[j] * ((E2 + L * x) / (L + C * x))
-    return (w1 + d1, w2 + d2, w3 + d3), h * total
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _long(moments: Vector, w: Vector, P: float, Q: float, rate: float, h: float) -> tuple[Vector, float]:
-    """w and ψ after any h."""
-    A, B, C = moments
-    w1, w2, w3 = w
-    gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
-    m, m1 = gba * Q / (gcb * P), gca * abs(_side_of_separatrix(A, B, C, w1, w3)) / (gcb * P)
-    M1, M2, M3 = A * w1, B * w2, C * w3
-    L = norm(M1, M2, M3)
-    E2 = w1 * M1 + w2 * M2 + w3 * M3
-    whole, beyond = 0.0, 0.0
-    u = rate * h
-    K = math.inf
-    if m1 > 0.0:
-        K = complete_quarter_period(m1)
-        whole = float(round(0.5 * u / K))
-        s, c, d = sn_cn_dn(u - 2.0 * K * whole, m, m1)
-        if whole % 2.0 != 0.0:
-            s, c = -s, -c
-    else:
-        if abs(u) > FARTHEST_ON_SEPARATRIX:
-            beyond = u - math.copysign(FARTHEST_ON_SEPARATRIX, u)
-            u -= beyond
-        s, c, d = sn_cn_dn(u, m, 0.0)
-    S = s / rate
-    bottom = (C * gca * w3 * w3 + B * gba * w2 * w2 * c * c) / P
-    v1 = (w1 * c - (C - B) / A * w2 * w3 * S * d) / bottom
-    v2 = (w2 * c * d + (C - A) / B * w1 * w3 * S) / bottom
-    v3 = (w3 * d - (B - A) / C * w1 * w2 * S * c) / bottom
-
-    k1 = math.sqrt(m1)
-    kappa, W, nu, f_a, f_b, modulus1 = precession_terms(A, B, C, P, Q, L, E2, m, k1)
-    sign = math.copysign(1.0, C - B)
-    x0, _ = _gauss_phase(w1 * math.sqrt(A * gca / Q), sign * w2 * math.sqrt(B * gcb / Q), w3 / W, k1)
-    x1, y1 = _gauss_phase(v1 * math.sqrt(A * gca / Q), sign * v2 * math.sqrt(B * gcb / Q), v3 / W, k1)
-    x, y = _gauss_phase(c, s, d, k1)
-    # By the addition theorem: the integral over the time itself, and what the phase of the start adds to it.
-    integral = _added_by_phase(x0, x, x1, y1, modulus1, kappa, nu)
-    if whole != 0.0:
-        integral += whole * 2.0 / 3.0 * carlson_rj(0.0, modulus1, 1.0, 1.0 + nu)
-        if whole % 2.0 != 0.0:
-            x = -x
-    integral += _third_kind(x, y, modulus1, nu)
-    psi = f_a * (u / rate) + f_b * (1.0 + kappa) / rate * integral
-    return (v1, v2, v3), psi + E2 / L * (beyond / rate)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def precession_terms(
-    A: float, B: float, C: float, P: float, Q: float, L: float, E2: float, m: float, k1: float
-) -> tuple[float, float, float, float, float, float]:
-    """κ, W (the largest w₃), ν, f_a, f_b and κ's complement m₁ of ψ' = f_a + f_b s²/(1 + νs²); k1 is √m₁, E2 is 2E."""
-    gca = abs(C - A)
-    kappa = m / ((1.0 + k1) * (1.0 + k1))
+    L, E2, k1 = norm(M1, M2, M3), w1 * M1 + w2 * M2 + w3 * M3, math.sqrt(m1)
+    kappa, modulus1 = m / ((1.0 + k1) * (1.0 + k1)), 4.0 * k1 / ((1.0 + k1) * (1.0 + k1))
     W = math.sqrt(P / (C * gca))
     most = L + C * W
     nu = kappa * A * Q / (gca * most * most)
-    f_a = (E2 + L * W) / most
-    f_b = 2.0 * kappa * W * math.copysign(Q, C - B) / (most * most)
-    return kappa, W, nu, f_a, f_b, 4.0 * k1 / ((1.0 + k1) * (1.0 + k1))
+    f_a, f_b = (E2 + L * W) / most, 2.0 * kappa * W * math.copysign(Q, C - B) / (most * most)
+    # From the start of a period, over the time alone: R_J.
+    x, y = _gauss_phase(c, s, d, k1)
+    if odd:
+        x = -x
+    xx, yy = x * x, y * y
+    integral = x * xx / 3.0 * carlson_rj(yy, yy + modulus1 * xx, 1.0, 1.0 + nu * xx)
+    if whole != 0.0:
+        integral += whole * 2.0 / 3.0 * carlson_rj(0.0, modulus1, 1.0, 1.0 + nu)
+    # What the phase of the start adds: x0, x1 are sn at the start and the end.
+    to_1, to_2 = math.sqrt(A * gca / Q), math.copysign(1.0, C - B) * math.sqrt(B * gcb / Q)
+    x0, _ = _gauss_phase(w1 * to_1, w2 * to_2, w3 / W, k1)
+    x1, y1 = _gauss_phase(v1 * to_1, v2 * to_2, v3 / W, k1)
+    x = -x if odd else x
+    d1 = math.sqrt(y1 * y1 + modulus1 * x1 * x1)
+    product = x0 * x * x1 / (1.0 + nu * x1 * x1 - nu * x0 * x * y1 * d1)
+    root = math.sqrt(nu * (1.0 + nu) * (nu + kappa * kappa))
+    angle = root * product
+    integral += product if abs(angle) < 1e-9 else inverse_tangent(angle) / root
+    psi = f_a * h + f_b * (1.0 + kappa) / rate * integral
+    s, c = sine_cosine(0.5 * psi)
+    turned = multiply(-M2, M1, 0.0, L + M3, 0.0, 0.0, s, c)
+    return multiply(*turned, B * v2, -A * v1, 0.0, L + C * v3), (v1, v2, v3)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _gauss_phase(cn: float, sn: float, dn: float, k1: float) -> tuple[float, float]:
+    """sn and cn of Gauss's transformed modulus."""
+    s = sn * (1.0 + k1) / (1.0 + dn)
+    c = cn * math.sqrt(2.0 * (1.0 + k1) / ((dn + k1) * (1.0 + dn)))
+    size = math.sqrt(s * s + c * c)
+    return s / size, c / size
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -274,34 +189,6 @@ def _side_of_separatrix(A: float, B: float, C: float, w1: float, w3: float) -> f
     y, y_low = pair_multiply(y, y_low, s, s_low)
     distance, _ = pair_add(x, x_low, -y, -y_low)
     return distance
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _gauss_phase(cn: float, sn: float, dn: float, k1: float) -> tuple[float, float]:
-    """sn and cn of Gauss's transformed modulus."""
-    s = sn * (1.0 + k1) / (1.0 + dn)
-    c = cn * math.sqrt(2.0 * (1.0 + k1) / ((dn + k1) * (1.0 + dn)))
-    size = math.sqrt(s * s + c * c)
-    return s / size, c / size
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _added_by_phase(s0: float, s: float, s1: float, c1: float, modulus1: float, kappa: float, nu: float) -> float:
-    """∫ from u₀ to u₀ + u less ∫ from 0 to u of sn²/(1 + ν sn²): s₀, s, s₁ are sn of u₀, u and u₀ + u, c₁
-    cn of the last.
-    """
-    d1 = math.sqrt(c1 * c1 + modulus1 * s1 * s1)
-    product = s0 * s * s1 / (1.0 + nu * s1 * s1 - nu * s0 * s * c1 * d1)
-    root = math.sqrt(nu * (1.0 + nu) * (nu + kappa * kappa))
-    angle = root * product
-    return product if abs(angle) < 1e-9 else inverse_tangent(angle) / root
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _third_kind(s: float, c: float, modulus1: float, nu: float) -> float:
-    """∫ sin²/(1 + ν sin²)/√(1 − κ² sin²) from 0 to φ."""
-    cc, ss = c * c, s * s
-    return s * ss / 3.0 * carlson_rj(cc, cc + modulus1 * ss, 1.0, 1.0 + nu * ss)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)

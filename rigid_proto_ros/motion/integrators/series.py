@@ -19,6 +19,7 @@ import math
 import numpy as np
 
 from ...base.compilation import njit
+from ...base.records import copy_numbers
 from ...base.rotation import norm, normalize
 from ...base.simd import (
     Packed,
@@ -28,7 +29,6 @@ from ...base.simd import (
     four,
     half,
     joined,
-    largest,
     load,
     mixed,
     number,
@@ -37,8 +37,7 @@ from ...base.simd import (
     triple,
 )
 from ..string import NO_DIRECTION
-from ..variables import DISPLACEMENT, HAND_WORK, HEAT, MAX_SPEED, SPIN, VELOCITY
-from .error_measure import Weights, scales_of
+from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good
 from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
 
 
@@ -98,35 +97,8 @@ VARIABLES_AT = _Q
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def variables_of(y: np.ndarray) -> Packed:
-    """q, ω, d and u, four numbers each. Kept so from step to step, nothing waits until it is written."""
-    return joined(load(y, 0, filled(0.0, 4)), triple(y, 4, 0.0), triple(y, 7, 0.0), triple(y, 10, 0.0))
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def _put_triple(array: np.ndarray, at: int, vector: Packed) -> None:
-    array[at], array[at + 1], array[at + 2] = number(vector, 0), number(vector, 1), number(vector, 2)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def put_variables(variables: Packed, y: np.ndarray) -> None:
-    """Put them into y (≥ 13,)."""
-    store(y, 0, component(variables, 0))
-    _put_triple(y, 4, component(variables, 1))
-    _put_triple(y, 7, component(variables, 2))
-    _put_triple(y, 10, component(variables, 3))
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def scales_at(variables: Packed, p: np.record, elapsed: float) -> Weights:
-    """Weights of errors at the variables, ``elapsed`` seconds into the segment (integrators/error_measure.py)."""
-    w = number(variables, 4), number(variables, 5), number(variables, 6)
-    return scales_of(w, (number(variables, 12), number(variables, 13), number(variables, 14)), p, elapsed)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def spin_series(variables: Packed, p: np.record, degree: int, c: np.ndarray) -> None:
-    """Coefficients c (degree + 1, SPIN_COLUMNS) of the motion from these variables: q, ω, d, u."""
+def spin_series(y: np.ndarray, p: np.record, degree: int, c: np.ndarray) -> None:
+    """Coefficients c (degree + 1, SPIN_COLUMNS) of the motion from variables y: q, ω, d, u."""
     translates = p.translates
     moments = triple(p.moments, 0, 1.0)
     gyroscopic = (arranged(moments, (1, 2, 0, 3)) - arranged(moments, (2, 0, 1, 3))) / moments
@@ -134,7 +106,7 @@ def spin_series(variables: Packed, p: np.record, degree: int, c: np.ndarray) -> 
     cw, cv = p.damping_angular / moments, p.damping_linear
     bx, by, bz = _spread(triple(p.acceleration_body, 0, 0.0))
     zeros, eight = filled(0.0, 4), filled(0.0, 8)
-    q, w, d, u = (component(variables, 0), component(variables, 1), component(variables, 2), component(variables, 3))
+    q, w, d, u = load(y, 0, zeros), triple(y, 4, 0.0), triple(y, 7, 0.0), triple(y, 10, 0.0)
     # What is constant counts in the first order alone.
     turning, pushing = triple(p.torque_body, 0, 0.0) / moments, triple(p.acceleration_added, 0, 0.0)
     q0, (qx0, qy0, qz0), (wx0, wy0, wz0) = q, _axes(q), _spread(w)
@@ -206,19 +178,15 @@ def spin_series(variables: Packed, p: np.record, degree: int, c: np.ndarray) -> 
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def spin_at(c: np.ndarray, degree: int, h: float) -> Packed:
-    """The variables h seconds on, with a unit quaternion; degree: 4 or more."""
+def spin_at(c: np.ndarray, degree: int, h: float, y: np.ndarray) -> None:
+    """The variables h seconds on into y (≥ 13,), with a unit quaternion; degree: 4 or more."""
     sums = power_sum(c, _Q, SPIN_COLUMNS, degree, h, filled(0.0, 16))
-    q = component(sums, 0)
-    x, y, z, w = number(q, 0), number(q, 1), number(q, 2), number(q, 3)
-    q = q * (1.0 / math.sqrt((x * x + y * y) + (z * z + w * w)))
-    return joined(q, component(sums, 1), component(sums, 2), component(sums, 3))
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def are_good(variables: Packed) -> bool:
-    """Finite and no runaway."""
-    return bool(largest(variables) <= MAX_SPEED)
+    q, w, d, u = component(sums, 0), component(sums, 1), component(sums, 2), component(sums, 3)
+    q1, q2, q3, q4 = number(q, 0), number(q, 1), number(q, 2), number(q, 3)
+    store(y, 0, q * (1.0 / math.sqrt((q1 * q1 + q2 * q2) + (q3 * q3 + q4 * q4))))
+    y[4], y[5], y[6] = number(w, 0), number(w, 1), number(w, 2)
+    y[7], y[8], y[9] = number(d, 0), number(d, 1), number(d, 2)
+    y[10], y[11], y[12] = number(u, 0), number(u, 1), number(u, 2)
 
 
 TAYLOR_DEGREE = 18
@@ -230,15 +198,13 @@ TAYLOR_DEGREE = 18
 @njit(cache=True, error_model="numpy")
 def taylor_steps_of_degree(y: np.ndarray, p: np.record, h: float, n: int, degree: int) -> int:
     """Up to n steps of h seconds in place by series of this degree; returns the number of good ones."""
-    c, here = np.zeros((degree + 1, SPIN_COLUMNS)), variables_of(y)
+    c, new = np.zeros((degree + 1, SPIN_COLUMNS)), y.copy()
     for done in range(n):
-        spin_series(here, p, degree, c)
-        there = spin_at(c, degree, h)
-        if not are_good(there):
-            n = done
-            break
-        here = there
-    put_variables(here, y)
+        spin_series(y, p, degree, c)
+        spin_at(c, degree, h, new)
+        if not is_good(new):
+            return done
+        copy_numbers(new, y)
     return n
 
 

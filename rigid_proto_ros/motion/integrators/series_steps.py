@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: MIT
 """Steps by the power series of the motion, as long as the accuracy allows, with slack and taut found on the series.
 
-With the coefficients' size σᵏ the remainder after degree N is (σh)^(N+1)/(1 − σh); h is where that is the accuracy
-times h. So the length of a step is read off the coefficients, and none is rejected. Source: Jorba and Zou, Experimental
-Mathematics 14 (2005) 99, section 3.
+An error's size is the largest of attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s).
+``accuracy`` is a rate in this measure: a step of h seconds may err by accuracy·h, but rounding allows no less than 32 ε
+a step. With the coefficients' size σᵏ the remainder after degree N is (σh)^(N+1)/(1 − σh); h is where that is the
+accuracy times h. So the length of a step is read off the coefficients, and none is rejected. Source: Jorba and Zou,
+Experimental Mathematics 14 (2005) 99, section 3.
 
-``spin_steps`` is for loads that turn with the body, ``motion_steps`` for all others. Where a pull-only string turns
-slack or taut (integrators/string_law.py) the series is left and another one, with the other law, begun. A step is laid
-out at its full length first: a series from its start, and where the law changes within it a last one from that time on.
-It ends at a whole nanosecond, so that times of commands stay integers. Committing it and sampling within it evaluate
-those same series.
+Loads that turn with the body take the series of the spin, all others that of the whole motion. Where a pull-only
+string turns slack or taut (integrators/string_law.py) the series is left and another one, with the other law, begun. A
+step is laid out at its full length first: a series from its start, and where the law changes within it a last one from
+that time on. It ends at a whole nanosecond, so that times of commands stay integers. Committing it and sampling within
+it evaluate those same series.
 
 An accepted step that reaches beyond the time asked for is kept, in CONTROL and ``following``, until it can be
 committed, so that when anybody asks never changes the steps.
@@ -25,34 +27,28 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.elementary import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of, logarithm
 from ...base.records import copy_numbers, record_type
+from ...base.rotation import norm
 from ...base.simd import Packed, aligned, filled, four, joined, largest, load
-from ..variables import ATTITUDE, HEAT, VARIABLES, is_good
-from .error_measure import FLOOR, WEIGHINGS, Weights, heavier, jump_of_displacement, scales
+from ..variables import ATTITUDE, HEAT, VARIABLES, damping_functions, is_good
 from .series import (
     A_KNOT,
     MOTION_COLUMNS,
     SPIN_COLUMNS,
     VARIABLES_AT,
-    are_good,
     motion_at,
     motion_series,
-    put_variables,
-    scales_at,
     spin_at,
     spin_series,
     stretch_at,
-    variables_of,
 )
 from .string_law import (
     NONE,
-    PASSES,
     PULLS,
     SHORTENS,
-    before_passage,
+    clear_of_the_end,
     is_one_sided,
     knot_at,
     law_of,
-    may_pass,
     next_law,
     shortening_heat,
 )
@@ -74,7 +70,6 @@ CONTROL = record_type(
         ("switch", np.float64),  # time after which the last series holds and no more the first [s]; infinite for none
         ("last_start", np.float64),  # where the last series starts [s]
         ("last_law", np.float64),  # the law of the last series
-        ("passages", np.int64),  # steps past the free end of a string that pushes, which keep no accuracy
     ]
 )
 """What is kept between calls."""
@@ -101,6 +96,56 @@ _MAX_PARTS = 200
 """In one step, all but the first and last within one nanosecond; more is chatter, and the rest of the
 step is taken with one law.
 """
+
+
+# How large an error is
+
+WEIGHINGS = 4
+"""Of a step whose end weighs errors more than its start did, each shorter than the one before."""
+
+FLOOR = 32.0 * 2.0**-52
+
+Weights = tuple[float, float, float, float]
+"""Of attitude (as quaternion difference), ω, x and v in the measure."""
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def scales(y: np.ndarray, p: np.record, elapsed: float) -> Weights:
+    """The weights at variables y, ``elapsed`` seconds into the segment."""
+    spin = norm(y[4], y[5], y[6])
+    if not p.translates:
+        return 2.0, 1.0 / max(spin, 1.0), 0.0, 0.0
+    c = p.reference_damping
+    push = elapsed * damping_functions(c * elapsed)[0]
+    speed = 0.0
+    for k in range(3):
+        v = p.reference_velocity[k]
+        v += push * (p.reference_acceleration[k] - c * v) + y[10 + k]
+        speed += v * v
+    length = p.length
+    return 2.0, 1.0 / max(spin, 1.0), 1.0 / length, 1.0 / max(math.sqrt(speed), length)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def heavier(ending: Weights, weights: Weights) -> tuple[Weights, bool]:
+    """The larger of the weights at a step's end and start, and whether they are clearly more than those
+    at the start: a quarter.
+    """
+    spin, speed = max(ending[1], weights[1]), max(ending[3], weights[3])
+    return (weights[0], spin, weights[2], speed), spin > 1.25 * weights[1] or speed > 1.25 * weights[3]
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def jump_of_displacement(p: np.record, spin: float, speed: float) -> float:
+    """Error that a displacement by one unit of the measure causes when a damped string jerks taut that
+    much too early or late.
+    """
+    if not p.has_string:
+        return 0.0
+    arm = norm(p.attach[0], p.attach[1], p.attach[2])
+    # What a force at the knot does to the measured velocities, per newton and second.
+    response = max(speed / p.mass, spin * arm / p.moments[0])
+    return float(p.string_damping * p.length * response)
 
 
 # How long a step may be
@@ -200,7 +245,7 @@ def begin_control(control: np.record, accuracy: float, degree: int) -> None:
     """What a segment starts with."""
     control.accuracy, control.degree = accuracy, degree
     control.accepted_ns, control.elapsed_ns = 0, 0
-    control.steps, control.evaluations, control.pending, control.passages = 0, 0, 0, 0
+    control.steps, control.evaluations, control.pending = 0, 0, 0
     control.floor_rate = 0.0
     control.failed, control.series = False, False
     control.law, control.switch, control.last_start, control.last_law = 0.0, 0.0, 0.0, 0.0
@@ -225,85 +270,7 @@ def _count(control: np.record) -> None:
     control.series = False
 
 
-# Loads that turn with the body
-
-
-def spin_workspace(degree: int) -> np.ndarray:
-    """Room for the coefficients, which stay there until the step is committed: every sample before sums
-    them once more.
-    """
-    return aligned((degree + 1, SPIN_COLUMNS))
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def spin_steps(
-    y: np.ndarray,
-    p: np.record,
-    control: np.record,
-    following: np.ndarray,
-    c: np.ndarray,
-    span_ns: int,
-    sampling: bool,
-) -> int:
-    """Commit steps in y that fit into span_ns; returns how far it came [ns]. control: CONTROL. following:
-    where the step that waits ends. c: workspace.
-
-    sampling: take the one step to span_ns instead, shorter than the one accepted, and leave no trace; returns 0 if it
-    failed.
-    """
-    # Unlike motion_steps, variables stay in registers from step to step: through arrays a short step waits for them.
-    degree, accuracy = control.degree, control.accuracy
-    here = variables_of(y)
-    if sampling:
-        if not control.series:
-            spin_series(here, p, degree, c)
-            control.series = True
-        there = spin_at(c, degree, span_ns * 1e-9)
-        put_variables(there, y)
-        return span_ns if are_good(there) else 0
-    advanced, elapsed = 0, control.elapsed_ns
-    length, there = control.accepted_ns, variables_of(following)
-    # A step begins with the scales with which the one before it has ended.
-    weights = scales_at(here, p, elapsed * 1e-9)
-    ending = weights
-    while True:
-        if length == 0:
-            if not control.series:
-                spin_series(here, p, degree, c)
-                control.series = True
-            for _ in range(WEIGHINGS):
-                of_row = joined(
-                    filled(weights[0], 4), filled(weights[1], 4), filled(weights[2], 4), filled(weights[3], 4)
-                )
-                length = int(_length_for(c, VARIABLES_AT, SPIN_COLUMNS, degree, of_row, accuracy, PART) * 1e9)
-                there = spin_at(c, degree, length * 1e-9)
-                if length < 1 or not are_good(there):
-                    control.failed = True
-                    put_variables(here, y)
-                    return advanced
-                # The error of a spin is measured by the spin at the end: where it falls within the step, that counts.
-                ending = scales_at(there, p, (elapsed + length) * 1e-9)
-                weights, more = heavier(ending, weights)
-                if not more:
-                    break
-            _accept_step(control, length)
-            control.pending = 1
-        else:
-            ending = scales_at(there, p, (elapsed + length) * 1e-9)
-        if length > span_ns - advanced:
-            put_variables(here, y)
-            put_variables(there, following)
-            return advanced
-        _count(control)
-        advanced += length
-        elapsed += length
-        here, weights, length = there, ending, 0
-
-
-# Any loads, and a string
-
-
-def motion_workspace(degree: int) -> np.ndarray:
+def series_workspace(degree: int) -> np.ndarray:
     """Room for the coefficients from the step's start, those of its last series, and the variables that one starts
     from. They stay there until the step is committed: every sample before takes them once more.
     """
@@ -311,10 +278,29 @@ def motion_workspace(degree: int) -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
+def _is_spin(p: np.record) -> bool:
+    """Whether all loads turn with the body."""
+    return not (p.has_string or p.has_world_torque)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def _spin_length(y: np.ndarray, p: np.record, control: np.record, weights: Weights, c: np.ndarray) -> int:
+    """Series of the spin from y into c; returns the step's length [ns]."""
+    if not control.series:
+        spin_series(y, p, control.degree, c)
+        control.series = True
+    control.pending, control.switch = 1, math.inf
+    of_row = joined(filled(weights[0], 4), filled(weights[1], 4), filled(weights[2], 4), filled(weights[3], 4))
+    return int(_length_for(c, VARIABLES_AT, SPIN_COLUMNS, control.degree, of_row, control.accuracy, PART) * 1e9)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
 def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, c: np.ndarray) -> int:
     """Series of one step from y into c and control; returns its length [ns], 0 when there is none.
     weights: of errors.
     """
+    if _is_spin(p):
+        return _spin_length(y, p, control, weights, c)
     degree, accuracy = degree_of_motion(control.degree), control.accuracy
     jerk_of_place = jump_of_displacement(p, weights[1], weights[3])
     part = PART_ON_A_STRING if p.has_string else PART
@@ -338,13 +324,7 @@ def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, 
         if law != PULLS:
             # The time at which it pulls again is read off that series.
             h = min(h, _known_length(series, degree, weights[2], accuracy, allowance))
-        if may_pass(p):
-            h, length_ns = before_passage(series, p, degree, knot, h)
-            if length_ns > 0:
-                motion_series(y, p, knot, degree, False, c)
-                control.law, control.series = PASSES, 0.0
-                control.passages += 1
-                return length_ns if length_ns * 1e-9 <= _allowed_length(c, degree, weights, accuracy, part) else 0
+        h = clear_of_the_end(series, p, degree, knot[3], h)
         if not h * 1e9 >= 1.0 or not is_good(series[1]):
             return 0
         if not is_one_sided(p) or parts >= _MAX_PARTS:
@@ -373,7 +353,9 @@ def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, 
 def _reach(p: np.record, control: np.record, c: np.ndarray, time_ns: int, out: np.ndarray) -> None:
     """Take the variables at the beginning of the step that is laid out ``time_ns`` into it."""
     degree, t = degree_of_motion(control.degree), time_ns * 1e-9
-    if t <= control.switch:
+    if _is_spin(p):
+        spin_at(c, control.degree, t, out)
+    elif t <= control.switch:
         _move(c, p, degree, t, control.law, out)
     else:
         copy_numbers(c[2 * (degree + 2)], out)
@@ -409,7 +391,7 @@ def _accept(y: np.ndarray, p: np.record, control: np.record, following: np.ndarr
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def motion_steps(
+def series_steps(
     y: np.ndarray,
     p: np.record,
     control: np.record,
@@ -418,10 +400,10 @@ def motion_steps(
     span_ns: int,
     sampling: bool,
 ) -> int:
-    """Commit steps in y that fit into span_ns; returns how far it came [ns]. The arrays are those
-    of ``spin_steps``.
+    """Commit steps in y that fit into span_ns; returns how far it came [ns]. control: CONTROL. following: where the
+    step that waits ends. c: workspace.
 
-    sampling: go span_ns into the step that waits instead, which is longer; returns 0 if that failed.
+    sampling: go span_ns into the step that waits instead, which is longer, and leave no trace; returns 0 if it failed.
     """
     advanced = 0
     while True:

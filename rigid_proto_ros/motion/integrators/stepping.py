@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: MIT
 """How a segment is stepped: fixed steps, one exact step, nothing at all, or steps whose length follows from the error.
 
+A kernel's address stands in an array of integers, so that one loop can call whichever kernel a segment needs without
+compiling the others in; what is called there is the machine code that numba made of the kernel for one fixed signature.
+Compiling or loading it waits until somebody asks for the address.
+
 All keep the same promise. ``commit`` commits only steps that are functions of the variables they start from; ``reach``
 takes one shorter step from there on a copy. So neither depends on when anybody asked.
 """
@@ -8,16 +12,52 @@ takes one shorter step from there on a copy. So neither depends on when anybody 
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numba import boolean, float64, from_dtype, int64, types
+from numba.core import cgutils
+from numba.core.types.function_type import CompileResultWAP
 
-from ...base.compilation import njit
-from ...base.function_pointers import address_of, function_at
+from ...base.compilation import INTERPRETED, Emitted, intrinsic, njit
 from ...base.records import record_type
 from ..problem import PROBLEM
 from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Integrator
 from .series_steps import CONTROL
+
+_kept: dict[int, Any] = {}
+"""What stands at the addresses given away: code must not be collected while an array points at it."""
+
+
+def address_of(kernel: Callable[..., Any], taken_as: types.FunctionType) -> int:
+    """The address of a compiled function for this signature, compiled or loaded from the cache if it isn't yet."""
+    if INTERPRETED:
+        found, address = kernel, id(kernel)
+    else:
+        kernel.compile(taken_as.signature)  # type: ignore[attr-defined]  # numba's
+        found = CompileResultWAP(kernel.get_compile_result(taken_as.signature))  # type: ignore[attr-defined]  # numba's
+        address = found.__wrapper_address__()
+    _kept[address] = found
+    return address
+
+
+def function_at(taken_as: types.FunctionType) -> Callable[..., Any]:
+    """The compiled function that turns an address into a function of this signature."""
+
+    @intrinsic
+    def at(_typing_context: Any, _address: Any) -> Emitted:
+        def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            function = cgutils.create_struct_proxy(taken_as)(context, builder)
+            nothing = cgutils.get_null_value(cgutils.voidptr_t)
+            function.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
+            function.py_addr, function.jit_addr = nothing, nothing
+            return function._getvalue()  # noqa: SLF001 (so numba's guide to extensions does it)
+
+        return taken_as(int64), code
+
+    return _kept.__getitem__ if INTERPRETED else at
+
 
 STEPS = types.FunctionType(int64(float64[::1], from_dtype(PROBLEM), float64, int64))
 """A kernel (y, p, h, n)."""

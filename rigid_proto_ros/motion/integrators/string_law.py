@@ -10,9 +10,8 @@ double's digits (integrators/runge_kutta.py).
 
 A bilateral string with a rest length pushes at the full length of that when its knot meets the free end, in a
 direction n = a/l that has no limit at l = 0. A knot that goes straight through meets no pole of its series, which lead
-on as if l became negative. So steps keep from the free end, and the nanoseconds around it are a step of their own,
-without the string: before and after that point it pushes alike, in opposite directions, so that little is lost of its
-impulse, but no accuracy is kept, and that is reported.
+on as if l became negative. So no step comes near the free end, and a knot that meets it to within a nanosecond ends
+the motion: there is no force to go on with.
 """
 
 from __future__ import annotations
@@ -27,8 +26,7 @@ from ..string import NO_DIRECTION
 from .equations import knot_of
 from .series import A_KNOT, DISTANCE, STRETCH, TENSION, Knot, distance_series, stretch_at
 
-SLACK, PULLS, SHORTENS, PASSES = 0.0, 1.0, 2.0, 3.0
-"""PASSES: of a step past the free end of a string that pushes at no length."""
+SLACK, PULLS, SHORTENS = 0.0, 1.0, 2.0
 
 _AGREEMENT = 0.03
 _AGREEMENT_SLACK = 1e-3
@@ -41,12 +39,6 @@ of it.
 _NEGLIGIBLE = 1e-19
 """Of the square of the rest length: what the highest terms of |a|² may come to before they are left out."""
 
-_AT_ONCE = 4e-9
-"""Before the nearest point [s]: nearer than this a step of a series would be too short."""
-_NEAR = 64e-9
-"""From the free end, by the knot's speed [s]: farther than this steps of series are always long enough."""
-_MISSES = 1e-9
-"""Distance of the nearest point by the knot's speed [s], below which series say nothing of it."""
 _APPROACH = 0.75
 """Of its distance from the free end, the knot of a string that pushes moves no more in a step."""
 
@@ -323,36 +315,15 @@ def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: fl
     return bool(wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE] + 2e-15 * damping * speed)
 
 
-# Past the free end
-
-
 @njit(cache=True, error_model="numpy")
-def may_pass(p: np.record) -> bool:
-    """Whether the string is one that pushes at no length."""
-    return bool(p.has_string and p.bilateral and p.rest_length != 0.0)
-
-
-@njit(cache=True, error_model="numpy")
-def before_passage(c: np.ndarray, p: np.record, degree: int, knot: Knot, h: float) -> tuple[float, int]:
-    """h cut down so that a step along the series c keeps from the free end; or, where the knot is about to pass that,
-    the length [ns] of the step that passes it, else 0. knot: at the series' start.
+def clear_of_the_end(c: np.ndarray, p: np.record, degree: int, distance: float, h: float) -> float:
+    """h cut down so that along the series c the knot of a string that pushes keeps from the free end, from which it
+    starts at this distance.
     """
-    ax, ay, az, length, _ = knot
-    vx, vy, vz = c[1, A_KNOT], c[1, A_KNOT + 1], c[1, A_KNOT + 2]
-    square = vx * vx + vy * vy + vz * vz
-    speed, shortest = math.sqrt(square), NO_DIRECTION * p.rest_length
-    # Within ``shortest`` there is no direction and no pull.
-    room = max(_APPROACH * length, shortest)
-    while h * 1e9 >= 1.0 and _moves(c, degree, h) > room:
-        h *= 0.5
-    if length > max(_NEAR * speed, shortest):
-        return h, 0
-    nearest = -(ax * vx + ay * vy + az * vz) / square if speed > 0.0 else 0.0
-    bx, by, bz = ax + vx * nearest, ay + vy * nearest, az + vz * nearest
-    straight = norm(bx, by, bz) <= _MISSES * speed
-    if h * 1e9 < 1.0 or (straight and 0.0 <= nearest <= _AT_ONCE and speed > 0.0):
-        return h, max(int(math.ceil(2e9 * abs(nearest))), 2)
-    return h, 0
+    if p.has_string and p.bilateral and p.rest_length != 0.0:
+        while h * 1e9 >= 1.0 and _moves(c, degree, h) > max(_APPROACH * distance, NO_DIRECTION * p.rest_length):
+            h *= 0.5
+    return h
 
 
 @njit(cache=True, error_model="numpy")
