@@ -12,9 +12,13 @@ import numpy as np
 from flights import SECOND, flight_setup, wrench
 from random_scenes import log_uniform, random_turn
 from reference_flights import DIRECTIONS, error, fly, numbers
+from scipy.spatial.transform import Rotation
 
+from rigid_proto_ros.base.bundled import body_names
+from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.motion.body import Body, make_body
 from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.commands import MoveString
 from rigid_proto_ros.simulation.setup import Setup
 from rigid_proto_ros.simulation.simulation import Simulation
@@ -82,7 +86,7 @@ def make_scene(features: dict, rng: np.random.Generator, accuracy: float = 1e-9)
     arm = reach * rng.normal(size=3) if f["knot"] == "off" else np.zeros(3)
     turn = random_turn(rng)
     row = np.zeros(13)
-    row[3:7] = _quaternion(turn)
+    row[3:7] = Rotation.from_matrix(turn).as_quat()
     if f["spin"] != "zero":
         spin = log_uniform(rng, 1e-6, 0.5) if f["spin"] == "slow" else log_uniform(rng, 1.0, 25.0)
         row[10:13] = spin * _direction(rng)
@@ -99,7 +103,7 @@ def make_scene(features: dict, rng: np.random.Generator, accuracy: float = 1e-9)
     nearest = 0.0 if f["knot"] == "com" else 1e-4
     distance = {"slack": rng.uniform(0.05, 0.99), "taut": rng.uniform(1.0, 1.2), "at the free end": nearest}[start]
     away = (rest or size) * distance * _direction(rng)
-    row[0:3] = target + away - _rotation(row[3:7]) @ arm
+    row[0:3] = target + away - Rotation.from_quat(row[3:7]).apply(arm)
     if start == "at the free end" and f["knot"] == "com":
         row[0:3] = target
     settings = StringSettings()
@@ -145,7 +149,7 @@ def numbers_of(setup: Setup, size: float, moved, loads) -> np.ndarray:
     """A scene's numbers for the reference, k and c of the string by its own arithmetic."""
     body, string, row = setup.body, setup.string, setup.initial
     arm = np.array(string.attach) * body.scale - body.center_of_mass if string.attached else np.zeros(3)
-    R = _rotation(row[3:7])
+    R = Rotation.from_quat(row[3:7]).as_matrix()
     span = row[0:3] + R @ arm - np.array(string.target)
     length = np.linalg.norm(span)
     ways = [R.T @ span / length] if length > 0.0 else list(np.eye(3))
@@ -236,19 +240,41 @@ def _direction(rng) -> np.ndarray:
     return way / np.linalg.norm(way)
 
 
-def _rotation(q) -> np.ndarray:
-    x, y, z, w = q / np.linalg.norm(q)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+# What people try first: a bundled body thrown on a rope, all else as the parameters' defaults have it, in numbers that
+# people type.
+
+SPEEDS = (0.0, 0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0)
+SPINS = (0.0, 0.0, 0.0, 0.1, 0.5, 1.0, 3.0, 10.0)
+LENGTHS = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0)
 
 
-def _quaternion(R) -> np.ndarray:
-    """xyzw, of any rotation but half turns."""
-    w = 0.5 * np.sqrt(max(1.0 + np.trace(R), 0.0))
-    q = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 4.0 * w * w]) / max(4.0 * w, 1e-9)
-    return q / np.linalg.norm(q)
+def _signed(rng, numbers) -> float:
+    return float(rng.choice(numbers) * rng.choice([-1.0, 1.0]))
+
+
+def everyday_scene(seed: int) -> Scene:
+    """A throw; the same for every run of a seed."""
+    rng = np.random.default_rng([1000, seed])
+    mesh = str(rng.choice(body_names()))
+    attach = [0.0, 0.0, 0.0]
+    if rng.random() < 0.6:
+        attach = [round(float(c), 3) for c in rng.choice(load_mesh(mesh).vertices)]
+    values = {
+        "mesh": mesh,
+        "gravity": [0.0, 0.0, 0.0 if rng.random() < 0.2 else -9.81],
+        "initial.linear_velocity": [_signed(rng, SPEEDS) for _ in range(3)],
+        "initial.angular_velocity": [_signed(rng, SPINS) for _ in range(3)],
+        "string.attached": True,
+        "string.attach": attach,
+        "string.rest_length": float(rng.choice(LENGTHS)),
+        "string.target": [0.0, 0.0, float(rng.choice([0.0, 0.0, 0.1, 0.2, 0.5]))],
+    }
+    if rng.random() < 0.3:
+        values["string.damping_ratio"] = float(rng.choice([0.0, 0.3, 1.0]))
+    if rng.random() < 0.3:
+        values["linear_damping"] = float(rng.choice([0.01, 0.1]))
+    if rng.random() < 0.3:
+        values["initial.position"] = [float(rng.choice([0.0, 0.1, -0.2])) for _ in range(3)]
+    setup = make_scenario(values).setup
+    target = np.array(setup.string.target)
+    return Scene(setup, (), numbers_of(setup, setup.length, target, [np.zeros(3)] * 6))

@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from flights import SECOND
 from one_segment import OneSegment, make_problem
+from reference_motion import angle_between, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
 from problems import P2
@@ -35,17 +35,14 @@ POINT, FORCE = P2.wrenches[0].point, P2.wrenches[0].force
 
 @dataclass(frozen=True)
 class Scene:
-    """What acts: keys of the integrators' needs, and always gravity and linear damping unless ``damped`` is False."""
+    """What acts: keys of the integrators' needs, and always gravity and linear damping."""
 
     needs: frozenset
-    damped: bool = True
     string: StringSettings | None = None
-    row: tuple = ROW
-    extra: dict = field(default_factory=dict)
 
     def problem_and_start(self) -> tuple[np.ndarray, State]:
         """The core's problem and the state it starts from."""
-        body, state = make_body(MASS, (0.0, 0.0, 0.0), TENSOR), State(0, np.array(self.row))
+        body, state = make_body(MASS, (0.0, 0.0, 0.0), TENSOR), State(0, np.array(ROW))
         wanted = self._values()
         sums = ("force_world", "force_body", "torque_world", "torque_body", "moment")
         loads = np.concatenate([np.ravel(wanted[name]) for name in sums])
@@ -82,22 +79,17 @@ class Scene:
             if torque
             else np.zeros(3),
             "moment": point[:, None] * force_world if world else np.zeros((3, 3)),
-            "linear_damping": 0.3 if self.damped else 0.0,
+            "linear_damping": 0.3,
             "angular_damping": 0.2 if ANGULAR_DAMPING in self.needs else 0.0,
             "gyroscopic": NO_GYROSCOPIC_TERM not in self.needs,
         }
 
 
 @lru_cache(maxsize=64)
-def _reference_rows(key, times):
-    problem, row = key
-    return reference_motion(problem, row, times, digits=20)
-
-
 def _reference(scene: Scene, times):
     values, string = scene._values(), None
     if scene.string is not None:
-        body, state = make_body(MASS, (0.0, 0.0, 0.0), TENSOR), State(0, np.array(scene.row))
+        body, state = make_body(MASS, (0.0, 0.0, 0.0), TENSOR), State(0, np.array(ROW))
         tied = scene.tied(body, state)
         string = ReferenceString(
             tied.attach,
@@ -114,7 +106,7 @@ def _reference(scene: Scene, times):
         **{k: tuple(float(x) for x in v) if isinstance(v, np.ndarray) else v for k, v in values.items()},
         string=string,
     )
-    return _reference_rows((problem, tuple(scene.row)), times)
+    return reference_motion(problem, ROW, times, digits=20)
 
 
 def scene_for(integrator: Integrator, **changes) -> Scene:
@@ -133,11 +125,6 @@ def flown(integrator: Integrator | str, scene: Scene, step_ns: int, until_ns: in
 
 def error(state: State, reference) -> float:
     """Largest of attitude angle [rad] and absolute errors of position, velocity and spin against a row of mpf."""
-    from reference_motion import angle_between, rotation_of
-
     angle = angle_between(state.orientation_xyzw, rotation_of(reference[3:7]))
     others = [abs(float(reference[i] - float(state.row[i]))) for i in (0, 1, 2, 7, 8, 9, 10, 11, 12)]
     return max(angle, *others)
-
-
-__all__ = ["SECOND", "Scene", "error", "flown", "scene_for"]

@@ -8,7 +8,7 @@ import numpy as np
 from rigid_proto_ros.base.records import new_record
 from rigid_proto_ros.motion.body import LENGTH, Body
 from rigid_proto_ros.motion.integrators.integrator import Integrator
-from rigid_proto_ros.motion.integrators.series_steps import CONTROL, degree_for
+from rigid_proto_ros.motion.integrators.series_steps import degree_for
 from rigid_proto_ros.motion.integrators.stepping import method_table, provide_kernel, workspace_size
 from rigid_proto_ros.motion.problem import PROBLEM, Environment, begin_body, begin_problem, begin_string
 from rigid_proto_ros.motion.state import State
@@ -44,13 +44,6 @@ def new_variables(row: np.ndarray, p: np.record) -> np.ndarray:
     y = np.zeros(VARIABLES)
     to_variables(row, p, y)
     return y
-
-
-def new_control(accuracy: float, degree: int) -> np.record:
-    """The step control of a segment's start."""
-    control = new_record(CONTROL)
-    control.accuracy, control.degree = accuracy, degree
-    return control
 
 
 class OneSegment:

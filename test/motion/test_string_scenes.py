@@ -6,8 +6,7 @@ wrenches, a free end that moves; bodies from micrometres to kilometres.
 """
 
 import numpy as np
-from everyday_scenes import everyday_scene
-from feature_scenes import END_S, FEATURES, make_scene, share
+from feature_scenes import END_S, FEATURES, everyday_scene, make_scene, share
 from flights import SECOND
 from hypothesis import given, settings
 from hypothesis import strategies as st
