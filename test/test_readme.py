@@ -144,6 +144,12 @@ def test_make_target_exists(command: str) -> None:
     assert re.search(rf"^{re.escape(target)}:", makefile, re.MULTILINE), command
 
 
+def test_make_help_lists_the_targets_that_people_rely_on() -> None:
+    said = subprocess.run(["make", "help"], cwd=SOURCE, capture_output=True, text=True, check=True).stdout
+    promised = "setup run up workbench test lint bench stress soak pictures build clean"
+    assert set(promised.split()) <= {line.split()[0] for line in said.splitlines()}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.stress)])
 def test_rigid_proto_commands_run(

@@ -157,6 +157,11 @@ def test_a_bounding_boxs_tensor_is_recognised(capsys, tmp_path):
 def test_a_mesh_may_be_named_for_the_link_that_shows_it(capsys, tmp_path, truth):
     status, (link,) = compare(capsys, tmp_path, urdf(*truth, mesh="lost/folder/hammer.stl"), "hammer")
     assert (status, link["link"]) == (0, "head")
+    # A little more about every axis: a body of this shape can have it, the uniform one doesn't.
+    com, six = truth
+    other = urdf(com, six + 0.03 * max(six) * np.array([1, 0, 0, 1, 0, 1]), mesh="lost/folder/hammer.stl")
+    assert compare(capsys, tmp_path, other, "hammer")[0] == 1
+    assert compare(capsys, tmp_path, other, "hammer", "--tolerance", "0.1")[0] == 0
 
 
 @pytest.mark.parametrize(

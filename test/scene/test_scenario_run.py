@@ -42,3 +42,8 @@ def test_a_change_refused_when_it_acts_leaves_the_scene_as_it_is_for_those_after
     assert run.simulation.state.linear_velocity[2] == -1.0
     assert len(scenes.scenes) == 1 and "free_body" not in scenes.scenes[0]
     assert run.ghost is not None and run.ghost.simulation.setup.integrator.name == "auto"
+
+
+def test_a_step_is_rounded_to_the_nearest_nanosecond() -> None:
+    for step_s, step_ns in ((1e-3 + 4e-10, 1_000_000), (1e-3 + 6e-10, 1_000_001), (2e-9, 2), (1.4e-9, 1)):
+        assert make_scenario({"step": step_s}).setup.step_ns == step_ns
