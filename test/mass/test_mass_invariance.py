@@ -9,7 +9,8 @@ from mass_solids import circle, moved, prism, rotation, sphere, together
 from rigid_proto_ros.mass.properties import MeshMoments
 from rigid_proto_ros.mass.tensor import principal_axes
 
-MODELS = st.sampled_from(["solid", "shell", "points", "bounding_box"])
+TURNED_WITH_THE_BODY = ("solid", "shell", "points")
+MODELS = st.sampled_from([*TURNED_WITH_THE_BODY, "bounding_box"])
 SEEDS = st.integers(0, 2**31)
 lengths = st.floats(-3, 3).map(lambda e: 10.0**e)
 settings.register_profile("mass", deadline=None, max_examples=12)
@@ -50,7 +51,7 @@ def slack(mesh):
     return 200 * np.spacing(np.max(np.abs(vertices))) / thin + 1e-13
 
 
-@given(bodies(), SEEDS, MODELS)
+@given(bodies(), SEEDS, st.sampled_from(TURNED_WITH_THE_BODY))
 @settings(PROFILE)
 def test_rigid_motion_turns_the_tensor_and_moves_the_com(mesh, seed, model):
     R = rotation(seed)
