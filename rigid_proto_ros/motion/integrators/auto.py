@@ -38,6 +38,7 @@ from .integrator import (
     Integrator,
     Method,
 )
+from .series import SPIN_COLUMNS
 from .series_steps import series_steps, series_workspace
 
 FASTEST = 5e5
@@ -112,12 +113,20 @@ _SERIES = Method(
     workspace=series_workspace,
 )
 
+
+def _spin_workspace(degree: int) -> np.ndarray:
+    """Room for the series of a spin alone: a segment clears it first, and it is a fifth of the other."""
+    return np.zeros((degree + 1, SPIN_COLUMNS))
+
+
 _BY_KIND = {
     ASLEEP: Method(NOTHING, None, "auto: sleeping, nothing moves or acts", sleeps=True),
     COASTING: Method(NOTHING, None, "auto: closed form, nothing turns the body"),
     STEADY: Method(ONE_STEP, steady_steps, "auto: closed form, nothing changes the spin", 1),
     FREE: Method(ONE_STEP, free_body_steps, "auto: free_body, free rotation, exact", 1),
-    TURNING_LOADS: replace(_SERIES, choice="auto: taylor of degree {degree}, the loads turn with the body"),
+    TURNING_LOADS: replace(
+        _SERIES, choice="auto: taylor of degree {degree}, the loads turn with the body", workspace=_spin_workspace
+    ),
     ANY_LOADS: _SERIES,
     SLACK_AT_REST: Method(
         NOTHING,
