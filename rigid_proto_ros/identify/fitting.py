@@ -19,7 +19,7 @@ import numpy as np
 from ..base.errors import InputError
 from . import shooting as sh
 from .initial_estimate import initial_values, least_noise, local_start, noise_by_differences
-from .measurements import ATTITUDE, MeasuredFlight
+from .measurements import MeasuredFlight
 from .trajectories import STATE
 from .unknowns import Unknowns, Values, is_possible, possible_step, possible_tensor
 
@@ -46,10 +46,6 @@ MOST_SEGMENTS = 40
 """Of all flights together in the first stage."""
 FEWEST_SAMPLES = 6
 """Of a segment in the first stage: a start has 12 numbers."""
-FITS = 2.0
-"""Residuals so many times what neighbouring samples say are no noise."""
-NEAR = 1e-3
-"""Radians, or part of the standard deviation of any other series, within which short segments fit well enough."""
 OFFSET_MARGIN_S = 0.05
 """The largest difference of two clocks that is looked for."""
 
@@ -301,17 +297,3 @@ def fit_flights(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: V
         if all(abs(sigmas[key] - before[key]) < 0.01 * before[key] for key in before):
             break
     return Estimate(problem, values, starts)
-
-
-def fits_in_short(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> bool:
-    """Whether short segments leave no more than noise."""
-    problem, _ = _first_problem(flights, unknowns, values)
-    try:
-        sigmas = problem.noise_left(*problem.solved(_local_starts(problem), most=4))
-    except CannotFlyError:
-        return False
-    for series in flights[0].series:
-        near = NEAR * (1.0 if series.kind == ATTITUDE else float(np.std(series.values)))
-        if sigmas[series.name] > max(FITS * problem.sigmas[series.name], near):
-            return False
-    return True

@@ -1,22 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""From measured flights to the body's mass properties, and what else samples could mean where no rigid body shows them:
-other units, another direction of gravity, another order.
-"""
+"""From measured flights to the body's mass properties."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..mass.properties import MassProperties
-from .fitting import CannotFlyError, fit_flights, fits_in_short
-from .measurements import ACCELERATION, ATTITUDE, POSITION, RATE, MeasuredFlight, Series, topics_of
+from .fitting import CannotFlyError, fit_flights
+from .measurements import ACCELERATION, MeasuredFlight, topics_of
 from .report import Identification
-from .unknowns import DEFAULT_FIT, Unknowns, Values, make_unknowns, possible_tensor
+from .unknowns import DEFAULT_FIT, Values, make_unknowns, possible_tensor
 from .verdict import Identifiability, check_residuals
 
 GUESSED_RADIUS = 0.1
@@ -27,13 +24,6 @@ USUAL = (
     "usual causes: positions that aren't in m, rates in degrees, accelerations in g, gravity along another axis"
     " (--gravity), quaternions that begin with w, a wrench along other axes (--wrench TOPIC@FRAME), clocks"
 )
-_SCALES = (
-    (POSITION, 1e-3, "positions are in mm"),
-    (POSITION, 1e-2, "positions are in cm"),
-    (RATE, np.pi / 180.0, "rates are in degrees a second"),
-    (ACCELERATION, 9.80665, "accelerations are in g"),
-)
-_GRAVITIES = ((0.0, -9.81, 0.0), (0.0, 0.0, -9.81), (0.0, 0.0, 9.81), (0.0, 9.81, 0.0), (0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -64,12 +54,11 @@ def identify(
     try:
         estimate = fit_flights(flights, unknowns, first)
     except CannotFlyError:
-        cause = _likely_cause(flights, unknowns, first)
-        raise CannotFlyError(cause) if cause else CannotFlyError() from None
+        raise CannotFlyError(USUAL) from None
     given = {"mass": known.mass is not None or known.body is not None}
     guessed = frozenset(name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.body is not None))
     checks = check_residuals(flights, estimate)
-    cause = "" if all(check.is_noise for check in checks) else _likely_cause(flights, unknowns, first)
+    cause = "" if all(check.is_noise for check in checks) else USUAL
     identifiability = Identifiability(estimate, known.length)
     return Identification(flights, estimate, identifiability, checks, _assumed(flights, known, fit), guessed, cause)
 
@@ -99,51 +88,3 @@ def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]
     for topic in dict.fromkeys(f.load_history.topic for f in flights if len(f.load_history.changes)):
         lines.append(f"{topic} was sampled: it changed between messages, and the errors count that")
     return lines
-
-
-def _likely_cause(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> str:
-    """Which conversion makes the flights fit, in words, or the usual causes; empty where short parts fit as they are
-    and no conversion makes the whole fit.
-    """
-    fits_short = fits_in_short(flights, unknowns, values)
-    for cause, remedy, converted, gravity in _conversions(flights, values, sensors_only=fits_short):
-        other = replace(values, gravity=gravity)
-        if not fits_in_short(converted, unknowns, other):
-            continue
-        try:
-            checks = check_residuals(converted, fit_flights(converted, unknowns, other))
-        except CannotFlyError:
-            continue
-        if all(check.is_noise for check in checks):
-            return f"it fits if {cause}: {remedy}"
-    return "" if fits_short else USUAL
-
-
-def _conversions(
-    flights: Sequence[MeasuredFlight], values: Values, sensors_only: bool
-) -> Iterator[tuple[str, str, Sequence[MeasuredFlight], np.ndarray]]:
-    """Cause, remedy, and flights and gravity as they are then; of rates and accelerations alone or of all: poses of
-    wrong units or axes don't fit for a moment, accelerations may, with another mass.
-    """
-    kinds = {series.kind for flight in flights for series in flight.series}
-    for kind, factor, cause in _SCALES:
-        if kind in kinds and not (sensors_only and kind == POSITION):
-            converted = _converted(flights, kind, partial(np.multiply, factor))
-            yield cause, f"multiply them by {factor:.6g}", converted, values.gravity
-    if sensors_only:
-        return
-    for gravity in map(np.array, _GRAVITIES):
-        if not np.allclose(gravity, values.gravity):
-            text = " ".join(f"{g:g}" for g in gravity.tolist())
-            yield f"gravity is {text} m/s²", f"--gravity {text}", flights, gravity
-    reordered = _converted(flights, ATTITUDE, partial(np.roll, shift=-1, axis=1))
-    yield "quaternions begin with w", "reorder them to x y z w", reordered, values.gravity
-
-
-def _converted(
-    flights: Sequence[MeasuredFlight], kind: str, convert: Callable[[np.ndarray], np.ndarray]
-) -> list[MeasuredFlight]:
-    def one(series: Series) -> Series:
-        return replace(series, values=convert(series.values)) if series.kind == kind else series
-
-    return [replace(flight, series=tuple(one(series) for series in flight.series)) for flight in flights]

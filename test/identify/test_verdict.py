@@ -106,11 +106,11 @@ def _with(flight, kinds, convert):
 @pytest.mark.parametrize(
     ("kinds", "convert", "gravity", "cause"),
     [
-        ((ms.POSITION,), lambda v: 1e3 * v, (0.0, 0.0, -9.81), "positions are in mm"),
-        ((ms.RATE,), np.degrees, (0.0, 0.0, -9.81), "rates are in degrees"),
-        ((ms.ACCELERATION,), lambda v: v / 9.80665, (0.0, 0.0, -9.81), "accelerations are in g"),
-        ((), None, (0.0, -9.81, 0.0), "gravity is 0 0 -9.81"),
-        ((ms.ATTITUDE,), lambda q: np.roll(q, 1, axis=1), (0.0, 0.0, -9.81), "quaternions begin with w"),
+        ((ms.POSITION,), lambda v: 1e3 * v, (0.0, 0.0, -9.81), "positions that aren't in m"),
+        ((ms.RATE,), np.degrees, (0.0, 0.0, -9.81), "rates in degrees"),
+        ((ms.ACCELERATION,), lambda v: v / 9.80665, (0.0, 0.0, -9.81), "accelerations in g"),
+        ((), None, (0.0, -9.81, 0.0), "gravity along another axis"),
+        ((ms.ATTITUDE,), lambda q: np.roll(q, 1, axis=1), (0.0, 0.0, -9.81), "quaternions that begin with w"),
     ],
 )
 def test_a_unit_or_an_axis_that_was_taken_for_another_is_named(kinds, convert, gravity, cause) -> None:
@@ -122,13 +122,3 @@ def test_a_unit_or_an_axis_that_was_taken_for_another_is_named(kinds, convert, g
     found = identify([flight], fit)
     assert not found.fits
     assert cause in found.remarks[0]
-
-
-def test_accelerations_in_g_are_named_where_short_parts_fit_with_another_mass() -> None:
-    truth = mf.values_of(0.5, (0.01, -0.02, 0.03), INERTIA, (0.0, 0.0, -9.81))
-    load = mf.load_history((0.5, 0.05, "body", (0.05, 0.02, 0.0), (0.3, 0.5, 2.0), (0, 0, 0)))
-    flight = mf.with_imu(truth, mf.tumbling(), np.random.default_rng(2), 3.0, load, place=(0.05, 0.0, 0.02))
-    found = identify(
-        [_with(flight, (ms.ACCELERATION,), lambda v: v / 9.80665)], ("mass", "com", "inertia", "imu_place")
-    )
-    assert not found.fits and found.remarks[0].startswith("it fits if accelerations are in g")
