@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Where logged data goes: a file, viewers on this machine, or both, each with a recording stream of its own.
+"""A flight as columns of Rerun: the streams that take them, and the backend that draws the picture on these.
 
-Two streams rather than one with two sinks: replacing a stream's sinks shuts its server down, so no file could be begun
-anew at a reset while somebody watches.
+A file and viewers have a stream each rather than one with two sinks: replacing a stream's sinks shuts its server down,
+so no file could be begun anew at a reset while somebody watches.
 
 Two things are done by functions of the SDK that it doesn't promise (tried with rerun-sdk 0.41.0):
 ``rr.send_blueprint`` keeps a stream of every layout for ever, two threads and a third of a megabyte each, and threads
@@ -12,12 +12,15 @@ and memory of closed recordings are kept until the process ends.
 from __future__ import annotations
 
 import os
+import shutil
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pyarrow as pa
 import rerun as rr
 import rerun_bindings
 from rerun.recording_stream import RecordingStream
@@ -25,10 +28,11 @@ from rerun.recording_stream import RecordingStream
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.provenance import cpu, versions
-from ..picture.backend import DrawnMesh
-from .layout import Finished, Subject, blueprint
+from ..picture import style
+from ..picture.backend import Backend, DrawnMesh
+from ..picture.style import Colour
+from . import rrd_file as e
 from .ports import LOOPBACK, PortTakenError, listens
-from .rrd_file import mark_end
 
 APPLICATION_ID = "rigid_proto_ros"
 """Of live streams: viewers keep one layout for all recordings of an application."""
@@ -39,66 +43,62 @@ FLUSH_TIMEOUT_S = 5.0
 TAKEN_S = 0.05
 """A live stream that hasn't taken half a second of data in this time is behind: some viewer doesn't read."""
 
-LEAVE_S = 2.0
-"""How long the end of a run waits for live streams; a viewer that doesn't read holds nobody up."""
+INVISIBLE = 1e-9
+"""A scale that nobody sees; the viewer refuses 0, which has no inverse."""
 
 
 class Stream:
     """A Rerun recording: one run of the simulation, with simulated time from 0.
 
     meshes: by part the mesh that it was sent last, and how many it was sent. styled: by entity what its style was sent
-    for, a size or a number of columns. subject: what the layout is for that it was sent. behind: what was sent hasn't
-    been taken yet, so that nothing more should be; missed: something was left out meanwhile.
+    for, a size or a number of columns. arranged: it was sent a layout. behind: what was sent hasn't been taken yet, so
+    that nothing more should be; missed: something was left out meanwhile.
     """
 
-    def __init__(self, recording_id: str, sink: Any, name: str, application_id: str = APPLICATION_ID) -> None:
+    def __init__(self, sink: Any, recording_id: str, name: str, application_id: str = APPLICATION_ID) -> None:
         self.application_id = application_id
         self.meshes: dict[str, tuple[int, DrawnMesh]] = {}
         self.styled: dict[str, float] = {}
-        self.subject: Subject | None = None
-        self.behind = self.missed = False
+        self.arranged = self.behind = self.missed = False
         self.recording = rr.RecordingStream(application_id, recording_id=recording_id)
         rr.set_sinks(sink, recording=self.recording)
         self.recording.send_recording_name(name)
         made_with = [f"{package} {version}" for package, version in versions("rerun-sdk").items()]
         self.recording.send_property("made_with", rr.AnyValues(versions=made_with, cpu=cpu()))
 
-    def send(self, entity: str, times: Iterable[Any], columns: Iterable[Any]) -> None:
+    def send(self, entity: str, times: list[Any], *parts: Any) -> None:
         """Log columns of an entity at the given time columns."""
+        columns = [column for part in parts for column in part]
         rr.send_columns(entity, indexes=times, columns=columns, recording=self.recording)
 
-    def log_static(self, entity: str, *values: Any) -> None:
-        """Log values that hold at all times. They arrive before what is sent after them: rr.log would put them aside
-        until a flush, and columns would overtake them.
+    def log_static(self, entity: str, value: Any) -> None:
+        """Log a value that holds at all times. It arrives before what is sent after it: rr.log would put it aside
+        until a flush, and columns would overtake it.
         """
-        batches = [batch for value in values for batch in value.as_component_batches()]
+        batches = value.as_component_batches()
         self.send(entity, [], [batch.partition([len(batch.as_arrow_array())]) for batch in batches])
 
-    def send_layout(self, subject: Subject, finished: Finished | None = None) -> None:
-        """Make a viewer open with the layout for what the flight is about: once, and again when it is finished; nothing
-        that somebody has arranged is undone in between.
-        """
-        if self.subject is not None and finished is None:
-            return
-        self.subject = subject
-        layout = RecordingStream._from_native(  # noqa: SLF001 (see above)
+    def send_layout(self, layout: Any) -> None:
+        """Make a viewer open with this blueprint."""
+        self.arranged = True
+        stream = RecordingStream._from_native(  # noqa: SLF001 (see above)
             rerun_bindings.new_blueprint(
                 application_id=self.application_id, make_default=False, make_thread_default=False, default_enabled=True
             )
         )
-        layout.set_time("blueprint", sequence=0)
-        blueprint(subject, finished)._log_to_stream(layout)  # noqa: SLF001 (see above)
-        messages = layout.memory_recording().storage
+        stream.set_time("blueprint", sequence=0)
+        layout._log_to_stream(stream)  # noqa: SLF001 (see above)
+        messages = stream.memory_recording().storage
         rerun_bindings.send_blueprint(messages, True, True, recording=self.recording.to_native())
-        layout.disconnect()
+        stream.disconnect()
 
     def flush(self) -> None:
-        """Hand on what was sent, and see whether it arrives."""
-        raise NotImplementedError
-
-    def close(self) -> None:
-        """Finish and let go of the sink."""
-        self.recording.disconnect()
+        """Ask whether all has been taken: a server waits for its slowest viewer, as would what is sent then."""
+        try:
+            self.recording.flush(timeout_sec=TAKEN_S)
+            self.behind = False
+        except RuntimeError:
+            self.behind = True
 
     def leave(self) -> threading.Thread:
         """Close on a thread of its own: the library waits without limit for a viewer that doesn't read, and at times
@@ -123,7 +123,7 @@ class FileStream(Stream):
         try:
             # An application of its own: in a viewer that shows another recording, too, it has its own layout.
             application_id = f"{APPLICATION_ID}_{recording_id[:8]}"
-            super().__init__(recording_id, rr.FileSink(path, write_footer=False), name, application_id)
+            super().__init__(rr.FileSink(path, write_footer=False), recording_id, name, application_id)
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
             self._inode = path.stat().st_ino
         except (RuntimeError, OSError) as error:
@@ -133,81 +133,38 @@ class FileStream(Stream):
         """Write out; raises OSError where the data would not arrive in the file of this name."""
         try:
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
-            if self.path.stat().st_ino != self._inode:
-                raise OSError("another file took its place")
-            return
+            if self.path.stat().st_ino == self._inode:
+                return
+            reason = "another file took its place"
         except RuntimeError as error:
-            reason = _reason_on_disk(self.path) or _last_line(error)
-        except OSError as error:
-            reason = error.strerror or str(error)
+            full = shutil.disk_usage(self.path.parent).free < 1_000_000
+            reason = "no space left on the disk" if full else _last_line(error)
         raise OSError(f"{self.path}: {reason}")
 
     def close(self) -> None:
         """Write the rest and mark the end; raises OSError as ``flush`` does."""
         self.flush()
-        super().close()
-        mark_end(self.path)
+        self.recording.disconnect()
+        e.mark_end(self.path)
 
 
-class LiveStream(Stream):
-    """One run for viewers; the first one hosts the server, later ones send to it."""
-
-    def flush(self) -> None:
-        """Ask whether the server has taken everything. It waits for its slowest viewer, and so would all
-        that is sent.
-        """
-        try:
-            self.recording.flush(timeout_sec=TAKEN_S)
-            self.behind = False
-        except RuntimeError:
-            self.behind = True
-
-
-class LiveServer:
-    """A gRPC server on loopback with bounded memory; viewers come and go without the sender noticing.
-
-    host: the first run's stream. The server lives as long as that, which is therefore kept. Raises PortTakenError where
-    another process listens on the port.
+def host(port: int, memory_limit: str, recording_id: str, name: str) -> tuple[Stream, str]:
+    """A stream with a gRPC server on loopback, which lives as long as it does, and the address to which other streams
+    send and viewers come. Raises PortTakenError where another process listens on the port.
     """
-
-    def __init__(self, port: int, memory_limit: str, recording_id: str, name: str) -> None:
-        self.address = f"rerun+http://{LOOPBACK}:{port}/proxy"
-        self._leaving: list[threading.Thread] = []
-        self.host = LiveStream(recording_id, rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=memory_limit), name)
-        deadline = time.monotonic() + FLUSH_TIMEOUT_S
-        try:
-            # A server that can't listen says so to nobody but who waits for what was sent, and not at once.
-            while True:
-                self.host.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
-                if listens(os.getpid(), port):
-                    return
-                if time.monotonic() > deadline:
-                    raise RuntimeError(f"nothing serves on port {port}")
-                time.sleep(0.02)
-        except RuntimeError as error:
-            self.host.close()
-            raise PortTakenError(_last_line(error)) from error
-
-    def next_run(self, before: LiveStream, recording_id: str, name: str) -> LiveStream:
-        """A stream for a new run in place of the one before; viewers keep their layout."""
-        following = LiveStream(recording_id, rr.GrpcSink(self.address), name)
-        following.subject = before.subject
-        self.end_run(before)
-        return following
-
-    def end_run(self, stream: LiveStream) -> None:
-        """Finish a run that no more data follows; the server stays."""
-        if stream is not self.host:
-            self._leaving = [thread for thread in self._leaving if thread.is_alive()]
-            self._leaving.append(stream.leave())
-
-    def close(self) -> bool:
-        """Shut the server down; returns whether that is done, or whether some viewer doesn't read what was sent."""
-        deadline = time.monotonic() + LEAVE_S
-        self._leaving.append(self.host.leave())
-        for thread in self._leaving:
-            thread.join(max(0.0, deadline - time.monotonic()))
-        return not any(thread.is_alive() for thread in self._leaving)
+    stream = Stream(rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=memory_limit), recording_id, name)
+    deadline = time.monotonic() + FLUSH_TIMEOUT_S
+    try:
+        # A server that can't listen says so to nobody but who waits for what was sent, and not at once.
+        while time.monotonic() < deadline:
+            stream.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+            if listens(os.getpid(), port):
+                return stream, f"rerun+http://{LOOPBACK}:{port}/proxy"
+            time.sleep(0.02)
+        raise RuntimeError(f"nothing serves on port {port}")
+    except RuntimeError as error:
+        stream.recording.disconnect()
+        raise PortTakenError(_last_line(error)) from error
 
 
 def forget_closed_recordings() -> None:
@@ -222,18 +179,157 @@ def forget_closed_recordings() -> None:
         rr.set_global_data_recording(users_own)
 
 
-def end_without_waiting() -> None:
-    """What the library does at the end of the process is to wait, without limit, for every recording to be taken."""
-    rr.unregister_shutdown()
-
-
 def _last_line(error: BaseException) -> str:
     return (str(error).strip().splitlines() or [type(error).__name__])[-1]
 
 
-def _reason_on_disk(path: Path) -> str:
-    try:
-        disk = os.statvfs(path.parent)
-    except OSError as error:
-        return error.strerror or "the folder is gone"
-    return "no space left on the disk" if disk.f_bavail * disk.f_frsize < 1_000_000 else ""
+# The backend
+
+
+def time_columns(times_ns: np.ndarray, walls_ns: np.ndarray) -> list[Any]:
+    """Both timelines: simulated times (n,) and wall clock times (n,), in ns."""
+    return [
+        rr.TimeColumn(e.SIM_TIME, duration=np.asarray(times_ns, np.int64).astype("timedelta64[ns]")),
+        rr.TimeColumn(e.ROS_TIME, timestamp=np.asarray(walls_ns, np.int64).astype("datetime64[ns]")),
+    ]
+
+
+def scalar_columns(values: np.ndarray) -> Any:
+    """Scalars of the rows of values (n, k)."""
+    return rr.Scalars.columns(scalars=np.ascontiguousarray(values).ravel()).partition([values.shape[1]] * len(values))
+
+
+class RerunBackend(Backend):
+    """Draws on ``streams``.
+
+    plotted: the least and the largest value of each plot, by name. paths: where each trail ends.
+    """
+
+    def __init__(self) -> None:
+        self.streams: Sequence[Stream] = ()
+        self.plotted: dict[str, tuple[float, float]] = {}
+        self.paths: dict[str, np.ndarray] = {}
+        self._size = 1.0
+        self._known = self._walls = np.zeros(1, np.int64)
+        self._times: list[Any] = []
+        self._count = 0
+
+    def send(self, entity: str, *parts: Any) -> None:
+        """Log columns of an entity at the times of ``begin``."""
+        for stream in self.streams:
+            stream.send(entity, self._times, *parts)
+
+    def begin(self, times_ns: np.ndarray, walls_ns: np.ndarray | None = None) -> None:
+        """What follows is of these times (n,) [ns]; walls_ns (n,) [ns]: when they were by the wall's clock, None for
+        times of which that was said before.
+        """
+        if walls_ns is None:
+            walls_ns = self._walls[np.minimum(np.searchsorted(self._known, times_ns), len(self._known) - 1)]
+        else:
+            self._known, self._walls = times_ns, walls_ns
+        self._times = time_columns(times_ns, walls_ns)
+        self._count = len(times_ns)
+
+    def resize(self, size: float) -> None:
+        """Widths are in this length [m]; streams are sent them as they come to the parts."""
+        self._size = size
+
+    def mesh(self, name: str, surface: DrawnMesh | None) -> None:
+        """Log a mesh once a run, and hide the one before from now on."""
+        nowhere = rr.Transform3D.columns(translation=[[0.0, 0.0, 0.0]], scale=[[INVISIBLE] * 3])
+        for stream in self.streams:
+            number, known = stream.meshes.get(name, (0, None))
+            if known is surface:
+                continue
+            if known is not None:
+                stream.send(_mesh_entity(name, number), self._times, nowhere)
+            if surface is None:
+                continue
+            stream.meshes[name] = number + 1, surface
+            entity, own = _mesh_entity(name, number + 1), style.STYLES[name]
+            if number:
+                stream.send(entity, time_columns(np.zeros(1), self._walls[:1]), nowhere)
+            drawn = rr.Mesh3D(
+                vertex_positions=surface.vertices,
+                triangle_indices=surface.triangles,
+                vertex_normals=surface.normals,
+                albedo_factor=(*own.colours[0], round(255 * own.opacity)),
+            )
+            stream.log_static(entity, drawn)
+
+    def place(
+        self,
+        name: str,
+        positions: np.ndarray | None = None,
+        attitudes: np.ndarray | None = None,
+        scale: np.ndarray | None = None,
+    ) -> None:
+        """Log transforms."""
+        scales = None if scale is None else np.tile(scale, (self._count, 1))
+        columns = rr.Transform3D.columns(translation=positions, quaternion=attitudes, scale=scales)
+        for stream in self.streams:
+            number, _ = stream.meshes.get(name, (1, None))
+            stream.send(_mesh_entity(name, number), self._times, columns)
+
+    def _draw(self, name: str, archetype: Any, counts: np.ndarray, **values: Any) -> None:
+        """Log parts of a kind, and how they look to the streams that don't know it, or know it of another size."""
+        size = self._size if name.startswith(style.WORLD) else 1.0
+        own = style.STYLES[name]
+        for stream in self.streams:
+            if stream.styled.get(name) != size:
+                stream.styled[name] = size
+                stream.log_static(name, archetype.from_fields(colors=list(own.colours), radii=own.width * size))
+        self.send(name, archetype.columns(**values).partition(counts))
+
+    def arrows(self, name: str, counts: np.ndarray, vectors: np.ndarray, origins: np.ndarray | None = None) -> None:
+        """Log arrows."""
+        self._draw(name, rr.Arrows3D, counts, vectors=vectors, origins=origins)
+
+    def lines(
+        self, name: str, counts: np.ndarray, strips: Sequence[np.ndarray], colours: Sequence[Colour] | None = None
+    ) -> None:
+        """Log line strips; made by the library itself, a strip costs .1 ms."""
+        points = np.concatenate([np.zeros((0, 3)), *strips]).astype(np.float32)
+        ends = np.cumsum([0, *map(len, strips)], dtype=np.int32)
+        kind = rr.components.LineStrip3DBatch([]).as_arrow_array().type
+        rows = pa.FixedSizeListArray.from_arrays(points.ravel(), type=kind.value_type)
+        self._draw(name, rr.LineStrips3D, counts, strips=pa.ListArray.from_arrays(ends, rows, kind), colors=colours)
+
+    def points(self, name: str, counts: np.ndarray, positions: np.ndarray) -> None:
+        """Log points; of a trail the straight way from each to the next one."""
+        if name in (style.TRAIL, style.COM_TRAIL):
+            before = self.paths.get(name, positions[0])
+            self.paths[name] = positions[-1].copy()
+            self.lines(name, counts, list(np.stack([np.vstack([before, positions[:-1]]), positions], axis=1)))
+        else:
+            self._draw(name, rr.Points3D, counts, positions=positions)
+
+    def labels(self, name: str, counts: np.ndarray, positions: np.ndarray, texts: Sequence[str]) -> None:
+        """Log labels as points of no size, below the part; those of loads change, others are logged once."""
+        entity, changes = f"{name}/label", name.startswith(style.LOADS)
+        for stream in self.streams:
+            if entity not in stream.styled and len(texts):
+                stream.styled[entity] = 0.0
+                colour, known = style.STYLES[name].colours[0], None if changes else texts[0]
+                look = rr.Points3D.from_fields(colors=colour, radii=0.0, labels=known, show_labels=True)
+                stream.log_static(entity, look)
+        labels = list(texts) if changes else None
+        self.send(entity, rr.Points3D.columns(positions=positions, labels=labels).partition(counts))
+
+    def scalars(self, name: str, values: np.ndarray) -> None:
+        """Log plotted values, and keep their range."""
+        finite = values[np.isfinite(values)]
+        if finite.size:
+            low, high = self.plotted.get(name, (np.inf, -np.inf))
+            self.plotted[name] = (min(low, float(finite.min())), max(high, float(finite.max())))
+        for stream in self.streams:
+            if stream.styled.get(name) != values.shape[1]:
+                stream.styled[name] = values.shape[1]
+                names, colours = zip(*style.SERIES[name][: values.shape[1]], strict=True)
+                stream.log_static(name, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
+        self.send(name, scalar_columns(values))
+
+
+def _mesh_entity(name: str, number: int) -> str:
+    """Where the run's mesh of a part with this number, from 1, is logged: a static mesh can't be replaced."""
+    return name if number == 1 else f"{name}_{number}"

@@ -32,18 +32,17 @@ observer.on(BodyChanged(0, flight.BODY))
 observer.on(Published(0, states[0]))
 print(observer.live_address, flush=True)
 sys.stdin.readline()
-streams = observer._writer.streams
 k, deadline = 1, time.monotonic() + 150.0
 while k < 200 and time.monotonic() < deadline:
     observer.on(Published(k * flight.PERIOD_NS, states[k]))
     observer.on(BodyChanged(k * flight.PERIOD_NS, flight.BODY))
     if k == 150:
         # Thousands of messages are more than the server keeps back for a viewer; how many, the library decides.
-        while not any(stream.behind for stream in streams):
+        while not any(stream.behind for stream in observer._streams):
             observer.on(BodyChanged(k * flight.PERIOD_NS, flight.BODY))
             time.sleep(0.01)
     k += 1
-behind = any(stream.behind for stream in streams)
+behind = any(stream.behind for stream in observer._streams)
 observer.close()
 print("behind" if behind else "never behind", k, repr(observer.error), flush=True)
 """
