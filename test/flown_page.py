@@ -55,7 +55,7 @@ class FlownPage:
         self.workbench = Workbench(self.live, lesson=lesson, anew=anew)
         self.page, self.server = self.workbench.page, self.workbench.page.server
         self.said: list[str] = []
-        self.page.announcements.say = self.page.flight._say = self.said.append
+        self.page.flight.say = self.said.append
         self._socket = bare_page(self.server.get_port())
         self.browser = self._socket.__enter__()
         self.until(lambda: self.page.picture.body is not None, "body")

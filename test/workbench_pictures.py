@@ -19,7 +19,7 @@ from workbench_page import SOFTWARE_GL, Browser, Flown, chromium
 from rigid_proto_ros.rerun_view.ports import any_free_port
 from rigid_proto_ros.scene.lessons import Lesson, lesson
 from rigid_proto_ros.workbench.flight import Flight
-from rigid_proto_ros.workbench.time_bar import motion_words
+from rigid_proto_ros.workbench.panel import motion_words
 
 SIZE, MOVING_SIZE = (1400, 800), (800, 450)
 RATE = 10

@@ -157,38 +157,28 @@ def comparison(scenario: Scenario) -> str:
     except InputError as error:
         return f"Simulating: **{flying}**. Nothing to compare with: {error}"
     difference = model_difference(approximate, true)
-    title, surface = TITLES.get(other, other), scenario.setup.surface
+    surface = scenario.setup.surface
     size = 1.0 if surface is None else float(np.linalg.norm(surface.extent * scenario.setup.body.scale))
     away = float(np.linalg.norm(own.center_of_mass - true.center_of_mass))
-    masses = f"{true.mass:.5g} | {approximate.mass:.5g} | {_per_cent(approximate.mass / true.mass - 1.0)} %"
+    turned = math.degrees(difference.axes_turned)
     lines = [
         f"Simulating: **{TITLES.get(flying, flying)}**",
         "",
-        f"|  | {TITLES['solid']} | {title} | error |",
+        f"|  | {TITLES['solid']} | {TITLES.get(other, other)} | error |",
         "| --- | --- | --- | --- |",
-        *(
-            f"| I{'₁₂₃'[k]} [kg m²] | {a:.5g} | {b:.5g} | **{_per_cent(error)} %** |"
-            for k, (a, b, error) in enumerate(
-                zip(
-                    principal_axes(true.inertia)[0],
-                    principal_axes(approximate.inertia)[0],
-                    difference.principal_moments,
-                    strict=True,
-                )
-            )
-        ),
-        f"| principal axes turned by | | | **{_degrees(difference.axes_turned)}** |",
-        f"| mass [kg] | {masses} |",
+    ]
+    moments = principal_axes(true.inertia)[0], principal_axes(approximate.inertia)[0], difference.principal_moments
+    for name, a, b, error in zip("₁₂₃", *moments, strict=True):
+        lines.append(f"| I{name} [kg m²] | {a:.5g} | {b:.5g} | **{_per_cent(error)} %** |")
+    error = approximate.mass / true.mass - 1.0
+    lines += [
+        f"| principal axes turned by | | | **{turned if turned > TURNED else 0.0:.3g}°** |",
+        f"| mass [kg] | {true.mass:.5g} | {approximate.mass:.5g} | {_per_cent(error)} % |",
         f"| COM of its own, off by | | {away:.3g} m | **{100.0 * away / size:.2g} % of the size** |",
     ]
     if np.linalg.norm(difference.center_of_mass) < 1e-9 * size < away:
         lines += ["", "It is simulated with the COM of the solid."]
     return "\n".join(lines)
-
-
-def _degrees(angle: float) -> str:
-    degrees = math.degrees(angle)
-    return f"{degrees if degrees > TURNED else 0.0:.3g}°"
 
 
 def _per_cent(error: float) -> str:

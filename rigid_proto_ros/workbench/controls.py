@@ -18,6 +18,7 @@ import viser
 
 from ..scene.parameters import parameter_named
 from ..scene.yaml_text import scalar
+from .flight import Flight
 
 Handle = viser.GuiInputHandle[Any]
 Values = Mapping[str, Any]
@@ -47,19 +48,11 @@ class _Control:
 
 
 class Controls:
-    """The inputs of one page server. set_parameters(changes) as ParameterSetter.set; say(text) tells of
-    what can't be read.
-    """
+    """The inputs of one page server, which set parameters of what flies."""
 
-    def __init__(
-        self,
-        gui: viser.GuiApi,
-        set_parameters: Callable[[Mapping[str, object]], None],
-        say: Callable[[str], None],
-    ) -> None:
+    def __init__(self, gui: viser.GuiApi, flight: Flight) -> None:
         self._gui = gui
-        self._set = set_parameters
-        self._say = say
+        self._flight = flight
         self._controls: list[_Control] = []
         self._values: Values = {}
 
@@ -179,10 +172,10 @@ class Controls:
         if changes is None:
             control.touched_s = -1e9
             if control.accepted:
-                self._say(f"{control.handle.label}: got {control.handle.value!r}; accepted: {control.accepted}")
+                self._flight.say(f"{control.handle.label}: got {control.handle.value!r}; accepted: {control.accepted}")
             self.update(self._values)
         else:
-            self._set(changes)
+            self._flight.set(changes)
 
 
 def _hint(name: str) -> str:

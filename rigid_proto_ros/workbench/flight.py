@@ -11,6 +11,7 @@ import asyncio
 import functools
 import json
 import threading
+import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -41,6 +42,9 @@ LOOKS = frozenset(
     {"record", "real_time_factor", "publish_rate", "publish_clock", "publish_tf", "imu_contact", "schedule_horizon"}
 )
 """Parameters that a lesson leaves as they are: how one looks at the motion, not the motion."""
+
+SOON_S = 0.3
+"""[s] What takes no longer isn't said to be waited for."""
 
 COMPILING = "compiling, once only"
 
@@ -110,19 +114,17 @@ class RunMemory(Observer):
 
 
 class Flight:
-    """say(text) tells the users of a refusal, busy(text) what takes time, "" when it is over.
+    """say(text) tells the users of a refusal. busy(text): what takes time from now on, "" when it is over.
 
     scenario: the one in force; scenes_begun: how many others began since the start. moment_ns: the time of the past
     that is looked at, None while the present is.
     """
 
-    def __init__(
-        self, live: LiveSimulation, say: Callable[[str], None], busy: Callable[[str], None] = lambda _: None
-    ) -> None:
+    def __init__(self, live: LiveSimulation, say: Callable[[str], None]) -> None:
         self.live = live
         self.memory = RunMemory(live.name)
-        self._say = say
-        self._busy = busy
+        self.say = say
+        self._doing, self._since_s = "", 0.0
         self._worker = ThreadPoolExecutor(1, "page")
         self.scenes_begun = 0
         self._past: RecordedSession | None = None
@@ -139,6 +141,17 @@ class Flight:
         """Whether simulated time stands."""
         return self.live.paused
 
+    def busy(self, doing: str) -> None:
+        """The page is busy with this, or, where it is empty, no longer."""
+        if doing != self._doing:
+            self._doing, self._since_s = doing, time.monotonic()
+
+    @property
+    def waited_for(self) -> str:
+        """What takes time, and for how long it has; empty for nothing."""
+        since_s = time.monotonic() - self._since_s
+        return f"{self._doing} … {since_s:.0f} s" if self._doing and since_s > SOON_S else ""
+
     def close(self) -> None:
         """No more requests."""
         self._worker.shutdown(wait=False, cancel_futures=True)
@@ -150,17 +163,17 @@ class Flight:
         try:
             return await asyncio.get_running_loop().run_in_executor(self._worker, self._work, doing, function)
         except InputError as error:
-            self._say(f"Refused: {error}")
+            self.say(f"Refused: {error}")
             return None
 
     def _work(self, doing: str, function: Callable[[], Result]) -> Result:
         """On the worker thread: who has asked for something else meanwhile sees what is being waited for."""
-        self._busy(doing)
+        self.busy(doing)
         try:
-            with notify_when_compiling(lambda: self._busy(COMPILING)):
+            with notify_when_compiling(lambda: self.busy(COMPILING)):
                 return function()
         finally:
-            self._busy("")
+            self.busy("")
 
     def _soon(self, asked: Awaitable[object]) -> None:
         task = asyncio.ensure_future(asked)
@@ -258,7 +271,7 @@ class Flight:
             try:
                 past = self.memory.session()
             except InputError as error:
-                self._say(str(error))
+                self.say(str(error))
                 return
             if not len(past.times):
                 return

@@ -46,13 +46,11 @@ from .drawing import ViserBackend
 from .flight import Flight
 from .lesson_course import Course
 from .lesson_panel import LessonPanel
-from .panel import ALWAYS, AT_FIRST, CENTRE_OF_MASS, PARTS, ForcesTab, ShowTab
+from .panel import ALWAYS, AT_FIRST, CENTRE_OF_MASS, PARTS, ForcesTab, SessionTab, ShowTab, TimeBar, motion_words
 from .pointer import DrawnPose, DrawnPoses, Pointer, Tools, suggested_force
 from .readouts import Readings, ReadoutTab
 from .room import Room
 from .server import ClassMode
-from .session_tab import SessionTab
-from .time_bar import Announcements, TimeBar, motion_words
 
 FRAME_S = 0.02
 """[s] Between two looks at what the simulation has told."""
@@ -124,8 +122,7 @@ class Page:
         self._begins_anew = anew
         self.server = server
         self.live = live
-        self.announcements = Announcements(server)
-        self.flight = Flight(live, self.announcements.say, self.announcements.busy)
+        self.flight = Flight(live, self._say)
         live.add_observer(self.flight.memory)
         self._told = Told()
         self._listening = False
@@ -160,9 +157,14 @@ class Page:
         server.on_client_connect(self._on_connect)
         server.on_client_disconnect(self._on_disconnect)
 
+    def _say(self, text: str) -> None:
+        """A line in the corner of all browsers."""
+        for client in self.server.get_clients().values():
+            client.add_notification("Workbench", text, auto_close_seconds=10.0)
+
     def _make_panel(self) -> None:
-        gui, flight, say = self.server.gui, self.flight, self.announcements.say
-        self.controls = Controls(gui, flight.set, say)
+        gui, flight = self.server.gui, self.flight
+        self.controls = Controls(gui, flight)
         self.bar = TimeBar(gui, self.controls, flight)
         self._class_mode = ClassMode(self.server)
         tabs = gui.add_tab_group()
@@ -170,7 +172,7 @@ class Page:
         self.body_tab = BodyTab(gui, tabs, self.controls, flight, self._fly)
         self.forces_tab = ForcesTab(gui, tabs, self.controls, self.tools, flight)
         self.readout_tab = ReadoutTab(gui, tabs, self.readings)
-        self.session_tab = SessionTab(gui, tabs, flight, say)
+        self.session_tab = SessionTab(gui, tabs, flight)
         self.show_tab = ShowTab(
             gui,
             tabs,
@@ -243,7 +245,7 @@ class Page:
         self.readout_tab.draw(now_s)
         failure = self.live.loop.simulation.failure
         words = "the past" if looking else f"⚠ {failure}" if failure else self._words()
-        self.bar.show(self.state.time_ns * 1e-9, self.announcements.waited_for or words)
+        self.bar.show(self.state.time_ns * 1e-9, self.flight.waited_for or words)
         self.session_tab.draw()
 
     def _words(self) -> str:
@@ -299,7 +301,7 @@ class Page:
                 if string is not None and self.pointer.dragging:
                     self.lessons.did("drag")
             case Refused(message=message):
-                self.announcements.say(f"Refused: {message}")
+                self.flight.say(f"Refused: {message}")
                 self.controls.show_again()
 
     def _body_changed(self) -> None:

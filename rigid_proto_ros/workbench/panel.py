@@ -1,17 +1,40 @@
 # SPDX-License-Identifier: MIT
-"""The tabs of forces and of what is shown."""
+"""The bar that stays in sight, and the tabs of forces, of the run since the last reset, and of what is shown."""
 
 from __future__ import annotations
 
+import asyncio
+import io
+import tempfile
+import zipfile
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 import viser
 
+from ..base.errors import InputError
+from ..export.flight_record import FlightRecord, frames, source_of_session
+from ..export.gltf import write_gltf
+from ..export.tracks import tracks_of
 from ..picture import style
+from ..scene.scenario import Scenario
+from ..session.as_script import script_of_session
+from ..session.replay import play
 from .controls import Controls, log_slider, on_slider
 from .flight import Flight
 from .pointer import Tools
+from .server import MARK
+
+SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0}
+"""Simulated seconds per second, as the bar names them."""
+
+PAUSE, PLAY, STEP, RESET = "Pause", "Play", "Step", "Reset"
+
+REWIND_STEP_S = 0.05
+"""[s] Of the rewind slider."""
+
+RATES = ("24", "25", "30", "60")
 
 GRAVITIES = {"off": [0.0, 0.0, 0.0], "Earth's": [0.0, 0.0, -9.81], "Moon's": [0.0, 0.0, -1.62]}
 
@@ -36,6 +59,80 @@ ALWAYS = (style.STRING, style.HAND, style.LOADS, style.GHOST_MESH)
 AT_FIRST = ("Angular momentum L",)
 
 
+class TimeBar:
+    """Shared by all pages."""
+
+    def __init__(self, gui: viser.GuiApi, controls: Controls, flight: Flight) -> None:
+        self._flight = flight
+        with gui.add_folder("Time"):
+            self._line = gui.add_html("")
+            play = gui.add_button_group("Simulation", (PAUSE, STEP, RESET))
+            self.speed = gui.add_dropdown(
+                "Speed", tuple(SPEEDS), initial_value="1", hint="Simulated seconds per second (real_time_factor)"
+            )
+        self._play: Any = play
+
+        @play.on_click
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            if play.value == RESET:
+                flight.reset()
+            elif play.value == STEP:
+                flight.look_at_present()
+                if flight.paused:
+                    flight.step()
+                else:
+                    flight.pause(True)
+            else:
+                await self.play_or_pause()
+
+        def shown(values: Any) -> str:
+            return next((name for name, f in SPEEDS.items() if f == values["real_time_factor"]), self.speed.value)
+
+        controls.bind(self.speed, shown, lambda name: {"real_time_factor": SPEEDS[name]})
+
+        # Browsers send no key that is typed into an input.
+        @gui.add_command("Pause or resume; after rewinding, continue from there", hotkey="space").on_trigger
+        async def _(_: Any) -> None:
+            await self.play_or_pause()
+
+    async def play_or_pause(self) -> None:
+        """Pause or go on; from the past that is looked at, go on from there."""
+        if self._flight.moment_ns is not None:
+            await self._flight.go_on_from_here()
+        else:
+            self._flight.pause(not self._flight.paused)
+
+    def show(self, time_s: float, words: str) -> None:
+        """The time that is shown, and what the body is doing."""
+        flight = self._flight
+        label = PLAY if flight.paused or flight.moment_ns is not None else PAUSE
+        if self._play.options[0] != label:
+            self._play.options = (label, STEP, RESET)
+        content = f'<div class="{MARK}"><b>{time_s:.2f} s</b> <span>{words}</span></div>'
+        if self._line.content != content:
+            self._line.content = content
+
+
+def motion_words(scenario: Scenario, loads: int, tied: bool, at_rest: bool, paused: bool) -> str:
+    """What the body does. loads: how many act; tied: to a string."""
+    setup = scenario.setup
+    if paused:
+        return "paused"
+    if loads:
+        words = "a force acts" if loads == 1 else f"{loads} forces act"
+    elif tied:
+        words = "string attached"
+    elif at_rest:
+        words = "at rest"
+    elif setup.gravity.any():
+        words = "free fall"
+    else:
+        words = "free rotation"
+        if setup.integrator.name in ("auto", "free_body") and not (setup.linear_damping or setup.angular_damping):
+            words += ", exact"
+    return words if setup.gyroscopic else f"{words}, without ω × Iω"
+
+
 class ForcesTab:
     """What acts on the body: the hand's force and string, the start, gravity, and any parameter by its name."""
 
@@ -54,6 +151,7 @@ class ForcesTab:
                 gravity = gui.add_button_group("Gravity is", tuple(GRAVITIES))
             with gui.add_folder("Any parameter"):
                 controls.any_parameter()
+
         self._slider = force
 
         @force.on_update
@@ -73,6 +171,101 @@ class ForcesTab:
         place = on_slider(tools.force / tools.usual_force, FORCE_DECADES)
         if self._slider.value != place:
             self._slider.value = place
+
+
+class SessionTab:
+    """The tab of what is kept of the run since the last reset."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        tabs: viser.GuiTabGroupHandle,
+        flight: Flight,
+    ) -> None:
+        self._flight = flight
+        with tabs.add_tab("Record"):
+            with gui.add_folder("Rewind"):
+                hint = "Time stands while the past is shown"
+                self._back: Any = gui.add_slider("Seconds back", 0.0, 10.0, REWIND_STEP_S, 0.0, hint=hint)
+                self._go_on = gui.add_button("Go on from here", disabled=True, hint="With another future")
+            with gui.add_folder("Take, since the last reset"):
+                hint = "What was done by hand; reproduces the motion bit for bit (.zip)"
+                save = gui.add_button("Save scene and script", hint=hint)
+                rate: Any = gui.add_dropdown("Frames a second", RATES, initial_value="30")
+                export = gui.add_button("Save as glTF", hint="For Blender and others (.glb)")
+                self._saved = gui.add_markdown("")
+
+        @self._back.on_update
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                seconds = float(self._back.value)
+                if seconds <= 0.0:
+                    flight.look_at_present()
+                else:
+                    flight.look_at(flight.reach_s[1] - seconds)
+
+        @self._go_on.on_click
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            await flight.go_on_from_here()
+
+        @save.on_click
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                await self._saving(event.client, "take.zip", self._take)
+
+        @export.on_click
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                await self._saving(event.client, "take.glb", lambda: self._motion(float(rate.value)))
+
+    def draw(self) -> None:
+        """How far back one can go grows while the body flies."""
+        flight = self._flight
+        first_s, last_s = flight.reach_s
+        looking = flight.moment_ns is not None
+        if not looking:
+            available = max(10.0, 10.0 * -(-(last_s - first_s) // 10.0))
+            if self._back.max != available:
+                self._back.max = available
+        back_s = last_s - (flight.moment_ns or 0) * 1e-9 if looking else 0.0
+        # What a hand has just set may be more than there is; only what differs by a step is written over it.
+        if abs(self._back.value - back_s) > 0.5 * REWIND_STEP_S:
+            self._back.value = min(back_s, self._back.max)
+        self._go_on.disabled = not looking
+
+    async def _saving(self, client: viser.ClientHandle, name: str, make: Callable[[], tuple[bytes, str]]) -> None:
+        try:
+            content, note = await asyncio.to_thread(make)
+        except InputError as error:
+            self._flight.say(str(error))
+            return
+        client.send_file_download(name, content, save_immediately=True)
+        self._saved.content = note
+
+    def _take(self) -> tuple[bytes, str]:
+        saved = script_of_session(self._flight.memory.session())
+        scene, packed = saved.scene, io.BytesIO()
+        mesh = self._flight.scenario.body_mesh
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+            if mesh is not None and mesh.mesh.path == self._flight.scenario.parameters.mesh:
+                # Beside the scene, which names it: the file itself may be gone by then.
+                name = Path(mesh.mesh.path).name
+                archive.writestr(name, Path(mesh.mesh.path).read_bytes())
+                scene = scene.replace(mesh.mesh.path, name)
+            archive.writestr("scene.yaml", scene)
+            archive.writestr("script.yaml", saved.script)
+        note = f"{len(saved.entries)} commands. Unpack, then:\n\n`rigid_proto simulate scene.yaml --script script.yaml`"
+        return packed.getvalue(), note
+
+    def _motion(self, rate: float) -> tuple[bytes, str]:
+        session = self._flight.memory.session()
+        record = FlightRecord()
+        play(session, record)
+        made, report = frames(record, source_of_session(session), rate)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "take.glb"
+            write_gltf(str(file), made, tracks_of(made))
+            return file.read_bytes(), report
 
 
 class ShowTab:
