@@ -46,6 +46,13 @@ def test_a_poked_session_gives_back_the_body_that_was_flown(flight: tuple, capsy
     assert found["inertia"]["izz"]["value"] == pytest.approx(truth["inertia"][2][2], rel=1e-6)
 
 
+def test_two_sessions_of_one_body_are_fitted_together(flight: tuple, capsys: pytest.CaptureFixture) -> None:
+    one, two = (_json(capsys, *[str(flight[0])] * count) for count in (1, 2))
+    assert two["mass"]["value"] == pytest.approx(one["mass"]["value"], rel=1e-6)
+    # The same noise twice: half the variance.
+    assert two["mass"]["sd"] == pytest.approx(one["mass"]["sd"] / 2.0**0.5, rel=0.05)
+
+
 def test_before_the_poke_its_mass_is_no_number(flight: tuple, capsys: pytest.CaptureFixture) -> None:
     found = _json(capsys, str(flight[0]), "--to", "0.5")
     assert found["mass"] is None

@@ -3,8 +3,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
+import pytest
 from flights import SECOND
 
+from rigid_proto_ros.base.errors import MeshError
+from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import parse_script
@@ -47,3 +53,36 @@ def test_a_change_refused_when_it_acts_leaves_the_scene_as_it_is_for_those_after
 def test_a_step_is_rounded_to_the_nearest_nanosecond() -> None:
     for step_s, step_ns in ((1e-3 + 4e-10, 1_000_000), (1e-3 + 6e-10, 1_000_001), (2e-9, 2), (1.4e-9, 1)):
         assert make_scenario({"step": step_s}).setup.step_ns == step_ns
+
+
+def test_contacts_move_with_a_mesh_that_is_scaled_in_flight() -> None:
+    values = {"mesh": "hammer", "mass": 1.0, "contacts.grip": [0.0, 0.0, 0.0]}
+    push = "at: grip, force: [1.0, 0.0, 0.0], duration: 1.0e-6"
+    flown = []
+    for scale in (1.0, 2.0):
+        script = f"- {{t: 0.0, set: {{scale: [{scale}]}}}}\n- {{t: 0.5, {push}}}"
+        run = OfflineRun(make_scenario(values), parse_script(script))
+        assert run.advance(SECOND)
+        flown.append(run.simulation.state.angular_velocity)
+    # The same force on twice the arm turns four times the inertia: half the spin.
+    np.testing.assert_allclose(flown[1], 0.5 * flown[0], rtol=1e-9, atol=1e-9 * np.abs(flown[0]).max())
+
+
+def test_displacements_are_measured_by_half_the_diagonal_as_scaled_and_by_1_m_without_a_mesh() -> None:
+    hammer = load_mesh("hammer")
+    diagonal = np.linalg.norm(np.ptp(hammer.vertices, axis=0) * 2.0)
+    assert make_scenario({"mesh": "hammer", "scale": 2.0}).setup.length == pytest.approx(0.5 * diagonal, rel=1e-14)
+    explicit = {"mesh": "", "inertia_model": "explicit"}
+    assert make_scenario(explicit).setup.length == 1.0
+
+
+def test_a_scene_takes_an_open_mesh_repaired_or_its_hull_or_box(tmp_path: Path) -> None:
+    box = tmp_path / "open.obj"
+    lines = [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 2) for z in (0, 3)]
+    quads = ["1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5"]
+    box.write_text("\n".join([*lines, *(f"f {quad}" for quad in quads)]))
+    with pytest.raises(MeshError, match="open"):
+        make_scenario({"mesh": str(box)})
+    for choice in ({"mesh_repair": True}, {"mesh_fallback": "hull"}, {"mesh_fallback": "box"}):
+        body = make_scenario({"mesh": str(box), **choice}).setup.body
+        assert body.mass == pytest.approx(6000.0, rel=1e-12), choice
