@@ -7,19 +7,20 @@ topic with its quality of service, messages logged at the time they were receive
 
 from __future__ import annotations
 
-import os
-import threading
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_client import LATCHED, TOPICS, RosClient
 
-from rigid_proto_ros.session.messages import DEFINITIONS, TOPICS
+from rigid_proto_ros.session.messages import DEFINITIONS
+from rigid_proto_ros.session.messages import TOPICS as WRITTEN
 
 ODOMETRY = "nav_msgs/msg/Odometry"
-RECORDED = {**TOPICS, "odom": ODOMETRY}
+RECORDED = {**WRITTEN, "odom": ODOMETRY}
 DEFINED = {**DEFINITIONS, ODOMETRY: "std_msgs/Header header\nstring child_frame_id\n"}
 """Odometry's own definition is longer; nothing here decodes it by its schema."""
 
@@ -34,74 +35,29 @@ class Logged:
     data: bytes
 
 
-class BagRecorder:
+class BagRecorder(RosClient):
     """Subscribes to a node's topics before the node is there, and keeps every message's bytes."""
 
     def __init__(self, environment: dict[str, str], name: str = "rigid_body", topics: Iterable[str] = RECORDED) -> None:
-        import rclpy
-        from geometry_msgs.msg import InertiaStamped, PoseStamped, TwistStamped, WrenchStamped
-        from nav_msgs.msg import Odometry
-        from rclpy.executors import SingleThreadedExecutor
-        from rclpy.qos import DurabilityPolicy, QoSProfile
-        from rclpy.signals import SignalHandlerOptions
-        from std_msgs.msg import String
-
-        types = {
-            "scene": String,
-            "events": String,
-            "pose": PoseStamped,
-            "twist": TwistStamped,
-            "odom": Odometry,
-            "applied": WrenchStamped,
-            "inertia": InertiaStamped,
-        }
-        before = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
-        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = environment["ROS_AUTOMATIC_DISCOVERY_RANGE"]
-        try:
-            self._context = rclpy.Context()
-            domain = int(environment["ROS_DOMAIN_ID"])
-            no_handlers = SignalHandlerOptions.NO
-            rclpy.init(args=[], context=self._context, domain_id=domain, signal_handler_options=no_handlers)
-            self._node = rclpy.create_node("bag_recorder", context=self._context)
-        finally:
-            if before is None:
-                del os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"]
-            else:
-                os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = before
+        super().__init__(environment, f"/{name}")
         self.messages: list[Logged] = []
         for topic in topics:
-            durability = (
-                DurabilityPolicy.TRANSIENT_LOCAL if topic in ("scene", "inertia") else DurabilityPolicy.VOLATILE
+            latched = DurabilityPolicy.TRANSIENT_LOCAL if topic in LATCHED else DurabilityPolicy.VOLATILE
+            self.own.create_subscription(
+                TOPICS[topic], self.name(topic), self._keep(topic), QoSProfile(depth=1000, durability=latched), raw=True
             )
-            profile = QoSProfile(depth=1000, durability=durability)
-            self._node.create_subscription(
-                types[topic], f"/{name}/{topic}", self._keep(f"/{name}/{topic}", RECORDED[topic]), profile, raw=True
-            )
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._spin, daemon=True)
-        self._thread.start()
 
-    def _keep(self, topic: str, message_type: str):
-        return lambda data: self.messages.append(Logged(topic, message_type, time.time_ns(), bytes(data)))
+    def _keep(self, topic: str):
+        name, message_type = self.name(topic), RECORDED[topic]
+        return lambda data: self.messages.append(Logged(name, message_type, time.time_ns(), bytes(data)))
 
-    def _spin(self) -> None:
-        while not self._stop.is_set():
-            self._executor.spin_once(timeout_sec=0.05)
-        # What is here already and hasn't been taken.
+    def finish(self) -> list[Logged]:
+        """After the node's end: take what is here already, stop, and return what was received."""
         taken = -1
         while taken != len(self.messages):
             taken = len(self.messages)
-            self._executor.spin_once(timeout_sec=0.2)
-
-    def close(self) -> list[Logged]:
-        """Stop, and return what was received."""
-        self._stop.set()
-        self._thread.join()
-        self._executor.shutdown()
-        self._node.destroy_node()
-        self._context.try_shutdown()
+            time.sleep(0.2)
+        self.close()
         return self.messages
 
 

@@ -16,6 +16,8 @@ settings.register_profile("the same examples every time", derandomize=True, dead
 settings.register_profile("new examples every time", deadline=None)
 settings.load_profile(f"{os.environ.get('RIGID_PROTO_EXAMPLES', 'the same')} examples every time")
 
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
 NEEDED = {"rerun": ["cli/test_demo.py", "rerun_view/test_*.py"]}
 """Files that test an extra; without its package (apt's numpy is too old for Rerun's) the rest of the suite runs all the same."""
 
@@ -90,7 +92,7 @@ def ros_domain_id() -> Iterator[int]:
 @pytest.fixture(scope="session")
 def ros_environment(ros_domain_id: int) -> dict[str, str]:
     """Environment for child processes of this interpreter: own domain, nothing leaves the machine."""
-    return {**os.environ, "ROS_DOMAIN_ID": str(ros_domain_id), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    return {**os.environ, "ROS_DOMAIN_ID": str(ros_domain_id)}
 
 
 @pytest.fixture(scope="session")
@@ -109,6 +111,6 @@ def rig(commanded):
     """The shared node with its first parameters in force again, reset and running, and nothing heard yet."""
     commanded.restore()
     yield commanded
-    assert commanded.node_process.alive, commanded.node_process.log.read_text()
+    assert commanded.node_process.process.poll() is None, commanded.node_process.errors
     # Flying on, perhaps at the test's own rates, node and client would take half a core from all tests to come.
     commanded.pause(True)

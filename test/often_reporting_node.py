@@ -3,9 +3,11 @@
 
 import sys
 
-from rigid_proto_ros.ros import diagnostics
-from rigid_proto_ros.ros.main import main
+REPORT_S = 0.1
 
 if __name__ == "__main__":
-    diagnostics.REPORT_S = 0.1
+    from rigid_proto_ros.ros import diagnostics
+    from rigid_proto_ros.ros.main import main
+
+    diagnostics.REPORT_S = REPORT_S
     sys.exit(main())

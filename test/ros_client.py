@@ -1,68 +1,64 @@
 # SPDX-License-Identifier: MIT
-"""A ROS client in a process of its own, told what to do in lines of JSON: {"do": name, ...} in, {"done": result} out.
-
-Messages and requests go in and out as nested dicts and lists, in the fields of their types.
+"""A ROS client in the test's own process, with a context, node and thread of its own. Messages go in and come out as nested
+dicts and lists, in the fields of their types.
 """
 
+from __future__ import annotations
+
+import itertools
 import json
-import os
-import sys
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import InertiaStamped, PointStamped, PoseStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
-from rcl_interfaces.srv import (
-    DescribeParameters,
-    GetParameters,
-    ListParameters,
-    SetParameters,
-    SetParametersAtomically,
-)
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters, SetParametersAtomically
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
+from rclpy.signals import SignalHandlerOptions
+from ros_process import READY_S
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
-WAIT_S = 180.0
-"""Longer than a first start with all kernels to compile on a loaded machine."""
-
-TYPES = {
-    t.__name__: t
-    for t in (
-        *(
-            DiagnosticArray,
-            InertiaStamped,
-            PointStamped,
-            PoseStamped,
-            TwistStamped,
-            WrenchStamped,
-            Odometry,
-            Clock,
-            Imu,
-        ),
-        *(
-            Float64MultiArray,
-            String,
-            SetBool,
-            Trigger,
-            DescribeParameters,
-            GetParameters,
-            ListParameters,
-            SetParameters,
-        ),
-        SetParametersAtomically,
-    )
+COMMANDS = {
+    "wrench": WrenchStamped,
+    "poke": WrenchStamped,
+    "string/target": PointStamped,
+    "string/attach": PointStamped,
+    "inertia/set": InertiaStamped,
+    "schedule": String,
+    "thrusters": Float64MultiArray,
 }
+STATES = {"pose": PoseStamped, "twist": TwistStamped}
+LATCHED = {"inertia": InertiaStamped, "scene": String}
+TOPICS = {
+    **COMMANDS,
+    **STATES,
+    **LATCHED,
+    "odom": Odometry,
+    "imu": Imu,
+    "applied": WrenchStamped,
+    "events": String,
+    "/diagnostics": DiagnosticArray,
+    "/clock": Clock,
+}
+"""Types by the topics' names."""
 
 
-def plain(value):
+def plain(value: Any) -> Any:
     """A message as dicts, lists and numbers."""
     if hasattr(value, "get_fields_and_field_types"):
         return {name: plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
@@ -73,12 +69,7 @@ def plain(value):
     return [plain(v) for v in value] if isinstance(value, (list, tuple)) else value
 
 
-def stamp_ns(message) -> int:
-    """The header's stamp [ns]."""
-    return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-
-
-def filled(message, content: dict):
+def filled(message: Any, content: dict) -> Any:
     """A message with these fields set."""
     for name, value in content.items():
         if isinstance(value, dict):
@@ -88,82 +79,174 @@ def filled(message, content: dict):
     return message
 
 
-def profile(depth=5000, latched=False, best_effort=False) -> QoSProfile:
-    return QoSProfile(
-        depth=depth,
-        history=HistoryPolicy.KEEP_LAST,
-        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )
+def stamp_ns(message: Any) -> int:
+    """The header's stamp [ns], of a message or of its dict."""
+    if not isinstance(message, dict):
+        return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+    stamp = message["header"]["stamp"]
+    return stamp["sec"] * 1_000_000_000 + stamp["nanosec"]
 
 
-class Client:
-    """What can be done; each method is a ``do``."""
+class RosClient:
+    """Short ways to talk to one node. Topics and services are names of that node's own, or begin with a slash."""
 
-    def __init__(self) -> None:
-        rclpy.init()
-        self.node = rclpy.create_node("tester", start_parameter_services=False, enable_rosout=False)
-        self.received: dict[str, list] = {}
-        self.subscriptions: dict = {}
-        self.publishers = {}
-        self.clients = {}
-        self.executor = SingleThreadedExecutor()
-        self.executor.add_node(self.node)
-        threading.Thread(target=self.executor.spin, daemon=True).start()
-
-    def listen(self, topic, type, wait=True, **qos):
-        """Collect what comes on a topic, in order; again, and a new subscription takes the place of the one before."""
-        messages = self.received.setdefault(topic, [])
-        if topic in self.subscriptions:
-            self.node.destroy_subscription(self.subscriptions[topic])
-        subscription = self.subscriptions[topic] = self.node.create_subscription(
-            TYPES[type], topic, messages.append, profile(**qos)
+    def __init__(self, environment: dict[str, str], node: str = "/rigid_body") -> None:
+        self.environment, self.node = environment, node
+        self._context = rclpy.Context()
+        domain, no_handlers = int(environment["ROS_DOMAIN_ID"]), SignalHandlerOptions.NO
+        rclpy.init(args=[], context=self._context, domain_id=domain, signal_handler_options=no_handlers)
+        self.own = rclpy.create_node(
+            "tester", context=self._context, start_parameter_services=False, enable_rosout=False
         )
-        if wait:
-            _until(lambda: subscription.get_publisher_count(), f"a publisher of {topic}")
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.own)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._spin, name="client", daemon=True)
+        self._thread.start()
+        self._received: dict[str, list] = {}
+        self._subscriptions: dict[str, Any] = {}
+        self._publishers: dict[str, Any] = {}
+        self._clients: dict[str, Any] = {}
 
-    def heard(self, topic, last=0, stamp=None, after=None):
-        """What has come on a topic; only the ``last`` ones, those with this stamp [ns] or one after it, if that is given."""
-        messages = list(self.received[topic])
+    def _spin(self) -> None:
+        while not self._ended.is_set():
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._executor.shutdown()
+        self.own.destroy_node()
+        self._context.try_shutdown()
+
+    def name(self, topic: str) -> str:
+        return topic if topic.startswith("/") else f"{self.node}/{topic}"
+
+    def until(self, condition: Callable[[], Any], what: str, pause_s: float = 0.02) -> Any:
+        """Wait for a condition; returns its value."""
+        deadline = time.monotonic() + READY_S
+        while not (found := condition()):
+            assert time.monotonic() < deadline, f"no {what} within {READY_S} s"
+            time.sleep(pause_s)
+        return found
+
+    # Hearing
+
+    def meet(self) -> None:
+        """Hear the node's states and reports from now on, and be ready to command it."""
+        self.listen(*STATES, "/diagnostics")
+        self.advertise(*(topic for topic in COMMANDS if topic != "thrusters"))
+
+    def listen(self, *topics: str, wait: bool = True, best_effort: bool = False) -> None:
+        """Collect what comes, in order; again, and a new subscription takes the place of the one before."""
+        for topic in topics:
+            name = self.name(topic)
+            messages = self._received.setdefault(name, [])
+            if name in self._subscriptions:
+                self.own.destroy_subscription(self._subscriptions[name])
+            profile = _profile(latched=topic in LATCHED, best_effort=best_effort)
+            subscription = self.own.create_subscription(TOPICS[topic], name, messages.append, profile)
+            self._subscriptions[name] = subscription
+            if wait:
+                self.until(subscription.get_publisher_count, f"publisher of {name}")
+
+    def heard(self, topic: str, last: int = 0, stamp: int | None = None, after: int | None = None) -> list[dict]:
+        """What has come; only the ``last`` ones, those with this stamp [ns] or one after it, if that is given."""
+        messages = list(self._received[self.name(topic)])
         if stamp is not None:
             messages = [m for m in messages if stamp_ns(m) == stamp]
         if after is not None:
             messages = [m for m in messages if stamp_ns(m) > after]
         return [plain(m) for m in (messages[-last:] if last else messages)]
 
-    def forget(self, topics):
-        """Drop what has come on some topics."""
+    def heard_count(self, topic: str) -> int:
+        return len(self._received[self.name(topic)])
+
+    def forget(self, *topics: str) -> None:
+        """Drop what was heard."""
         for topic in topics:
-            self.received[topic].clear()
+            self._received[self.name(topic)].clear()
 
-    def stamps(self, topic):
-        """Stamps of what has come on a topic [ns]."""
-        return [stamp_ns(m) for m in list(self.received[topic])]
+    def events(self, kind: str = "") -> list[dict]:
+        """Lines of the event log that were heard, of one kind or all."""
+        found = [json.loads(message["data"]) for message in self.heard("events")]
+        return [event for event in found if kind in ("", event["kind"])]
 
-    def heard_count(self, topic):
-        """How many messages have come on a topic."""
-        return len(self.received[topic])
+    def newest_ns(self, topic: str) -> int:
+        """The newest message's stamp [ns], -1 without one."""
+        messages = self._received[self.name(topic)]
+        return stamp_ns(messages[-1]) if messages else -1
 
-    def advertise(self, topic, type, wait=True, **qos):
-        """A publisher, matched with the node's subscription; ``topic#2`` is another one of the same topic."""
-        publisher = self.node.create_publisher(TYPES[type], topic.partition("#")[0], profile(**qos))
-        self.publishers[topic] = (publisher, TYPES[type])
-        if wait:
-            _until(lambda: publisher.get_subscription_count(), f"a subscription of {topic}")
+    def now_ns(self) -> int:
+        """The stamp of the newest pose, once there is one."""
+        self.until(lambda: self.newest_ns("pose") >= 0, "state")
+        return self.newest_ns("pose")
 
-    def publish(self, topic, messages, rate=0.0):
-        """Messages in order; rate per second, 0 as fast as it goes."""
-        publisher, message_type = self.publishers[topic]
+    def fly_until(self, time_ns: int) -> None:
+        """Wait until the newest states heard have reached ``time_ns``."""
+        self.until(lambda: all(self.newest_ns(topic) >= time_ns for topic in STATES), f"states at {time_ns} ns")
+
+    def all_diagnostics(self, last: int = 0, after: int | None = None) -> list[dict]:
+        """Reports of the node so far, among the ``last`` or those made after a time of the system's clock [ns].
+
+        Each as keys and values, with ``level``, ``message``, ``name`` and ``stamp_ns``.
+        """
+        reports = []
+        for message in self.heard("/diagnostics", last=last, after=after):
+            for status in message["status"]:
+                if status["name"] == f"{self.node}: simulation":
+                    values = {entry["key"]: entry["value"] for entry in status["values"]}
+                    said = {k: status[k] for k in ("level", "message", "name")}
+                    reports.append({**values, **said, "stamp_ns": stamp_ns(message)})
+        return reports
+
+    def diagnostics(self) -> dict:
+        """A report of what is so after this call began: it is stamped before its values are read."""
+        asked_ns = time.time_ns()
+        return self.until(lambda: self.all_diagnostics(after=asked_ns), "diagnostics")[0]
+
+    def until_received(self, count: int, topic: str = "commands") -> dict:
+        """The first report that has received so many commands since the counters were read."""
+
+        def covered():
+            reports = self.all_diagnostics(last=5)
+            return reports and int(reports[-1][f"{topic}_received"]) >= count and reports[-1]
+
+        return self.until(covered, f"{count} {topic} received")
+
+    # Commanding
+
+    def advertise(self, *topics: str, wait: bool = True, depth: int = 5000, best_effort: bool = False) -> None:
+        """Publishers, matched with the node's subscriptions; ``topic#2`` is another one of the same topic."""
+        for topic in topics:
+            own = topic.partition("#")[0]
+            message_type = TOPICS.get(own, WrenchStamped)
+            publisher = self.own.create_publisher(
+                message_type, self.name(own), _profile(depth, best_effort=best_effort)
+            )
+            self._publishers[topic] = publisher
+            if wait:
+                self.until(publisher.get_subscription_count, f"subscription of {topic}")
+
+    def publish(self, topic: str, *messages: dict | bytes, rate: float = 0.0) -> None:
+        """Messages in order, as dicts or serialized; rate per second, 0 as fast as it goes."""
+        publisher = self._publishers[topic]
         start = time.monotonic()
         for k, content in enumerate(messages):
             if rate:
                 time.sleep(max(0.0, start + k / rate - time.monotonic()))
-            publisher.publish(filled(message_type(), content))
+            publisher.publish(content if isinstance(content, bytes) else filled(publisher.msg_type(), content))
 
-    def repeat(self, topics, content, count, rate=0.0):
+    def repeat(self, topics: list[str], content: dict, count: int, rate: float = 0.0) -> None:
         """One message ``count`` times by each of these publishers, in turn; rate per second, 0 as fast as it goes."""
-        publishers = [self.publishers[topic][0] for topic in topics]
-        message = serialize_message(filled(self.publishers[topics[0]][1](), content))
+        publishers = [self._publishers[topic] for topic in topics]
+        message = serialize_message(filled(publishers[0].msg_type(), content))
         start = time.monotonic()
         for k in range(count):
             if rate and k % 10 == 0:
@@ -171,120 +254,72 @@ class Client:
             for publisher in publishers:
                 publisher.publish(message)
 
-    def publish_bytes(self, topic, messages):
-        """Serialized messages, in hex, as they are."""
-        publisher, _ = self.publishers[topic]
-        for text in messages:
-            publisher.publish(bytes.fromhex(text))
-
-    def acknowledged(self, topic):
+    def acknowledged(self, *topics: str) -> None:
         """Wait until all that was published has been received by everybody."""
-        assert self.publishers[topic][0].wait_for_all_acked(rclpy.duration.Duration(seconds=WAIT_S))
+        for topic in topics:
+            assert self._publishers[topic].wait_for_all_acked(Duration(seconds=READY_S))
 
-    def call(self, service, type, request=None, timeout=WAIT_S):
+    def schedule(self, *entries: str) -> None:
+        self.publish("schedule", *({"data": entry} for entry in entries))
+
+    def call(self, service: str, service_type: Any, pause_s: float = 0.002, **request: Any) -> Any:
         """A service's answer."""
-        if service not in self.clients:
-            self.clients[service] = self.node.create_client(TYPES[type], service)
-            _until(self.clients[service].service_is_ready, f"the service {service}")
-        future = self.clients[service].call_async(filled(TYPES[type].Request(), request or {}))
-        _until(future.done, f"an answer of {service}", timeout)
-        return plain(future.result())
+        name = self.name(service)
+        if name not in self._clients:
+            self._clients[name] = self.own.create_client(service_type, name)
+            self.until(self._clients[name].service_is_ready, f"service {name}")
+        future = self._clients[name].call_async(service_type.Request(**request))
+        self.until(future.done, f"answer of {name}", pause_s)
+        return future.result()
 
-    def lockstep_by_wrench(self, node, count, forces):
-        """``count`` times: publish a wrench and wait for a twist of a later time. Returns the stamps of the twists [ns] and
-        the seconds that it took.
-        """
-        publisher, _ = self.publishers[f"{node}/wrench"]
-        message = WrenchStamped()
-        twists = self.received[f"{node}/twist"]
-        stamps, began = [stamp_ns(twists[-1])], time.monotonic()
-        for k in range(count):
-            message.wrench.force.x = forces[k % len(forces)]
-            publisher.publish(message)
-            # While paused the present state comes again ten times a second.
-            _until(lambda: stamp_ns(twists[-1]) > stamps[-1], "a later twist", pause=0.0)
-            stamps.append(stamp_ns(twists[-1]))
-        return {"stamps": stamps, "seconds": time.monotonic() - began}
+    def trigger(self, service: str) -> dict:
+        return plain(self.call(service, Trigger))
 
-    def lockstep(self, node, count, push):
-        """``count`` times: publish an impulse that means now, call step, and wait for the twist of its end, after which the
-        next goes out. Returns the stamps of the twists [ns] and the answers.
-        """
-        publisher, _ = self.publishers[f"{node}/poke"]
-        message = WrenchStamped()
-        message.header.frame_id = "world;impulse"
-        message.wrench.force.x = push
-        service = self.node.create_client(Trigger, f"{node}/step")
-        _until(service.service_is_ready, f"the service {node}/step")
-        twists = self.received[f"{node}/twist"]
-        stamps, answers = [stamp_ns(twists[-1])], []
-        for _ in range(count):
-            publisher.publish(message)
-            future = service.call_async(Trigger.Request())
-            _until(future.done, "an answer of step")
-            answers.append(future.result().message)
-            # While paused the present state comes again ten times a second.
-            _until(lambda: stamp_ns(twists[-1]) > stamps[-1], "a later twist", pause=0.0)
-            stamps.append(stamp_ns(twists[-1]))
-        return {"stamps": stamps, "answers": answers}
+    def pause(self, paused: bool) -> dict:
+        return plain(self.call("pause", SetBool, data=paused))
 
-    def set_parameters(self, node, values, atomically=False):
-        """[[name, value]] through the standard services; [[successful, reason]]."""
-        kind = "SetParametersAtomically" if atomically else "SetParameters"
-        service = f"{node}/set_parameters{'_atomically' if atomically else ''}"
-        messages = [Parameter(name, value=value).to_parameter_msg() for name, value in values]
-        answer = self.call(service, kind, {"parameters": messages})
-        results = [answer["result"]] if atomically else answer["results"]
-        return [[r["successful"], r["reason"]] for r in results]
+    def reset(self) -> None:
+        """Time 0, and states heard that were published since; some must have been heard before."""
 
-    def get_parameters(self, node, names):
-        """Values by name through the standard service."""
-        service = f"{node}/get_parameters"
-        self.call(service, "GetParameters", {"names": []})
-        future = self.clients[service].call_async(GetParameters.Request(names=names))
-        _until(future.done, f"an answer of {service}")
-        return {n: plain(parameter_value_to_python(v)) for n, v in zip(names, future.result().values, strict=True)}
+        def runs() -> int:
+            stamps = [list(map(stamp_ns, list(self._received[self.name(topic)]))) for topic in STATES]
+            return min(sum(b < a for a, b in itertools.pairwise(own)) for own in stamps)
 
-    def endpoints(self, topic):
-        """QoS of the topic's publishers and subscriptions: [side, node, reliability, durability]."""
-        found = []
-        for side, infos in (
-            ("pub", self.node.get_publishers_info_by_topic(topic)),
-            ("sub", self.node.get_subscriptions_info_by_topic(topic)),
-        ):
-            for info in infos:
-                q = info.qos_profile
-                name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-                found.append([side, name, q.reliability.name, q.durability.name])
-        return found
+        self.fly_until(1)
+        before = runs()
+        assert self.trigger("reset")["success"]
+        self.until(lambda: runs() > before, "states since the reset")
+
+    def set(self, atomically: bool = False, **values) -> list:
+        """Parameters by name, double underscores for dots; [[successful, reason]]."""
+        return self.set_named({n.replace("__", "."): v for n, v in values.items()}, atomically)
+
+    def set_named(self, values: dict, atomically: bool = False) -> list:
+        messages = [Parameter(name, value=_alike(value)).to_parameter_msg() for name, value in values.items()]
+        if atomically:
+            results = [self.call("set_parameters_atomically", SetParametersAtomically, parameters=messages).result]
+        else:
+            results = self.call("set_parameters", SetParameters, parameters=messages).results
+        return [[r.successful, r.reason] for r in results]
+
+    def get(self, *names: str) -> dict:
+        values = self.call("get_parameters", GetParameters, names=list(names)).values
+        return {n: plain(parameter_value_to_python(v)) for n, v in zip(names, values, strict=True)}
+
+    def names(self) -> list[str]:
+        """All parameters of the node."""
+        return list(self.call("list_parameters", ListParameters).result.names)
 
 
-def _until(condition, what, timeout=WAIT_S, pause=0.002):
-    deadline = time.monotonic() + timeout
-    while not condition():
-        if time.monotonic() > deadline:
-            raise TimeoutError(f"no {what} within {timeout} s")
-        time.sleep(pause)
+def _profile(depth: int = 5000, latched: bool = False, best_effort: bool = False) -> QoSProfile:
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
 
 
-def main() -> None:
-    # Answers get stdout for themselves: the middleware writes its errors there, too, and they now go to stderr.
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    client = Client()
-    for line in sys.stdin:
-        job = json.loads(line)
-        try:
-            answer = {"done": getattr(client, job.pop("do"))(**job)}
-        except Exception as error:  # told to the test, which fails with it
-            answer = {"failed": f"{type(error).__name__}: {error}"}
-        print(json.dumps(answer), file=answers, flush=True)
-    # The executor's thread still sits in the middleware: the orderly way out races with it. But a publisher that goes
-    # without a word is believed to be there for 20 s more.
-    for publisher, _ in client.publishers.values():
-        client.node.destroy_publisher(publisher)
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    main()
+def _alike(value: Any) -> Any:
+    """A list of whole numbers and doubles as one of doubles: rclpy takes no mixed ones."""
+    mixed = isinstance(value, (list, tuple)) and {type(x) for x in value} == {int, float}
+    return [float(x) for x in value] if mixed else value

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -109,10 +110,24 @@ class RosProcess:
         return self.process.returncode
 
 
+def start_node(
+    environment: dict[str, str],
+    log: Path,
+    values: dict | None = None,
+    *arguments: object,
+    name: str = "rigid_body_node",
+) -> RosProcess:
+    """A node with these ROS arguments, a parameter file's for example, and then these parameters."""
+    given = [word for key, value in (values or {}).items() for word in ("-p", f"{key}:={json.dumps(value)}")]
+    return RosProcess(name, "--ros-args", *arguments, *given, environment=environment, log=log)
+
+
 @contextmanager
-def running_node(*arguments: object, environment: dict[str, str], log: Path) -> Iterator[RosProcess]:
-    """A rigid_body_node that flies; ended by SIGINT, with status 0, at the end."""
-    node = RosProcess("rigid_body_node", *arguments, environment=environment, log=log)
+def running_node(
+    environment: dict[str, str], log: Path, values: dict | None = None, *arguments: object
+) -> Iterator[RosProcess]:
+    """A node that flies; ended by SIGINT, with status 0, at the end."""
+    node = start_node(environment, log, values, *arguments)
     try:
         node.wait_for("is simulating")
         yield node

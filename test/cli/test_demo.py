@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,25 +16,27 @@ from ros_process import SOURCE, from_source, run
 pytest.importorskip("rclpy")
 pytest.importorskip("rerun")
 
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.rerun_view.rrd_file import read_session, record_batches
+from rigid_proto_ros.ros.domain import hold_domain
 
-def fly(ros_environment, folder, *arguments):
-    from rigid_proto_ros.rerun_view.rrd_file import read_session, record_batches
-
-    done = run("rigid_proto", "demo", *arguments, environment=ros_environment, cwd=folder, timeout=180)
-    assert done.returncode == 0, done.stderr
-    session = folder / "out" / "session.rrd"
-    assert "out/session.rrd" in done.stdout
-    return session, read_session(session), list(record_batches(session))
+SESSION = Path("out/session.rrd")
 
 
-def check(session, recorded, batches, pokes):
-    """The mesh once, a pose for every published state, arrows while the pokes act."""
+def check_flown(capfd, monkeypatch, folder: Path, *arguments: str) -> None:
+    """The mesh once, a pose for every published state, arrows while the pokes act, and a session that verifies."""
+    monkeypatch.chdir(folder)
+    assert main(["demo", *arguments]) == 0, capfd.readouterr().err
+    told = capfd.readouterr().out
+    assert str(SESSION) in told
+    assert ("domain 0 is in use; this one is in ROS_DOMAIN_ID=" in told) == ("ROS_DOMAIN_ID" not in os.environ)
+    recorded, batches = read_session(SESSION), list(record_batches(SESSION))
     assert recorded.complete
     assert recorded.mesh_chunks == 1
-    order = np.argsort(recorded.times)
-    times = recorded.times[order]
+    times = np.sort(recorded.times)
     assert times[0] == 0
     assert set(np.diff(times)) == {10_000_000}
+    assert recorded.times.max() == recorded.end_ns == 10_000_000_000
     poses = [
         batch
         for entity, _, batch in batches
@@ -43,41 +46,36 @@ def check(session, recorded, batches, pokes):
     assert len(positions.reshape(-1, 3)) == len(times)
     kinds = [json.loads(line)["kind"] for _, line in recorded.events]
     assert kinds[0] == "reset"
-    assert kinds.count("poke") == pokes
+    assert kinds.count("poke") == 3
     arrows = [
         entity
         for entity, _, batch in batches
         if any(name.startswith("Arrows3D:vectors") for name in batch.schema.names)
     ]
     assert any("load" in entity for entity in arrows), sorted(set(arrows))
+    assert main(["replay", str(SESSION), "--verify"]) == 0
+    assert "reproduced bit for bit" in capfd.readouterr().out
 
 
-def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies_also_beside_another(
-    ros_environment, tmp_path
+def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies_beside_another(
+    tmp_path, monkeypatch, capfd
 ):
-    """Two at once, and neither hears the other's pokes."""
+    """Whoever is in domain 0 hears none of its pokes, nor it theirs."""
     # As a user's shell, which names no domain.
-    environment = {name: value for name, value in ros_environment.items() if name != "ROS_DOMAIN_ID"}
-    folders = [tmp_path / name for name in "ab"]
-    for folder in folders:
-        folder.mkdir()
-    with ThreadPoolExecutor() as both:
-        flown = list(both.map(lambda folder: fly(environment, folder, "--duration", "10"), folders))
-    for session, recorded, batches in flown:
-        check(session, recorded, batches, pokes=3)
-        assert recorded.times.max() == recorded.end_ns == 10_000_000_000
-    verified = run("rigid_proto", "replay", flown[0][0], "--verify", environment=ros_environment)
-    assert verified.returncode == 0, verified.stderr
-    assert "reproduced bit for bit" in verified.stdout
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    held = hold_domain([0])  # None where somebody else holds it
+    try:
+        check_flown(capfd, monkeypatch, tmp_path)
+    finally:
+        if held is not None:
+            held[1].close()
 
 
 @pytest.mark.stress
-def test_a_real_mesh_flies_too_and_hangs_where_the_state_says(ros_environment, tmp_path, meshes):
-    session, recorded, batches = fly(ros_environment, tmp_path, "--duration", "7", "--mesh", meshes / "spot.obj")
-    check(session, recorded, batches, pokes=3)
-    assert len(recorded.vertices) == 11533
-    verified = run("rigid_proto", "replay", session, "--verify", environment=ros_environment)
-    assert verified.returncode == 0, verified.stderr
+def test_a_real_mesh_flies_too_and_hangs_where_the_state_says(ros_environment, tmp_path, meshes, monkeypatch, capfd):
+    monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
+    check_flown(capfd, monkeypatch, tmp_path, "--duration", "10", "--mesh", str(meshes / "spot.obj"))
+    assert len(read_session(SESSION).vertices) == 11533
 
 
 @pytest.mark.stress

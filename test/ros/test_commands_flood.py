@@ -5,8 +5,9 @@ import signal
 from contextlib import contextmanager
 
 import pytest
-from command_rig import Commanded, RosClient, wrench_message
+from command_rig import Commanded, wrench_message
 from conftest import held_domain
+from ros_client import RosClient
 
 
 @pytest.fixture(scope="module")
@@ -26,16 +27,10 @@ LAST = wrench_message(0, "nowhere")
 COUNTERS = ("wrench_received", "poke_received", "messages_lost", "queue_full", "refused_total")
 
 
-def repeat(client, publishers: list[str], message: dict, count: int, rate: float = 0.0) -> None:
-    """Each publisher sends a message ``count`` times."""
-    client.do("repeat", topics=publishers, content=message, count=count, rate=rate)
-
-
 def greet(client, publishers: list[str], message: dict) -> None:
     """One message of each is taken and acknowledged: the middleware counts what a publisher loses from then on."""
-    repeat(client, publishers, message, 1)
-    for publisher in publishers:
-        client.do("acknowledged", topic=publisher)
+    client.repeat(publishers, message, 1)
+    client.acknowledged(*publishers)
 
 
 def gained_when(rig, before: dict[str, int], condition) -> dict[str, int]:
@@ -78,13 +73,12 @@ def all_known_or_told(rig, before: dict[str, int], sent: int, publishers: int, t
 def flood(rig, publishers: int, messages: int) -> None:
     """So many publishers send ``messages`` each on one topic, 1000 a second."""
     with RosClient(rig.environment, rig.node) as client:
-        names = [f"{rig.name('wrench')}#{k}" for k in range(publishers)]
-        for name in names:
-            client.do("advertise", topic=name, type="WrenchStamped")
+        names = [f"wrench#{k}" for k in range(publishers)]
+        client.advertise(*names)
         before = rig.counters()
         greet(client, names, HARMLESS)
-        repeat(client, names, HARMLESS, messages, 1000.0)
-        repeat(client, names, LAST, 1)
+        client.repeat(names, HARMLESS, messages, 1000.0)
+        client.repeat(names, LAST, 1)
         all_known_or_told(rig, before, publishers * (messages + 2), publishers)
 
 
@@ -110,17 +104,15 @@ def held_up(rig):
 @pytest.mark.parametrize(("publishers", "kept"), [(2, 1_000), (2, 5_000)])
 def test_with_the_node_held_up_losses_are_counted_exactly_or_a_full_queue_is_told(rig, publishers, kept):
     """Each sends far more than the ``kept`` messages that it holds for a reader that doesn't answer."""
-    names = [f"{rig.name('poke')}#{k} of {publishers}, {kept}" for k in range(publishers)]
-    for name in names:
-        rig.do("advertise", topic=name, type="WrenchStamped", depth=kept)
+    names = [f"poke#{k} of {publishers}, {kept}" for k in range(publishers)]
+    rig.advertise(*names, depth=kept)
     before = rig.counters()
     greet(rig, names, PUSH)
     with held_up(rig):
-        repeat(rig, names, PUSH, 7_000)
-    for name in names:
-        rig.do("acknowledged", topic=name)
+        rig.repeat(names, PUSH, 7_000)
+    rig.acknowledged(*names)
     # The last of each shows what was lost before it.
-    repeat(rig, names, LAST, 1)
+    rig.repeat(names, LAST, 1)
     # Where the node's own queue has room for all that was kept, none but what the middleware counts is lost.
     gained = all_known_or_told(rig, before, publishers * 7_002, publishers, told=publishers * kept > 5_000)
     assert gained["messages_lost"] > 0 or gained["queue_full"] > 0

@@ -3,10 +3,14 @@
 
 from pathlib import Path
 
+import pytest
 import yaml
-from command_rig import COMMANDS, LATCHED, TYPES, NodeProcess, RosClient, wrench_message
-from conftest import held_domain
+from command_rig import wrench_message
+from rcl_interfaces.srv import DescribeParameters
+from ros_client import COMMANDS, LATCHED, TOPICS, RosClient
+from ros_process import running_node
 
+from rigid_proto_ros.ros.arguments import given_arguments
 from rigid_proto_ros.scene.parameters import PARAMETERS, READ_ONLY, is_ros_parameter
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
@@ -48,35 +52,31 @@ KEYS = [
 
 
 def test_all_topics_are_reliable_and_the_latched_ones_stay_for_who_comes_late(rig):
-    for name in TYPES.keys() - {"thrusters"}:  # of bodies that have some
-        side = "sub" if name in COMMANDS else "pub"
+    def side_of_the_node(name: str) -> list:
+        look = rig.own.get_subscriptions_info_by_topic if name in COMMANDS else rig.own.get_publishers_info_by_topic
+        return [end.qos_profile for end in look(rig.name(name)) if end.node_name == "rigid_body"]
 
-        def of_the_node(name=name, side=side) -> list:
-            return [e for e in rig.do("endpoints", topic=rig.name(name)) if e[:2] == [side, "/rigid_body"]]
-
-        (own,) = rig.until(of_the_node, f"the node's side of {name}")
-        assert own[2:] == ["RELIABLE", "TRANSIENT_LOCAL" if name in LATCHED else "VOLATILE"]
+    for name in TOPICS.keys() - {"/clock", "/diagnostics"}:
+        (profile,) = rig.until(lambda name=name: side_of_the_node(name), f"the node's side of {name}")
+        durability = "TRANSIENT_LOCAL" if name in LATCHED else "VOLATILE"
+        assert (profile.reliability.name, profile.durability.name) == ("RELIABLE", durability)
 
 
 def test_every_parameter_has_a_descriptor_with_description_bounds_and_read_only_mark(rig):
-    names = list(PARAMETERS)
-    answer = rig.do(
-        "call", service=rig.name("describe_parameters"), type="DescribeParameters", request={"names": names}
-    )
-    for descriptor in answer["descriptors"]:
-        declared = PARAMETERS[descriptor["name"]]
-        assert declared.description in descriptor["description"]
-        assert descriptor["read_only"] == (declared.changes == READ_ONLY)
+    for descriptor in rig.call("describe_parameters", DescribeParameters, names=list(PARAMETERS)).descriptors:
+        declared = PARAMETERS[descriptor.name]
+        assert declared.description in descriptor.description
+        assert descriptor.read_only == (declared.changes == READ_ONLY)
         if declared.type == "double" and declared.upper < float("inf"):
-            (bounds,) = descriptor["floating_point_range"]
-            assert (bounds["from_value"], bounds["to_value"]) == (declared.lower, declared.upper)
+            (bounds,) = descriptor.floating_point_range
+            assert (bounds.from_value, bounds.to_value) == (declared.lower, declared.upper)
 
 
 def test_diagnostics_have_all_their_keys_and_warn_for_one_report_after_a_refusal(rig):
     report = rig.diagnostics()
     assert report["name"] == "/rigid_body: simulation"
     assert set(KEYS) <= report.keys()
-    kinds = ("wrench", "poke", "string", "inertia", "schedule")
+    kinds = ("wrench", "poke", "string", "inertia", "schedule", "thrusters")
     assert int(report["commands_received"]) == sum(int(report[f"{kind}_received"]) for kind in kinds) == rig.sent
     before = report["stamp_ns"]
     rig.publish("poke", wrench_message(0, "nowhere", (1.0, 0, 0)))
@@ -108,7 +108,7 @@ def dumped(rig, folder) -> Path:
     return path
 
 
-def test_a_dump_of_a_running_node_starts_a_second_one_with_the_same_scene(rig, tmp_path):
+def test_a_dump_of_a_running_node_is_its_scene(rig, tmp_path):
     changes = {"mass": 1.5, "ballast.nut": [0.1, 0.0, 0.0, 0.07], "gravity": [0.0, 0.0, -1.0], "string.stiffness": 7.0}
     rig.set_named(changes, atomically=True)
 
@@ -117,24 +117,13 @@ def test_a_dump_of_a_running_node_starts_a_second_one_with_the_same_scene(rig, t
         text = rig.heard("scene", last=1)[0]["data"]
         return text if changes.items() <= read_scene_text(text).values.items() else ""
 
-    scene = rig.until(told, "the scene")
-    dump = dumped(rig, tmp_path)
-    # Read without ROS it is that scene too.
-    first = make_scenario(read_scene_text(scene).values)
-    again = make_scenario({n: v for n, v in read_scene_file(dump).values.items() if not is_ros_parameter(n)})
-    assert first.parameters == again.parameters
+    first = make_scenario(read_scene_text(rig.until(told, "the scene")).values)
     assert first.parameters == make_scenario({**rig.scene, **first.parameters.named()}).parameters
-    with held_domain() as domain:
-        environment = {**rig.environment, "ROS_DOMAIN_ID": str(domain)}
-        second = NodeProcess(environment, tmp_path / "second.log", {}, "--params-file", str(dump))
-        client = RosClient(environment)
-        try:
-            client.listen("scene")
-            heard = client.until(lambda: client.heard("scene"), "the second node's scene")
-            assert heard[-1]["data"] == scene
-        finally:
-            client.close()
-            assert second.stop() == 0
+    dump = dumped(rig, tmp_path)
+    offline = {n: v for n, v in read_scene_file(dump).values.items() if not is_ros_parameter(n)}
+    online = given_arguments(["--ros-args", "--params-file", str(dump)], "rigid_body", pytest.fail)
+    for values in (offline, {n: v for n, v in online.items() if not is_ros_parameter(n)}):
+        assert make_scenario(values).parameters == first.parameters
 
 
 def test_a_nodes_own_dump_can_be_loaded_and_what_differs_acts(rig):
@@ -151,45 +140,32 @@ def test_a_nodes_own_dump_can_be_loaded_and_what_differs_acts(rig):
     assert rig.get("inertia_model", "mesh") == {"inertia_model": "shell", "mesh": "book"}
 
 
-def test_two_nodes_of_one_domain_do_not_mix(ros_environment, tmp_path):
-    with held_domain() as domain:
-        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
-        nodes = [
-            NodeProcess(environment, tmp_path / "plain.log", {"mesh": "t_handle"}),
-            NodeProcess(
-                environment,
-                tmp_path / "other.log",
-                {"mesh": "hammer", "world_frame": "map", "qos_overrides./lab/tool/pose.publisher.depth": 3},
-                *("-r", "__node:=tool", "-r", "__ns:=/lab", "-r", "~/poke:=/lab/hit"),
-            ),
-        ]
-        one, two = RosClient(environment), RosClient(environment, "/lab/tool")
-        try:
-            for client in (one, two):
-                client.listen("pose", "odom", "events", "inertia")
-                client.watch_diagnostics()
-            two.do("advertise", topic="/lab/hit", type="WrenchStamped")
-            one.advertise("poke")
-            # The names of its own frames, beside the words for them.
-            for frame in ("tool@com", "map@com", "map", "tool", "world", "body@origin"):
-                two.publish("/lab/hit", wrench_message(0, f"{frame};impulse", (1.0, 0.0, 0.0)))
-            two.until(lambda: len(two.events()) == 6, "the pokes")
-            reports = two.diagnostics(), one.diagnostics()
-            assert [(r["poke_received"], r["refused_total"]) for r in reports] == [("6", "0"), ("0", "0")]
-            assert [r["name"] for r in reports] == ["/lab/tool: simulation", "/rigid_body: simulation"]
-            assert one.events() == []
-            odometry = two.until(lambda: two.heard("odom", last=1), "odometry")[0]
-            inertias = [client.until(lambda c=client: c.heard("inertia"), "its inertia")[0] for client in (one, two)]
-            assert (odometry["header"]["frame_id"], odometry["child_frame_id"]) == ("map", "tool")
-            assert inertias[1]["header"]["frame_id"] == "tool/mesh"
-            # What a user overrides is of that topic alone.
-            depths = [f"qos_overrides./lab/tool/{topic}.publisher.depth" for topic in ("pose", "twist")]
-            assert list(two.get(*depths).values()) == [3, 10]
-            assert inertias[0]["inertia"]["m"] != inertias[1]["inertia"]["m"]
-            two.trigger("reset")
-            two.until(lambda: two.events()[-1]["kind"] == "reset", "the reset")
-            assert one.events() == []
-        finally:
-            one.close()
-            two.close()
-            assert {node.stop() for node in nodes} == {0}
+def test_two_nodes_of_one_domain_do_not_mix(rig, tmp_path):
+    hammer = {"mesh": "hammer", "world_frame": "map", "qos_overrides./lab/tool/pose.publisher.depth": 3}
+    names = ("-r", "__node:=tool", "-r", "__ns:=/lab", "-r", "~/poke:=/lab/hit")
+    rig.forget("inertia")
+    with (
+        RosClient(rig.environment, "/lab/tool") as tool,
+        running_node(rig.environment, tmp_path / "tool", hammer, *names),
+    ):
+        tool.listen("odom", "events", "inertia", "/diagnostics")
+        tool.advertise("/lab/hit")
+        before = rig.counters()
+        # The names of its own frames, beside the words for them.
+        for frame in ("tool@com", "map@com", "map", "tool", "world", "body@origin"):
+            tool.publish("/lab/hit", wrench_message(0, f"{frame};impulse", (1.0, 0.0, 0.0)))
+        tool.until(lambda: len(tool.events()) == 6, "the pokes")
+        report = tool.diagnostics()
+        assert (report["poke_received"], report["refused_total"]) == ("6", "0")
+        assert report["name"] == "/lab/tool: simulation"
+        assert rig.gained(before, "poke_received") == {} and rig.events() == []
+        odometry = tool.until(lambda: tool.heard("odom", last=1), "odometry")[0]
+        assert (odometry["header"]["frame_id"], odometry["child_frame_id"]) == ("map", "tool")
+        inertia = tool.until(lambda: tool.heard("inertia"), "its inertia")[0]
+        assert inertia["header"]["frame_id"] == "tool/mesh"
+        # What a user overrides is of that topic alone.
+        depths = [f"qos_overrides./lab/tool/{topic}.publisher.depth" for topic in ("pose", "twist")]
+        assert list(tool.get(*depths).values()) == [3, 10]
+        tool.trigger("reset")
+        tool.until(lambda: tool.events()[-1]["kind"] == "reset", "the reset")
+        assert rig.events() == [] and rig.heard("inertia") == []

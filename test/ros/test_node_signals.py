@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """SIGINT and SIGTERM end every command quietly, with a complete recording and no orphan: with 128 + the signal's number,
-and the node with 0.
+and the node with 0. ``up`` is among the commands of the README that stay up, in test_readme.py.
 """
 
 import signal
@@ -8,54 +8,49 @@ import time
 
 import pytest
 from conftest import needs_rerun
-from ros_process import RosProcess, alive, catches, descendants, running_node
+from ros_process import RosProcess, catches, start_node
 
+from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.rerun_view.rrd_file import read_session
 
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.stress)])
-"""One handler serves both; a node's end by SIGTERM is looked at in test_node_flight.py too."""
-
-
-@BOTH
-def test_up_without_a_viewer_ends(ros_environment, tmp_path, number):
-    up = RosProcess("rigid_proto", "up", "--viewer", "none", environment=ros_environment, log=tmp_path / "up")
-    up.wait_for("is simulating")
-    children = descendants(up.pid)
-    assert up.end(number) == 128 + number, up.errors
-    assert not [pid for pid in children if alive(pid)]
+"""One handler serves both."""
 
 
 @needs_rerun
 @BOTH
-def test_a_waiting_client_and_an_offline_run_end(ros_environment, tmp_path, number):
+def test_a_recording_node_a_waiting_client_and_an_offline_run_end(ros_environment, tmp_path, number):
     script = tmp_path / "late.yaml"
     script.write_text("- {t: 1000, at: com, force: [0, 0, 1]}\n")
-    session = tmp_path / "run.rrd"
-    with running_node(environment=ros_environment, log=tmp_path / "node"):
-        client = RosProcess("poke_client", script, environment=ros_environment, log=tmp_path / "client")
-        # The command lies too far ahead to be sent: it waits, beside a long offline run.
-        flight = RosProcess(
-            *("rigid_proto", "simulate", "t_handle", "--duration", 1e6, "--record", session),
-            environment=ros_environment,
-            log=tmp_path / "flight",
-        )
-        while not (session.exists() and session.stat().st_size > 10_000):
-            assert flight.process.poll() is None, flight.errors
+    run, flown = tmp_path / "run.rrd", tmp_path / "flown.rrd"
+    scene = ("--params-file", scene_path("hammer"))
+    node = start_node(ros_environment, tmp_path / "node", {"record": str(flown)}, *scene)
+    node.wait_for("is simulating")
+    # The command lies too far ahead to be sent: it waits, beside a long offline run.
+    client = RosProcess("poke_client", script, environment=ros_environment, log=tmp_path / "client")
+    offline = RosProcess(
+        *("rigid_proto", "simulate", "t_handle", "--duration", 1e6, "--record", run),
+        environment=ros_environment,
+        log=tmp_path / "offline",
+    )
+    for ready in (lambda: run.exists() and run.stat().st_size > 10_000, lambda: catches(client.pid, number)):
+        while not ready():
+            assert offline.process.poll() is None and client.process.poll() is None, offline.errors + client.errors
             time.sleep(0.02)
-        while not catches(client.pid, number):
-            assert client.process.poll() is None, client.errors
-            time.sleep(0.02)
-        assert flight.end(number) == 128 + number, flight.errors
-        assert client.end(number) == 128 + number, client.errors
-    assert flight.errors == client.errors == ""
-    assert read_session(session).complete
+    assert offline.end(number) == 128 + number, offline.errors
+    assert client.end(number) == 128 + number, client.errors
+    assert node.end(signal.SIGTERM if number == signal.SIGINT else signal.SIGINT) == 0, node.errors
+    assert offline.errors == client.errors == ""
+    assert read_session(run).complete
+    recorded = read_session(flown)
+    assert recorded.complete and recorded.mesh_chunks == 1
 
 
 @BOTH
 def test_a_node_that_compiles_its_kernels_ends_at_once(ros_environment, tmp_path, number):
     """From an empty cache they take a minute or two, and nothing interrupts a compiler."""
     environment = {**ros_environment, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
-    node = RosProcess("rigid_body_node", environment=environment, log=tmp_path / "node")
+    node = start_node(environment, tmp_path / "node")
     node.wait_for("compiling kernels")
     assert node.end(number, within_s=10.0) == 0, node.errors  # 59 s before
     assert "Traceback" not in node.errors

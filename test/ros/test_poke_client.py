@@ -4,20 +4,25 @@
 import json
 import subprocess
 import sys
-import threading
 
 import numpy as np
 import pytest
-from command_rig import stamp_ns
-from ros_process import READY_S, command, from_source, run
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.srv import GetParameters
+from rclpy.parameter import Parameter
+from ros_client import RosClient, stamp_ns
+from ros_process import from_source, run
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
 
 from rigid_proto_ros.base.bundled import example_path
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.base.rotation import rotate
+from rigid_proto_ros.ros import script_sender
 from rigid_proto_ros.ros.poke_client import main as poke_client
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.session.messages import PROJECTIONS
 
 SECOND = 10**9
 EVERY_ENTRY = """
@@ -75,18 +80,25 @@ def test_repeats_come_every_so_often_and_jitter_is_the_same_for_the_same_seed_wi
             times(f"[{{t: 1, impulse: [1, 0, 0], {wrong}}}]")
 
 
-def client(rig, *arguments, timeout: float = READY_S):
-    """The real poke_client, run to its end."""
-    return run("poke_client", *arguments, "--timeout", 120, environment=rig.environment, timeout=timeout)
+@pytest.fixture
+def client(rig, monkeypatch, capsys):
+    """Runs poke_client to its end, in this process; returns its status and what it said."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", rig.environment["ROS_DOMAIN_ID"])
+
+    def run_client(*arguments) -> tuple[int, str]:
+        status = poke_client([*map(str, arguments), "--timeout", "120"])
+        return status, capsys.readouterr().out
+
+    return run_client
 
 
 def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(rig, script):
-    """Held wrenches with a duration outlast the timeout, 0.4 s here."""
+    """By the installed program. Held wrenches with a duration outlast the timeout, 0.4 s here."""
     rig.set(real_time_factor=4.0, wrench_timeout=0.4)
     before = rig.counters()
     # Nothing that was flown before may pass for the flight after the reset.
     rig.start_over(paused=True)
-    done = client(rig, script, "--reset")
+    done = run("poke_client", script, "--reset", "--timeout", 120, environment=rig.environment)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "0 late, 0 refused" in done.stdout
     sent = parse_script(EVERY_ENTRY)
@@ -102,9 +114,8 @@ def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(r
             continue
         assert offline.advance(time_ns)
         row = offline.simulation.state.row.tolist()
-        pose, twist = message["pose"], twists[time_ns]
-        assert [*pose["position"].values(), *pose["orientation"].values()] == row[:7], time_ns
-        assert [*twist["linear"].values(), *twist["angular"].values()] == [*row[7:10], *rotate(*row[3:7], *row[10:13])]
+        for name, content in (("pose", message["pose"]), ("twist", twists[time_ns])):
+            assert [x for part in content.values() for x in part.values()] == PROJECTIONS[name](row), time_ns
         checked += 1
     assert checked > 300
     assert not offline.simulation.refused
@@ -112,39 +123,32 @@ def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(r
     assert gained == {"commands_received": len(sent)}
 
 
-def test_with_reset_all_within_the_horizon_is_there_before_time_goes_on_and_the_rest_waits(rig, tmp_path):
+def test_with_reset_all_within_the_horizon_is_there_before_time_goes_on_and_the_rest_waits(rig, client, tmp_path):
     path = tmp_path / "long.yaml"
     path.write_text("".join(f"- {{t: {t}, impulse: [1.0e-6, 0, 0]}}\n" for t in (0, 8)))
-    # Between a report that lets the second one go and its time lie 1.5 s of a clock or more.
-    rig.set_named({"real_time_factor": 2.0, "schedule_horizon": 5.0})
-    done = client(rig, path, "--reset")
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "0 late, 0 refused" in done.stdout
+    # Between a report that lets the second one go and its time lie 1.2 s of a clock or more.
+    rig.set_named({"real_time_factor": 4.0, "schedule_horizon": 5.0})
+    status, said = client(path, "--reset")
+    assert status == 0 and "0 late, 0 refused" in said
     rig.sent += 2
 
 
-def test_without_reset_every_time_counts_from_now_and_the_lead_and_single_commands_come_from_the_line(rig, tmp_path):
-    rig.set(real_time_factor=4.0)
+def test_without_reset_every_time_counts_from_now_and_the_lead_and_single_commands_come_from_the_line(
+    rig, client, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(script_sender, "STANDSTILL_S", 0.1)
     (tmp_path / "two.yaml").write_text("- {t: 0.1, impulse: [1.0e-6, 0, 0]}\n- {t: 0.35, impulse: [1.0e-6, 0, 0]}\n")
-    # While time stands still, so that none comes late; and at once: each is a process with a start-up of its own.
+    # While time stands still, so that none comes late.
     rig.start_over(paused=True)
     start_ns = rig.now_ns()
-    arguments = (
-        (tmp_path / "two.yaml", "--lead", 1),
-        ("poke", "--at", "tip", "--push", 5, "--lead", 1),
-        ("wrench", "--force", 1, 0, 0, "--for", 2, "--lead", 1),
-    )
-    children = [
-        subprocess.Popen(
-            command("poke_client", *a, "--timeout", 120),
-            env=from_source(rig.environment),
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        for a in arguments
-    ]
-    said = [child.communicate(timeout=READY_S)[0] for child in children]
-    assert [child.returncode for child in children] == [0, 0, 0], said
+    for words in (
+        (tmp_path / "two.yaml",),
+        ("poke", "--at", "tip", "--push", 5),
+        ("wrench", "--force", 1, 0, 0, "--for", 2),
+    ):
+        status, said = client(*words, "--lead", 1)
+        # Its time doesn't move: the client says so, and waits no longer for the last command to act.
+        assert status == 0 and "but simulated time stands still at 0 s" in said
     rig.sent += 2 + 1 + 1
     rig.until_received(rig.sent)
     rig.pause(False)
@@ -156,7 +160,7 @@ def test_without_reset_every_time_counts_from_now_and_the_lead_and_single_comman
     assert (wrench["content"]["frame_id"], wrench["content"]["force"]) == ("world@com;duration=2.0", [1.0, 0.0, 0.0])
 
 
-def test_what_comes_late_or_is_refused_is_reported_and_makes_exit_1(rig, tmp_path):
+def test_what_comes_late_or_is_refused_is_reported_and_makes_exit_1(rig, client, tmp_path):
     (tmp_path / "late.yaml").write_text("- {t: 0.0, impulse: [1.0e-6, 0, 0]}\n")
     # A ray that misses is refused when its time has come, long after all are sent.
     (tmp_path / "refused.yaml").write_text(
@@ -164,35 +168,19 @@ def test_what_comes_late_or_is_refused_is_reported_and_makes_exit_1(rig, tmp_pat
         "- {t: 4.0, at: {ray: {origin: [5, 5, 5], direction: [0, 0, 1]}}, force: [1, 0, 0]}\n"
     )
     rig.set(real_time_factor=4.0)
-    late = client(rig, tmp_path / "late.yaml", "--lead", 0)
+    status, said = client(tmp_path / "late.yaml", "--lead", 0)
     rig.sent += 1
-    assert late.returncode == 1
-    assert "1 late, 0 refused" in late.stdout
-    refused = client(rig, tmp_path / "refused.yaml", "--reset")
+    assert status == 1 and "1 late, 0 refused" in said
+    status, said = client(tmp_path / "refused.yaml", "--reset")
     rig.sent += 2
-    assert refused.returncode == 1
-    assert "0 late, 2 refused (1 frame, 1 ray_miss)" in refused.stdout
+    assert status == 1 and "0 late, 2 refused (1 frame, 1 ray_miss)" in said
 
 
-class SlowNode:
+class SlowNode(RosClient):
     """Stands in for a node that is slow to confirm: not before 500 wait for it, or all of ``count`` have come."""
 
     def __init__(self, environment: dict, count: int) -> None:
-        import rclpy
-        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-        from rclpy.executors import SingleThreadedExecutor
-        from rclpy.signals import SignalHandlerOptions
-        from std_msgs.msg import String
-        from std_srvs.srv import SetBool, Trigger
-
-        self.context = rclpy.Context()
-        rclpy.init(
-            args=[],
-            context=self.context,
-            domain_id=int(environment["ROS_DOMAIN_ID"]),
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
-        node = rclpy.create_node("slow", context=self.context)
+        super().__init__(environment, "/tester")
         self.received = self.confirmed = self.most_ahead = 0
         self.calls: list[str] = []
 
@@ -208,70 +196,61 @@ class SlowNode:
 
             return answer
 
-        node.declare_parameter("schedule_horizon", 3600.0)
+        def horizon(request, response):
+            response.values = [Parameter(name, value=3600.0).get_parameter_value() for name in request.names]
+            return response
+
+        node = self.own
         node.create_subscription(String, "~/schedule", on_schedule, 5000)
         node.create_service(Trigger, "~/reset", answered("reset"))
         node.create_service(SetBool, "~/pause", answered("pause"))
+        node.create_service(GetParameters, "~/get_parameters", horizon)
         diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
 
         def report() -> None:
             if self.received - self.confirmed >= 500 or self.received == count:
                 self.confirmed = self.received
             values = {"commands_received": self.confirmed, "late": 0, "refused_total": 0, "sim_time_ns": 0}
-            status = DiagnosticStatus(name="/slow: simulation")
+            status = DiagnosticStatus(name="/tester: simulation")
             status.values = [KeyValue(key=k, value=str(v)) for k, v in values.items()]
             diagnostics.publish(DiagnosticArray(status=[status]))
 
-        node.create_timer(0.25, report)
-        self.node = node
-        self.executor = SingleThreadedExecutor(context=self.context)
-        self.executor.add_node(node)
-        self.thread = threading.Thread(target=self.executor.spin, daemon=True)
-        self.thread.start()
-
-    def close(self) -> None:
-        self.executor.shutdown()
-        self.thread.join(5.0)
-        self.node.destroy_node()
-        self.context.try_shutdown()
+        node.create_timer(0.1, report)
 
 
-def test_never_more_than_500_commands_are_ahead_of_what_the_node_has_confirmed(ros_environment, tmp_path):
+def test_never_more_than_500_commands_are_ahead_of_what_the_node_has_confirmed(
+    ros_environment, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
+    monkeypatch.setattr(script_sender, "STANDSTILL_S", 0.1)
     path = tmp_path / "many.yaml"
     path.write_text("- {t: 1.0, impulse: [1.0e-6, 0, 0], repeat: 1600, every: 0.001}\n")
-    slow = SlowNode(ros_environment, 1600)
-    try:
-        done = run("poke_client", path, "--node", "slow", "--reset", "--timeout", 0, environment=ros_environment)
-        assert done.returncode == 0, done.stdout + done.stderr
-        # Its time doesn't move: the client says so, and waits no longer for the last command to act.
-        assert "the last acts at 2.599 s, but simulated time stands still at 0 s" in done.stdout
+    with SlowNode(ros_environment, 1600) as slow:
+        assert poke_client([str(path), "--node", "tester", "--reset", "--timeout", "0"]) == 0
+        assert "the last acts at 2.599 s, but simulated time stands still at 0 s" in capsys.readouterr().out
         assert slow.most_ahead == 500
         assert slow.received == 1600
         assert slow.calls == ["pauseTrue", "reset", "pauseFalse"]
-    finally:
-        slow.close()
 
 
-LOADED = """
+LOADED = f"""
 import sys
 from rigid_proto_ros.base import interrupts
 from rigid_proto_ros.cli.executables import poke_client
 interrupts.leave = lambda status: status
-status = poke_client()
-print(status, [module for module in ("numba", "scipy") if module in sys.modules])
+for *words, expected in (
+    ({str(example_path("flip_and_poke"))!r}, "--dry-run", 0),
+    ({str(example_path("ballast_in_flight"))!r}, "--dry-run", 0),
+    # Everything is there when it has looked for a node in vain.
+    ({str(example_path("pull_on_string"))!r}, "--node", "/nobody", "--timeout", "0.1", 2),
+):
+    sys.argv[1:] = words
+    assert poke_client() == expected
+print([module for module in ("numba", "scipy") if module in sys.modules])
 """
 
 
-@pytest.mark.parametrize(
-    ("arguments", "status"),
-    [
-        ([example_path("flip_and_poke"), "--dry-run"], 0),
-        ([example_path("ballast_in_flight"), "--dry-run"], 0),
-        # Everything is there when it has looked for a node in vain.
-        ([example_path("pull_on_string"), "--node", "/nobody", "--timeout", "0.1"], 2),
-    ],
-)
-def test_a_client_starts_without_numba_and_scipy(arguments, status, ros_environment):
-    command = [sys.executable, "-c", LOADED, *map(str, arguments)]
+def test_a_client_starts_without_numba_and_scipy(ros_environment):
+    command = [sys.executable, "-c", LOADED]
     done = subprocess.run(command, env=from_source(ros_environment), capture_output=True, text=True, check=False)
-    assert done.stdout.splitlines()[-1] == f"{status} []", done.stderr
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from command_rig import stamp_ns, wrench_message
+from command_rig import wrench_message
+from ros_client import stamp_ns
 from scipy.spatial.transform import Rotation
 
 pytest.importorskip("rclpy")

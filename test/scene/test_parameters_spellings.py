@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from command_rig import RosClient
+from ros_client import RosClient
 from ros_process import running_node
 
 from rigid_proto_ros.base.errors import InputError
@@ -95,11 +95,10 @@ def test_the_node_takes_every_spelling_from_files_the_command_line_and_services(
     # One file with all spellings: every other parameter as text, the rest as whole numbers.
     spellings = iter(range(1000))
     path.write_text(scene_lines(lambda v: f'"{v}"' if next(spellings) % 2 else str(v)), encoding="utf-8")
-    line = ["-p", "linear_damping:=2", "-p", "gravity:=[0, 0, 3]", "-p", 'angular_damping:="1e-3"']
-    arguments = ["--ros-args", "--params-file", path, *line]
+    line = {"linear_damping": 2, "gravity": [0, 0, 3], "angular_damping": "1e-3"}
     with (
         RosClient(ros_environment) as client,
-        running_node(*arguments, environment=ros_environment, log=tmp_path / "node"),
+        running_node(ros_environment, tmp_path / "node", line, "--params-file", path),
     ):
         read = client.get(*(p.name for p in NUMERIC if settable(p)))
         given = {"linear_damping": 2.0, "gravity": [0.0, 0.0, 3.0], "angular_damping": 1e-3}

@@ -16,9 +16,10 @@ pytest.importorskip("mcap")
 pytest.importorskip("rclpy")
 
 from bag_recorder import BagRecorder, Logged, write_bag, write_bag_file
-from command_rig import RosClient, wrench_message
+from command_rig import wrench_message
 from flights import SECOND
 from mcap.writer import CompressionType
+from ros_client import RosClient
 from ros_process import running_node
 
 from rigid_proto_ros.base.errors import InputError
@@ -36,11 +37,11 @@ def flown(ros_environment, tmp_path_factory) -> list[Logged]:
     folder = tmp_path_factory.mktemp("flown")
     shutil.copy(resolve_mesh("l_bracket"), folder / "bracket.obj")
     recorder = BagRecorder(ros_environment)
-    arguments = ["-p", f"mesh:={folder / 'bracket.obj'}", "-p", "initial.angular_velocity:=[0.3, 2.0, 0.1]"]
-    arguments += ["-p", "contacts.tip:=[0.01, 0.0, 0.0]", "-p", "start_paused:=true"]
+    values = {"mesh": str(folder / "bracket.obj"), "initial.angular_velocity": [0.3, 2.0, 0.1], "start_paused": True}
+    values |= {"contacts.tip": [0.01, 0.0, 0.0], "real_time_factor": 2.0}
     with (
         RosClient(ros_environment) as client,
-        running_node("--ros-args", *arguments, environment=ros_environment, log=folder / "node"),
+        running_node(ros_environment, folder / "node", values),
     ):
         client.meet()
         # Recorders find the node late; nothing has moved by then.
@@ -49,7 +50,7 @@ def flown(ros_environment, tmp_path_factory) -> list[Logged]:
         _fly(client)
         client.reset()
         _fly(client)
-    messages = recorder.close()
+    messages = recorder.finish()
     (folder / "bracket.obj").unlink()
     return messages
 

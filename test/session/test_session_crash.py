@@ -153,13 +153,14 @@ def states_end_ns(path: Path) -> int:
 
 
 def kill_while_recording(environment: dict[str, str], folder: Path, ending: str, after_s: float) -> None:
-    from command_rig import RosClient, stamp_ns, wrench_message
-    from ros_process import RosProcess
+    from command_rig import wrench_message
+    from ros_client import RosClient, stamp_ns
+    from ros_process import start_node
 
     pytest.importorskip("rclpy")
     path = folder / f"session{ending}"
-    arguments = ["--params-file", scene_path("t_handle"), "-p", f"record:={path}", "-p", "publish_rate:=200"]
-    node = RosProcess("rigid_body_node", "--ros-args", *arguments, environment=environment, log=folder / "node")
+    values = {"record": str(path), "publish_rate": 200}
+    node = start_node(environment, folder / "node", values, "--params-file", scene_path("t_handle"))
     seen: list[tuple[float, int]] = []  # how long the node had starved, and then where the file ended
 
     def recorded_for_long_enough() -> bool:

@@ -5,8 +5,10 @@ import math
 import time
 
 import pytest
-from command_rig import NodeProcess, RosClient, point_message, stamp_ns, wrench_message
+from command_rig import point_message, wrench_message
 from conftest import held_domain
+from ros_client import RosClient, stamp_ns
+from ros_process import start_node
 
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.simulation import Simulation
@@ -28,7 +30,7 @@ def test_while_paused_ten_states_a_second_go_out_with_the_frozen_stamp_and_comma
     frozen = {stamp_ns(m) for m in rig.heard("pose")}
     assert len(frozen) == 1
     assert len({tuple(position(m)) for m in rig.heard("pose")}) == 1
-    assert not [event for event in rig.events() if event["kind"] == "poke"]
+    assert not rig.events("poke")
     assert rig.diagnostics()["state"] == "paused"
 
     def wait_for(count: int) -> float:
@@ -127,7 +129,7 @@ def test_stamps_zero_and_past_mean_now_and_one_of_the_systems_clock_is_told_apar
     gained = rig.gained(before)
     assert gained == {"late": 2, "wall_stamp": 2, "refused_total": 1, "refused_stamp": 1}
     # Told once in the node's life, and counted from then on.
-    assert rig.node_process.log.read_text().count("stamped with the system's clock") == 1
+    assert rig.node_process.errors.count("stamped with the system's clock") == 1
     pokes = rig.wait_event("poke", 5)
     assert len(pokes) == 5
     acted_before = int(rig.diagnostics()["sim_time_ns"])
@@ -167,7 +169,7 @@ def test_the_pace_is_the_real_time_factor_and_changes_no_bit_of_the_motion(rig):
 
 def test_clock_is_published_on_request_with_the_states_stamps(rig):
     assert rig.set(publish_clock=True)[0][0]
-    rig.do("listen", topic="/clock", type="Clock", best_effort=True)
+    rig.listen("/clock", best_effort=True)
     rig.until(lambda: rig.heard_count("/clock") >= 20, "/clock")
     clocks = [m["clock"]["sec"] * SECOND + m["clock"]["nanosec"] for m in rig.heard("/clock")]
     assert clocks == sorted(clocks)
@@ -180,7 +182,7 @@ def test_clock_is_published_on_request_with_the_states_stamps(rig):
     # On again, by the one publisher.
     assert rig.set(publish_clock=True)[0][0]
     rig.until(lambda: rig.heard_count("/clock") >= 5, "/clock again")
-    assert len([e for e in rig.do("endpoints", topic="/clock") if e[0] == "pub"]) == 1
+    assert len(rig.own.get_publishers_info_by_topic("/clock")) == 1
 
 
 def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_environment, tmp_path):
@@ -189,15 +191,15 @@ def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_envir
     """
     with held_domain() as domain:
         environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
-        node = NodeProcess(
-            environment, tmp_path / "node.log", {"use_sim_time": True, "initial.linear_velocity": [1.0, 0.0, 0.0]}
+        node = start_node(
+            environment, tmp_path / "node", {"use_sim_time": True, "initial.linear_velocity": [1.0, 0.0, 0.0]}
         )
         client = RosClient(environment)
         try:
             client.listen("pose", "events")
-            client.watch_diagnostics()
+            client.listen("/diagnostics")
             client.advertise("poke", "schedule")
-            client.do("advertise", topic="/clock", type="Clock", depth=1)
+            client.advertise("/clock", depth=1)
 
             clock = {"ns": 0}
 
@@ -255,7 +257,7 @@ def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_envir
             ]
         finally:
             client.close()
-            assert node.stop() == 0
+            assert node.end() == 0
 
 
 def test_asleep_states_still_go_out_and_it_wakes_at_a_command(rig):
