@@ -157,7 +157,7 @@ def test_a_launch_file_needs_no_numba() -> None:
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"
 
 
-@pytest.mark.parametrize("module", ["simulation.simulation", "scene.scenario", "session.replay"])
+@pytest.mark.parametrize("module", ["simulation.simulation", "scene.scenario", "session.recorded_session"])
 def test_simulating_loads_no_viewer_mesh_reader_or_ros(module: str) -> None:
     # scipy is not among them: numba loads it where it is installed, for linear algebra that we don't use.
     heavy = ("trimesh", "rerun", "rclpy", "pyarrow", "manifold3d", "mcap", "zstandard")

@@ -62,3 +62,14 @@ class Parser(argparse.ArgumentParser):
         if action.metavar == "COMMAND":
             raise argparse.ArgumentError(None, f"there is no command {value!r}; {one_of(str(value), known)}")
         raise argparse.ArgumentError(action, f"there is no {value!r}; {one_of(str(value), known)}")
+
+
+def number_from(lower: float, upper: float) -> Callable[[str], float]:
+    """The type of an option that takes a number within these bounds."""
+
+    def number(text: str) -> float:
+        if not lower <= (value := float(text)) <= upper:
+            raise argparse.ArgumentTypeError(f"got {text}; accepted: a number from {lower:g} to {upper:g}")
+        return value
+
+    return number

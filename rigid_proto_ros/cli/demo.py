@@ -14,9 +14,10 @@ import sys
 import time
 from pathlib import Path
 
+from ..base.command_line import number_from
 from ..base.errors import InputError
 from ..base.interrupts import end_with_this_thread, with_this_package
-from .options import add_mesh, number_from
+from .options import add_mesh
 
 GRACE_S = 5.0
 """A process that doesn't end within this time of SIGTERM is killed."""

@@ -6,9 +6,9 @@ from __future__ import annotations
 import argparse
 import sys
 
+from ..base.command_line import number_from
 from ..base.errors import InputError, is_missing
 from ..base.files import output_file, whole_file
-from .options import number_from
 
 FPS = 30.0
 

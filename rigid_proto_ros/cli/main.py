@@ -8,11 +8,8 @@ SIGTERM).
 from __future__ import annotations
 
 import argparse
-import gc
 import importlib
 import sys
-from types import SimpleNamespace
-from typing import Any
 
 from .. import __version__
 from ..base import interrupts
@@ -42,8 +39,6 @@ EXAMPLES = (
 def main(argv: list[str] | None = None) -> int:
     """Run one command and return its exit status."""
     own_process = argv is None
-    if own_process:
-        gc.disable()  # what is imported stays: looking through it for garbage takes a tenth of a command's start
     argv = sys.argv[1:] if argv is None else argv
     parser = Parser(
         prog="rigid_proto",
@@ -65,9 +60,6 @@ def main(argv: list[str] | None = None) -> int:
     if own_process:
         # All commands need it, and while it is imported there is nothing to close.
         importlib.import_module("..base.compilation", __package__)
-        _without_unused_libraries()
-        gc.freeze()
-        gc.enable()
         return interrupts.run(lambda: _run(args), lambda error: tell(program, error))
     try:
         return args.run(args)
@@ -86,27 +78,3 @@ def _run(args: argparse.Namespace) -> int:
         status = args.run(args)
     print(end="", flush=True)  # in here: what can't be written is told as any other file
     return status
-
-
-def _without_unused_libraries() -> None:
-    """Let numba find neither SciPy's BLAS, cffi nor other packages' extensions, as where they aren't installed: no
-    kernel of this package has a use for them, and looking for them takes three tenths of a command's start. For
-    processes that run nobody else's kernels.
-    """
-    # The modules that look for them, when the first kernel is called (tried with numba 0.68).
-    modules: dict[str, Any] = sys.modules
-    for library, looks in (("scipy.linalg", "numba.np.arraymath"), ("cffi", "numba.core.typing.cffi_utils")):
-        if looks in modules or library in modules:
-            continue
-        modules[library] = None
-        try:
-            importlib.import_module(looks)
-        finally:
-            del modules[library]
-    # It reads the metadata of every package that is installed.
-    extensions: Any = importlib.import_module("numba.core.entrypoints")
-    metadata, extensions.importlib_metadata = extensions.importlib_metadata, SimpleNamespace(entry_points=dict)
-    try:
-        extensions.init_all()
-    finally:
-        extensions.importlib_metadata = metadata

@@ -7,6 +7,7 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from ..base.command_line import number_from
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.progress import Progress
@@ -37,17 +38,6 @@ def add_session(parser: argparse.ArgumentParser, node: str) -> None:
 def add_json(parser: argparse.ArgumentParser) -> None:
     """--json: for other programs."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-
-
-def number_from(lower: float, upper: float) -> Callable[[str], float]:
-    """The type of an option that takes a number within these bounds."""
-
-    def number(text: str) -> float:
-        if not lower <= (value := float(text)) <= upper:
-            raise argparse.ArgumentTypeError(f"got {text}; accepted: a number from {lower:g} to {upper:g}")
-        return value
-
-    return number
 
 
 # The motion for other tools

@@ -9,10 +9,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..base.command_line import number_from
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.progress import Progress
-from .options import add_exports, add_session, asked, check_exports, number_from, write_exports
+from .options import add_exports, add_session, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
     from ..scene.scenario import Scenario
@@ -127,7 +128,7 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
 
 def _export(runs: list[RecordedSession], args: argparse.Namespace, given: Scenario | None) -> None:
     from ..export.flight_record import FlightRecord, source_of_session
-    from ..session.replay import play
+    from ..session.recorded_session import play
 
     session, record = runs[-1], FlightRecord()
     with Progress("reading the motion") as progress:

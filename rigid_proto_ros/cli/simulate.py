@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.command_line import Parser
+from ..base.command_line import Parser, number_from
 from ..base.errors import InputError
 from ..base.files import output_file
-from .options import add_exports, add_json, add_scene, asked, check_exports, number_from, write_exports
+from .options import add_exports, add_json, add_scene, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord

@@ -10,8 +10,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..scene.offline import OfflineRun
 from ..scene.scenario import Scenario, publication_ns
-from ..session.recorded_session import RecordedSession
-from ..session.replay import Resimulation, resimulation
+from ..session.recorded_session import RecordedSession, Resimulation, resimulation
 from ..simulation.commands import Command
 from ..simulation.observer import (
     BodyChanged,

@@ -10,8 +10,7 @@ from ..base.vectors import vector
 from ..motion.loads import Load, resolve_load
 from ..scene.command_codec import frame_names, of_event
 from ..scene.scenario import Scenario
-from ..session.recorded_session import RecordedSession, decode_event
-from ..session.replay import session_scenario
+from ..session.recorded_session import RecordedSession, decode_event, session_scenario
 from ..simulation.commands import ClearWrench, WrenchCommand
 from ..simulation.setup import Setup
 from .measurements import ATTITUDE, POSITION, LoadHistory, MeasuredFlight, Series, load_history

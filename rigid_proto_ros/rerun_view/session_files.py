@@ -148,7 +148,7 @@ def record(
 
     Raises InputError for a session without a scene and a file that can't be written.
     """
-    from ..session.replay import play
+    from ..session.recorded_session import play
 
     for session in runs:
         if not session.scene and given is None:

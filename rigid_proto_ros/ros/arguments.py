@@ -6,13 +6,12 @@ a stack of errors.
 from __future__ import annotations
 
 import argparse
-import math
 import textwrap
 from collections.abc import Callable, Iterator
 
 from rclpy.utilities import remove_ros_args
 
-from ..base.command_line import Parser
+from ..base.command_line import Parser, number_from
 from ..base.errors import InputError
 from ..scene.offline import scene_values
 from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
@@ -39,7 +38,8 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
         description="Simulate a rigid body as a ROS 2 node until Ctrl-C. A scene is a ROS parameter file.",
         examples=EXAMPLES,
     )
-    parser.add_argument("--until", type=_seconds, metavar="S", help="end when simulated time reaches this many seconds")
+    seconds = number_from(1e-9, MAX_TIME_S)
+    parser.add_argument("--until", type=seconds, metavar="S", help="end when simulated time reaches this many seconds")
     try:
         own = remove_ros_args(argv)[1:]
     except Exception as error:  # rclpy's own error types differ between versions
@@ -50,17 +50,6 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
     if own and not any(word.startswith("-") for word in own):
         raise InputError(own[0], f"not an option; a scene is given by --ros-args --params-file {own[0]}")
     return parser.parse_args(own)
-
-
-def _seconds(text: str) -> float:
-    """A time that a flight can end at; argparse says the rest of the refusal."""
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
-    if not 0.0 < seconds <= MAX_TIME_S:
-        raise argparse.ArgumentTypeError(f"got {text}; accepted: seconds above 0, up to {MAX_TIME_S:g}")
-    return seconds
 
 
 def _parameter_help() -> str:

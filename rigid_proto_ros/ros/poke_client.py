@@ -17,7 +17,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from ..base import interrupts
-from ..base.command_line import Parser
+from ..base.command_line import Parser, number_from
 from ..base.errors import InputError, tell
 
 if TYPE_CHECKING:
@@ -72,10 +72,15 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     )
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
     parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")
-    parser.add_argument("--lead", type=float, default=0.2, metavar="S", help="seconds added to every t (default 0.2)")
+    lead, timeout = number_from(0.0, 3600.0), number_from(0.0, MAX_TIME_S)
+    parser.add_argument("--lead", type=lead, default=0.2, metavar="S", help="seconds added to every t (default 0.2)")
     parser.add_argument("--dry-run", action="store_true", help="print what would be sent, and send nothing")
     parser.add_argument(
-        "--timeout", type=float, default=10.0, metavar="S", help="wait this long for the node (default 10; 0: for ever)"
+        "--timeout",
+        type=timeout,
+        default=10.0,
+        metavar="S",
+        help="wait this long for the node (default 10; 0: no limit)",
     )
     line = parser.add_argument_group("one command from the line")
     line.add_argument("--at", default="com", help="com, origin, a contact, vertex/<i>, point/<x>,<y>,<z>, ray/...")
@@ -87,15 +92,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     line.add_argument("--axes", choices=("world", "body"), help="axes of force and torque (default world)")
     line.add_argument("--slot", metavar="NAME", help="replace what acts in this slot, and nothing else")
     line.add_argument("--for", dest="duration", type=float, metavar="S", help="duration in seconds")
-    args = parser.parse_args(argv)
-    limits = (
-        ("--lead", args.lead, 3600.0),
-        ("--timeout", args.timeout, MAX_TIME_S),
-    )
-    for name, value, upper in limits:
-        if not 0.0 <= value <= upper:
-            raise InputError(name, value, f"seconds from 0 to {upper:g}")
-    return args
+    return parser.parse_args(argv)
 
 
 def _script(args: argparse.Namespace) -> list[Command]:

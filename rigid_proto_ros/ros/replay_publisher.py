@@ -23,8 +23,7 @@ from ..scene.command_codec import frame_names
 from ..scene.script import parse_script
 from ..session.as_script import script_of_session
 from ..session.messages import PROJECTIONS
-from ..session.recorded_session import RecordedSession, StampedRows
-from ..session.replay import recorded_parameters
+from ..session.recorded_session import RecordedSession, StampedRows, recorded_parameters
 from . import qos
 from .script_sender import ScriptSender
 

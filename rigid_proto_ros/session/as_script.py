@@ -31,8 +31,7 @@ from ..simulation.observer import Applied, Event, Logged, Observer
 from ..simulation.simulation import Simulation
 from ..simulation.string_control import mesh_point
 from .messages import PROJECTIONS
-from .recorded_session import RecordedSession, decode_event
-from .replay import Resimulation, resimulation
+from .recorded_session import RecordedSession, Resimulation, decode_event, resimulation
 
 NOT_OF_THE_MOTION = frozenset({"record", "viewer", "rerun_port", "web_port", "workbench_port", "start_paused"})
 """Parameters of a running node that a scene to keep or to send doesn't carry."""

@@ -14,8 +14,7 @@ from ..base.provenance import cpu, versions
 from ..simulation.event_log import EventLog
 from ..simulation.observer import Event, Logged, Observer
 from .messages import FIELDS, PROJECTIONS
-from .recorded_session import RecordedSession, decode_event
-from .replay import Resimulation, resimulation
+from .recorded_session import RecordedSession, Resimulation, decode_event, resimulation
 
 
 class NotVerifiableError(InputError):

@@ -38,7 +38,7 @@ from ..simulation.observer import (
     Started,
 )
 from .mailbox import BATCH, Mailbox
-from .messages import DEFINITIONS, FLOOR, LATCHED, MADE_WITH, PROJECTIONS, TOPICS, applied_bytes, inertia_bytes
+from .messages import DEFINITIONS, FLOOR, MADE_WITH, PROJECTIONS, TOPICS, applied_bytes, inertia_bytes
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -124,12 +124,7 @@ class McapObserver(Observer):
             if message_type in TOPICS.values()
         }
         self._channels = {
-            name: writer.register_channel(
-                f"/{node_name.strip('/')}/{name}",
-                "cdr",
-                schemas[message_type],
-                {"offered_qos_profiles": _offered(name in LATCHED)},
-            )
+            name: writer.register_channel(f"/{node_name.strip('/')}/{name}", "cdr", schemas[message_type])
             for name, message_type in TOPICS.items()
         }
         self._stream.flush()
@@ -228,13 +223,3 @@ class McapObserver(Observer):
     def _stopped(self, reason: str) -> None:
         self.error = f"recording stopped: {self._path}: {reason}"
         self._on_error(self.error)
-
-
-def _offered(latched: bool) -> str:
-    """The publisher's quality of service as bags keep it: reliable, and transient local where latched."""
-    none = "sec: 9223372036\n    nsec: 854775807"
-    return (
-        f"- history: 1\n  depth: {1 if latched else 10}\n  reliability: 1\n  durability: {1 if latched else 2}\n"
-        f"  deadline:\n    {none}\n  lifespan:\n    {none}\n  liveliness: 1\n"
-        f"  liveliness_lease_duration:\n    {none}\n  avoid_ros_namespace_conventions: false"
-    )

@@ -67,8 +67,6 @@ TOPICS = {
 }
 """Topics of a session that we write, below the node's name, and their types."""
 
-LATCHED = ("scene", "inertia")
-
 READ = {name: TOPICS[name] for name in ("scene", "events", "pose", "twist")} | {"odom": "nav_msgs/msg/Odometry"}
 """Topics that a session is read from."""
 

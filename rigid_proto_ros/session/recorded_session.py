@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A recorded flight as plain arrays and text, whatever file it was read from, and the mesh that it flew,
-found by its hash.
+"""A recorded flight as plain arrays and text, whatever file it was read from; the mesh that it flew, found by its hash;
+and the flight computed anew from its scene and its events, and told to an observer once more.
 """
 
 from __future__ import annotations
@@ -8,14 +8,26 @@ from __future__ import annotations
 import hashlib
 import json
 import tempfile
-from collections.abc import Iterable
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
 
 from ..base.errors import InputError, MeshError
 from ..mesh.reading import Mesh, load_mesh
+from ..scene.command_codec import frame_names, of_event
+from ..scene.offline import notify_start
+from ..scene.parameters import Parameters, convert_all
+from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
+from ..scene.scenario_run import ScenarioRun
+from ..scene.scene_file import read_scene_text
+from ..simulation.commands import Change, Command
+from ..simulation.observer import BodyChanged, Observer, Published, snapshot
+from ..simulation.setup import Setup
+from .messages import PROJECTIONS
 
 
 @dataclass(frozen=True)
@@ -106,15 +118,165 @@ def find_mesh(
             return mesh
     for file_name, data in attachments:
         if hashlib.sha256(data).hexdigest() == sha256:
-            return _from_bytes(file_name, data)
+            # Loaded through a file: what a mesh is depends on its ending, too.
+            with tempfile.TemporaryDirectory(prefix="rigid_proto_") as temporary:
+                path = Path(temporary) / Path(file_name).name
+                path.write_bytes(data)
+                return load_mesh(str(path))
     raise MeshError(
         "mesh", name, f"the file with SHA-256 {sha256}, there or beside the session; the recording doesn't hold it"
     )
 
 
-def _from_bytes(file_name: str, data: bytes) -> Mesh:
-    # Loaded through a file: what a mesh is depends on its ending, too.
-    with tempfile.TemporaryDirectory(prefix="rigid_proto_") as folder:
-        path = Path(folder) / Path(file_name).name
-        path.write_bytes(data)
-        return load_mesh(str(path))
+# Computed anew
+
+
+def recorded_parameters(session: RecordedSession) -> Parameters:
+    """The parameters that the session began with; those of the default where it has no scene."""
+    scene = read_scene_text(session.scene, "the recorded scene").values if session.scene else {}
+    return Parameters().replaced(scene)
+
+
+def session_scenario(session: RecordedSession) -> Scenario:
+    """The scenario that the session began with; the mesh by name if its content is the same, else the recorded one."""
+    if not session.scene:
+        raise InputError("session", "the recording has no scene; give one with --scene FILE")
+    values = read_scene_text(session.scene, "the recorded scene").values
+    if not session.mesh_sha256:
+        return make_scenario(values)
+    name = str(values.get("mesh", ""))
+    if session.vertices is None or session.triangles is None:
+        return make_scenario(values, find_mesh(name, session.mesh_sha256, session.attachments, session.folder))
+    try:
+        mesh = load_mesh(name)
+    except InputError:
+        mesh = None
+    if mesh is None or mesh.sha256 != session.mesh_sha256:
+        mesh = Mesh(name, name, session.vertices, session.triangles, None, session.mesh_sha256)
+    return make_scenario(values, mesh)
+
+
+def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
+    """By name, the meshes that later scenes of the session say were flown; None for those that none speaks of."""
+    hashes: dict[str, str] = {}
+    for scene in session.scenes:
+        if mesh_sha256_of(scene):
+            hashes[str(read_scene_text(scene, "a recorded scene").values.get("mesh", ""))] = mesh_sha256_of(scene)
+
+    def find(name: str) -> Mesh | None:
+        return find_mesh(name, hashes[name], session.attachments, session.folder) if name in hashes else None
+
+    return find
+
+
+class Resimulation(ScenarioRun):
+    """A session's simulation; its commands are submitted when their time has come, as they were then. Raises InputError
+    for events that can't be decoded.
+
+    mesh_of(name) gives the mesh that a change names, or None to load it.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        event_lines: Sequence[str],
+        observer: Observer | None = None,
+        mesh_of: Callable[[str], Mesh | None] = lambda _: None,
+        node_name: str = "rigid_body",
+    ) -> None:
+        super().__init__(scenario, observer)
+        # Its own are recorded like all events, and those of recordings from before there were such ones aren't.
+        self.simulation.logs_timeouts = False
+        self.frames = frame_names(scenario.parameters, node_name)
+        self._mesh_of = mesh_of
+        self._changes_ns = -1
+        waiting: list[tuple[int, str, dict, Command | None, int]] = []
+        for number, line in enumerate(event_lines, 1):
+            time_ns, kind, content = decode_event(line, number)
+            try:
+                if kind == "set":
+                    convert_all(content)
+                command = of_event(kind, content, self.frames)
+            except InputError as error:
+                raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
+            waiting.append((time_ns, kind, content, command, number))
+        # Stable: what happened at one instant keeps its order.
+        self._waiting = deque(sorted(waiting, key=itemgetter(0)))
+
+    def advance(self, until_ns: int) -> np.ndarray:
+        """Advance the body to ``until_ns``; returns its state row, before what acts at that very time.
+
+        Raises CommandRefused for a recorded command that can't be taken.
+        """
+        # Marks at the time asked for were made before anything else could act there.
+        while self._waiting and (
+            self._waiting[0][0] < until_ns or (self._waiting[0][0] == until_ns and self._waiting[0][3] is None)
+        ):
+            time_ns, kind, content, command, number = self._waiting.popleft()
+            self.simulation.advance(max(time_ns, self.simulation.time_ns))
+            if command is None:
+                self.simulation.log(kind, content)
+                continue
+            if isinstance(command, Change):
+                self._changes_ns = time_ns
+            # What acts under a change of its own instant can't be checked before that acts.
+            checked = (b"", self.simulation.setup) if self._changes_ns == time_ns else None
+            # What acted at one instant acts in the order of the log, whatever rule made it.
+            self.simulation.submit(command, time_ns, (0, number), checked)
+        return self.simulation.advance(until_ns).row
+
+    def setup_of(self, command: Change) -> Setup:
+        """Put in force what a change says, with the mesh that was flown then."""
+        mesh = self._mesh_of(command.content["mesh"]) if command.content.get("mesh") else None
+        return super().setup_of(command) if mesh is None else self.change(command.content, mesh)
+
+
+def resimulation(session: RecordedSession, observer: Observer | None = None) -> Resimulation:
+    """The session's simulation at its start; raises InputError for events that can't be decoded."""
+    scenario = session_scenario(session)
+    return Resimulation(scenario, session.lines, observer, mesh_finder(session), session.node_name)
+
+
+def play(
+    session: RecordedSession,
+    observer: Observer,
+    given: Scenario | None = None,
+    progress: Callable[[float, float], None] = lambda _done, _total: None,
+) -> None:
+    """Tell ``observer`` the session from its start to its last state; ``progress`` is called with (states told, all
+    states).
+
+    given: the scene of a session that lacks it; then states alone are told. Raises InputError for events that can't be
+    decoded, and for a session without a scene.
+    """
+    again = None
+    if given is not None or session.missing:
+        if given is None:
+            raise InputError("session", ", ".join(session.missing), "--scene FILE, to draw it")
+        notify_start(observer, given)
+        observer.on(BodyChanged(0, snapshot(given.setup)))
+    else:
+        again = resimulation(session, observer)
+        notify_start(observer, again.scenario)
+        again.simulation.announce()
+        again.begin_ghost()
+    for count, k in enumerate(np.argsort(session.times, kind="stable").tolist()):
+        progress(count, len(session.times))
+        time_ns, row = int(session.times[k]), session.rows[k]
+        if again is None:
+            observer.on(Published(time_ns, row))
+            continue
+        try:
+            computed = again.advance(time_ns)
+        except InputError:
+            # A command that is refused here: from now on only the recorded states are shown.
+            computed = row
+        # A bag holds of a state what was published of it, and no more.
+        alike = bool(session.published) and all(
+            np.allclose(PROJECTIONS[name](computed.tolist()), PROJECTIONS[name](row.tolist()), rtol=1e-12, atol=1e-12)
+            for name in session.published
+        )
+        observer.on(Published(time_ns, computed if alike else row))
+        again.simulation.notify_floor()
+        if again.ghost is not None:
+            again.ghost.advance(time_ns)

@@ -20,7 +20,7 @@ from ..export.tracks import tracks_of
 from ..picture import style
 from ..scene.scenario import Scenario
 from ..session.as_script import script_of_session
-from ..session.replay import play
+from ..session.recorded_session import play
 from .controls import Controls, log_slider, on_slider
 from .flight import Flight
 from .pointer import Tools

@@ -8,7 +8,6 @@ import os
 import resource
 import signal
 import subprocess
-import sys
 
 import pytest
 from conftest import ENDINGS
@@ -72,26 +71,6 @@ def test_a_command_without_its_package_names_it_in_one_line_and_does_nothing(
     assert main(command) == 2
     told = capsys.readouterr()
     assert told.out == "" and len(told.err.splitlines()) == 1 and named in told.err
-
-
-COMMAND = """
-import gc, importlib.metadata, sys
-from rigid_proto_ros.cli import main
-asked, entry_points = [], importlib.metadata.entry_points
-importlib.metadata.entry_points = lambda **group: asked.append(group) or entry_points(**group)
-sys.argv = ["rigid_proto", "inspect", "t_handle", "--urdf"]
-status = main.main()
-looks = "numba.np.arraymath" in sys.modules and "numba.core.typing.cffi_utils" in sys.modules
-print(status, looks, [m for m in ("scipy.linalg", "scipy.spatial", "cffi") if m in sys.modules], asked, gc.isenabled())
-import scipy.linalg
-"""
-
-
-def test_a_command_starts_without_scipys_linear_algebra_cffi_and_extensions_of_numba():
-    ran = subprocess.run([sys.executable, "-c", COMMAND], capture_output=True, text=True, check=True)
-    expected = "0 True [] [] True"
-    moved = "numba no longer looks for BLAS, cffi or extensions where cli/main.py lets it find none"
-    assert ran.stdout.splitlines()[-1] == expected, moved
 
 
 def buffered() -> dict[str, str]:

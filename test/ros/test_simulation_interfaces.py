@@ -147,7 +147,7 @@ def test_without_the_package_nothing_is_offered(monkeypatch):
 
 
 def test_a_state_that_is_set_acts_as_a_command_that_replays_to_the_bit(services):
-    from rigid_proto_ros.session.replay import Resimulation
+    from rigid_proto_ros.session.recorded_session import Resimulation
 
     answer, node = services
     entity, told = answer, EventLines()

@@ -16,8 +16,7 @@ from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script, read_script
 from rigid_proto_ros.session.as_script import branch_at
 from rigid_proto_ros.session.messages import PROJECTIONS
-from rigid_proto_ros.session.recorded_session import RecordedSession
-from rigid_proto_ros.session.replay import resimulation
+from rigid_proto_ros.session.recorded_session import RecordedSession, resimulation
 from rigid_proto_ros.simulation.observer import Logged, Observer
 
 SECOND = 10**9

@@ -11,7 +11,7 @@ from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.script import parse_script
-from rigid_proto_ros.session.replay import Resimulation
+from rigid_proto_ros.session.recorded_session import Resimulation
 from rigid_proto_ros.simulation.commands import slot_name, slot_number
 
 SCENE = {"mesh": "t_handle", "mass": 1.0, "publish_rate": 10.0}
