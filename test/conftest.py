@@ -32,19 +32,12 @@ collect_ignore_glob = [file for files in MISSING.values() for file in files]
 
 
 LONG = (
-    *("msg_examples", "workbench_page", "time_in_flight", "readme", "poke_client", "sweep_runs", "session_crash"),
-    *(
-        "conventions_of_the_node",
-        "replay_publish",
-        "node_signals",
-        "commands_refused",
-        "mass_exactness",
-        "commands_node",
-    ),
-    *("string_scenes", "node_flight", "stress_free_body", "lockstep", "demo", "stress_auto", "commands_flood"),
-    *("order_of_commands", "string_pendulum", "rerun_live", "rerun_slow_viewers", "snapshot", "packaging", "fitting"),
-    *("rerun_crash", "simulate_bad_input", "session_bag", "node_work", "interface", "node_warnings"),
-    *("workbench_lessons", "workbench_script_node", "mesh_fuzz", "architecture", "stress_extremes", "sweep_bits"),
+    *("msg_examples", "workbench_page", "readme", "sweep_runs", "replay_publish", "mass_exactness", "poke_client"),
+    *("string_scenes", "commands_flood", "time_in_flight", "demo", "executables", "stress_auto"),
+    *("session_crash", "order_of_commands", "commands_node", "string_pendulum", "rerun_live", "rerun_slow_viewers"),
+    *("snapshot", "packaging", "fitting", "node_warnings", "rerun_crash", "conventions_of_the_node", "node_signals"),
+    *("session_bag", "workbench_lessons", "node_workbench", "node_work", "commands_refused", "simulate_bad_input"),
+    *("mesh_fuzz", "architecture", "sweep_bits"),
 )
 """Files that take longest, waiting and computing ones by turns: workers begin with them, so that none has one left at the end."""
 

@@ -191,9 +191,8 @@ def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_envir
     """
     with held_domain() as domain:
         environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
-        node = start_node(
-            environment, tmp_path / "node", {"use_sim_time": True, "initial.linear_velocity": [1.0, 0.0, 0.0]}
-        )
+        values = {"use_sim_time": True, "initial.linear_velocity": [1.0, 0.0, 0.0]}
+        node = start_node(environment, tmp_path / "node", values, name="often_reporting_node")
         client = RosClient(environment)
         try:
             client.listen("pose", "events")
