@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigid_proto_ros.mass.from_mesh import MeshBody, mesh_body
-from rigid_proto_ros.mass.verdict_cache import PASSING
+from rigid_proto_ros.mass.from_mesh import PASSING, MeshBody, mesh_body
 from rigid_proto_ros.mesh.reading import Mesh, load_mesh
 
 

@@ -60,8 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Read, estimate, and print it."""
     try:
-        from ..identify.identification import Known, identify
-        from ..identify.report import as_json, as_text, as_urdf
+        from ..identify.identification import Known, as_json, as_text, as_urdf, identify
     except ImportError as error:
         package = str(error.name).partition(".")[0]
         raise InputError("identify", is_missing(package, "identify")) from None

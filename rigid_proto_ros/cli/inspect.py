@@ -10,7 +10,8 @@ import sys
 
 from ..base.errors import InputError
 from ..mass.from_mesh import FALLBACKS, mesh_body
-from ..mass.inspection import MODELS, Inspection, as_json, inspect_mesh, verify_moments
+from ..mass.inspection import Inspection, as_json, inspect_mesh, verify_moments
+from ..mass.moments import MODELS
 from ..mass.properties import scale_vector
 from .inspect_report import print_inertial, print_report
 from .inspect_robot import add_robot_arguments, compare, lump

@@ -145,18 +145,15 @@ def _fix(args: argparse.Namespace) -> int:
     with whole_file("--fix", args.fix) as path:
         path.write_bytes(data)
     if args.json:
-        rows = [
-            {**link.before.as_dict(), "written": link.written, "left": link.left, "after": link.after.as_dict()}
-            for link in links
-        ]
+        rows = [{**link.before.as_dict(), "written": link.written, "left": link.left} for link in links]
         print(json.dumps({"compare": args.compare[0], "fix": args.fix, "links": rows}))
     else:
         for link in links:
-            after = f" -> {link.after.status}" if link.written else f"; left: {link.left}" if link.left else ""
-            print(f"{link.before.link}: {link.before.status}{after}")
+            became = " -> uniform" if link.written else f"; left: {link.left}" if link.left else ""
+            print(f"{link.before.link}: {link.before.status}{became}")
         written, left = sum(link.written for link in links), sum(bool(link.left) for link in links)
         print(f"{args.fix}: {written} of {len(links)} inertials rewritten, {left} left as they are")
-    return 1 if any(link.after.status in WRONG for link in links) else 0
+    return 1 if any(link.before.status in WRONG and not link.written for link in links) else 0
 
 
 def lump(args: argparse.Namespace) -> int:
@@ -178,9 +175,7 @@ def _lump_as_dict(robot: str, whole: Lump) -> dict:
     moments, axes = principal_axes(whole.properties.inertia)
     return {
         "lump": robot,
-        "mass": whole.properties.mass,
-        "center_of_mass": whole.properties.center_of_mass.tolist(),
-        "inertia": whole.properties.inertia.tolist(),
+        **whole.properties.as_dict(),
         "principal_moments": moments.tolist(),
         "principal_axes": axes.tolist(),
         "links": dict(whole.links),

@@ -269,14 +269,10 @@ def _margin(unknowns: Unknowns) -> float:
     return OFFSET_MARGIN_S if "offset" in unknowns else 0.0
 
 
-def _local_starts(problem: Problem) -> list[np.ndarray]:
-    return [one.begin(local_start(one.flight, one.begin_ns)) for one in problem.segments]
-
-
 def fit_flights(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> Estimate:
     """The most likely values, from these on; raises CannotFlyError."""
     problem, length = _first_problem(flights, unknowns, values)
-    starts = _local_starts(problem)
+    starts = [one.begin(local_start(one.flight, one.begin_ns)) for one in problem.segments]
     while len(problem.segments) > len(flights):
         values, starts = problem.solved(starts)
         sigmas = problem.noise_left(values, starts)

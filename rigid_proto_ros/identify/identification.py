@@ -1,20 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""From measured flights to the body's mass properties."""
+"""From measured flights to the body's mass properties, and what ``rigid_proto identify`` prints of them: the verdict,
+then the identified numbers with their standard deviations.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
 
 import numpy as np
 
 from ..base.errors import InputError
+from ..mass.export import urdf_inertial
 from ..mass.properties import MassProperties
-from .fitting import CannotFlyError, fit_flights
+from ..mass.tensor import principal_axes, six_from_tensor
+from .fitting import CannotFlyError, Estimate, fit_flights
 from .measurements import ACCELERATION, MeasuredFlight, topics_of
-from .report import Identification
 from .unknowns import DEFAULT_FIT, Values, make_unknowns, possible_tensor
-from .verdict import Identifiability, check_residuals
+from .verdict import Identifiability, Quantity, ResidualCheck, Unidentified, check_residuals
 
 GUESSED_RADIUS = 0.1
 """Of the ball that stands for a body of which nothing is known [m]."""
@@ -24,6 +29,115 @@ USUAL = (
     "usual causes: positions that aren't in m, rates in degrees, accelerations in g, gravity along another axis"
     " (--gravity), quaternions that begin with w, a wrench along other axes (--wrench TOPIC@FRAME), clocks"
 )
+MISFIT = "the residuals are larger than the noise, so the numbers may be farther off than their standard deviations say"
+OTHER_UNITS = {"gravity": "m/s²", "offset": "s", "gyro_bias": "rad/s", "accel_bias": "m/s²", "imu_place": "m"}
+DAMPING_UNITS = ("N s/m", "N m s")
+TENSOR_NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+@dataclass(frozen=True)
+class Identification:
+    """The estimate, what of it is identified, and the checks of its residuals. guessed: of ``mass``, ``com`` and
+    ``inertia`` what was neither asked for nor given, which has no number. cause: what may be the cause where the
+    residuals are no noise.
+    """
+
+    flights: Sequence[MeasuredFlight]
+    estimate: Estimate
+    identifiability: Identifiability
+    checks: Sequence[ResidualCheck]
+    assumed: Sequence[str]
+    guessed: frozenset[str] = frozenset()
+    cause: str = ""
+
+    @property
+    def unidentified(self) -> list[Unidentified]:
+        """What the motion doesn't identify."""
+        return self.identifiability.unidentified
+
+    @property
+    def verdict(self) -> str:
+        """What is identified, in a sentence, after the warning that the model doesn't fit, if it doesn't."""
+        text = "everything that was asked for is identified from this motion"
+        if self.unidentified:
+            words = {"mass": [self.mass], "centre of mass": self.center_of_mass, "tensor": self.inertia}
+            found = [name for name, parts in words.items() if all(part.value is not None for part in parts)]
+            if "tensor" not in found and all(part.value is not None for part in self.shape):
+                found.append("shape of the tensor")
+            hidden = ", ".join(one.what for one in self.unidentified)
+            identified = ", ".join(found) or "nothing that was asked for"
+            text = f"identified from this motion: {identified}; not identified: {hidden}"
+        return text if self.fits else f"{MISFIT}; {text}"
+
+    @property
+    def fits(self) -> bool:
+        """Whether the residuals are noise: else the numbers may be far off, whatever their standard deviations."""
+        return all(check.is_noise for check in self.checks)
+
+    @property
+    def mass(self) -> Quantity:
+        """[kg]."""
+        return self._each(lambda values: np.array([values.mass]), 1, "mass")[0]
+
+    @property
+    def center_of_mass(self) -> list[Quantity]:
+        """[m, tracked frame]."""
+        return self._each(lambda values: values.center_of_mass, 3, "com")
+
+    @property
+    def inertia(self) -> list[Quantity]:
+        """ixx ixy ixz iyy iyz izz [kg m², about the COM, axes of the tracked frame]."""
+        return self._whole(lambda values: np.array(six_from_tensor(values.inertia)), 6)
+
+    @property
+    def shape(self) -> list[Quantity]:
+        """The same divided by the tensor's trace."""
+        return self._whole(lambda values: np.array(six_from_tensor(values.inertia)) / np.trace(values.inertia), 6)
+
+    @property
+    def moments(self) -> list[Quantity]:
+        """Principal moments, ascending [kg m²]."""
+        return self._whole(lambda values: principal_axes(values.inertia)[0], 3)
+
+    @property
+    def others(self) -> dict[str, Quantity]:
+        """Whatever else was asked for, by name."""
+        unknowns, found = self.estimate.unknowns, {}
+        for slot in self._other_slots:
+            found[unknowns.name(slot)] = self.identifiability.quantity(partial(unknowns.read, slot=slot))
+        return found
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Of the others, by name."""
+        unknowns, found = self.estimate.unknowns, {}
+        for slot in self._other_slots:
+            group, index = unknowns.slots[slot]
+            found[unknowns.name(slot)] = DAMPING_UNITS[index] if group == "damping" else OTHER_UNITS[group]
+        return found
+
+    @property
+    def remarks(self) -> list[str]:
+        """On the residuals."""
+        return [*filter(None, [self.cause]), *(remark for check in self.checks for remark in check.remarks)]
+
+    @property
+    def _other_slots(self) -> list[int]:
+        return [k for k, (group, _) in enumerate(self.estimate.unknowns.slots) if group not in DEFAULT_FIT]
+
+    def _each(self, read: Callable[[Values], np.ndarray], count: int, group: str) -> list[Quantity]:
+        if group in self.guessed:
+            return [Quantity(None, None)] * count
+
+        def entry(values: Values, k: int) -> float:
+            return float(read(values)[k])
+
+        return [self.identifiability.quantity(partial(entry, k=k)) for k in range(count)]
+
+    def _whole(self, read: Callable[[Values], np.ndarray], count: int) -> list[Quantity]:
+        """All of them or none: an entry that happens to be 0 has the size of the others."""
+        found = self._each(read, count, "inertia")
+        return found if all(one.value is not None for one in found) else [Quantity(None, None)] * count
 
 
 @dataclass(frozen=True)
@@ -88,3 +202,64 @@ def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]
     for topic in dict.fromkeys(f.load_history.topic for f in flights if len(f.load_history.changes)):
         lines.append(f"{topic} was sampled: it changed between messages, and the errors count that")
     return lines
+
+
+def as_json(found: Identification) -> dict:
+    """The command's JSON object; what isn't identified is null."""
+
+    def pair(quantity: Quantity) -> dict | None:
+        return None if quantity.value is None else asdict(quantity)
+
+    return {
+        "verdict": found.verdict,
+        "fits": found.fits,
+        "hidden": [asdict(one) for one in found.unidentified],
+        "mass": pair(found.mass),
+        "center_of_mass": [pair(one) for one in found.center_of_mass],
+        "inertia": dict(zip(TENSOR_NAMES, map(pair, found.inertia), strict=True)),
+        "inertia_over_trace": dict(zip(TENSOR_NAMES, map(pair, found.shape), strict=True)),
+        "principal_moments": [pair(one) for one in found.moments],
+        "others": {name: pair(one) for name, one in found.others.items()},
+        "assumed": list(found.assumed),
+        "residuals": [{**asdict(check), "white": check.is_white} for check in found.checks],
+        "remarks": found.remarks,
+    }
+
+
+def as_text(found: Identification) -> list[str]:
+    """Lines for a terminal."""
+    lines = [found.verdict]
+    lines += [f"  {one.what}: needs {one.remedy}" for one in found.unidentified]
+    lines += [f"  {text}" for text in found.assumed]
+    tensor, unit = found.inertia, "kg m²"
+    if any(one.value is None for one in tensor):
+        tensor, unit = found.shape, "of the trace"
+    units = found.units
+    rows = [("mass", found.mass, "kg")]
+    rows += [(f"centre of mass {axis}", one, "m") for axis, one in zip("xyz", found.center_of_mass, strict=True)]
+    rows += [(name, one, unit) for name, one in zip(TENSOR_NAMES, tensor, strict=True)]
+    rows += [(name, one, units[name]) for name, one in found.others.items()]
+    lines += [f"{name:<18} {number(one)} {unit}" for name, one, unit in rows if one.value is not None]
+    for check in found.checks:
+        white = "white" if check.is_white else "not white"
+        lines.append(f"noise of {check.series}: {check.noise:.3g} {check.unit}, {white}, {check.samples} samples")
+    return lines + found.remarks
+
+
+def number(quantity: Quantity) -> str:
+    """Value ± standard deviation, with two digits of the latter."""
+    value, sd = quantity.value, quantity.sd
+    if value is None or sd is None or not 0.0 < sd < math.inf:
+        return f"{value:.9g}"
+    digits = 2 + math.floor(math.log10(max(abs(value), sd))) - math.floor(math.log10(sd))
+    return f"{value:#.{min(digits, 15)}g} ± {sd:.2g}"
+
+
+def as_urdf(found: Identification) -> str:
+    """A URDF <inertial>; raises InputError where not all of it is identified."""
+    parts = [found.mass, *found.center_of_mass, *found.inertia]
+    if any(part.value is None for part in parts):
+        raise InputError("--urdf", f"{found.verdict}; a URDF needs mass, centre of mass and tensor")
+    body = found.estimate.values
+    written = urdf_inertial(MassProperties(body.mass, body.center_of_mass, body.inertia))
+    return written if found.fits else f"<!-- {MISFIT} -->\n{written}"

@@ -19,16 +19,8 @@ from ..mass.tensor import principal_axes
 GROUPS = ("mass", "inertia", "com", "damping", "gravity", "offset", "gyro_bias", "accel_bias", "imu_place")
 """What ``--fit`` takes."""
 DEFAULT_FIT = ("mass", "com", "inertia")
-_SIZES = {
-    "mass": 1,
-    "inertia": 6,
-    "com": 3,
-    "damping": 2,
-    "gravity": 3,
-    "gyro_bias": 3,
-    "accel_bias": 3,
-    "imu_place": 3,
-}
+_SIZES = {"mass": 1, "inertia": 6, "damping": 2}
+"""How many numbers a group has, where they aren't 3."""
 THINNEST = 1e-9
 """Least second moment of an estimate, of the largest: of none at all there may be a rod, whose least moment is 0."""
 
@@ -127,7 +119,7 @@ def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:
     for group in GROUPS:
         if group in fit:
             # All clocks together say nothing but when the flight began: the first one is taken as right.
-            slots += [(group, index) for index in (topics[1:] if group == "offset" else range(_SIZES[group]))]
+            slots += [(group, index) for index in (topics[1:] if group == "offset" else range(_SIZES.get(group, 3)))]
     if not slots:
         raise InputError("--fit", ",".join(fit), ", ".join(GROUPS) + "; an offset needs a second topic")
     return Unknowns(tuple(slots))

@@ -40,10 +40,6 @@ LAGS = 10
 """Of the residuals' autocorrelation."""
 LEAST_PROBABILITY = 1e-4
 """Of noise that is white looking so little like it: below it the check fails."""
-FAR = 5.0
-"""Standard deviations beyond which a sample is called an outlier; noise alone does that once in half a
-million numbers.
-"""
 TOO_LARGE = 1.5
 """Residuals so many times the noise between neighbouring samples are no noise."""
 
@@ -154,7 +150,7 @@ def _remedy(name: str) -> str:
 @dataclass(frozen=True)
 class ResidualCheck:
     """noise: standard deviation as estimated. by_differences: what neighbouring samples say it is. probability: of
-    white noise looking so (Ljung and Box). outliers: how many samples lie far off.
+    white noise looking so (Ljung and Box).
     """
 
     flight: str
@@ -164,7 +160,6 @@ class ResidualCheck:
     noise: float
     by_differences: float
     probability: float
-    outliers: int
 
     @property
     def is_white(self) -> bool:
@@ -179,17 +174,14 @@ class ResidualCheck:
     @property
     def remarks(self) -> list[str]:
         """What it shows, in sentences; empty when all is noise."""
-        where, found = f"{self.series} of {self.flight}", []
-        if self.outliers:
-            found.append(f"{where}: {self.outliers} of {self.samples} samples lie beyond {FAR:g} standard deviations")
-        if not self.is_noise:
-            found.append(
-                f"{where}: the residuals of {self.noise:.3g} {self.unit} aren't white noise, and neighbouring samples"
-                f" differ by {self.by_differences:.3g} only: drag (--fit damping), gravity (--fit gravity), clocks"
-                " (--fit offset), a contact (--from and --to exclude it), or a wrench that isn't in the bag; the"
-                " standard deviations are too small"
-            )
-        return found
+        if self.is_noise:
+            return []
+        return [
+            f"{self.series} of {self.flight}: the residuals of {self.noise:.3g} {self.unit} aren't white noise, and"
+            f" neighbouring samples differ by {self.by_differences:.3g} only: drag (--fit damping), gravity (--fit"
+            " gravity), clocks (--fit offset), a contact (--from and --to exclude it), or a wrench that isn't in the"
+            " bag; the standard deviations are too small"
+        ]
 
 
 def check_residuals(flights: Sequence[MeasuredFlight], estimate: Estimate) -> list[ResidualCheck]:
@@ -198,10 +190,8 @@ def check_residuals(flights: Sequence[MeasuredFlight], estimate: Estimate) -> li
     for flight, segment, start in zip(flights, estimate.problem.segments, estimate.starts, strict=True):
         for series, residuals in zip(segment.series, residuals_of(segment, start, estimate.values), strict=True):
             noise = estimate.problem.sigmas[series.name]
-            scaled = residuals / noise
-            outliers = int(np.sum(np.max(np.abs(scaled), axis=1) > FAR))
             check = flight.name, series.name, UNITS[series.kind], len(residuals), noise
-            found.append(ResidualCheck(*check, noise_by_differences(series), _whiteness(scaled), outliers))
+            found.append(ResidualCheck(*check, noise_by_differences(series), _whiteness(residuals / noise)))
     return found
 
 

@@ -1,10 +1,2 @@
 # SPDX-License-Identifier: MIT
 """Mass properties: moments of a mesh, inertia models, tensors, verdict and repair, inspection and export."""
-
-INERTIA_MODELS = ("solid", "shell", "points", "bounding_box", "explicit")
-"""How mass is spread: exact polyhedron, uniform surface, equal point masses at the referenced vertices, the bounding
-box's cuboid, or given numbers."""
-MODEL_COMS = ("model", "solid")
-"""Where a model's centre of mass is taken from: the model's own, or the solid's, so that two tensors can
-be compared alone.
-"""

@@ -57,32 +57,6 @@ def loaded(
 
 
 @njit(cache=True, nogil=True)
-def stretched(
-    left: np.ndarray,
-    center: np.ndarray,
-    center_low: np.ndarray,
-    reference: np.ndarray,
-    second: np.ndarray,
-    per_measure: float,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """center (3,), reference (3,) and COM (3,) times ``left``, second moments (3, 3) of a body with ``per_measure`` kg
-    a unit of measure."""
-    place = np.empty(3)
-    base = np.empty(3)
-    com = np.empty(3)
-    matrix = np.empty((3, 3))
-    slot = 0
-    for i in range(3):
-        base[i] = left[i] * reference[i] + 0.0  # no -0
-        place[i] = left[i] * center[i]
-        com[i] = base[i] + (place[i] + left[i] * center_low[i])
-        for j in range(i, 3):
-            matrix[i, j] = matrix[j, i] = second[slot] * (left[i] * left[j]) * per_measure
-            slot += 1
-    return place, base, com, matrix
-
-
-@njit(cache=True, nogil=True)
 def spread_mass(
     mass: float,
     measure: float,
@@ -100,7 +74,15 @@ def spread_mass(
     measure, reference, center and center_low (3,), second (6,): the moments at unit density. scale (3,) of the mesh;
     left (3,): what of it the moments don't have in them yet. points (k, 4): ballast in mesh coordinates.
     """
-    place, base, com, matrix = stretched(left, center, center_low, reference, second, mass / measure)
+    place, base, com, matrix = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
+    slot, per_measure = 0, mass / measure
+    for i in range(3):
+        base[i] = left[i] * reference[i] + 0.0  # no -0
+        place[i] = left[i] * center[i]
+        com[i] = base[i] + (place[i] + left[i] * center_low[i])
+        for j in range(i, 3):
+            matrix[i, j] = matrix[j, i] = second[slot] * (left[i] * left[j]) * per_measure
+            slot += 1
     total, moved, inertia, principal = loaded(mass, place, matrix, scale, reference * (left / scale), points)
     if points.shape[0]:
         com = base + moved

@@ -35,11 +35,8 @@ def urdf_inertial(properties: MassProperties) -> str:
 
 def sdf_inertial(properties: MassProperties) -> str:
     """An SDF <inertial> element; the tensor is about the COM in the link's axes."""
-    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    entries = "".join(
-        f"    <{name}>{_number(value)}</{name}>\n"
-        for name, value in zip(names, six_from_tensor(properties.inertia), strict=True)
-    )
+    six = zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), six_from_tensor(properties.inertia), strict=True)
+    entries = "".join(f"    <{name}>{_number(value)}</{name}>\n" for name, value in six)
     return (
         "<inertial>\n"
         f"  <pose>{_numbers(properties.center_of_mass)} 0 0 0</pose>\n"

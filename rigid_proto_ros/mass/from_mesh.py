@@ -1,25 +1,38 @@
 # SPDX-License-Identifier: MIT
-"""From a mesh to its moments: the verdict first, then repair or a stand-in where they are asked for."""
+"""From a mesh to its moments: the verdict first, then repair or a stand-in where they are asked for.
+
+Verdicts on files are kept in the user's cache folder under the hash of their bytes and of the code that made them, so
+that a newer version never serves an older one's verdicts. A cache that can't be written or read is no error: the work
+is then done again. ``RIGID_PROTO_CACHE=off`` turns it off.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import functools
+import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from ..base.compilation import INTERPRETED, source_stamp
 from ..base.errors import InputError
+from ..base.files import whole_file
 from ..mesh.reading import Mesh, load_mesh
-from ..mesh.solids import box_surface, convex_hull, united_surface
+from ..mesh.solids import box_surface, can_unite, convex_hull, united_surface
 from .moments import referenced_vertices
 from .properties import MeshMoments, Surface
 from .repair import close_surface, repair_surface
 from .verdict import NESTED, WARNING, Finding, Verdict, check_surface
-from .verdict_cache import check_mesh
 
 FALLBACKS = ("", "hull", "box")
 """What stands in for a surface that bounds no solid: nothing (refuse), its convex hull, or its bounding box."""
+PASSING = "rigid_proto_upload_"
+"""In the paths of files that are gone tomorrow: nothing of them is kept."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +90,9 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
     if verdict.united:
         stand_in = functools.cache(lambda: united_surface(vertices, triangles))
     elif fallback and verdict.usable and not verdict.closed:
-        stand_in = functools.cache(lambda: _stand_in(vertices, triangles, fallback))
-        shape = "convex hull" if fallback == "hull" else "bounding box"
+        points = referenced_vertices(vertices, triangles)
+        shape, made = ("convex hull", convex_hull) if fallback == "hull" else ("bounding box", box_surface)
+        stand_in = functools.cache(lambda: made(points))
         message = f"fallback: the mass properties are those of its {shape}"
         verdict.findings.append(Finding("fallback", WARNING, message))
     remedies = ("" if repair else "--repair (mesh_repair), ") + "--fallback hull|box (mesh_fallback)"
@@ -87,8 +101,31 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
     return MeshBody(mesh, verdict, moments)
 
 
-def _stand_in(vertices: np.ndarray, triangles: np.ndarray, fallback: str) -> tuple[np.ndarray, np.ndarray]:
-    points = referenced_vertices(vertices, triangles)
-    if fallback == "hull":
-        return convex_hull(points)
-    return box_surface(points.min(axis=0), points.max(axis=0))
+def folder() -> Path | None:
+    """The cache folder, or None when it is turned off or there is no home."""
+    if os.environ.get("RIGID_PROTO_CACHE", "").lower() in ("off", "0", "no"):
+        return None
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    try:
+        return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "rigid_proto_ros" / "meshes"
+    except RuntimeError:
+        return None
+
+
+def check_mesh(mesh: Mesh) -> Verdict:
+    """The verdict on a mesh, from the cache or anew."""
+    base = None if PASSING in mesh.path else folder()
+    if base is None:
+        return check_surface(mesh.vertices, mesh.triangles)
+    # Sums may round otherwise where they aren't compiled.
+    ways = mesh.path.rpartition(".")[2].lower(), "united" if can_unite() else "body", str(INTERPRETED)
+    path = base / f"{mesh.sha256}-{'-'.join(ways)}-{source_stamp(__file__).hex()[:16]}.json"
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
+        kept = json.loads(path.read_bytes())
+        return Verdict(findings=[Finding(**finding) for finding in kept.pop("findings")], **kept)
+    verdict = check_surface(mesh.vertices, mesh.triangles)
+    with contextlib.suppress(OSError, InputError):
+        base.mkdir(parents=True, exist_ok=True)
+        with whole_file("cache", path) as entry:
+            entry.write_text(json.dumps(dataclasses.asdict(verdict)))
+    return verdict

@@ -1,30 +1,94 @@
 # SPDX-License-Identifier: MIT
-"""All that is to be said of one mesh at one scale and mass: every model's mass properties, and the remarks on them."""
+"""All that is to be said of one mesh at one scale and mass: every model's mass properties, how they differ from the
+solid's in what counts for the motion, and the remarks on them.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import InputError
-from . import INERTIA_MODELS
 from .exact_moments import exact_solid_moments, relative_errors
 from .from_mesh import MeshBody
-from .model_difference import ModelDifference, model_difference
-from .moments import referenced_vertices
+from .moments import MODELS, referenced_vertices
 from .properties import MassProperties, scale_vector
 from .tensor import principal_axes
-from .verdict import WARNING, Finding, stated_unit, unit_suspicion
+from .verdict import INFO, WARNING, Finding
 
-MODELS = tuple(model for model in INERTIA_MODELS if model != "explicit")
 JSON_KEYS = (
     *("mesh", "vertices", "triangles", "watertight", "winding_consistent", "components", "volume", "area", "mass"),
     *("density", "center_of_mass", "inertia", "principal_moments", "principal_axes", "bounding_box", "models"),
     "verdict",
 )
+
+
+LARGE_M = 5.0
+"""Longest side [m] beyond which another unit is suspected: few bodies that one pokes are longer, and every part of more
+than 5 mm drawn in millimetres is."""
+
+
+@dataclass(frozen=True)
+class ModelDifference:
+    """principal_moments (3,): relative errors of the moments, in ascending order, each by its own. axes_turned [rad]:
+    the smallest turn that brings the principal axes onto the true ones. center_of_mass (3,): offset from the true one
+    [m].
+    """
+
+    principal_moments: np.ndarray
+    axes_turned: float
+    center_of_mass: np.ndarray
+
+
+def model_difference(properties: MassProperties, true: MassProperties) -> ModelDifference:
+    """How ``properties`` differ from the true ones."""
+    moments, axes = principal_axes(properties.inertia)
+    true_moments, true_axes = principal_axes(true.inertia)
+    turned = _axes_turned(axes, _symmetry_axis(moments), true_axes, _symmetry_axis(true_moments))
+    return ModelDifference(moments / true_moments - 1.0, turned, properties.center_of_mass - true.center_of_mass)
+
+
+ANY = -1
+"""The axis of symmetry of what has the same moment about every axis."""
+EQUAL = 1e-9
+"""Part of the largest moment by which two that count as one may differ: their axes are then any pair at right angles in
+the plane that they span."""
+
+
+def _symmetry_axis(moments: np.ndarray) -> int | None:
+    """The axis about which a tensor is symmetric, None without one, ANY where all moments are the same."""
+    first, last = np.diff(moments) <= EQUAL * moments[2]
+    if first and last:
+        return ANY
+    return 2 if first else 0 if last else None
+
+
+def _axes_turned(axes: np.ndarray, mine: int | None, others: np.ndarray, theirs: int | None) -> float:
+    """The smallest angle [rad] of a rotation that takes one set of principal axes (3, 3), columns, to another.
+
+    An axis has no sign. Those across an axis of symmetry are arbitrary, and what turns within their span is no
+    difference.
+    """
+    if mine is ANY or theirs is ANY:
+        return 0.0
+    if mine is None and theirs is None:
+        angles = []
+        for a, b in product((1.0, -1.0), repeat=2):
+            R = others @ np.diag((a, b, a * b)) @ axes.T
+            across = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+            angles.append(math.atan2(float(np.linalg.norm(across)), float(np.trace(R)) - 1.0))
+        return min(angles)
+    one = mine if mine is not None else theirs
+    other = theirs if theirs is not None else mine
+    a, b = axes[:, one], others[:, other]
+    between = math.atan2(float(np.linalg.norm(np.cross(a, b))), abs(float(a @ b)))
+    # Where the axes of symmetry are different ones, mine has to end anywhere across theirs.
+    return between if one == other else 0.5 * math.pi - between
 
 
 @dataclass(frozen=True)
@@ -66,8 +130,10 @@ def inspect_mesh(
 ) -> Inspection:
     """Mass properties of every model that ``body`` can have, and the remarks that belong to them."""
     s = scale_vector(scale)
-    unit = stated_unit(body.mesh.unit)
-    findings = [*([unit] if unit else []), *body.verdict.findings]
+    findings = list(body.verdict.findings)
+    if body.mesh.unit != 1.0:
+        said = f"the file says that its unit is {body.mesh.unit:g} m: coordinates have been converted to metres"
+        findings.insert(0, Finding("stated_unit", INFO, said))
     if not body.verdict.usable:
         refusal = InputError(body.mesh.name, body.verdict.reason)
         nowhere = np.full(3, np.nan)
@@ -75,9 +141,10 @@ def inspect_mesh(
     moments = body.moments
     points = referenced_vertices(body.vertices, body.moments.triangles) * s
     lower, upper = points.min(axis=0), points.max(axis=0)
-    suspicion = unit_suspicion(float(np.max(upper - lower)))
-    if suspicion:
-        findings.append(suspicion)
+    side = float(np.max(upper - lower))
+    if side > LARGE_M:
+        units = f"it would be {side:.4g} mm if the file is in millimetres (--scale 0.001)"
+        findings.append(Finding("unit_suspicion", WARNING, f"the body is {side:.4g} m across; {units} (scale)"))
     models, refusal = {}, None
     # Mass, density, scale and ballast are checked by any model: their refusal comes first and is the same for all.
     for name in (model, *(other for other in MODELS if other != model)):
@@ -95,15 +162,13 @@ def inspect_mesh(
         volume = moments.moments("solid").measure * float(np.prod(np.abs(s)))
     shell = moments.moments("shell", s) if "shell" in models else None
     area = None if shell is None else shell.measure * float(s[0]) ** 2
-    implied = density
-    if mass > 0.0:
-        implied = mass / volume if volume else None
+    implied = density if not mass > 0.0 else mass / volume if volume else None
     return Inspection(body, s, model, models, findings, refusal, volume, area, lower, upper, implied)
 
 
 def as_json(inspection: Inspection) -> dict:
     """The inspection as the command's JSON object."""
-    verdict = [finding.as_dict() for finding in inspection.findings]
+    verdict = [vars(finding) for finding in inspection.findings]
     if inspection.refusal is not None:
         return {**dict.fromkeys(JSON_KEYS), "verdict": verdict}
     body, chosen = inspection.body, inspection.chosen
@@ -117,23 +182,12 @@ def as_json(inspection: Inspection) -> dict:
         "components": body.verdict.components,
         "volume": inspection.volume,
         "area": inspection.area,
-        "mass": chosen.mass,
         "density": inspection.density,
-        "center_of_mass": chosen.center_of_mass.tolist(),
-        "inertia": chosen.inertia.tolist(),
+        **chosen.as_dict(),
         "principal_moments": moments.tolist(),
         "principal_axes": axes.tolist(),
         "bounding_box": {"min": inspection.lower.tolist(), "max": inspection.upper.tolist()},
-        "models": {
-            name: None
-            if name not in inspection.models
-            else {
-                "mass": inspection.models[name].mass,
-                "center_of_mass": inspection.models[name].center_of_mass.tolist(),
-                "inertia": inspection.models[name].inertia.tolist(),
-            }
-            for name in MODELS
-        },
+        "models": {name: inspection.models[name].as_dict() if name in inspection.models else None for name in MODELS},
         "verdict": verdict,
     }
 

@@ -19,6 +19,7 @@ Sums stand in the order 1, x, y, z, xx, xy, xz, yy, yz, zz, each a pair of doubl
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,7 +53,7 @@ class Moments:
 
     measure: volume, area or number of points. reference (3,): a point near the bounding box's centre. center (3,):
     centroid minus reference; center_low (3,): what a double couldn't hold of it. second (6,): ∫ x xᵀ about the
-    centroid in the order xx, xy, xz, yy, yz, zz. path: "blocked" or "compensated" sums, or "closed form".
+    centroid in the order xx, xy, xz, yy, yz, zz.
     """
 
     measure: float
@@ -60,7 +61,6 @@ class Moments:
     center: np.ndarray
     center_low: np.ndarray
     second: np.ndarray
-    path: str
 
     @property
     def centroid(self) -> np.ndarray:
@@ -153,14 +153,13 @@ def _moments(
     factor: float,
     divisors: tuple[float, float, float],
     dimension: int,
-    path: str = "closed form",
 ) -> Moments:
     """From raw sums as ``_central`` takes them; mass is spread over what has a measure of that dimension."""
     measure, center, second = _central(sums, factor, *divisors)
     if measure == 0.0:
         raise MeshError("mesh", "the surface encloses no volume" if dimension == 3 else "the surface has no area")
     unit = factor**-dimension
-    return Moments(measure * unit, reference, center[:, 0].copy(), center[:, 1].copy(), second * unit, path)
+    return Moments(measure * unit, reference, center[:, 0].copy(), center[:, 1].copy(), second * unit)
 
 
 @njit(cache=True, nogil=True)
@@ -295,9 +294,9 @@ def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "a
         sums, edges = _blocked_sums(vertices, triangles, reference, factor)
         rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
         if path == "blocked" or rounding <= ROUNDING_LIMIT * abs(sums[0, 0]):
-            return _moments(sums, reference, factor, (6.0, 24.0, 120.0), 3, "blocked")
+            return _moments(sums, reference, factor, (6.0, 24.0, 120.0), 3)
     sums = _compensated_sums((vertices - reference) * factor, triangles)
-    return _moments(sums, reference, factor, (6.0, 24.0, 120.0), 3, "compensated")
+    return _moments(sums, reference, factor, (6.0, 24.0, 120.0), 3)
 
 
 @njit(cache=True, nogil=True)
@@ -394,4 +393,15 @@ def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     # A flat box has no volume but a distribution all the same: a unit measure then stands for its mass.
     measure = volume if volume > 0.0 else 1.0
     second[[0, 3, 5]] = measure * (side * side) / 12.0
-    return Moments(measure, 0.5 * low + 0.5 * high, np.zeros(3), np.zeros(3), second, "closed form")
+    return Moments(measure, 0.5 * low + 0.5 * high, np.zeros(3), np.zeros(3), second)
+
+
+MODELS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray | None], Moments]] = {
+    "solid": lambda vertices, triangles, _: solid_moments(vertices, triangles).outward(),
+    "shell": shell_moments,
+    "points": lambda vertices, triangles, _: point_moments(vertices, triangles),
+    "bounding_box": lambda vertices, triangles, _: box_moments(vertices, triangles),
+}
+"""How mass is spread over vertices, triangles and polygon_starts: the moments of each inertia model by its name."""
+INERTIA_MODELS = (*MODELS, "explicit")
+"""Those of a mesh, and given numbers."""

@@ -5,17 +5,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import InputError, MeshError, TensorError
-from . import INERTIA_MODELS, MODEL_COMS
 from .closed_form import given_mass, is_plainly_good, spread_mass
-from .moments import Moments, box_moments, point_moments, shell_moments, solid_moments
+from .moments import MODELS, Moments
 from .tensor import check_tensor, tensor_from_six
 
+MODEL_COMS = ("model", "solid")
+"""Where a model's centre of mass is taken from: the model's own, or the solid's, so that two tensors can be compared
+alone."""
 SCALE_LIMITS = (1e-9, 1e9)
 Surface = tuple[np.ndarray, np.ndarray]
 """Vertices (n, 3) and triangles (m, 3)."""
@@ -35,6 +37,11 @@ class MassProperties:
     warnings: tuple[str, ...] = ()
     reference: np.ndarray | None = None
     center_from_reference: np.ndarray | None = None
+
+    def as_dict(self) -> dict:
+        """Mass, COM and inertia as a JSON object."""
+        inertia = self.inertia.tolist()
+        return {"mass": self.mass, "center_of_mass": self.center_of_mass.tolist(), "inertia": inertia}
 
 
 def scale_vector(scale: ArrayLike) -> np.ndarray:
@@ -69,6 +76,7 @@ def _checked_ballast(ballast: Iterable) -> np.ndarray:
 _NO_BALLAST = np.empty((0, 4))
 
 
+@dataclass
 class MeshMoments:
     """A mesh's moments at unit density, each model's computed when first asked for and never again.
 
@@ -79,23 +87,13 @@ class MeshMoments:
     Of a surface wound inward throughout the results are those of the outward one.
     """
 
-    def __init__(
-        self,
-        vertices: np.ndarray,
-        triangles: np.ndarray,
-        polygon_starts: np.ndarray | None = None,
-        *,
-        no_solid: str = "",
-        name: str = "mesh",
-        stand_in: Callable[[], Surface] | None = None,
-    ) -> None:
-        self.vertices = vertices
-        self.triangles = triangles
-        self.polygon_starts = polygon_starts
-        self.no_solid = no_solid
-        self.name = name
-        self.stand_in = stand_in
-        self._moments: dict[str | tuple, Moments] = {}
+    vertices: np.ndarray
+    triangles: np.ndarray
+    polygon_starts: np.ndarray | None = None
+    no_solid: str = ""
+    name: str = "mesh"
+    stand_in: Callable[[], Surface] | None = None
+    _moments: dict[tuple, Moments] = field(default_factory=dict)
 
     def solid_surface(self) -> Surface:
         """Vertices and triangles of the solid's surface; raises MeshError when the mesh's isn't closed."""
@@ -105,29 +103,22 @@ class MeshMoments:
             raise MeshError(self.name, f"{self.no_solid}, or another model with --mass (mass)")
         return self.vertices, self.triangles
 
-    def _get(self, key: str | tuple, compute: Callable[[], Moments]) -> Moments:
-        if key not in self._moments:
-            self._moments[key] = compute()
-        return self._moments[key]
-
     def moments(self, model: str, scale: ArrayLike = (1.0, 1.0, 1.0)) -> Moments:
         """Unscaled moments of ``model`` at unit density, outward; ``scale`` counts for the shell alone.
 
         A shell's area elements stretch by direction, so a non-uniform scale takes a new pass over the surface; it is
         kept per ratio of the components. Its moments are then those of the shape stretched by scale/|scale_x|.
         """
-        if model == "solid":
-            return self._get("solid", lambda: solid_moments(*self.solid_surface()).outward())
-        if model == "points":
-            return self._get("points", lambda: point_moments(self.vertices, self.triangles))
-        if model == "bounding_box":
-            return self._get("bounding_box", lambda: box_moments(self.vertices, self.triangles))
-        if model == "shell":
-            stretch = np.abs(scale_vector(scale))
-            stretch = stretch / stretch[0]
-            key = "shell" if np.all(stretch == 1.0) else ("shell", *stretch.tolist())
-            return self._get(key, lambda: shell_moments(self.vertices * stretch, self.triangles, self.polygon_starts))
-        raise InputError("inertia_model", model, ", ".join(INERTIA_MODELS))
+        if model not in MODELS:
+            raise InputError("inertia_model", model, ", ".join(MODELS))
+        stretch = np.abs(scale_vector(scale)) if model == "shell" else np.ones(3)
+        stretch = stretch / stretch[0]
+        key = (model, *stretch.tolist())
+        if key not in self._moments:
+            vertices, triangles = self.solid_surface() if model == "solid" else (self.vertices, self.triangles)
+            stretched = vertices if np.all(stretch == 1.0) else vertices * stretch
+            self._moments[key] = MODELS[model](stretched, triangles, self.polygon_starts)
+        return self._moments[key]
 
     def body_mass(self, *, scale: ArrayLike = (1.0, 1.0, 1.0), mass: float = 0.0, density: float = 1000.0) -> float:
         """Mass [kg] without ballast: ``mass`` when > 0, else density × solid volume, the same for all models."""
@@ -159,8 +150,6 @@ class MeshMoments:
         x, y, z [mesh coordinates]); the position scales with the mesh, the mass is added to the body's. Raises
         InputError, MeshError (surface not closed where a volume is needed) or TensorError (collinear body).
         """
-        if model not in INERTIA_MODELS or model == "explicit":
-            raise InputError("inertia_model", model, ", ".join(m for m in INERTIA_MODELS if m != "explicit"))
         if com not in MODEL_COMS:
             raise InputError("inertia_model_com", com, ", ".join(MODEL_COMS))
         s = scale_vector(scale)

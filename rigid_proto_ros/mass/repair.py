@@ -7,33 +7,27 @@ number instead of theirs.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..base.compilation import njit
 from ..base.rotation import length, times
 from ..mesh.intersection import component_nesting
-from ..mesh.topology import (
-    Topology,
-    component_sums,
-    fan,
-    joined_sets,
-    mesh_topology,
-    rims,
-    surplus_copies,
-)
+from ..mesh.topology import Topology, component_sums, fan, joined_sets, mesh_topology, rims, surplus_copies
 from .verdict import MAX_NESTED_COMPONENTS, counted
 
 WELD = 1e-5
 """Rim vertices closer than this part of the diagonal are one: files with six digits round by up to that."""
 
 
+@dataclass
 class RepairedSurface:
     """Triangles (m, 3) over vertices (n, 3) with polygon_starts (p + 1,) or None, changed step by step."""
 
-    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None) -> None:
-        self.vertices = vertices
-        self.triangles = triangles.copy()
-        self.polygon_starts = polygon_starts
+    vertices: np.ndarray
+    triangles: np.ndarray
+    polygon_starts: np.ndarray | None
 
     def drop(self, triangles: np.ndarray) -> None:
         """Remove the triangles marked True in ``triangles`` (m,)."""
@@ -43,15 +37,8 @@ class RepairedSurface:
         self.triangles = self.triangles[~triangles]
 
     def turn(self, triangles: np.ndarray) -> None:
-        """Reverse the triangles marked True in ``triangles`` (m,); a polygon's fan is reversed as a whole."""
-        self.triangles[triangles] = self.triangles[triangles][:, [0, 2, 1]]
-        if self.polygon_starts is None:
-            return
-        starts = self.polygon_starts
-        for polygon in np.nonzero(np.diff(starts) > 1)[0]:
-            part = slice(starts[polygon], starts[polygon + 1])
-            if triangles[part].all():
-                self.triangles[part] = self.triangles[part][::-1].copy()
+        """Reverse the triangles marked True in ``triangles`` (m,)."""
+        self.triangles = np.where(triangles[:, None], self.triangles[:, [0, 2, 1]], self.triangles)
 
     def add_polygon(self, ring: list[int]) -> None:
         """Append a polygon, fanned from its first corner."""

@@ -150,13 +150,6 @@ def check_tensor(inertia: np.ndarray, *, source: str = "inertia tensor") -> tupl
     return ()
 
 
-def degenerate_pairs(moments: np.ndarray, tolerance: float = 1e-9) -> tuple[bool, bool]:
-    """Whether A and B, and B and C, of ``moments`` (3,) ascending agree to ``tolerance``·C: their axes are then any
-    pair at right angles in the plane (or space) that they span, and carry no meaning of their own."""
-    a, b, c = (float(m) for m in moments)
-    return bool(b - a <= tolerance * c), bool(c - b <= tolerance * c)
-
-
 def equimomental_shapes(mass: float, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sides (3,) of the uniform box and semi-axes (3,) of the uniform ellipsoid with ``mass`` [kg] and principal
     ``moments`` (3,) [kg m²]; both lengths [m], in the order of the moments.

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import dataclass, field
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from ..base.errors import MeshError
 from ..mesh.intersection import Nesting, component_nesting
-from ..mesh.solids import can_unite, united
+from ..mesh.solids import can_unite, united_surface
 from ..mesh.topology import Components, Topology, component_sums, fan, mesh_topology, rims, surplus_copies
 from .moments import referenced_vertices, solid_moments
 
@@ -28,9 +29,6 @@ SMALL_HOLES = 0.1
 """Largest effect of holes that is said together with the option that accepts it."""
 MAX_RIM = 20_000
 """Unbalanced edges up to which caps are tried; walking along more takes long."""
-LARGE_M = 5.0
-"""Longest side [m] beyond which another unit is suspected: few bodies that one pokes are longer, and every part of more
-than 5 mm drawn in millimetres is."""
 MAX_SELF_CROSSING = 20_000
 """Triangles above which a single component isn't examined for passing through itself."""
 
@@ -42,10 +40,6 @@ class Finding:
     code: str
     severity: str
     message: str
-
-    def as_dict(self) -> dict[str, str]:
-        """The finding as a JSON object."""
-        return {"code": self.code, "severity": self.severity, "message": self.message}
 
 
 @dataclass
@@ -75,31 +69,14 @@ class Verdict:
             self.reason = self.reason or message
 
 
-def unit_suspicion(longest_side: float) -> Finding | None:
-    """A remark when a body of ``longest_side`` [m] looks as if its file weren't in metres."""
-    if longest_side > LARGE_M:
-        units = f"{longest_side:.4g} mm if the file is in millimetres (--scale 0.001)"
-        message = f"the body is {longest_side:.4g} m across; it would be {units} (scale)"
-        return Finding("unit_suspicion", WARNING, message)
-    return None
-
-
-def stated_unit(unit: float) -> Finding | None:
-    """A remark when a mesh's file says that its unit is ``unit`` metres."""
-    if unit == 1.0:
-        return None
-    message = f"the file says that its unit is {unit:g} m: coordinates have been converted to metres"
-    return Finding("stated_unit", INFO, message)
-
-
 def counted(number: int, noun: str) -> str:
     """``number`` and the noun, in the plural but for one."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray, degenerate: int) -> None:
+def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray) -> None:
     """Open, inconsistently wound, duplicated, and how much depends on how holes are closed."""
-    verdict.watertight = topology.watertight
+    verdict.watertight = topology.odd == 0
     verdict.winding_consistent = topology.flipped == 0
     surplus = int(np.count_nonzero(surplus_copies(topology)))
     if surplus:
@@ -113,7 +90,7 @@ def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray, deg
     if verdict.hole_effect is not None and verdict.hole_effect < SMALL_HOLES:
         known = f"; whatever closes it changes volume and tensor by at most {100.0 * verdict.hole_effect:.2g} %"
         known += f", which --accept-open {_rounded_up(verdict.hole_effect)} accepts"
-    if not topology.watertight:
+    if topology.odd:
         rim = len(topology.boundary)
         edges = counted(rim, "boundary edge")
         if topology.odd > rim:
@@ -125,14 +102,6 @@ def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray, deg
         edges = f"{counted(topology.flipped, 'edge')} used twice in the same direction"
         remedy = "--repair (mesh_repair) turns faces"
         verdict.add("inconsistent_winding", ERROR, f"inconsistent winding: {edges}{known}", remedy)
-    if topology.nonmanifold and not len(topology.unbalanced) and not surplus:
-        message = f"{counted(topology.nonmanifold, 'edge')} shared by more than two faces, which are wound consistently"
-        verdict.add("non_manifold", INFO, message)
-    if topology.opposites:
-        message = f"{counted(topology.opposites, 'face')} coinciding with another one that is wound the other way"
-        verdict.add("opposite_faces", WARNING, message)
-    if degenerate:
-        verdict.add("degenerate_faces", INFO, f"{counted(degenerate, 'triangle')} without area, which have no effect")
 
 
 def _hole_effect(topology: Topology, vertices: np.ndarray) -> float | None:
@@ -182,9 +151,7 @@ def _check_components(verdict: Verdict, topology: Topology, sums: Components, ve
         else:
             verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
         if nesting.crossing:
-            lie = topology.corners, topology.component, volume, nesting.depth
-            solid = united(vertices, *lie) if verdict.closed and not verdict.inward else None
-            _check_overlap(verdict, len(nesting.crossing), whole, None if solid is None else float(solid[0].volume()))
+            _check_overlap(verdict, nesting, whole, vertices, topology.corners)
         if nesting.within:
             message = f"the surface passes through itself ({counted(nesting.within, 'pair')} of triangles)"
             verdict.add("self_crossing", WARNING, f"{message}; what it encloses twice counts twice")
@@ -214,10 +181,15 @@ def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> No
         verdict.add("cavities", INFO, f"{counted(cavities, 'closed inner surface')} wound inward, taken as cavities")
 
 
-def _check_overlap(verdict: Verdict, pairs: int, volume: float, whole: float | None) -> None:
-    """Components that cross: by how much their volumes' sum exceeds that of the union, ``whole``, where it is known."""
-    overlap = f"{counted(pairs, 'pair')} of components overlap"
-    if whole is None or not whole > 0.0:
+def _check_overlap(
+    verdict: Verdict, nesting: Nesting, volume: float, vertices: np.ndarray, triangles: np.ndarray
+) -> None:
+    """Components that cross: by how much their volumes' sum exceeds that of the union, where it can be had."""
+    overlap, whole = f"{counted(len(nesting.crossing), 'pair')} of components overlap", 0.0
+    if verdict.closed and not verdict.inward:
+        with contextlib.suppress(MeshError):
+            whole = solid_moments(*united_surface(vertices, triangles, nesting)).measure
+    if not whole > 0.0:
         measure = "" if can_unite() else " (the extra [meshes] measures by how much)"
         verdict.add("overlapping_components", WARNING, f"{overlap}; what they share counts twice{measure}")
         return
@@ -265,7 +237,7 @@ def check_surface(vertices: np.ndarray, triangles: np.ndarray) -> Verdict:
         return verdict
     diagonal = float(np.linalg.norm(sides))
     sums = component_sums(vertices, topology)
-    _check_edges(verdict, topology, vertices, sums.degenerate)
+    _check_edges(verdict, topology, vertices)
     if not len(topology.unbalanced):
         empty = abs(float(np.sum(sums.volume))) <= NO_VOLUME * diagonal**3 and _no_volume(vertices, triangles, diagonal)
         if topology.components > 1 or not empty:

@@ -82,7 +82,7 @@ def _largest(a: _Vector) -> float:
     return max(abs(a[0]), abs(a[1]), abs(a[2]))
 
 
-def _hierarchy(vertices: np.ndarray, corners: np.ndarray) -> Hierarchy:
+def hierarchy(vertices: np.ndarray, corners: np.ndarray) -> Hierarchy:
     """The hierarchy of triangles (m, 3); an empty node's lower corner lies above its upper one."""
     points = vertices[corners]
     own = np.concatenate([points.min(axis=1), points.max(axis=1)], axis=1)
@@ -169,9 +169,12 @@ def _share_a_corner(corners: np.ndarray, i: int, j: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _crossings(
+def crossings(
     vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, count: int, tree: Hierarchy, limit: int
 ) -> tuple[int, np.ndarray, bool]:
+    """Pairs of triangles of one component that cross without sharing a corner; which components cross each other,
+    (count, count); and whether ``limit`` visits sufficed. corners (m, 3): over welded vertices; component (m,).
+    """
     order, own, boxes = tree
     inner = len(boxes) // 2
     crossing = np.zeros((count, count), np.bool_)
@@ -203,15 +206,6 @@ def _crossings(
         if visits > limit:
             return within, crossing, False
     return within, crossing, True
-
-
-def crossings(
-    vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, limit: int = WORK_LIMIT
-) -> tuple[int, np.ndarray, bool]:
-    """Pairs of triangles of one component that cross without sharing a corner; which components cross each other,
-    (k, k); and whether ``limit`` visits sufficed. corners (m, 3): over welded vertices; component (m,).
-    """
-    return _crossings(vertices, corners, component, int(component.max()) + 1, _hierarchy(vertices, corners), limit)
 
 
 @njit(cache=True, nogil=True)
@@ -341,8 +335,8 @@ class Nesting:
 def component_nesting(vertices: np.ndarray, topology: Topology, sums: Components) -> Nesting:
     """How closed components lie to each other, and whether they pass through themselves."""
     component, count = topology.component, topology.components
-    tree = _hierarchy(vertices, topology.corners)
-    within, found, complete = _crossings(vertices, topology.corners, component, count, tree, WORK_LIMIT)
+    tree = hierarchy(vertices, topology.corners)
+    within, found, complete = crossings(vertices, topology.corners, component, count, tree, WORK_LIMIT)
     near = np.all((sums.lower[:, None] <= sums.upper[None]) & (sums.lower[None] <= sums.upper[:, None]), axis=2)
     np.fill_diagonal(near, False)
     inside = np.zeros((count, count), dtype=bool)

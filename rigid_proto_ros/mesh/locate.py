@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,9 +11,6 @@ from urllib.parse import unquote
 
 from ..base.bundled import BODIES, PACKAGE_FOLDER, body_names
 from ..base.errors import MeshError, did_you_mean
-
-RESOURCE_PATHS = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "ROS_PACKAGE_PATH")
-"""Environment variables with folders, colon separated, in which Gazebo and ROS look for models and packages."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +28,11 @@ NOWHERE_ELSE = Search()
 def _installed_package(package: str) -> Path | None:
     """Share folder of a ROS package, or this package's own folder for its own name."""
     try:
-        from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+        from ament_index_python.packages import get_package_share_directory
 
-        try:
-            return Path(get_package_share_directory(package))
-        except (PackageNotFoundError, ValueError, OSError):  # OSError: no ROS environment is set up
-            pass
-    except ImportError:
-        pass
-    return PACKAGE_FOLDER if package == "rigid_proto_ros" else None
+        return Path(get_package_share_directory(package))
+    except (ImportError, LookupError, ValueError, OSError):  # OSError: no ROS environment is set up
+        return PACKAGE_FOLDER if package == "rigid_proto_ros" else None
 
 
 def _names_itself(folder: Path, package: str) -> bool:
@@ -57,8 +49,7 @@ def _names_itself(folder: Path, package: str) -> bool:
 
 def _package_folders(package: str, search: Search) -> Iterator[Path]:
     """Folders that may be the package or model: those asked for, then installed ones, then upwards from the file."""
-    environment = [Path(part) for name in RESOURCE_PATHS for part in os.environ.get(name, "").split(":") if part]
-    for folder in (*search.folders, *environment):
+    for folder in search.folders:
         if _names_itself(folder.absolute(), package):
             yield folder
         yield folder / package
@@ -106,8 +97,7 @@ def _at_path(name: str, search: Search) -> Path:
     if path.is_dir():
         raise MeshError("mesh", f"{name!r} is a folder, not a mesh file")
     names = body_names()
-    siblings = [p.name for p in path.parent.iterdir() if p.is_file()] if path.parent.is_dir() and "/" in name else []
-    hint = did_you_mean(path.name, [*names, *siblings])
+    hint = did_you_mean(path.name, names)
     known = f"the bundled meshes are {', '.join(names)}"
     raise MeshError("mesh", f"there is no file and no bundled mesh {name!r}; {' '.join(filter(None, [hint, known]))}")
 

@@ -103,7 +103,7 @@ def read_ply(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray
     ]
     if len(places) != 1 or not {"x", "y", "z"} <= places[0]:
         raise MeshError(name, "what its vertices are is not told", "one element vertex with properties x, y, z")
-    vertices, polygons = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+    vertices, corners = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
     for element in elements:
         label, count, properties = element
         rows = _rows(data, position, element, order, text, name)
@@ -114,24 +114,19 @@ def read_ply(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray
             with np.errstate(invalid="ignore"):  # the verdict refuses what isn't finite
                 vertices = np.stack([rows[scalars[axis]].astype(np.float64) for axis in "xyz"], axis=1)
         elif label == "face" and lists and count:
-            with np.errstate(invalid="ignore"):
-                polygons = rows[lists[0]].astype(np.int64)
-            wrong = rows[lists[0]] != polygons
-            if wrong.any():
-                received = f"a face uses vertex {rows[lists[0]][wrong][0]:g}"
-                raise MeshError(name, received, "whole numbers")
+            corners = rows[lists[0]]
         elif label == "tristrips" and count:
             raise MeshError(name, "it has triangle strips", _REMEDY)
     beyond = len(data) - position
     if beyond > (0 if text else SPARE):
         unit = f"{beyond // 8} numbers" if text else f"{beyond} bytes"
         raise MeshError(name, f"{unit} follow what the header announces; the file may be damaged")
-    size = polygons.shape[1]
+    size = corners.shape[1]
     if size < 3:
         raise MeshError(name, f"its faces have {size} corners; a face has three or more")
-    outside = polygons[(polygons < 0) | (polygons >= len(vertices))]
-    if len(outside):
-        raise MeshError(
-            name, f"a face uses vertex {outside[0]}, but the vertices are numbered 0 to {len(vertices) - 1}"
-        )
+    with np.errstate(invalid="ignore"):
+        polygons = corners.astype(np.int64)
+    wrong = corners[(polygons != corners) | (polygons < 0) | (polygons >= len(vertices))]
+    if len(wrong):
+        raise MeshError(name, f"a face uses vertex {wrong[0]:g}", f"vertices numbered 0 to {len(vertices) - 1}")
     return vertices, polygons.reshape(-1), size * np.arange(len(polygons) + 1)

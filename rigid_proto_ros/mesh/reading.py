@@ -49,11 +49,6 @@ class Mesh:
     sha256: str
     unit: float = 1.0
 
-    @property
-    def polygons(self) -> int:
-        """Number of faces in the file."""
-        return len(self.triangles) if self.polygon_starts is None else len(self.polygon_starts) - 1
-
 
 def fan_polygons(corners: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
     """Triangles (m, 3), fanned from each polygon's first corner, and the polygons' starts among them (p + 1,).

@@ -6,16 +6,12 @@ and a mesh's convex hull and bounding box.
 from __future__ import annotations
 
 import importlib.util
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.errors import MeshError, is_missing
-from .intersection import component_nesting
-from .topology import component_sums, mesh_topology
-
-if TYPE_CHECKING:
-    import manifold3d
+from .intersection import Nesting, component_nesting
+from .topology import component_sums, fan, mesh_topology
 
 MAX_UNITED = 300_000
 """Triangles up to which overlaps are measured: about a second of manifold3d's work."""
@@ -28,45 +24,38 @@ def can_unite() -> bool:
     return importlib.util.find_spec("manifold3d") is not None
 
 
-def united(
-    vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, volume: np.ndarray, depth: np.ndarray
-) -> tuple[manifold3d.Manifold, np.ndarray] | None:
-    """The union of closed components as manifold3d has it, and the point (3,) that is its origin, near their centre;
-    None where it can't be had, or would take long.
+def united_surface(
+    vertices: np.ndarray, triangles: np.ndarray, nesting: Nesting | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) and triangles (m, 3) of the union of closed components that overlap; nesting: how they lie, where
+    it is known.
 
-    component (m,) numbers the triangles (m, 3); volume (k,): signed; depth (k,): in how many others each lies.
-    Outermost first, they are united where they are wound outward and cut out where inward.
+    Outermost first, they are united where they are wound outward and cut out where inward. Raises MeshError where that
+    can't be done, or would take long.
     """
-    if not can_unite() or len(corners) > MAX_UNITED:
-        return None
+    refusal = MeshError("mesh", "components that overlap can't be united")
+    if not can_unite() or len(triangles) > MAX_UNITED:
+        raise refusal
     import manifold3d
 
-    points = vertices[corners.ravel()]
+    topology = mesh_topology(vertices, triangles)
+    sums = component_sums(vertices, topology)
+    nesting = nesting or component_nesting(vertices, topology, sums)
+    points = vertices[topology.corners.ravel()]
     middle = 0.5 * points.min(axis=0) + 0.5 * points.max(axis=0)
     result = manifold3d.Manifold()
-    for c in np.argsort(depth, kind="stable").tolist():
-        part = corners[component == c]
-        if volume[c] < 0.0:
+    for c in np.argsort(nesting.depth, kind="stable").tolist():
+        part = topology.corners[topology.component == c]
+        if sums.volume[c] < 0.0:
             part = part[:, [0, 2, 1]]
         used, local = np.unique(part, return_inverse=True)
         local = local.reshape(-1, 3).astype(np.uint64)
         solid = manifold3d.Manifold(manifold3d.Mesh64(vert_properties=vertices[used] - middle, tri_verts=local))
         if solid.status() != manifold3d.Error.NoError:
-            return None
-        result = result - solid if volume[c] < 0.0 else result + solid
-    return result, middle
-
-
-def united_surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and triangles (m, 3) of the union of closed components that overlap."""
-    topology = mesh_topology(vertices, triangles)
-    sums = component_sums(vertices, topology)
-    nesting = component_nesting(vertices, topology, sums)
-    found = united(vertices, topology.corners, topology.component, sums.volume, nesting.depth)
-    if found is None:  # the verdict has had it
-        raise MeshError("mesh", "components that overlap can't be united")
-    mesh = found[0].to_mesh64()
-    return np.asarray(mesh.vert_properties)[:, :3] + found[1], np.asarray(mesh.tri_verts).astype(np.int64)
+            raise refusal
+        result = result - solid if sums.volume[c] < 0.0 else result + solid
+    mesh = result.to_mesh64()
+    return np.asarray(mesh.vert_properties)[:, :3] + middle, np.asarray(mesh.tri_verts).astype(np.int64)
 
 
 def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -108,15 +97,9 @@ def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return points[used], triangles
 
 
-_BOX_TRIANGLES = np.array(
-    [
-        *([0, 3, 1], [0, 2, 3], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4]),
-        *([2, 7, 3], [2, 6, 7], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5]),
-    ]
-)
-
-
-def box_surface(lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (8, 3) and outward triangles (12, 3) of the box between two corners; vertex bits are x, y, z."""
-    vertices = np.array([[(lower, upper)[(i >> k) & 1][k] for k in range(3)] for i in range(8)])
-    return vertices, _BOX_TRIANGLES.copy()
+def box_surface(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (8, 3) and outward triangles (12, 3) of the bounding box of points (k, 3); vertex bits are x, y, z."""
+    ends = points.min(axis=0), points.max(axis=0)
+    vertices = np.array([[ends[(i >> k) & 1][k] for k in range(3)] for i in range(8)])
+    sides = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+    return vertices, np.concatenate([fan(list(side)) for side in sides])

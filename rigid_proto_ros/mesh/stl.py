@@ -48,22 +48,16 @@ def read_stl(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
     if is_ascii_stl(data):
         return _merge(_ascii_points(data.removeprefix(codecs.BOM_UTF8), name))
     if len(data) < 84:
-        raise MeshError(
-            name, f"{len(data)} bytes are no STL file: neither ASCII, nor a binary header of 84 bytes and facets"
-        )
+        raise MeshError(name, f"{len(data)} bytes are no STL file", "ASCII, or a binary header of 84 bytes and facets")
     (count,) = struct.unpack_from("<I", data, 80)
     held, beyond = divmod(len(data) - 84, _FACET.itemsize)
     if count == 0 and beyond <= _SPARE:  # left for later by some that write facets as they come
         count = held
     if count > held:
-        raise MeshError(
-            name, f"the file has room for {held} facets, but its header announces {count}; the file may be truncated"
-        )
+        raise MeshError(name, f"the header announces {count} facets, but it holds {held}; the file may be truncated")
     extra = len(data) - 84 - _FACET.itemsize * count
     if extra > _SPARE:
-        raise MeshError(
-            name, f"{extra} bytes follow the {count} facets that the header announces; the file may be damaged"
-        )
+        raise MeshError(name, f"{extra} bytes follow the {count} facets that the header announces")
     facets = np.frombuffer(data, _FACET, count=count, offset=84)
     return _merge(facets["corners"].reshape(-1, 3).astype(np.float64))
 

@@ -103,8 +103,7 @@ class Topology:
 
     corners (m, 3): triangles over welded vertices. edges (e, 6): low vertex, high vertex, uses low→high, uses high→low,
     first triangle, second triangle or −1. component (m,): number of each triangle's component, counted from 0 by first
-    appearance. duplicates (m,): True for a triangle that repeats an earlier one with the same winding. opposites:
-    triangles that repeat an earlier one with the opposite winding.
+    appearance. duplicates (m,): True for a triangle that repeats an earlier one with the same winding.
     """
 
     corners: np.ndarray
@@ -112,7 +111,6 @@ class Topology:
     component: np.ndarray
     components: int
     duplicates: np.ndarray
-    opposites: int
 
     @property
     def boundary(self) -> np.ndarray:
@@ -135,19 +133,9 @@ class Topology:
         return int(np.count_nonzero(self._uses & 1))
 
     @property
-    def watertight(self) -> bool:
-        """No edge is used an odd number of times."""
-        return self.odd == 0
-
-    @property
     def flipped(self) -> int:
         """Number of unbalanced edges that an even number of triangles share."""
         return len(self.unbalanced) - self.odd
-
-    @property
-    def nonmanifold(self) -> int:
-        """Number of edges of more than two triangles."""
-        return int(np.count_nonzero(self._uses > 2))
 
 
 def mesh_topology(vertices: np.ndarray, triangles: np.ndarray) -> Topology:
@@ -156,22 +144,12 @@ def mesh_topology(vertices: np.ndarray, triangles: np.ndarray) -> Topology:
     corners = triangles if np.array_equal(first, np.arange(len(first))) else first[triangles]
     edges, root = _edges(corners, len(vertices))
     _, component = np.unique(root, return_inverse=True)
-    ordered = np.sort(corners, axis=1)
-    first = first_equal_rows(ordered)
+    smallest = np.argmin(corners, axis=1)[:, None]
+    turned = np.take_along_axis(corners, (smallest + np.arange(3)) % 3, axis=1)  # keeps the winding
     # A triangle with two corners in one place adds nothing, however often it is there.
-    real = (ordered[:, 0] != ordered[:, 1]) & (ordered[:, 1] != ordered[:, 2])
-    again = np.flatnonzero((first != np.arange(len(first))) & real)
-    same = _even_permutation(corners[again]) == _even_permutation(corners[first[again]])
-    duplicates = np.zeros(len(corners), dtype=bool)
-    duplicates[again[same]] = True
-    components = int(component.max(initial=-1)) + 1
-    return Topology(corners, edges, component, components, duplicates, int(np.count_nonzero(~same)))
-
-
-def _even_permutation(corners: np.ndarray) -> np.ndarray:
-    """Whether each row's three numbers are a cyclic shift of their ascending order, (k,) bool."""
-    a, b, c = corners.T
-    return ((a < b) & (b < c)) | ((b < c) & (c < a)) | ((c < a) & (a < b))
+    real = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    duplicates = (first_equal_rows(turned) != np.arange(len(corners))) & real
+    return Topology(corners, edges, component, int(component.max(initial=-1)) + 1, duplicates)
 
 
 def surplus_copies(topology: Topology) -> np.ndarray:
@@ -190,8 +168,8 @@ def surplus_copies(topology: Topology) -> np.ndarray:
 @njit(cache=True, nogil=True)
 def _component_sums(
     vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, count: int, middle: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    volume, degenerate = np.zeros(count), 0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    volume = np.zeros(count)
     lower, upper = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     for t in range(len(triangles)):
         c = component[t]
@@ -204,20 +182,16 @@ def _component_sums(
         wx, wy, wz = (w[0] - middle[0]) - ax, (w[1] - middle[1]) - ay, (w[2] - middle[2]) - az
         nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
         volume[c] += (ax * nx + ay * ny + az * nz) / 6.0
-        size = max(ux * ux + uy * uy + uz * uz, wx * wx + wy * wy + wz * wz)
-        degenerate += nx * nx + ny * ny + nz * nz <= (4e-16 * size) ** 2
-    return volume, lower, upper, degenerate
+    return volume, lower, upper
 
 
 @dataclass(frozen=True)
 class Components:
-    """Per component: signed volume (k,), lower and upper corners (k, 3). degenerate: triangles whose area is 0 to
-    rounding."""
+    """Per component: signed volume (k,), lower and upper corners (k, 3)."""
 
     volume: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
-    degenerate: int
 
 
 def component_sums(vertices: np.ndarray, topology: Topology) -> Components:

@@ -37,14 +37,13 @@ _LARGEST_POWER = 9
 """Of ten, by which a single entry may be off: from kg m² to g mm²."""
 
 
-def _quarter_turns() -> list[np.ndarray]:
-    """The 24 rotations (3, 3) that take the axes to each other."""
-    orders, signs = itertools.permutations(range(3)), itertools.product((1.0, -1.0), repeat=3)
-    turns = [np.eye(3)[list(order)] * np.array(sign) for order, sign in itertools.product(orders, signs)]
-    return [turn for turn in turns if np.linalg.det(turn) > 0.0]
-
-
-_QUARTER_TURNS = _quarter_turns()
+_TURNS = [
+    np.eye(3)[list(order)] * np.array(signs)
+    for order in itertools.permutations(range(3))
+    for signs in itertools.product((1.0, -1.0), repeat=3)
+]
+_QUARTER_TURNS = [turn for turn in _TURNS if np.linalg.det(turn) > 0.0]
+"""The 24 rotations (3, 3) that take the axes to each other."""
 
 
 def _other_shapes(parts: LinkShapes, mass: float) -> Iterator[tuple[str, MassProperties]]:

@@ -14,9 +14,8 @@ from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor
 from ..mesh.locate import Search
 from ..mesh.reading import load_mesh
-from .link_shapes import Meshes, primitive_surface
-from .model import COLLISION, HERE, VISUAL, Link, Pose, Shape, valid_numbers
-from .reading import read_robot
+from .link_shapes import Meshes, placed_surface
+from .reading import COLLISION, HERE, VISUAL, Link, Pose, read_robot, valid_numbers
 
 
 @dataclass(frozen=True)
@@ -106,30 +105,17 @@ def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[np.ndarray,
         shown = [shape for shape in link.shapes if shape.role == VISUAL]
         for shape in shown or link.shapes:
             try:
-                points, corners = _surface(shape, search)
+                mesh = load_mesh(shape.file, search=search) if shape.kind == "mesh" and not shape.problem else None
+                if shape.problem or mesh is not None and not np.isfinite(mesh.vertices).all():
+                    raise InputError(shape.file or shape.kind, shape.problem or "vertices that are not finite")
+                points, corners = placed_surface(shape, mesh)
             except InputError as error:
                 absent.append(f"{link.name}: {error}")
                 continue
-            whole = pose @ Pose(shape.rotation, shape.position)
-            vertices.append(points @ whole.rotation.T + whole.position)
+            vertices.append(points @ pose.rotation.T + pose.position)
             triangles.append(corners + count)
             count += len(points)
     return np.concatenate(vertices), np.concatenate(triangles), tuple(absent)
-
-
-def _surface(shape: Shape, search: Search) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and triangles of a shape in its own frame; raises InputError for one that can't be had."""
-    if shape.problem:
-        raise InputError(shape.file or shape.kind, shape.problem)
-    if shape.kind != "mesh":
-        return primitive_surface(shape.kind, shape.size)
-    mesh = load_mesh(shape.file, search=search)
-    used, local = np.unique(mesh.triangles, return_inverse=True)
-    vertices = mesh.vertices[used] * shape.scale
-    if not np.isfinite(vertices).all():
-        raise InputError(shape.file, "vertices that are not finite")
-    triangles = local.reshape(-1, 3)
-    return vertices, triangles[:, ::-1] if np.prod(shape.scale) < 0.0 else triangles
 
 
 def obj_text(vertices: np.ndarray, triangles: np.ndarray) -> str:

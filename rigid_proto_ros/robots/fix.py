@@ -15,8 +15,7 @@ from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mesh.locate import Search
 from .diagnosis import NOT_UNIFORM, UNIFORM, LinkDiagnosis, diagnose
 from .link_shapes import Meshes
-from .model import MAX_BYTES, Link, parse_xml
-from .reading import robot_of
+from .reading import MAX_BYTES, Link, parse_xml, robot_of
 
 _WRITERS = {"robot": urdf_inertial, "sdf": sdf_inertial, "mujoco": mjcf_inertial}
 _REPLACED = {"origin", "pose", "mass", "inertia", *("ixx", "ixy", "ixz", "iyy", "iyz", "izz")}
@@ -32,16 +31,12 @@ _INERTIAL = re.compile(
 
 @dataclass(frozen=True)
 class FixedLink:
-    """One link before and after; ``left``: why nothing was written though it isn't uniform, else ""."""
+    """One link as it was, and whether its inertial was rewritten; ``left``: why it wasn't though it isn't uniform, else
+    ""."""
 
     before: LinkDiagnosis
-    after: LinkDiagnosis
-    left: str = ""
-
-    @property
-    def written(self) -> bool:
-        """Whether the link's inertial was rewritten."""
-        return self.before is not self.after
+    written: bool
+    left: str
 
 
 def _places(data: bytes) -> list[tuple[int, int]]:
@@ -91,21 +86,15 @@ def fix_robot(
     links = robot_of(root, path).links
     meshes = Meshes(Search(path.parent, folders), accept_open)
     write = _WRITERS[str(root.tag)]
-    before, reasons, written = [], [], {}
+    fixed, written = [], {}
     for link in links:
         diagnosis = diagnose(link, meshes)
         reason = "" if diagnosis.status == UNIFORM else _reason_to_leave(link, diagnosis, places, everything)
         if diagnosis.status != UNIFORM and not reason and diagnosis.expected is not None:
             written[id(link.element)] = write(diagnosis.expected)
-        before.append(diagnosis)
-        reasons.append(reason)
+        fixed.append(FixedLink(diagnosis, id(link.element) in written, reason))
     for element, (start, end) in sorted(places.items(), key=lambda item: item[1], reverse=True):
         if element in written:
             inertial = written[element].rstrip().encode().replace(b"\n", _indent(data, start))
             data = data[:start] + inertial + data[end:]
-    fixed = []
-    again = robot_of(parse_xml(data, path), path).links
-    for link, now, diagnosis, reason in zip(links, again, before, reasons, strict=True):
-        after = diagnose(now, meshes) if id(link.element) in written else diagnosis
-        fixed.append(FixedLink(diagnosis, after, reason))
     return data, fixed

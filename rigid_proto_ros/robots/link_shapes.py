@@ -12,13 +12,13 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..mass.from_mesh import MeshBody, mesh_body
-from ..mass.moments import referenced_vertices, solid_moments
+from ..mass.moments import solid_moments
 from ..mass.properties import MassProperties
 from ..mass.tensor import tensor_from_six
 from ..mesh.locate import Search
-from ..mesh.reading import load_mesh
+from ..mesh.reading import Mesh, load_mesh
 from ..mesh.solids import convex_hull
-from .model import Shape
+from .reading import Shape
 
 SEGMENTS = 48
 """Corners of a round shape's circle; a multiple of 4, so that its box is exact."""
@@ -69,6 +69,18 @@ def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[np.ndarray, n
     return vertices * stretch + upward, np.asarray(made.faces, dtype=np.int64)
 
 
+def placed_surface(shape: Shape, mesh: Mesh | None) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) and triangles (m, 3) of a shape, a mesh or for None a primitive, in the link's frame."""
+    if mesh is None:
+        vertices, triangles = primitive_surface(shape.kind, shape.size)
+    else:
+        used, local = np.unique(mesh.triangles, return_inverse=True)
+        vertices, triangles = mesh.vertices[used] * shape.scale, local.reshape(-1, 3)
+        if np.prod(shape.scale) < 0.0:
+            triangles = triangles[:, ::-1]
+    return vertices @ shape.rotation.T + shape.position, triangles
+
+
 class Meshes:
     """The meshes that a robot's shapes name, each loaded once; accept_open as in ``mesh_body``."""
 
@@ -107,14 +119,7 @@ class LinkShapes:
     @cached_property
     def points(self) -> np.ndarray:
         """Vertices (n, 3) of all shapes, round primitives as inscribed surfaces, in the link's frame."""
-        found = []
-        for shape, body in self.parts:
-            if body is None:
-                own, _ = primitive_surface(shape.kind, shape.size)
-            else:
-                own = referenced_vertices(body.vertices, body.moments.triangles) * shape.scale
-            found.append(own @ shape.rotation.T + shape.position)
-        return np.concatenate(found)
+        return np.concatenate([placed_surface(shape, body.mesh if body else None)[0] for shape, body in self.parts])
 
     @property
     def diagonal(self) -> float:

@@ -18,19 +18,7 @@ import numpy as np
 
 from ..base.errors import InputError, is_missing
 from ..base.files import read_bounded
-from .model import (
-    COLLISION,
-    HERE,
-    MAX_BYTES,
-    VISUAL,
-    Link,
-    Pose,
-    Robot,
-    Shape,
-    parse_xml,
-    printed_link,
-    rotation_from_wxyz,
-)
+from . import reading as rd
 
 MAX_INCLUDES = 200
 """Of one model, the includes of included files counted."""
@@ -47,7 +35,7 @@ def _include(parent: Element, path: Path, left: Iterator[int]) -> None:
         if next(left, None) is None:
             raise InputError("robot file", f"{path.name} includes more files", f"at most {MAX_INCLUDES}")
         file = path.parent / child.get("file", "")
-        content = parse_xml(read_bounded(file, MAX_BYTES, "robot file", "an MJCF file to include"), file)
+        content = rd.parse_xml(read_bounded(file, rd.MAX_BYTES, "robot file", "an MJCF file to include"), file)
         _include(content, path, left)
         place = list(parent).index(child)
         parent[place : place + 1] = list(content)
@@ -107,13 +95,13 @@ class _Source:
             raise InputError("robot file", self.path.name, f"what MuJoCo {verb} ({reason})") from None
 
 
-def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int) -> Shape | None:
+def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int) -> rd.Shape | None:
     """The shape of a geom, raw as the file has it, at its compiled place; None for those that are no solid."""
     kind = str(raw.type).rpartition("_")[2].lower()
     if kind in ("plane", "hfield"):
         return None
-    role = COLLISION if raw.contype or raw.conaffinity else VISUAL
-    shape = Shape(role, kind, rotation_from_wxyz(model.geom_quat[number]), model.geom_pos[number].copy())
+    role = rd.COLLISION if raw.contype or raw.conaffinity else rd.VISUAL
+    shape = rd.Shape(role, kind, rd.rotation_from_wxyz(model.geom_quat[number]), model.geom_pos[number].copy())
     if kind == "mesh":
         mesh = meshes.get(raw.meshname)
         if mesh is None or not mesh.file or np.any(mesh.refpos) or mesh.refquat.tolist() != [1.0, 0.0, 0.0, 0.0]:
@@ -133,9 +121,9 @@ def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int)
     return replace(shape, size=sizes[kind])
 
 
-def _link(spec: Any, body: Any, name: str, shapes: list[Shape | None], inertial: Element | None) -> Link:
+def _link(spec: Any, body: Any, name: str, shapes: list[rd.Shape | None], inertial: Element | None) -> rd.Link:
     """A body with the inertial that the file has."""
-    bare = Link(name, tuple(filter(None, shapes)))
+    bare = rd.Link(name, tuple(filter(None, shapes)))
     if not body.explicitinertial:
         return bare
     if np.isnan(body.fullinertia[0]):
@@ -148,20 +136,20 @@ def _link(spec: Any, body: Any, name: str, shapes: list[Shape | None], inertial:
     if body.ialt.type != type(body.ialt.type).mjORIENTATION_QUAT:
         of = body.compiler
         quaternion = spec.resolve_orientation(degree=of.degree, sequence=of.eulerseq, orientation=body.ialt)
-    center = [repr(value) for value in body.ipos.tolist()]
-    return printed_link(bare, repr(body.mass), center, [repr(v) for v in six], rotation_from_wxyz(quaternion), inertial)
+    center, rotation = [repr(value) for value in body.ipos.tolist()], rd.rotation_from_wxyz(quaternion)
+    return rd.printed_link(bare, repr(body.mass), center, [repr(value) for value in six], rotation, inertial)
 
 
-def _poses(model: Any, names: list[str]) -> dict[str, Pose]:
+def _poses(model: Any, names: list[str]) -> dict[str, rd.Pose]:
     """Poses of the bodies in the world, as the file has them."""
-    poses = [HERE]
+    poses = [rd.HERE]
     for body in range(1, model.nbody):
-        own = Pose(rotation_from_wxyz(model.body_quat[body]), model.body_pos[body])
+        own = rd.Pose(rd.rotation_from_wxyz(model.body_quat[body]), model.body_pos[body])
         poses.append(poses[model.body_parentid[body]] @ own)
     return dict(zip(names, poses, strict=True))
 
 
-def _simulated(source: _Source, links: list[Link], names: list[str]) -> list[Link]:
+def _simulated(source: _Source, links: list[rd.Link], names: list[str]) -> list[rd.Link]:
     """The links with the masses that MuJoCo takes: of its <compiler>, and of the geoms where there are no inertials."""
     spec = source.parsed()
     from_geoms = spec.compiler.inertiafromgeom == source.mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
@@ -171,9 +159,9 @@ def _simulated(source: _Source, links: list[Link], names: list[str]) -> list[Lin
     known = {link.name: link for link in links}
     found = []
     for body, name in list(enumerate(names))[1:]:
-        rotation = rotation_from_wxyz(model.body_iquat[body])
+        rotation = rd.rotation_from_wxyz(model.body_iquat[body])
         link = replace(
-            known.get(name) or Link(name),
+            known.get(name) or rd.Link(name),
             mass=float(model.body_mass[body]),
             center_of_mass=model.body_ipos[body].copy(),
             inertia=rotation @ np.diag(model.body_inertia[body]) @ rotation.T,
@@ -183,7 +171,7 @@ def _simulated(source: _Source, links: list[Link], names: list[str]) -> list[Lin
     return found
 
 
-def read_mjcf(root: Element, path: Path) -> Robot:
+def read_mjcf(root: Element, path: Path) -> rd.Robot:
     """The bodies of a <mujoco>; raises InputError for what MuJoCo refuses, and without it."""
     inertials = {body.get("name", ""): body.find("inertial") for body in root.iter("body")}
     _include(root, path, iter(range(MAX_INCLUDES)))
@@ -195,11 +183,11 @@ def read_mjcf(root: Element, path: Path) -> Robot:
     model = source.compiled(frames)
     names = [model.body(body).name or f"body {body}" for body in range(model.nbody)]
     meshes = {mesh.name: mesh for mesh in spec.meshes}
-    shapes: dict[int, list[Shape | None]] = {body: [] for body in range(model.nbody)}
+    shapes: dict[int, list[rd.Shape | None]] = {body: [] for body in range(model.nbody)}
     for raw, placed in zip(spec.geoms, frames.geoms, strict=True):
         shapes[int(model.geom_bodyid[placed.id])].append(_shape(spec, raw, meshes, model, placed.id))
     links = [
         _link(spec, raw, names[placed.id], shapes[placed.id], inertials.get(raw.name) if raw.name else None)
         for raw, placed in zip(spec.bodies[1:], frames.bodies[1:], strict=True)
     ]
-    return Robot(links, lambda: _poses(model, names), lambda: _simulated(source, links, names))
+    return rd.Robot(links, lambda: _poses(model, names), lambda: _simulated(source, links, names))

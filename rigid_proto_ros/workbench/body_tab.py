@@ -12,7 +12,7 @@ import viser
 
 from ..base.bundled import body_names
 from ..base.errors import InputError
-from ..mass.model_difference import model_difference
+from ..mass.inspection import model_difference
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
 from ..picture.style import without_rounding

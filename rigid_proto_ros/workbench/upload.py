@@ -20,9 +20,8 @@ import numpy as np
 import viser
 
 from ..base.errors import InputError, MeshError
-from ..mass.from_mesh import mesh_body
+from ..mass.from_mesh import PASSING, mesh_body
 from ..mass.inspection import Inspection, inspect_mesh
-from ..mass.verdict_cache import PASSING
 from ..mesh.reading import OWN_FORMATS, load_mesh
 from .flight import Flight
 

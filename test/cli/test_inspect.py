@@ -10,6 +10,7 @@ import pytest
 from mesh_files import CUBE_TRIANGLES, obj
 
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mass.moments import MODELS
 
 KEYS = {
     *("mesh", "vertices", "triangles", "watertight", "winding_consistent", "components", "volume", "area", "mass"),
@@ -93,17 +94,15 @@ def test_verification_states_errors_against_exact_arithmetic(capsys):
 
 
 def test_a_verification_that_fails_exits_1(capsys, monkeypatch):
-    from rigid_proto_ros.mass import properties as mass_properties
+    true_solid = MODELS["solid"]
 
-    true_solid = mass_properties.solid_moments
-
-    def slightly_off(*mesh):
-        moments = true_solid(*mesh)
+    def slightly_off(*surface):
+        moments = true_solid(*surface)
         object.__setattr__(moments, "measure", moments.measure * (1 + 1e-12))
         return moments
 
     monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
-    monkeypatch.setattr(mass_properties, "solid_moments", slightly_off)
+    monkeypatch.setitem(MODELS, "solid", slightly_off)
     status, out, err = inspect(capsys, "book", "--verify", "--json")
     assert status == 1
     assert json.loads(out)["verification"]["volume_error"] == pytest.approx(1e-12, rel=1e-2)

@@ -18,9 +18,8 @@ import numpy as np
 from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.identify import shooting as sh
 from rigid_proto_ros.identify.fitting import Estimate, Problem
-from rigid_proto_ros.identify.identification import Known, identify
+from rigid_proto_ros.identify.identification import Identification, Known, identify
 from rigid_proto_ros.identify.measurements import ACCELERATION, ATTITUDE, POSITION, RATE, MeasuredFlight, topics_of
-from rigid_proto_ros.identify.report import Identification
 from rigid_proto_ros.identify.unknowns import DEFAULT_FIT, Values, make_unknowns
 from rigid_proto_ros.identify.verdict import Identifiability, Quantity
 from rigid_proto_ros.mass.from_mesh import mesh_body

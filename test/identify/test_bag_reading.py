@@ -15,8 +15,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.identify import rotations as rot
 from rigid_proto_ros.identify.bag_reading import Choice, bag_flight
-from rigid_proto_ros.identify.identification import identify
-from rigid_proto_ros.identify.report import Identification
+from rigid_proto_ros.identify.identification import Identification, identify
 from rigid_proto_ros.rerun_view.session_files import is_bag
 
 INERTIA = np.diag([2.0, 3.0, 4.0]) * 1e-3
@@ -148,7 +147,7 @@ def _poses(tmp_path: Path, **others) -> Path:
     position, attitude = mf.mocap(_truth(), mf.tumbling(), np.random.default_rng(3), 0.5).series
     rows = zip(position.times_ns, position.values, attitude.values, strict=True)
     messages = [(t, fb.pose(t, p, q)) for t, p, q in rows]
-    return fb.write(tmp_path / "bag.mcap", {"/pose": ("geometry_msgs/msg/PoseStamped", messages), **others})
+    return fb.write(tmp_path / "bag.mcap", {"/pose": ("geometry_msgs/msg/PoseStamped", messages)} | others)
 
 
 @pytest.mark.parametrize("storage", list(StoragePlugin))
@@ -170,39 +169,24 @@ def test_a_folder_of_rosbag2_says_what_the_bare_file_does_and_a_broken_one_is_re
         bag_flight(file, Choice())
 
 
-def test_a_bag_without_pose_or_rate_is_refused(tmp_path: Path) -> None:
-    bag = fb.write(
-        tmp_path / "bag.mcap", {"/w": ("geometry_msgs/msg/WrenchStamped", [(0, fb.wrench(0, FORCE, TORQUE, "body"))])}
-    )
-    with pytest.raises(InputError, match="has no poses, transforms or odometry"):
-        bag_flight(bag, Choice())
-
-
-def test_a_number_that_is_not_finite_is_named_with_its_topic_and_time(tmp_path: Path) -> None:
-    bad = [(0, fb.pose(0, (0, 0, 0), (0, 0, 0, 1))), (10**8, fb.pose(10**8, (0, np.nan, 0), (0, 0, 0, 1)))]
-    bag = fb.write(tmp_path / "bag.mcap", {"/p": ("geometry_msgs/msg/PoseStamped", bad)})
-    with pytest.raises(InputError, match=r"/p: the message 0\.1 s after the first"):
-        bag_flight(bag, Choice())
-
-
-def test_clocks_that_have_no_time_in_common_are_refused(tmp_path: Path) -> None:
-    late = [(t, fb.imu(t, (0, 0, 0), (0, 0, 0))) for t in range(100 * 10**9, 101 * 10**9, 10**8)]
-    bag = _poses(tmp_path, **{"/late": ("sensor_msgs/msg/Imu", late)})
-    with pytest.raises(InputError, match="clocks: got '/late begins 100 s after /pose"):
-        bag_flight(bag, Choice())
+POSE, IMU, WRENCH = "geometry_msgs/msg/PoseStamped", "sensor_msgs/msg/Imu", "geometry_msgs/msg/WrenchStamped"
+THRUST = {"/w": (WRENCH, [(0, fb.wrench(0, FORCE, TORQUE, "thruster_7"))])}
+NAN = [(t, fb.pose(t, (0, y, 0), (0, 0, 0, 1))) for t, y in ((0, 0.0), (10**8, np.nan))]
+LATE = [(t, fb.imu(t, (0, 0, 0), (0, 0, 0))) for t in range(100 * 10**9, 101 * 10**9, 10**8)]
 
 
 @pytest.mark.parametrize(
-    ("topics", "message"),
+    ("others", "topics", "message"),
     [
-        ({"pose": "/nothing"}, "a topic of the bag: /pose"),
-        ({"pose": "/pose", "imu": "/pose"}, "it has none of such a type"),
-        ({"pose": "/pose@drone"}, "/pose alone, as a geometry_msgs/msg/PoseStamped has no choice of frames"),
-        ({"pose": "/pose", "wrench": "/w"}, "in frame 'thruster_7'"),
+        (THRUST, {"pose": "/nothing"}, "a topic of the bag: /pose"),
+        (THRUST, {"pose": "/pose", "imu": "/pose"}, "it has none of such a type"),
+        (THRUST, {"pose": "/pose@drone"}, f"/pose alone, as a {POSE} has no choice of frames"),
+        (THRUST, {"pose": "/pose", "wrench": "/w"}, "in frame 'thruster_7'"),
+        ({"/late": (IMU, LATE)}, {}, "clocks: got '/late begins 100 s after /pose"),
+        ({"/pose": (POSE, NAN)}, {}, r"/pose: the message 0\.1 s after the first"),
+        ({**THRUST, "/pose": (IMU, LATE)}, {}, "has no poses, transforms or odometry"),
     ],
 )
-def test_a_topic_that_does_not_fit_is_named_with_those_that_do(tmp_path: Path, topics: dict, message: str) -> None:
-    thrust = [(0, fb.wrench(0, FORCE, TORQUE, "thruster_7"))]
-    bag = _poses(tmp_path, **{"/w": ("geometry_msgs/msg/WrenchStamped", thrust)})
+def test_a_topic_that_cannot_be_used_is_named(tmp_path: Path, others: dict, topics: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        bag_flight(bag, Choice(topics))
+        bag_flight(_poses(tmp_path, **others), Choice(topics))

@@ -11,17 +11,11 @@ import numpy as np
 import pytest
 
 from rigid_proto_ros.identify import shooting as sh
-from rigid_proto_ros.identify.identification import identify
-from rigid_proto_ros.identify.initial_estimate import initial_values
+from rigid_proto_ros.identify.identification import as_text, identify
 from rigid_proto_ros.identify.measurements import SampledChanges, topics_of
-from rigid_proto_ros.identify.report import as_text
 from rigid_proto_ros.identify.unknowns import (
-    DEFAULT_FIT,
     GROUPS,
-    is_possible,
     make_unknowns,
-    moved_tensor,
-    possible_step,
     second_moments,
 )
 
@@ -87,16 +81,6 @@ def test_a_weak_poke_late_in_a_long_fall_tells_the_mass_too() -> None:
     assert np.mean(study.normalised_errors(found, truth) ** 2) < 2.5  # 0.25
 
 
-def test_the_balance_of_momentum_needs_no_guess_of_the_body() -> None:
-    truth = _body()
-    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 3.0, load=mf.load_history(POKE))
-    guess = mf.values_of(70.0, (1.0, 0.0, 0.0), np.eye(3), study.EARTH)
-    found = initial_values([flight], make_unknowns(DEFAULT_FIT, ["/mocap/pose"]), guess)
-    assert abs(found.mass - truth.mass) < 0.01 * truth.mass  # measured 0.002
-    assert np.abs(found.center_of_mass - truth.center_of_mass).max() < 1e-3  # 4e-5
-    assert np.abs(found.inertia - truth.inertia).max() < 0.03 * truth.inertia.max()  # 0.008
-
-
 def test_a_sheet_of_no_thickness_ends_on_the_rim_of_what_can_exist() -> None:
     truth = mf.values_of(0.5, (0.01, -0.02, 0.03), np.diag([1.0, 2.0, 3.0]) * 1e-3, study.EARTH)
     ends = []
@@ -107,38 +91,6 @@ def test_a_sheet_of_no_thickness_ends_on_the_rim_of_what_can_exist() -> None:
         assert ends[-1] > -1e-12
         assert np.mean(study.normalised_errors(found, truth) ** 2) < 2.5
     assert min(ends) < 1e-8  # every other one would have less than no thickness
-
-
-def test_a_step_held_to_possible_tensors_is_better_than_all_possible_ones_beside_it() -> None:
-    rng, tensor = np.random.default_rng(1), slice(1, 7)
-    held = 0
-    for _ in range(20):
-        root, jacobian = rng.standard_normal((3, 3)), rng.standard_normal((30, 10))
-        inertia, so_far = np.trace(root @ root.T) * np.eye(3) - root @ root.T, rng.normal(0.0, 0.01, 6)
-        residuals = jacobian @ rng.normal(0.0, 0.6, 10) + 0.1 * rng.standard_normal(30)
-        step = possible_step(jacobian, residuals, tensor, inertia, so_far)
-        assert is_possible(moved_tensor(inertia, so_far + step[tensor]))
-        best = np.sum((jacobian @ step + residuals) ** 2)
-        free = np.linalg.lstsq(jacobian, -residuals, rcond=None)[0]
-        if is_possible(moved_tensor(inertia, so_far + free[tensor])):
-            assert np.abs(step - free).max() < 1e-6
-            continue
-        held += 1
-        for _ in range(60):
-            # The possible tensors are convex: from the step towards any of them all are possible.
-            other = rng.normal(0.0, 1.0, 10)
-            if is_possible(moved_tensor(inertia, so_far + other[tensor])):
-                beside = step + 1e-3 * (other - step)
-                assert np.sum((jacobian @ beside + residuals) ** 2) > best * (1.0 - 1e-6)
-    assert held > 5
-
-
-def test_several_throws_tell_more_than_one() -> None:
-    truth = _body()
-    rng = np.random.default_rng(3)
-    flights = [mf.mocap(truth, mf.tumbling(rate), rng, 1.5) for rate in ((0.4, 6.0, 0.3), (5.0, 0.5, 1.0))]
-    alone, both = (identify(some).shape[0].sd for some in (flights[:1], flights))
-    assert both < alone
 
 
 def test_small_sample_of_the_calibration() -> None:

@@ -12,8 +12,7 @@ import pytest
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.identify import measurements as ms
-from rigid_proto_ros.identify.identification import Known, identify
-from rigid_proto_ros.identify.report import as_json, as_text, as_urdf
+from rigid_proto_ros.identify.identification import Known, as_json, as_text, as_urdf, identify
 from rigid_proto_ros.mass.properties import MassProperties
 
 INERTIA = np.diag([2.0, 3.0, 4.0]) * 1e-3

@@ -5,18 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from mesh_files import (
-    CUBE_QUADS,
-    CUBE_TRIANGLES,
-    CUBE_VERTICES,
-    moebius,
-    obj,
-    off,
-    ply,
-    ply_binary,
-    stl,
-    stl_text,
-)
+from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, moebius, obj, off, ply, ply_binary, stl, stl_text
 
 from rigid_proto_ros.cli.main import main
 
@@ -38,40 +27,27 @@ def replaced(data: bytes, old: bytes, new: bytes) -> bytes:
 # file name, bytes, what the one line says; the file can't be read, so there is no verdict
 UNREADABLE = [
     ("empty.obj", b"", "empty"),
-    ("blank.obj", b"\n \n\t\n", "empty"),
-    ("empty.stl", b"", "empty"),
     ("short.stl", b"x" * 50, "84 bytes"),
-    ("junk.obj", JUNK, "text"),
     ("junk.stl", JUNK, "announces"),
     ("junk.glb", JUNK, "the .glb file can't be read"),
     ("prose.obj", TEXT, "no faces"),
-    ("prose.stl", TEXT, "announces"),
     ("vertices_only.obj", obj(faces=[]), "no faces"),
     ("no_facets.stl", stl(faces=[]), "no faces"),
-    ("no_faces.off", off(faces=[]), "no faces"),
     ("cut.stl", stl()[:-70], "may be truncated"),
     ("cut_text.stl", stl_text()[:-60], "may be truncated"),
     ("cut.off", off()[:-40], "may be truncated"),
-    ("cut.ply", ply()[:-40], "may be truncated"),
     ("cut_binary.ply", ply_binary()[:-40], "may be truncated"),
     ("more.off", replaced(off(), b"8 12", b"8 11"), "20 lines, but the header announces 8 vertices and 11 faces"),
-    ("more.ply", ply(announced=11), "4 numbers follow"),
     ("more_binary.ply", replaced(ply_binary(), b"face 12", b"face 11"), "17 bytes follow"),
     ("cut_header.ply", ply()[:60], "end_header"),
-    ("cut_vertex.obj", obj()[:9], "three coordinates"),
     ("long.stl", stl() + b"\0" * 33, "33 bytes follow the 12 facets"),
     ("huge.stl", stl(count=4_000_000_000), "announces 4000000000"),
-    ("digits.off", b"OFF\n" + b"9" * 4300 + b" 1 1\n", "got '9999"),
-    ("huge.off", replaced(off(), b"8 12", b"8000000000 12"), "8000000000 vertices"),
     ("huge.ply", ply(announced=2_000_000_000), "2000000000 rows of face"),
     ("negative.ply", replaced(ply(), b"element face 12", b"element face -12"), "element face -12"),
     ("word.obj", replaced(obj(), b"v 0.0 0.0 1.0", b"v 0.0 zero 1.0"), "zero"),
-    ("word.off", replaced(off(), b"0.0 0.0 1.0", b"0.0 zero 1.0"), "zero"),
     ("word.ply", replaced(ply(), b"0.0 0.0 1.0", b"0.0 zero 1.0"), "zero"),
-    ("word_text.stl", replaced(stl_text(), b"vertex 0.0 0.0 1.0", b"vertex 0.0 zero 1.0"), "zero"),
     ("index.obj", replaced(obj(), b"f 1 2 4", b"f 1 2 99"), "vertex 99"),
     ("index_zero.obj", replaced(obj(), b"f 1 2 4", b"f 0 2 4"), "nonzero"),
-    ("index_float.obj", replaced(obj(), b"f 1 2 4", b"f 1.5 2 4"), "nonzero integer"),
     ("index_back.obj", replaced(obj(), b"f 1 2 4", b"f -1 -2 -99"), "counted back"),
     ("index.off", replaced(off(), b"3 0 1 3", b"3 0 1 88"), "vertex numbers from 0 to 7"),
     ("index.ply", replaced(ply(), b"3 0 1 3", b"3 0 1 88"), "vertex 88"),
@@ -82,23 +58,16 @@ UNREADABLE = [
     ("ply_named.stl", ply(), "announces"),
     ("off_named.ply", off(), "a .ply file"),
     ("packed.stl.gz", stl(), "a file named"),
-    ("mesh.odt", obj(), "obj"),
     ("noextension", obj(), "obj"),
 ]
 
 # file name, bytes, code of the verdict, words of the one line; the file can be read but bounds no solid
 REFUSED = [
     ("nan.obj", obj(WITH_NAN), "nonfinite", "1 of 8 vertices"),
-    ("nan.off", off(WITH_NAN), "nonfinite", "1 of 8 vertices"),
-    ("nan.ply", ply(WITH_NAN), "nonfinite", "1 of 8 vertices"),
     ("nan.stl", stl(WITH_NAN), "nonfinite", "not finite"),
     ("inf.obj", replaced(obj(), b"v 0.0 0.0 1.0", b"v 0.0 1e999 1.0"), "nonfinite", "not finite"),
     ("open.obj", obj(faces=T[:-1]), "open", "3 boundary edges"),
-    ("open.stl", stl(faces=T[:-1]), "open", "3 boundary edges"),
-    ("cut_between_lines.obj", obj()[:-8], "open", "boundary edge"),
-    ("one_triangle.obj", obj(faces=T[:1]), "open", "3 boundary edges"),
     ("quarter_flipped.obj", obj(faces=FLIPPED), "inconsistent_winding", "inconsistent winding"),
-    ("one_flipped_quad.off", off(faces=[CUBE_QUADS[0][::-1], *CUBE_QUADS[1:]]), "inconsistent_winding", "4 edges"),
     ("one_body_inward.obj", obj(TWO, [*T, *(T + 8)[:, ::-1]]), "component_inward", "1 of 2 components"),
     ("all_twice.obj", obj(faces=[*T, *T]), "duplicate_faces", "12 duplicate faces"),
     ("one_twice.stl", stl(faces=[*T, T[0]]), "duplicate_faces", "1 duplicate face"),
@@ -119,8 +88,7 @@ def inspect(capsys, *arguments: str) -> tuple[int, str, str]:
 
 
 def one_line(err: str) -> str:
-    assert err.count("\n") == 1, err
-    assert "Traceback" not in err
+    assert err.count("\n") == 1 and "Traceback" not in err, err
     return err
 
 
@@ -170,15 +138,16 @@ def test_files_that_only_look_broken_are_read(tmp_path, capsys):
         assert json.loads(out)["mass"] == pytest.approx(1000.0, rel=1e-14), name
 
 
-def test_a_name_that_is_no_file_lists_the_bundled_ones(capsys):
-    status, out, err = inspect(capsys, "tennis_raket")
-    assert (status, out) == (2, "")
-    assert "did you mean tennis_racket?" in one_line(err)
-    assert "hammer" in err
-
-
-@pytest.mark.parametrize("name", ["package://no_such_package/x.obj", "package://rigid_proto_ros/none.obj", "/", ""])
-def test_other_names_without_a_file(capsys, name):
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("tennis_raket", "did you mean tennis_racket?"),
+        ("package://no_such_package/x.obj", "no_such_package"),
+        ("package://rigid_proto_ros/none.obj", "none.obj"),
+        ("/", "folder"),
+        ("", "hammer"),
+    ],
+)
+def test_a_name_that_is_no_file_says_what_would_be_one(capsys, name, words):
     status, out, err = inspect(capsys, name)
-    assert (status, out) == (2, "")
-    one_line(err)
+    assert (status, out) == (2, "") and words in one_line(err)

@@ -8,7 +8,7 @@ import numpy as np
 from judged_meshes import body, codes
 from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES
 
-from rigid_proto_ros.mesh.intersection import crossings
+from rigid_proto_ros.mesh.intersection import WORK_LIMIT, crossings, hierarchy
 from rigid_proto_ros.mesh.topology import mesh_topology
 
 
@@ -31,53 +31,47 @@ def exactly_cross(first: np.ndarray, second: np.ndarray) -> bool:
     return any(pierces(s[k], s[(k + 1) % 3], t) for s, t in ((p, q), (q, p)) for k in range(3))
 
 
+def found(points: np.ndarray, corners: np.ndarray, component: np.ndarray, limit: int = WORK_LIMIT) -> tuple:
+    return crossings(points, corners, component, int(component.max()) + 1, hierarchy(points, corners), limit)
+
+
 def within_one(points: np.ndarray, corners: np.ndarray) -> int:
     """Pairs of triangles that cross, all being of one component."""
-    return crossings(points, corners, np.zeros(len(corners), np.int64))[0]
-
-
-def soup(count: int, seed: int) -> np.ndarray:
-    """Corners (3 count, 3) of triangles of all sizes, some long and thin, in a unit cube."""
-    random = np.random.default_rng(seed)
-    size = (
-        10.0 ** random.uniform(-1.2, -0.2, (count, 1, 1)) * np.array([[[1.0]], [[0.05]]])[random.integers(0, 2, count)]
-    )
-    return (random.uniform(size=(count, 1, 3)) + size * random.normal(size=(count, 3, 3))).reshape(-1, 3)
+    return found(points, corners, np.zeros(len(corners), np.int64))[0]
 
 
 def test_crossing_triangles_are_those_that_exact_arithmetic_finds():
-    count = 100
-    points = soup(count, 3)
+    """Of all sizes, some long and thin, in a unit cube."""
+    count, random = 80, np.random.default_rng(3)
+    thin = np.array([1.0, 0.05])[random.integers(0, 2, (count, 1, 1))]
+    size = 10.0 ** random.uniform(-1.2, -0.2, (count, 1, 1)) * thin
+    points = (random.uniform(size=(count, 1, 3)) + size * random.normal(size=(count, 3, 3))).reshape(-1, 3)
     corners = np.arange(3 * count).reshape(-1, 3)
     pairs = [pair for pair in combinations(range(count), 2) if exactly_cross(*points[corners[list(pair)]])]
-    assert len(pairs) > 50
+    assert len(pairs) > 30
     assert within_one(points, corners) == len(pairs)
     # Between components only whether any two cross is asked.
-    component = np.random.default_rng(4).integers(0, 40, count)
-    expected = np.zeros((40, 40), dtype=bool)
+    component = np.random.default_rng(4).integers(0, 30, count)
+    expected = np.zeros((component.max() + 1, component.max() + 1), dtype=bool)
     for i, j in pairs:
         expected[component[i], component[j]] = expected[component[j], component[i]] = component[i] != component[j]
-    within, found, complete = crossings(points, corners, component)
-    assert complete and np.array_equal(found, expected) and found.any() and not found.all()
+    within, crossing, complete = found(points, corners, component)
+    assert complete and np.array_equal(crossing, expected) and crossing.any() and not crossing.all()
     assert within == sum(component[i] == component[j] for i, j in pairs)
-    assert not crossings(points, corners, component, 10)[2]
+    assert not found(points, corners, component, 10)[2]
 
 
 def test_triangles_that_share_a_corner_do_not_cross():
     # The second passes through the first from their common corner's other side: a fold, no crossing.
-    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0.2, 1.0], [0.4, 0.3, -1.0]], dtype=float)
-    corners = np.array([[0, 1, 2], [0, 3, 4]])
-    assert within_one(points, corners) == 0
-    apart = np.array([[0, 1, 2], [5, 3, 4]])
-    points = np.concatenate([points, [[0.05, 0.05, 0.0]]])
-    assert within_one(points, apart) == 1
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0.2, 1.0], [0.4, 0.3, -1.0], [0.05, 0.05, 0.0]])
+    assert within_one(points, np.array([[0, 1, 2], [0, 3, 4]])) == 0
+    assert within_one(points, np.array([[0, 1, 2], [5, 3, 4]])) == 1
 
 
 def test_a_cube_everted_through_its_own_edges_is_told():
     """Corners exchanged or faces turned so that sides pass through sides, and by no inside of a triangle."""
     cube = CUBE_VERTICES - 0.5
-    hourglass = np.where(cube[:, 2:] > 0.0, cube * (-1.0, -1.0, 1.0), cube)
-    everted = [hourglass]
+    everted = [np.where(cube[:, 2:] > 0.0, cube * (-1.0, -1.0, 1.0), cube)]
     for i in range(8):
         exchanged = cube.copy()
         exchanged[[i, i ^ 1]] = exchanged[[i ^ 1, i]]
@@ -87,13 +81,13 @@ def test_a_cube_everted_through_its_own_edges_is_told():
 
 
 def test_a_wall_that_dips_into_a_flat_floor_by_little_is_found_and_one_that_stands_on_it_is_not():
-    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(5.0), np.arange(5.0)))
-    cell = (5 * np.arange(4)[:, None] + np.arange(4)).ravel()
-    sheet = np.vstack([np.column_stack([cell, cell + 1, cell + 6]), np.column_stack([cell, cell + 6, cell + 5])])
-    floor = np.column_stack([x, y, np.zeros(25)])
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(4.0), np.arange(4.0)))
+    cell = (4 * np.arange(3)[:, None] + np.arange(3)).ravel()
+    sheet = np.vstack([np.column_stack([cell, cell + 1, cell + 5]), np.column_stack([cell, cell + 5, cell + 4])])
+    floor = np.column_stack([x, y, np.zeros(16)])
     for depth in (0.0, 1e-7):
-        wall = np.column_stack([np.full(25, 1.7), 0.4 * y + 0.25, 0.5 * x - depth])
-        points, triangles = np.vstack([floor, wall]), np.vstack([sheet, sheet + 25])
+        wall = np.column_stack([np.full(16, 1.7), 0.4 * y + 0.25, 0.5 * x - depth])
+        points, triangles = np.vstack([floor, wall]), np.vstack([sheet, sheet + 16])
         pairs = sum(exactly_cross(points[one], points[other]) for one, other in combinations(triangles, 2))
         assert within_one(points, mesh_topology(points, triangles).corners) == pairs
         assert (pairs > 0) == (depth > 0.0)

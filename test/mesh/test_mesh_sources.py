@@ -4,35 +4,22 @@
 import json
 import struct
 
+import mesh_files as mf
 import numpy as np
 import pytest
 from judged_meshes import load, volume
-from mesh_files import (
-    CUBE_QUADS,
-    CUBE_TRIANGLES,
-    CUBE_VERTICES,
-    Gltf,
-    collada,
-    cube_object,
-    model,
-    obj,
-    ply,
-    stl,
-    threemf,
-)
 
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.inspection import inspect_mesh
-from rigid_proto_ros.mass.verdict import unit_suspicion
 from rigid_proto_ros.mesh import assembly, reading
 from rigid_proto_ros.mesh.reading import load_mesh
 
 
 def write_gltf(folder, vertices: np.ndarray) -> None:
     """model.gltf and model.bin of a cube; the .gltf is the same for any vertices."""
-    made = Gltf(vertices)
+    made = mf.Gltf(vertices)
     folder.mkdir(exist_ok=True)
     buffers = [{"uri": "model.bin", "byteLength": len(made.bytes)}]
     (folder / "model.gltf").write_text(json.dumps({**made.json, "buffers": buffers}))
@@ -43,7 +30,7 @@ def test_every_file_that_was_read_is_in_the_caches_key(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
     for name, scale, expected in (("a", 1.0, 1.0), ("b", 2.0, 8.0), ("a", 1.0, 1.0), ("a", 3.0, 27.0)):
-        write_gltf(tmp_path / name, scale * CUBE_VERTICES)
+        write_gltf(tmp_path / name, scale * mf.CUBE_VERTICES)
         assert volume(load_mesh(str(tmp_path / name / "model.gltf"))) == pytest.approx(expected, rel=1e-12)
     assert volume(load_mesh(str(tmp_path / "a" / "model.gltf"))) == pytest.approx(27.0, rel=1e-12)
     (tmp_path / "a" / "model.bin").unlink()
@@ -51,30 +38,24 @@ def test_every_file_that_was_read_is_in_the_caches_key(tmp_path, monkeypatch):
         volume(load_mesh(str(tmp_path / "a" / "model.gltf")))
 
 
-def dae(unit: str) -> bytes:
-    return collada('<node><instance_geometry url="#cube"/></node>').replace(b'<unit meter="1"/>', unit.encode())
-
-
-def build(unit: str) -> bytes:
-    return threemf(model(cube_object(1), 'objectid="1"').replace('unit="meter"', unit))
-
-
-UNITS = [
-    ("a.dae", dae('<unit name="millimeter" meter="0.001"/>'), 1e-3),
-    ("b.dae", dae('<unit name="inch" meter="0.0254"/>'), 0.0254),
-    ("c.dae", dae('<unit name="meter" meter="1"/>'), 1.0),
-    ("d.dae", dae(""), 1.0),
-    ("a.3mf", build(""), 1e-3),
-    ("b.3mf", build('unit="centimeter"'), 1e-2),
-    ("c.3mf", build('unit="inch"'), 0.0254),
-    ("d.3mf", build('unit="meter"'), 1.0),
-]
-
-
-@pytest.mark.parametrize(("name", "data", "unit"), UNITS, ids=[row[0] for row in UNITS])
-def test_a_unit_that_the_file_states_is_taken_and_said(tmp_path, name, data, unit):
+@pytest.mark.parametrize(
+    ("name", "stated", "unit"),
+    [
+        ("a.dae", '<unit name="inch" meter="0.0254"/>', 0.0254),
+        ("b.dae", '<unit name="meter" meter="1"/>', 1.0),
+        ("c.dae", "", 1.0),
+        ("a.3mf", "", 1e-3),
+        ("b.3mf", 'unit="inch"', 0.0254),
+        ("c.3mf", 'unit="meter"', 1.0),
+    ],
+)
+def test_a_unit_that_the_file_states_is_taken_and_said(tmp_path, name, stated, unit):
     if name.endswith("dae"):
         pytest.importorskip("collada")
+        scene = mf.collada('<node><instance_geometry url="#cube"/></node>')
+        data = scene.replace(b'<unit meter="1"/>', stated.encode())
+    else:
+        data = mf.threemf(mf.model(mf.cube_object(1), 'objectid="1"').replace('unit="meter"', stated))
     mesh = load(tmp_path, name, data)
     assert mesh.unit == unit
     inspection = inspect_mesh(mesh_body(mesh))
@@ -83,16 +64,9 @@ def test_a_unit_that_the_file_states_is_taken_and_said(tmp_path, name, data, uni
     assert (len(said) == 1 and f"{unit:g} m" in said[0]) if unit != 1.0 else not said
 
 
-@pytest.mark.parametrize(
-    ("side", "words"), [(20.0, "20 mm if the file is in millimetres (--scale 0.001)"), (3000.0, "3000 mm"), (1.8, None)]
-)  # fmt: skip
-def test_a_size_that_no_metre_file_has_names_the_unit_that_makes_sense(side, words):
-    assert (unit_suspicion(side) is None) if words is None else (words in unit_suspicion(side).message)
-
-
 def test_an_archive_that_is_none_or_would_fill_the_memory_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr(reading, "MAX_BYTES", 40_000)
-    for data, words in ((b"PK\3\4no archive", "zip file"), (threemf(" " * 10**6), "bytes unpacked")):
+    for data, words in ((b"PK\3\4no archive", "zip file"), (mf.threemf(" " * 10**6), "bytes unpacked")):
         with pytest.raises(MeshError, match=words):
             load(tmp_path, "a.3mf", data)
 
@@ -100,7 +74,7 @@ def test_an_archive_that_is_none_or_would_fill_the_memory_says_so(tmp_path, monk
 def test_a_mesh_beyond_the_limit_is_refused(tmp_path, monkeypatch):
     for module in (reading, assembly):
         monkeypatch.setattr(module, "MAX_TRIANGLES", 11)
-    for name, data in (("a.obj", obj()), ("a.stl", stl()), ("a.ply", ply()), ("a.glb", Gltf().glb())):
+    for name, data in (("a.obj", mf.obj()), ("a.stl", mf.stl()), ("a.ply", mf.ply()), ("a.glb", mf.Gltf().glb())):
         with pytest.raises(MeshError, match="11"):
             load(tmp_path, name, data)
 
@@ -111,8 +85,8 @@ def test_a_binary_ply_with_several_lists_and_one_in_big_endian_are_read(tmp_path
         header += "".join(f"property double {axis}\n" for axis in "xyz")
         header += "element face 6\nproperty list uint int vertex_indices\nproperty uchar flags\n"
         header += "property list uchar float texcoord\nend_header\n"
-        rows = b"".join(struct.pack(f"{order}3d", *v) for v in CUBE_VERTICES)
-        for quad in CUBE_QUADS:
+        rows = b"".join(struct.pack(f"{order}3d", *v) for v in mf.CUBE_VERTICES)
+        for quad in mf.CUBE_QUADS:
             rows += struct.pack(f"{order}I4iBB8f", 4, *quad, 7, 8, *[0.5] * 8)
         assert volume(load(tmp_path, "a.ply", header.encode() + rows)) == 1.0
         with pytest.raises(MeshError, match="truncated"):
@@ -120,7 +94,7 @@ def test_a_binary_ply_with_several_lists_and_one_in_big_endian_are_read(tmp_path
 
 
 def test_a_ply_whose_faces_name_fractions_of_vertices_is_refused(tmp_path):
-    text = ply().replace(b"3 0 1 3", b"3 0 1.5 3", 1).replace(b"list uchar int", b"list uchar float")
+    text = mf.ply().replace(b"3 0 1 3", b"3 0 1.5 3", 1).replace(b"list uchar int", b"list uchar float")
     with pytest.raises(MeshError, match=r"vertex 1\.5"):
         load(tmp_path, "a.ply", text)
 
@@ -131,8 +105,8 @@ def test_a_ply_whose_faces_name_fractions_of_vertices_is_refused(tmp_path):
         ("long.off", b"OFF\n" + b"9" * 4300 + b" 12 0\n"),
         ("nul.obj", b"#" * 5000 + b"\nv 0 0 \0\0\0\nf 1 1 1\n"),
         ("nul.off", b"OFF\n3 1 0\n0 0 0\n\0\0\0 0 0\n1 1 1\n3 0 1 2\n"),
-        ("nul.ply", ply().replace(b"element face", b"elem\0\0ent face", 1)),
-        ("name.ply", ply(announced=99).replace(b"element face", b"element f\x13ce", 1)),
+        ("nul.ply", mf.ply().replace(b"element face", b"elem\0\0ent face", 1)),
+        ("name.ply", mf.ply(announced=99).replace(b"element face", b"element f\x13ce", 1)),
     ],
 )
 def test_no_traceback_and_no_raw_bytes_in_a_message(tmp_path, capsys, name, data):
@@ -143,8 +117,8 @@ def test_no_traceback_and_no_raw_bytes_in_a_message(tmp_path, capsys, name, data
 
 
 def xaml(matrix: str) -> bytes:
-    points = " ".join(f"{x},{y},{z}" for x, y, z in CUBE_VERTICES)
-    corners = " ".join(str(i) for i in CUBE_TRIANGLES.ravel())
+    points = " ".join(f"{x},{y},{z}" for x, y, z in mf.CUBE_VERTICES)
+    corners = " ".join(str(i) for i in mf.CUBE_TRIANGLES.ravel())
     return (
         '<ModelVisual3D xmlns="http://schemas.microsoft.com/winfx/2006/xaml/presentation"><ModelVisual3D.Transform>'
         f'<MatrixTransform3D Matrix="{matrix}"/></ModelVisual3D.Transform><ModelVisual3D.Content><GeometryModel3D>'
@@ -158,14 +132,12 @@ def test_a_format_without_a_reader_here_is_read_by_trimesh(tmp_path):
     path = tmp_path / "a.xaml"
     path.write_bytes(xaml("2 0 0 0 0 2 0 0 0 0 2 0 5 6 7 1"))
     mesh = load_mesh(str(path))
-    assert mesh.vertices.tolist() == (2.0 * CUBE_VERTICES + [5.0, 6.0, 7.0]).tolist()
+    assert mesh.vertices.tolist() == (2.0 * mf.CUBE_VERTICES + [5.0, 6.0, 7.0]).tolist()
     assert volume(load_mesh(str(path))) == 8.0
     path.write_bytes(b"<a/>")
     with pytest.raises(MeshError, match=r"a\.xaml"):
         load_mesh(str(path))
 
-
-def test_what_is_no_surface_to_trimesh_is_refused(tmp_path):
     path = tmp_path / "points.xyz"
     path.write_text("0 0 0\n1 0 0\n0 1 0\n0 0 1\n")
     with pytest.raises(MeshError, match="PointCloud"):

@@ -13,10 +13,9 @@ from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.properties import MeshMoments
 from rigid_proto_ros.mass.tensor import six_from_tensor
-from rigid_proto_ros.robots.diagnosis import compare_robot
+from rigid_proto_ros.robots.diagnosis import MARGIN, beyond_shapes, compare_robot
 from rigid_proto_ros.robots.link_shapes import primitive_surface
-from rigid_proto_ros.robots.model import Link, rotation_from_rpy
-from rigid_proto_ros.robots.realizable import MARGIN, beyond_shapes
+from rigid_proto_ros.robots.reading import Link, rotation_from_rpy
 
 BOX = '<visual><geometry><box size="1 2 3"/></geometry></visual>'
 NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -84,8 +83,10 @@ def test_each_verdict_and_its_exit_status(tmp_path, capsys):
         assert main(["inspect", "--compare", str(path)]) == status
         assert main(["inspect", "--compare", str(path), "--tolerance", "0.01"]) == strict
     assert main(["inspect", "--compare", str(urdf(tmp_path, links[6])), "--tolerance", "0.2"]) == 0
+    assert main(["inspect", "--compare", str(urdf(tmp_path, *links[5:8]))]) == 0
     told = capsys.readouterr().out
-    assert "outside the hull" in told and "kg cm²" in told and "times as large" in told
+    for part in ("outside the hull", "kg cm²", "times as large", "expected: com", "density", "3 links: "):
+        assert part in told
 
 
 def test_an_open_mesh_bounds_what_may_lie_inside_it(tmp_path):

@@ -18,7 +18,7 @@ from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.gltf import INDICES, TRIANGLES, VERTICES, Document
-from rigid_proto_ros.mass import verdict_cache
+from rigid_proto_ros.mass import from_mesh
 from rigid_proto_ros.mass.inspection import as_json
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.picture.surface import BOX_CORNERS, BOX_TRIANGLES
@@ -157,8 +157,8 @@ def test_an_upload_that_flies_no_more_is_removed_and_nothing_of_it_is_cached(pla
     folder.close()
     server.stop()
     assert not files(place)
-    assert verdict_cache.folder() is not None
-    assert not verdict_cache.folder().exists()
+    assert from_mesh.folder() is not None
+    assert not from_mesh.folder().exists()
 
 
 @pytest.mark.parametrize(("head", "up"), [(b"", "y"), (b"# made by hand\n# Z-up\n", "z")])
