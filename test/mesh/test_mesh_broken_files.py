@@ -145,7 +145,7 @@ def test_files_that_only_look_broken_are_read(tmp_path, capsys):
         ("package://no_such_package/x.obj", "no_such_package"),
         ("package://rigid_proto_ros/none.obj", "none.obj"),
         ("/", "folder"),
-        ("", "hammer"),
+        ("", "a bundled name"),
     ],
 )
 def test_a_name_that_is_no_file_says_what_would_be_one(capsys, name, words):
