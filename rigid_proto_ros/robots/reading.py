@@ -120,7 +120,7 @@ def parse_xml(data: bytes, path: Path) -> Element:
     parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
     parser.CharacterDataHandler = tree.data
     try:
-        parser.Parse(data, True)
+        parser.Parse(data.lstrip(), True)  # blank lines before the declaration, which other readers skip
         return tree.close()
     except (expat.ExpatError, ValueError, LookupError) as error:
         raise InputError("robot file", path.name, f"well-formed XML ({error})") from None

@@ -91,11 +91,12 @@ BOX = (
 )
 
 
-def test_prefixes_that_an_sdf_does_not_declare_are_names_like_others(tmp_path):
+def test_prefixes_that_an_sdf_does_not_declare_are_names_and_blank_lines_before_it_are_no_fault(tmp_path):
     inertia = "<inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia>"
     path = sdf(
         tmp_path, f'<link name="a"><inertial><mass>6.0000</mass>{inertia}</inertial>{BOX.format("c", 0, "")}</link>'
     )
+    path.write_text(f'\n\n<?xml version="1.0"?>\n{path.read_text()}')
     (link,) = compare_robot(path)
     assert link.status == "uniform"
 
