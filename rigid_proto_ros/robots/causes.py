@@ -18,6 +18,10 @@ from .link_shapes import LinkShapes
 
 LIMIT = 1e-3
 """Differences up to this are taken for rounding of printed numbers."""
+ANOTHER_MASS = 0.02
+"""Part by which a tensor that is right but for a factor must be off to be called that of another mass: a little less
+or more is how real bodies differ from their drawings.
+"""
 
 _INCH, _POUND = 1.0 / 0.0254, 1.0 / 0.45359237
 _FACTORS = {
@@ -137,7 +141,7 @@ def explain_inertia(given: np.ndarray, truth: MassProperties, stated: np.ndarray
         factor = float(np.sum(given * wrong) / max(np.sum(wrong * wrong), 1e-300))
         unit = _unit(factor) if factor > 0.0 else None
         fits = np.max(np.abs(given - factor * wrong)) <= LIMIT * factor * np.max(np.abs(wrong))
-        if fits and unit is None and not sentence and not _is_isotropic(wrong):
+        if fits and unit is None and not sentence and not _is_isotropic(wrong) and abs(factor - 1.0) > ANOTHER_MASS:
             other = f"computed for {factor * truth.mass:.6g} kg (another density?)"
             unit = f"{factor:.6g} times the tensor for this mass: {other}"
         if fits and unit is not None:

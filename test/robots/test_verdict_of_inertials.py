@@ -89,6 +89,12 @@ def test_each_verdict_and_its_exit_status(tmp_path, capsys):
         assert part in told
 
 
+def test_a_tensor_that_is_a_little_too_large_throughout_is_no_mistake(tmp_path):
+    for factor, word in ((1.0034, "not uniform"), (1.5, "explained")):
+        six = [f"{factor * moment:.8f}" for moment in (13 / 12, 0, 0, 10 / 12, 0, 5 / 12)]
+        assert verdicts(urdf(tmp_path, (BOX, "1.00000", "0 0 0", six))) == {"l0": word}
+
+
 def test_an_open_mesh_bounds_what_may_lie_inside_it(tmp_path):
     (tmp_path / "open.obj").write_bytes(obj(CUBE_VERTICES - 0.5, CUBE_TRIANGLES[:-1]))
     shape = '<visual><geometry><mesh filename="open.obj"/></geometry></visual>'
