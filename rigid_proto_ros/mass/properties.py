@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import InputError, MeshError, TensorError
+from . import MODEL_COMS
 from .closed_form import given_mass, is_plainly_good, spread_mass
 from .moments import MODELS, Moments
 from .tensor import check_tensor, tensor_from_six
 
-MODEL_COMS = ("model", "solid")
-"""Where a model's centre of mass is taken from: the model's own, or the solid's, so that two tensors can be compared
-alone."""
 SCALE_LIMITS = (1e-9, 1e9)
 Surface = tuple[np.ndarray, np.ndarray]
 """Vertices (n, 3) and triangles (m, 3)."""

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError, did_you_mean
-from ..mass.moments import INERTIA_MODELS
-from ..mass.properties import MODEL_COMS
+from ..mass import INERTIA_MODELS, MODEL_COMS
 from ..motion import INTEGRATOR_FILES
 from ..motion.frames import check_contact_name
 

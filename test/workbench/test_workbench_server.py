@@ -8,6 +8,7 @@ import importlib.util
 import re
 import socket
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numba
 import pytest
@@ -148,9 +149,8 @@ def test_what_one_page_sets_another_one_shows(server) -> None:
     import msgspec.msgpack
     from websockets.sync.client import connect
 
-    sent: list[dict] = []
     with server.gui.add_folder("Two pages"):
-        controls = Controls(server.gui, sent.append, [].append)
+        controls = Controls(server.gui, SimpleNamespace(set=[].append, say=[].append))
         field = controls.numbers("mass", "Mass")
     address, protocol = f"ws://{LOOPBACK}:{server.get_port()}", f"viser-v{viser.__version__}"
     with connect(address, subprotocols=[protocol]) as one, connect(address, subprotocols=[protocol]) as other:
