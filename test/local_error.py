@@ -13,17 +13,16 @@ from mpmath import mp, mpf
 from reference_motion import angle_between, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
+from rigid_proto_ros.motion.integrators.series_steps import floor_of_step, heavier, scales
+from rigid_proto_ros.motion.integrators.string_law import PULLS, knot_at, law_of
 from rigid_proto_ros.simulation.flight import steps_of_segment
 from rigid_proto_ros.simulation.simulation import Simulation
-
-FLOOR = 32.0 * 2.0**-52
-"""What rounding is allowed in one step, whatever its length."""
 
 
 @dataclass(frozen=True)
 class CommittedStep:
-    """Problem (SIZE,) of its segment, variables before and after, times from the segment's start [ns], and whether the
-    integrator had reported by then that rounding, not the accuracy, sets what a step may err.
+    """Problem (SIZE,) of its segment, variables before and after, times from the segment's start [ns], and the error
+    rate [1/s] that the integrator had reported by then as set by rounding, not by the accuracy; 0 for none.
     """
 
     problem: np.record
@@ -31,11 +30,19 @@ class CommittedStep:
     after: np.ndarray
     begin_ns: int
     end_ns: int
-    floor_binds: bool
+    floor_rate: float
 
     @property
     def length(self) -> float:
         return (self.end_ns - self.begin_ns) * 1e-9
+
+    @property
+    def floor(self) -> float:
+        """What rounding may err in this step by itself."""
+        p, ends = self.problem, ((self.before, self.begin_ns), (self.after, self.end_ns))
+        begin, end = (scales(y, p, time_ns * 1e-9) for y, time_ns in ends)
+        pulls = p.has_string and any(law_of(y, p, knot_at(y, p)) == PULLS for y, _ in ends)
+        return floor_of_step(self.before, p, heavier(end, begin)[0], pulls, self.length)
 
 
 def committed_steps(
@@ -65,7 +72,7 @@ def committed_steps(
                         flight.variables.copy(),
                         begin_ns - origin_ns,
                         int(flight.committed_ns) - origin_ns,
-                        bool(flight.control.floor_rate),
+                        float(max(flight.control.floor_rate, flight.control.pull_floor_rate)),
                     )
                 )
                 break

@@ -64,7 +64,7 @@ FLIGHT = record_type(
         ("taken", np.int64),  # steps of the segment, but for those that an adaptive kernel counts
         ("steps_before", np.int64),
         ("evaluations_before", np.int64),
-        ("floors", np.float64, 4),  # (FLOOR_KINDS,) the most that rounding, and not the accuracy, has set since time 0
+        ("floors", np.float64, 5),  # (FLOOR_KINDS,) the most that rounding, and not the accuracy, has set since time 0
         # Rows of the table of loads: those that act are 0 to acting − 1, in the order in which they began; the commands
         # that are to act next, in their order, due to due_end − 1.
         ("acting", np.int64),
@@ -106,10 +106,10 @@ APPLIED, BEGAN, ENDED, DONE, TIMED_OUT = range(5)
 wrench has ended so.
 """
 
-STEP_FLOOR, SPIN_FLOOR, TENSOR_FLOOR, PLACE_FLOOR, FLOOR_KINDS = range(5)
-"""Why the motion is held to less than its accuracy. An error rate [1/s] of steps too short for it; rates [rad/s] at
-which the rounding of a spin, or of a tensor given in other axes than its own, turns the attitude; the rounding of a
-place far from the world's origin, in lengths of the body.
+STEP_FLOOR, PULL_FLOOR, SPIN_FLOOR, TENSOR_FLOOR, PLACE_FLOOR, FLOOR_KINDS = range(6)
+"""Why the motion is held to less than its accuracy. Error rates [1/s] of steps too short for it, and of steps on a
+string whose pull is known no better; rates [rad/s] at which the rounding of a spin, or of a tensor given in other axes
+than its own, turns the attitude; the rounding of a place far from the world's origin, in lengths of the body.
 """
 
 ROUNDINGS = 2.0
@@ -297,6 +297,7 @@ def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> N
     """
     accuracy, control, body, row = flight.accuracy, flight.control, flight.body, flight.row
     floors[STEP_FLOOR] = max(floors[STEP_FLOOR], control.floor_rate)
+    floors[PULL_FLOOR] = max(floors[PULL_FLOOR], control.pull_floor_rate)
     rate = ROUNDINGS * 2.0**-52 * norm(row[10], row[11], row[12])
     method = methods[flight.method]
     if method.way in (NOTHING, ONE_STEP) and not method.sleeps and rate > accuracy:

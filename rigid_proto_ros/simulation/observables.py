@@ -11,8 +11,7 @@ import numpy as np
 
 from ..base.rotation import cross, dot, length, times, transposed_times
 from ..base.vectors import Numbers, Vector
-from ..motion.integrators.auto import fastest_swing
-from ..motion.integrators.series_steps import degree_of_motion
+from ..motion.integrators.series_steps import degree_of_motion, fastest_swing
 from ..motion.loads import TORQUE_WORLD
 from ..motion.problem import PROBLEM
 from ..motion.state import State, angular_momentum
@@ -27,6 +26,7 @@ from .thrusters import ThrusterControl
 
 FLOORS = (
     "rounding of 32 units in the last place a step, in steps that short, comes to {:.2g} a second",
+    "rounding of the string's length, which its stiffness multiplies, comes to {:.2g} a second",
     "rounding of the spin turns the attitude by up to {:.2g} rad a second",
     "rounding of a slender tensor given in axes other than its own turns the attitude by up to {:.2g} rad a second",
     "rounding of a position far from the world's origin is {:.2g} of the body's size",

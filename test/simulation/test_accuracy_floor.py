@@ -2,6 +2,7 @@
 """Where rounding limits a motion and not the accuracy asked for, that is said; and only there."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -57,9 +58,12 @@ def test_a_floor_that_has_bound_is_told_until_the_reset_whatever_follows():
     simulation.submit(ReleaseString(), SECOND // 100)
     simulation.advance(SECOND)
     assert simulation.string is None
-    assert "32 units" in simulation.accuracy_floor
+    assert "the string's length" in simulation.accuracy_floor
     simulation.reset()
     assert simulation.accuracy_floor == ""
+    everyday = flight(BOX, integrator="auto", initial=spinning((1, 2, 3)), string=replace(string, frequency=100.0))
+    everyday.advance(SECOND)
+    assert everyday.string is not None and everyday.accuracy_floor == ""
 
 
 def test_simulate_and_a_recording_tell_of_a_floor(capsys, tmp_path):

@@ -23,7 +23,6 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
-from ..string import most_yielding
 from ..variables import damping_functions, is_good
 from .equations import stretch
 from .free_body import free_body_steps
@@ -75,14 +74,6 @@ ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, SLACK_AT_REST, ON_STRI
 def _any(v: np.ndarray, at: int = 0) -> bool:
     """Whether any of three numbers isn't zero."""
     return bool(v[at] != 0.0 or v[at + 1] != 0.0 or v[at + 2] != 0.0)
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def fastest_swing(p: np.record) -> float:
-    """The fastest that the string can swing the body [rad/s], whatever its direction."""
-    arm, I = p.attach, p.moments
-    yields = most_yielding(p.mass, I[0], I[1], I[2], arm[0], arm[1], arm[2])
-    return math.sqrt(p.stiffness * yields)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)

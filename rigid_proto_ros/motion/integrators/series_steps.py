@@ -3,9 +3,9 @@
 
 An error's size is the largest of attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s).
 ``accuracy`` is a rate in this measure: a step of h seconds may err by accuracy·h, but rounding allows no less than 32 ε
-a step. With the coefficients' size σᵏ the remainder after degree N is (σh)^(N+1)/(1 − σh); h is where that is the
-accuracy times h. So the length of a step is read off the coefficients, and none is rejected. Source: Jorba and Zou,
-Experimental Mathematics 14 (2005) 99, section 3.
+a step, and on a stiff string more (``floor_of_step``). With the coefficients' size σᵏ the remainder after degree N is
+(σh)^(N+1)/(1 − σh); h is where that is the accuracy times h. So the length of a step is read off the coefficients, and
+none is rejected. Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, section 3.
 
 Loads that turn with the body take the series of the spin, all others that of the whole motion. Where a pull-only
 string turns slack or taut (integrators/string_law.py) the series is left and another one, with the other law, begun. A
@@ -29,6 +29,7 @@ from ...base.elementary import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of
 from ...base.records import copy_numbers, record_type
 from ...base.rotation import norm
 from ...base.simd import Packed, aligned, filled, four, joined, largest, load
+from ..string import most_yielding
 from ..variables import ATTITUDE, HEAT, VARIABLES, damping_functions, is_good
 from .series import (
     A_KNOT,
@@ -62,7 +63,10 @@ CONTROL = record_type(
         ("steps", np.int64),  # committed
         ("evaluations", np.int64),  # in committed steps, one for each series
         ("pending", np.int64),  # evaluations spent on the step that waits
-        ("floor_rate", np.float64),  # the largest [1/s] that rounding, and not the accuracy, has allowed a step
+        # The largest [1/s] that rounding, and not the accuracy, has allowed a step; and where it is most of all the
+        # rounding of a string's pull.
+        ("floor_rate", np.float64),
+        ("pull_floor_rate", np.float64),
         ("failed", np.bool_),  # a nanosecond would be too long a step, or the motion ran away
         ("series", np.bool_),  # the workspace holds the series from the committed variables on
         # Of the step that waits, where the string's law changes within it:
@@ -103,7 +107,8 @@ step is taken with one law.
 WEIGHINGS = 4
 """Of a step whose end weighs errors more than its start did, each shorter than the one before."""
 
-FLOOR = 32.0 * 2.0**-52
+EPSILON = 2.0**-52
+FLOOR = 32.0 * EPSILON
 
 Weights = tuple[float, float, float, float]
 """Of attitude (as quaternion difference), ω, x and v in the measure."""
@@ -136,16 +141,46 @@ def heavier(ending: Weights, weights: Weights) -> tuple[Weights, bool]:
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
+def response_at_knot(p: np.record, spin: float, speed: float) -> float:
+    """What an impulse of 1 N s at the string's knot does to velocities whose errors have these weights, at most."""
+    arm = norm(p.attach[0], p.attach[1], p.attach[2])
+    return float(max(speed / p.mass, spin * arm / p.moments[0]))
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
 def jump_of_displacement(p: np.record, spin: float, speed: float) -> float:
     """Error that a displacement by one unit of the measure causes when a damped string jerks taut that
     much too early or late.
     """
-    if not p.has_string:
-        return 0.0
-    arm = norm(p.attach[0], p.attach[1], p.attach[2])
-    # What a force at the knot does to the measured velocities, per newton and second.
-    response = max(speed / p.mass, spin * arm / p.moments[0])
-    return float(p.string_damping * p.length * response)
+    return float(p.string_damping * p.length * response_at_knot(p, spin, speed)) if p.has_string else 0.0
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def fastest_swing(p: np.record) -> float:
+    """The fastest that the string can swing the body [rad/s], whatever its direction."""
+    arm, I = p.attach, p.moments
+    yields = most_yielding(p.mass, I[0], I[1], I[2], arm[0], arm[1], arm[2])
+    return math.sqrt(p.stiffness * yields)
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def floor_of_step(y: np.ndarray, p: np.record, weights: Weights, pulls: bool, h: float) -> float:
+    """What rounding may err in a step of h seconds from y, in the measure: 32 ε, and on a string that pulls what its
+    force does that is known no better than the place of its knot. The span from free end to knot errs by ε of itself
+    and of the arm, k and c multiply that, and a swing takes it back after a radian. Near its free end a string that
+    pushes errs in its direction, too.
+    """
+    if not pulls:
+        return FLOOR
+    _, _, _, length, _ = knot_at(y, p)
+    arm, k, c = norm(p.attach[0], p.attach[1], p.attach[2]), p.stiffness, p.string_damping
+    reach = max(length, p.rest_length)
+    size = reach + (arm * reach / length if p.bilateral and length > 0.0 else arm)
+    speed = norm(y[10], y[11], y[12]) + norm(y[4], y[5], y[6]) * arm
+    time = min(h, 1.0 / fastest_swing(p))
+    impulse = EPSILON * (size * (k * time + c) + speed * c * time)
+    # Within the step, velocities move place and attitude.
+    return FLOOR + impulse * response_at_knot(p, max(weights[1], h), max(weights[3], h * weights[2]))
 
 
 # How long a step may be
@@ -246,17 +281,22 @@ def begin_control(control: np.record, accuracy: float, degree: int) -> None:
     control.accuracy, control.degree = accuracy, degree
     control.accepted_ns, control.elapsed_ns = 0, 0
     control.steps, control.evaluations, control.pending = 0, 0, 0
-    control.floor_rate = 0.0
+    control.floor_rate, control.pull_floor_rate = 0.0, 0.0
     control.failed, control.series = False, False
     control.law, control.switch, control.last_start, control.last_law = 0.0, 0.0, 0.0, 0.0
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
-def _accept_step(control: np.record, length_ns: int) -> None:
-    """Let a step of this length wait for its commitment, its allowance no less than the floor."""
-    control.accepted_ns = length_ns
-    if control.accuracy * length_ns * 1e-9 < FLOOR:
-        control.floor_rate = max(control.floor_rate, FLOOR / (length_ns * 1e-9))
+def _note_floor(y: np.ndarray, p: np.record, control: np.record, weights: Weights, h: float) -> None:
+    """Keep the floor of a step of h seconds from y where it is more than the accuracy allows."""
+    pulls = p.has_string and (control.law == PULLS or control.switch < math.inf)
+    floor = floor_of_step(y, p, weights, pulls, h)
+    if floor <= control.accuracy * h:
+        return
+    if floor > 2.0 * FLOOR:
+        control.pull_floor_rate = max(control.pull_floor_rate, floor / h)
+    else:
+        control.floor_rate = max(control.floor_rate, floor / h)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -386,7 +426,8 @@ def _accept(y: np.ndarray, p: np.record, control: np.record, following: np.ndarr
         weights, more = heavier(scales(following, p, (elapsed + length) * 1e-9), weights)
         if not (good and more):
             break
-    _accept_step(control, length)
+    control.accepted_ns = length
+    _note_floor(y, p, control, weights, length * 1e-9)
     return good
 
 
