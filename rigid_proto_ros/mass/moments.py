@@ -402,4 +402,6 @@ MODELS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray | None], Moments]
     "points": lambda vertices, triangles, _: point_moments(vertices, triangles),
     "bounding_box": lambda vertices, triangles, _: box_moments(vertices, triangles),
 }
-"""How mass is spread over vertices, triangles and polygon_starts: the moments of each of INERTIA_MODELS that a mesh has."""
+"""How mass is spread over vertices, triangles and polygon_starts: the moments of each of INERTIA_MODELS that a mesh
+has.
+"""
