@@ -25,7 +25,7 @@ sys.path.insert(0, str(HERE.parent))
 
 from result_table import ResultTable
 from rigid_proto_ros.base.bundled import example_path
-from rigid_proto_ros.rerun_view.observer import RerunObserver
+from rigid_proto_ros.rerun_view.observer import FileRecorder
 from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.mcap_observer import McapObserver
@@ -71,7 +71,7 @@ class OneByOne(Observer):
 
 
 RECORDERS: dict[str, tuple[str, Callable[[Path], Observer]]] = {
-    ".rrd": (".rrd", lambda path: RerunObserver(record=str(path))),
+    ".rrd": (".rrd", lambda path: FileRecorder(str(path))),
     ".mcap": (".mcap", McapObserver),
     "rr.log for each value": (".rrd", OneByOne),
 }

@@ -60,6 +60,15 @@ def rows(count: int, seed: int = 7) -> np.ndarray:
     return made
 
 
+def live_view(**options: Any):
+    """A view of which viewers are told, and none is started: its window would need a display."""
+    from rigid_proto_ros.rerun_view.live_view import LiveView
+
+    for display in ("DISPLAY", "WAYLAND_DISPLAY"):
+        os.environ.pop(display, None)
+    return LiveView("native", report=lambda _: None, **options)
+
+
 def fly(observer: Observer, states: np.ndarray, body: BodySnapshot = BODY) -> None:
     """A run of ``states``: a poke from 200 to 400 ms, a wrench from 305 ms to the end, a refusal at 500 ms."""
     observer.on(Started(SCENE, VERTICES, TRIANGLES, SHA256))
@@ -113,13 +122,13 @@ def flush(observer: Observer) -> None:
 
 def cells(path: Path, entity: str, name: str) -> tuple[list[int], list]:
     """Simulated times [ns] and values of a component over all chunks of an entity, what holds at all times left out."""
-    from rigid_proto_ros.rerun_view import rrd_file as e
-    from rigid_proto_ros.rerun_view.rrd_file import record_batches
+    from rigid_proto_ros.rerun_view.backend import SIM_TIME
+    from rigid_proto_ros.rerun_view.rrd_reading import record_batches
 
     times, found = [], []
     for chunk_entity, static, batch in record_batches(path):
         if chunk_entity == entity and not static and name in batch.schema.names:
-            times.extend(batch.column(e.SIM_TIME).to_numpy(zero_copy_only=False).astype(np.int64).tolist())
+            times.extend(batch.column(SIM_TIME).to_numpy(zero_copy_only=False).astype(np.int64).tolist())
             found.extend(batch.column(name).to_pylist())
     return times, found
 

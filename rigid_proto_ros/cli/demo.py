@@ -154,7 +154,7 @@ def write_demo(mesh: str) -> tuple[Path, Path]:
 
 def _report(session: Path) -> int:
     """What happened, read back from the recording itself."""
-    from ..rerun_view.rrd_file import read_session
+    from ..rerun_view.rrd_reading import read_session
 
     recorded = read_session(session)
     if not len(recorded.times):

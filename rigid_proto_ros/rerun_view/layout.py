@@ -12,7 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from ..picture import style
-from . import rrd_file as e
+from . import backend as e
 
 TRAIL_SECONDS = 3.0
 """[simulated s] Length of the trail shown behind the body."""

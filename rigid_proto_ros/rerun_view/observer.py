@@ -1,29 +1,35 @@
 # SPDX-License-Identifier: MIT
-"""The observer that shows and records a flight with Rerun: the picture, the exact states, and what happened as text.
+"""The observers that show and record a flight with Rerun: the picture, the exact states, and what happened as text.
 
 The stepping thread only copies a row into a mailbox. One thread of our own empties it every half second and sends
-columns: into a file, to viewers on this machine, or both.
+columns to one stream, which is a file's or the viewers' (live_view.py): replacing a stream's sinks shuts its server
+down, so no file could be begun anew at a reset while somebody watches.
 
 Runs. A reset starts simulated time again at 0, and rows of two runs on one timeline could not be told apart, so every
 run is a recording of its own. Viewers show them side by side. In files, FILE.rrd always holds the newest run; at a
 reset the one before is kept beside it as FILE.run1.rrd, FILE.run2.rrd and so on, unless its time never left 0.
+
+An .rrd is a 12-byte header (``RRF2``, version, options), then frames of two little-endian uint64 (kind, length) and
+``length`` bytes; kind 0 ends the stream, an index may stand behind it.
 """
 
 from __future__ import annotations
 
 import logging
-import threading
+import shutil
+import struct
 import time
 import uuid
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from threading import Thread
+from typing import get_args
 
 import numpy as np
 import rerun as rr
 
 from ..base.errors import InputError
+from ..base.files import output_file
 from ..picture import style
 from ..picture.picture import Picture
 from ..session.mailbox import BATCH, Mailbox, Noted
@@ -44,118 +50,49 @@ from ..simulation.observer import (
     Started,
     StringChanged,
 )
-from . import rrd_file as e
+from . import backend as e
+from .backend import RerunBackend, Stream, forget_closed_recordings, last_line, scalar_columns
 from .layout import Finished, Subject, blueprint
-from .ports import serve_on_port
-from .streams import FileStream, RerunBackend, Stream, forget_closed_recordings, host, scalar_columns
-
-if TYPE_CHECKING:
-    from .viewers import ViewerProcess
-
-VIEWERS = ("none", "web", "native", "serve")
-
-DEFAULT_RERUN_PORT = 9876
-DEFAULT_WEB_PORT = 9090
-LIVE_MEMORY_LIMIT = "32MiB"
-"""What the server keeps for viewers that come late, a minute at 1 kHz; the oldest is dropped first. It takes about
-twice that of this process's memory.
-"""
-
-REPEATED_ROWS = 16384
-"""After as many states viewers are told again what holds since long: a fourth of what the live server keeps."""
 
 FLUSH_PERIOD_S = 0.5
 """What a kill -9 loses at most, and how far viewers lag; every flush costs about 5 ms and 20 kB of overhead."""
 
+FLUSH_TIMEOUT_S = 5.0
+"""A disk that takes longer than this to take half a second of data counts as lost."""
+
 STALLED_S = 0.9
 """A flush that takes longer is told of: a report comes once a second, and a stalled file is to be told within two."""
 
-LEAVE_S = 2.0
-"""How long the end of a run waits for live streams; a viewer that doesn't read holds nobody up."""
-
 REACH_PER_TIP = 1.7
 """A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
+
+FRAME_HEAD = struct.Struct("<QQ")
 
 _logger = logging.getLogger(__name__)
 
 
 class RerunObserver(Observer):
-    """Records to ``record`` (a path, or "" for no file) and shows to viewers.
-
-    viewer: ``none``; ``serve`` hosts the live stream on loopback; ``web`` serves the web viewer too; ``native`` opens
-    the viewer's window. rerun_port and web_port: None takes the first free port from the default on; a number is used
-    or refused. ``report`` gets one line for every address and every warning, ``on_error`` one line when recording has
-    stopped because the file can't be written; both may be called from another thread. error: why it has, or "".
-
-    Raises InputError for a file that can't be written, a port that is taken, and an unknown viewer.
+    """Sends what it is told to a stream, which FileRecorder and LiveView open. ``on_error`` gets one line when it has
+    stopped because nothing can be sent, and may be called from another thread. error: that line, or "".
     """
 
     takes = frozenset(get_args(Event)) - {Applied}
+    purpose = "recording"
 
-    def __init__(
-        self,
-        record: str = "",
-        viewer: str = "none",
-        rerun_port: int | None = None,
-        web_port: int | None = None,
-        name: str = "rigid_body",
-        report: Callable[[str], None] = _logger.info,
-        on_error: Callable[[str], None] | None = None,
-        live_memory_limit: str = LIVE_MEMORY_LIMIT,
-    ) -> None:
-        if viewer not in VIEWERS:
-            raise InputError("viewer", viewer, "one of " + ", ".join(VIEWERS))
-        self.live_address = self.web_address = self.error = ""
-        self._name = name
-        self._report, self._on_error = report, on_error or _logger.error
-        self._run, self._run_id = 1, uuid.uuid4().hex
-        self._host: Stream | None = None
-        self._live: Stream | None = None
-        self._file: FileStream | None = None
-        self._viewer: ViewerProcess | None = None
+    def __init__(self, name: str, on_error: Callable[[str], None] | None) -> None:
+        self.error = ""
+        self._name, self._on_error = name, on_error or _logger.error
+        self._run, self._last_time_ns = 1, 0
+        self._stream: Stream | None = self._open(uuid.uuid4().hex, name)
         self._backend = RerunBackend()
         self._picture = Picture(self._backend)
         self._started: Started | None = None
-        self._last_time_ns = self._rows_since_repeat = 0
         self._lines: dict[str, list[tuple[int, int, str]]] = {}
         self._commanded = False
         self._flushing_since_s: float | None = None
         self._mailbox = Mailbox(lambda: self._lost("nothing can be written to the disk any more"))
-        self._thread = threading.Thread(target=self._flush_until_closed, name="rerun", daemon=True)
-        try:
-            if viewer != "none":
-                self._serve(viewer, rerun_port, web_port, live_memory_limit)
-            if record:
-                self._file = FileStream(Path(record), self._run_id, name)
-        except InputError:
-            # Nobody has it yet, so nobody else would end what was started.
-            self.close()
-            raise
+        self._thread = Thread(target=self._flush_until_closed, name="rerun", daemon=True)
         self._thread.start()
-
-    def _serve(self, viewer: str, rerun_port: int | None, web_port: int | None, memory_limit: str) -> None:
-        from . import viewers
-
-        serve = partial(host, memory_limit=memory_limit, recording_id=self._run_id, name=self._name)
-        self._host, self.live_address = serve_on_port("rerun_port", rerun_port, DEFAULT_RERUN_PORT, serve)
-        self._live = self._host
-        self._report(f"live stream: {self.live_address}")
-        try:
-            if viewer == "web":
-                self._viewer, self.web_address = serve_on_port(
-                    "web_port", web_port, DEFAULT_WEB_PORT, lambda port: viewers.serve_web(port, self.live_address)
-                )
-                self._report(f"viewer: {self.web_address}")
-            elif viewer == "native" and viewers.has_display():
-                self._viewer = viewers.open_native(self.live_address)
-            elif viewer == "native":
-                # Without --connect the program takes the server at its usual port for a viewer, and feeds the stream
-                # back into itself.
-                self._report(
-                    f"no display for the viewer; elsewhere on this machine: rerun --connect {self.live_address}"
-                )
-        except OSError as error:
-            self._report(f"no viewer: {error}")
 
     def on(self, event: Event) -> None:
         """Take an event from the stepping thread; states and meshes are copied."""
@@ -165,45 +102,51 @@ class RerunObserver(Observer):
         if type(event) in self.takes:
             self._mailbox.put(event)
 
-    @property
-    def stalled(self) -> str:
-        """Says that the file hasn't taken what was sent for longer than STALLED_S; empty while it does."""
-        since_s, file = self._flushing_since_s, self._file
-        if since_s is None or file is None or time.monotonic() < since_s + STALLED_S:
-            return ""
-        return f"recording {file.path}: nothing could be written for {time.monotonic() - since_s:.1f} s"
-
     def close(self) -> None:
-        """Send what is buffered, finish the file, end the viewer that was started here."""
+        """Send what is buffered, and finish."""
         if self._mailbox.closed:
             return
         self._mailbox.close()
-        if self._thread.ident is None:
-            self._finish()
-        elif not self._mailbox.emptied_by(self._thread):
+        if not self._mailbox.emptied_by(self._thread):
             rr.unregister_shutdown()
             self._lost("the last states could not be written")
-        if self._viewer is not None:
-            self._viewer.stop()
+
+    # The stream
+
+    def _open(self, run_id: str, name: str) -> Stream:
+        """The stream of the first run; raises InputError."""
+        raise NotImplementedError
+
+    def _open_next(self, before: Stream, run_id: str, name: str) -> Stream:
+        """End a run's stream, and open that of the next one; raises OSError and InputError."""
+        raise NotImplementedError
+
+    def _end(self, stream: Stream) -> None:
+        """End the stream of a run that is complete; raises OSError."""
+        raise NotImplementedError
 
     # The thread
 
     def _flush_until_closed(self) -> None:
-        while True:
+        closing = False
+        while not closing:
             closing = self._mailbox.closed
             self._flushing_since_s = time.monotonic()
+            # Whatever goes wrong here must not reach the flight: it goes on without a recording.
             try:
                 self._flush()
+                if closing and self._stream is not None:
+                    self._end(self._stream)
+            except OSError as error:
+                self._give_up(str(error))
             except Exception as error:
-                # Whatever goes wrong here must not reach the flight: go on without a recording.
-                file, self._live = self._file, None
+                stream, self._stream = self._stream, None
                 self._lost(f"{type(error).__name__}: {error}")
-                self._end_file(file)
+                if stream is not None:
+                    self._end(stream)
             self._flushing_since_s = None
-            if closing:
-                break
-            self._mailbox.wait(FLUSH_PERIOD_S)
-        self._finish()
+            if not closing:
+                self._mailbox.wait(FLUSH_PERIOD_S)
 
     def _flush(self) -> None:
         """Send what waits; not what arrives meanwhile, a few rows a time."""
@@ -211,106 +154,53 @@ class RerunObserver(Observer):
         while more:
             events = self._mailbox.take()
             more = len(events) == BATCH
-            self._write(events)
-        for stream in self._streams:
-            try:
-                stream.flush()
-            except OSError as error:
-                self._give_up(stream, error)
+            if self._stream is not None:
+                self._write(events)
+        if self._stream is not None:
+            self._stream.flush()
             self._mailbox.moved()
-            if stream.missed and not stream.behind:
-                self._describe(stream)
+            if self._stream.missed and not self._stream.behind:
+                self._describe(self._stream)
 
-    def _finish(self) -> None:
-        self._end_file(self._file)
-        # Also of runs before.
-        leaving = [thread for thread in threading.enumerate() if thread.name == "rerun leaving"]
-        leaving += [stream.leave() for stream in {self._live, self._host} if stream is not None]
-        deadline = time.monotonic() + LEAVE_S
-        for thread in leaving:
-            thread.join(max(0.0, deadline - time.monotonic()))
-        if any(thread.is_alive() for thread in leaving):
-            # At the end of the process the library would wait, without limit, for every recording to be taken.
-            rr.unregister_shutdown()
-
-    def _end_file(self, file: FileStream | None) -> None:
-        """Finish the file of a run that is complete, with the layout for what it holds."""
-        if file is None:
-            return
-        try:
-            self._arrange(file, Finished(1e-9 * self._last_time_ns, self._backend.plotted, self._commanded))
-            file.close()
-            self._mailbox.moved()
-            self._file = None
-        except OSError as error:
-            self._give_up(file, error)
-
-    def _give_up(self, stream: Stream, error: OSError) -> None:
+    def _give_up(self, reason: str) -> None:
         # Told first: what the library does with a file that it can't write may take for ever.
-        self._lost(str(error))
+        stream, self._stream = self._stream, None
+        self._lost(reason)
         rr.unregister_shutdown()
-        stream.leave()
+        if stream is not None:
+            stream.leave()
 
     def _lost(self, reason: str) -> None:
-        self._file = None
-        self.error = f"recording stopped: {reason}"
+        self.error = f"{self.purpose} stopped: {reason}"
         self._on_error(self.error)
-
-    @property
-    def _streams(self) -> list[Stream]:
-        return [stream for stream in (self._live, self._file) if stream is not None]
 
     # What holds for a run
 
-    def _next_run(self) -> None:
+    def _next_run(self, stream: Stream) -> None:
         """A reset: another run, in a recording of its own; the parameters in force, mesh and body stay."""
-        moved, live, file = self._last_time_ns > 0, self._live, self._file
-        self._end_file(file)
-        self._run += moved
-        self._run_id = uuid.uuid4().hex
+        self._run += self._last_time_ns > 0
+        name = self._name if self._run == 1 else f"{self._name}, run {self._run}"
+        self._stream = self._backend.stream = self._open_next(stream, uuid.uuid4().hex, name)
         self._last_time_ns = 0
         self._lines, self._commanded = {}, False
         self._picture.restart()
-        self._backend.plotted, self._backend.paths = {}, {}
-        name = self._name if self._run == 1 else f"{self._name}, run {self._run}"
-        if live is not None:
-            self._live = Stream(rr.GrpcSink(self.live_address), self._run_id, name)
-            self._live.arranged = live.arranged  # viewers keep their layout
-            if live is not self._host:  # whose server stays
-                live.leave()
-        if file is not None and not self.error:
-            try:
-                if moved:
-                    file.path.rename(file.path.with_name(f"{file.path.stem}.run{self._run - 1}{file.path.suffix}"))
-                self._file = FileStream(file.path, self._run_id, name)
-            except (OSError, InputError) as error:
-                self._lost(str(error))
-        for stream in self._streams:
-            self._send_scene(stream)
-            self._describe(stream)
-        if live is None or not live.behind:
+        self._backend.restart()
+        self._send_scene(self._stream)
+        self._describe(self._stream)
+        if not stream.behind:
             forget_closed_recordings()
 
     def _send_scene(self, stream: Stream) -> None:
-        """What a run begins with: the scene as text, in files the mesh's exact numbers."""
-        began = self._started
-        if began is None:
-            return
+        """What a run begins with: the scene as text."""
         stream.log_static(style.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         stream.log_static(style.POINSOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        stream.log_static(e.SCENE, rr.TextDocument(began.scene, media_type="text/plain"))
-        if stream is self._file and began.vertices is not None and began.triangles is not None:
-            numbers = rr.AnyValues(
-                sha256=began.mesh_sha256,
-                vertices=np.ascontiguousarray(began.vertices, dtype=np.float64).ravel(),
-                triangles=np.ascontiguousarray(began.triangles, dtype=np.int64).ravel(),
-            )
-            stream.log_static(e.SESSION_MESH, numbers)
+        if self._started is not None:
+            stream.log_static(e.SCENE, rr.TextDocument(self._started.scene, media_type="text/plain"))
 
     def _describe(self, stream: Stream) -> None:
         """Tell a stream that knows nothing yet, or that has missed something, how things are now."""
         stream.missed = False
-        self._backend.streams = [stream]
+        self._backend.stream = stream
         self._backend.begin(np.array([self._last_time_ns]), np.array([time.time_ns()]))
         self._picture.describe(self._backend)
         self._arrange(stream)
@@ -336,8 +226,12 @@ class RerunObserver(Observer):
     # What happens in it
 
     def _write(self, events: list[Noted]) -> None:
-        """Send what happened."""
+        """Send what happened; nothing to a stream that is behind, which must be told later how things are then."""
         states: list[Noted] = []
+        stream = self._stream
+        if stream is not None and events:
+            stream.missed |= stream.behind
+            self._backend.stream = None if stream.behind else stream
         for wall_ns, event in events:
             self._mailbox.moved()  # there may be thousands
             time_ns = event.time_ns
@@ -361,37 +255,24 @@ class RerunObserver(Observer):
                     states = []
                     self._change(event, wall_ns)
         self._write_states(states)
-        if self._live is not None and self._rows_since_repeat >= REPEATED_ROWS:
-            # The live server drops the oldest, so what was said long ago is lost on viewers that come late.
-            self._rows_since_repeat = 0
-            if not self._live.behind:
-                self._describe(self._live)
 
     def _change(self, event: Event, wall_ns: int) -> None:
         if isinstance(event, Reset):
-            self._next_run()
+            if self._stream is not None:
+                self._next_run(self._stream)
             return
-        self._backend.streams = self._listening()
         self._backend.begin(np.array([event.time_ns]), np.array([wall_ns]))
         self._picture.on(event)
         if isinstance(event, Started):
             self._started = event
-            for stream in self._backend.streams:
-                self._send_scene(stream)
+            if self._backend.stream is not None:
+                self._send_scene(self._backend.stream)
         elif isinstance(event, MeshChanged) and self._started is not None:
             vertices, triangles, sha256 = event.vertices, event.triangles, event.mesh_sha256
             self._started = self._started._replace(vertices=vertices, triangles=triangles, mesh_sha256=sha256)
 
-    def _listening(self) -> list[Stream]:
-        """The streams that take what they are sent; the others must be told later how things are then."""
-        for stream in self._streams:
-            stream.missed = stream.missed or stream.behind
-        return [stream for stream in self._streams if not stream.behind]
-
     def _write_states(self, states: list[Noted]) -> None:
         """Exact states and picture, which all belong to the present body, and what happened."""
-        self._rows_since_repeat += len(states)
-        self._backend.streams = self._listening()
         # What happened comes first: a file that is cut behind it has every line that acted on its states.
         self._commanded |= bool(self._lines)
         for entity, lines in self._lines.items():
@@ -411,6 +292,98 @@ class RerunObserver(Observer):
             else:
                 self._backend.send(e.STATE, scalar_columns(rows))
                 self._picture.draw(times, rows)
-        if states:
-            for stream in self._backend.streams:
-                self._arrange(stream)
+        if states and self._backend.stream is not None:
+            self._arrange(self._backend.stream)
+
+
+# Files
+
+
+class FileRecorder(RerunObserver):
+    """Records to a file. Raises InputError for one that can't be written."""
+
+    def __init__(self, path: str, name: str = "rigid_body", on_error: Callable[[str], None] | None = None) -> None:
+        self.path = Path(path)
+        super().__init__(name, on_error)
+
+    @property
+    def stalled(self) -> str:
+        """Says that the file hasn't taken what was sent for longer than STALLED_S; empty while it does."""
+        since_s = self._flushing_since_s
+        if since_s is None or self._stream is None or time.monotonic() < since_s + STALLED_S:
+            return ""
+        return f"recording {self.path}: nothing could be written for {time.monotonic() - since_s:.1f} s"
+
+    def _open(self, run_id: str, name: str) -> Stream:
+        return FileStream(self.path, run_id, name)
+
+    def _open_next(self, before: Stream, run_id: str, name: str) -> Stream:
+        self._end(before)
+        if self._last_time_ns > 0:
+            self.path.rename(self.path.with_name(f"{self.path.stem}.run{self._run - 1}{self.path.suffix}"))
+        return FileStream(self.path, run_id, name)
+
+    def _end(self, stream: Stream) -> None:
+        """Finish the file, with the layout for what it holds."""
+        assert isinstance(stream, FileStream)
+        self._arrange(stream, Finished(1e-9 * self._last_time_ns, self._backend.plotted, self._commanded))
+        stream.close()
+        self._mailbox.moved()
+        self._stream = None
+
+    def _send_scene(self, stream: Stream) -> None:
+        """With the mesh's exact numbers."""
+        super()._send_scene(stream)
+        began = self._started
+        if began is not None and began.vertices is not None and began.triangles is not None:
+            numbers = rr.AnyValues(
+                sha256=began.mesh_sha256,
+                vertices=np.ascontiguousarray(began.vertices, dtype=np.float64).ravel(),
+                triangles=np.ascontiguousarray(began.triangles, dtype=np.int64).ravel(),
+            )
+            stream.log_static(e.SESSION_MESH, numbers)
+
+
+class FileStream(Stream):
+    """One run in one .rrd file, complete on disk (in the system's cache) after each ``flush``.
+
+    It has no index: the library would gather that in memory, 3 kB for each piece that it writes, 200 MB an hour.
+    """
+
+    def __init__(self, path: Path, recording_id: str, name: str) -> None:
+        self._path = path
+        if path.suffix != ".rrd":
+            raise InputError("record", str(path), "a path that ends in .rrd or .mcap")
+        output_file("record", path)
+        try:
+            # An application of its own: in a viewer that shows another recording, too, it has its own layout.
+            application_id = f"{e.APPLICATION_ID}_{recording_id[:8]}"
+            super().__init__(rr.FileSink(path, write_footer=False), recording_id, name, application_id)
+            self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+            self._inode = path.stat().st_ino
+        except (RuntimeError, OSError) as error:
+            raise InputError("record", str(path), f"a file that can be written ({last_line(error)})") from error
+
+    def flush(self) -> None:
+        """Write out; raises OSError where the data would not arrive in the file of this name."""
+        try:
+            self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
+            if self._path.stat().st_ino == self._inode:
+                return
+            reason = "another file took its place"
+        except RuntimeError as error:
+            full = shutil.disk_usage(self._path.parent).free < 1_000_000
+            reason = "no space left on the disk" if full else last_line(error)
+        raise OSError(f"{self._path}: {reason}")
+
+    def close(self) -> None:
+        """Write the rest and mark the end; raises OSError as ``flush`` does."""
+        self.flush()
+        self.recording.disconnect()
+        mark_end(self._path)
+
+
+def mark_end(path: Path) -> None:
+    """Mark a stream as ended: the library doesn't, where it writes no index."""
+    with open(path, "ab") as file:
+        file.write(FRAME_HEAD.pack(0, 0))

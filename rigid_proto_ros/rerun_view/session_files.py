@@ -20,9 +20,9 @@ from ..simulation.observer import Reset
 if TYPE_CHECKING:
     from ..session.mcap_observer import McapObserver
     from ..session.recorded_session import RecordedSession
-    from .observer import RerunObserver
+    from .observer import FileRecorder
 
-    Recorder = McapObserver | RerunObserver
+    Recorder = McapObserver | FileRecorder
 
 
 def is_mcap(path: str) -> bool:
@@ -51,9 +51,9 @@ def make_recorder(
             raise InputError("record", is_missing("mcap", "mcap")) from None
     if importlib.util.find_spec("rerun") is None:
         raise InputError("record", is_missing("rerun-sdk", "rerun"))
-    from .observer import RerunObserver
+    from .observer import FileRecorder
 
-    return RerunObserver(record=path, name=node_name, on_error=on_error)
+    return FileRecorder(path, node_name, on_error)
 
 
 @contextmanager
@@ -97,7 +97,7 @@ def repair(path: str | Path, repaired: str | Path) -> None:
         raise InputError("--repair", str(repaired), "another file than the one that is repaired")
     output_file("--repair", repaired)
     if not bag:
-        from .rrd_file import copy_whole
+        from .rrd_reading import copy_whole
 
         # What is damaged inside is refused here.
         _read_rrd(path)
@@ -132,7 +132,7 @@ def _bag_reader() -> ModuleType:
 def _read_rrd(path: Path) -> RecordedSession:
     if importlib.util.find_spec("rerun") is None:
         raise InputError("session", is_missing("rerun-sdk", "rerun"))
-    from .rrd_file import read_session
+    from .rrd_reading import read_session
 
     return read_session(path)
 

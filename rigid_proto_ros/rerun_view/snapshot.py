@@ -17,8 +17,9 @@ from PIL import Image
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..session.recorded_session import RecordedSession
+from .backend import SIM_TIME
 from .ports import LOOPBACK, PortTakenError, is_free, listens, serve_on_port
-from .rrd_file import SIM_TIME, read_session, whole_part
+from .rrd_reading import read_session, whole_part
 from .viewers import ViewerProcess, open_headless
 
 FIRST_PORT = 19876

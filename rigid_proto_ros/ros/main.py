@@ -171,13 +171,13 @@ def make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
         return None
     if importlib.util.find_spec("rerun") is None:
         raise InputError("viewer", is_missing("rerun-sdk", "rerun"))
-    from ..rerun_view.observer import RerunObserver
+    from ..rerun_view.live_view import LiveView
 
     def tell(line: str) -> None:
         print(f"{node_name}: {line}", file=sys.stderr)
 
-    return RerunObserver(
-        viewer=parameters.viewer,
+    return LiveView(
+        parameters.viewer,
         rerun_port=_asked_for("rerun_port", parameters.rerun_port),
         web_port=_asked_for("web_port", parameters.web_port),
         name=node_name,

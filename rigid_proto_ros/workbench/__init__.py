@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The interactive page: a ROS client like any other, and what it keeps of a flight."""
+"""The interactive page: an observer of a simulation in its own process, and the hands of its user."""

@@ -44,8 +44,7 @@ from .body_tab import BodyTab
 from .controls import Controls
 from .drawing import ViserBackend
 from .flight import Flight
-from .lesson_course import Course
-from .lesson_panel import LessonPanel
+from .lessons import Course, LessonPanel
 from .panel import ALWAYS, AT_FIRST, CENTRE_OF_MASS, PARTS, ForcesTab, SessionTab, ShowTab, TimeBar, motion_words
 from .pointer import DrawnPose, DrawnPoses, Pointer, Tools, suggested_force
 from .readouts import Readings, ReadoutTab

@@ -122,7 +122,10 @@ class Pointer:
         node.on_drag("left")(self._on_drag)
 
     def attach_com(self, node: Any) -> None:
-        """The same for the mark of the centre of mass, which can lie where there is no body: a click acts there."""
+        """The same for the mark of the centre of mass, which can lie where there is no body: a click acts there, and a
+        drag ties the string to the body beside it.
+        """
+        node.on_drag("left")(self._on_drag)
 
         async def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
             if event.ray_direction is not None:

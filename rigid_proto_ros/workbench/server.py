@@ -178,9 +178,12 @@ STYLE = f"""<style>
 .mantine-Button-label {{ white-space: normal; }}
 .mantine-Notification-root:has(.tabler-icon-check) {{ display: none; }}
 .{MARK} {{ padding: 0 0.6em; font-size: 0.95em; white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }}
-.{MARK} b {{ font-size: 1.35em; font-weight: 500; font-variant-numeric: tabular-nums; display: inline-block; min-width:
-4.6em; }} .{MARK} span {{ opacity: 0.7; }} {_BAR} {{ position: sticky; top: 0; z-index: 20; background: var(--mantine-
-color-body); margin-top: 0.4em; }} .{ANSWERS} {{ display: none; }}
+.{MARK} b {{ font-size: 1.35em; font-weight: 500; font-variant-numeric: tabular-nums; }}
+.{MARK} b {{ display: inline-block; min-width: 4.6em; }}
+.{MARK} span {{ opacity: 0.7; }}
+.mantine-Input-input {{ text-overflow: ellipsis; }}
+{_BAR} {{ position: sticky; top: 0; z-index: 20; background: var(--mantine-color-body); margin-top: 0.4em; }}
+.{ANSWERS} {{ display: none; }}
 @media (max-width: {NARROW}) {{
   {_SHEET} {{ max-height: {100 - PICTURE_SHARE}% !important; width: 100% !important; }}
   {_SHEET} [style*="width: 20em"] {{ width: 100% !important; }}

@@ -17,7 +17,7 @@ pytest.importorskip("rclpy")
 pytest.importorskip("rerun")
 
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.rrd_file import read_session, record_batches
+from rigid_proto_ros.rerun_view.rrd_reading import read_session, record_batches
 from rigid_proto_ros.ros.domain import hold_domain
 
 SESSION = Path("out/session.rrd")

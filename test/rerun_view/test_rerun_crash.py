@@ -13,15 +13,15 @@ import rerun_flight as flight
 from rerun.chunk import RrdReader
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, RerunObserver
-from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, HEADER_BYTES, read_session, whole_bytes
+from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, FileRecorder
+from rigid_proto_ros.rerun_view.rrd_reading import FRAME_HEAD, HEADER_BYTES, read_session, whole_bytes
 from rigid_proto_ros.rerun_view.session_files import repair
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("crash") / "whole.rrd"
-    observer = RerunObserver(record=str(path))
+    observer = FileRecorder(str(path))
     flight.fly(observer, flight.rows(400))
     observer.close()
     return path
@@ -104,8 +104,8 @@ import os, sys, time
 import rerun_flight as flight
 from rerun.chunk import RrdReader
 from rigid_proto_ros.simulation.observer import BodyChanged, Published, Started
-from rigid_proto_ros.rerun_view.observer import RerunObserver
-observer = RerunObserver(record=sys.argv[1])
+from rigid_proto_ros.rerun_view.observer import FileRecorder
+observer = FileRecorder(sys.argv[1])
 states = flight.rows(100_000)
 published, flush = 0, observer._flush
 def told():

@@ -14,8 +14,8 @@ from rerun_flight import cells
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.picture import style
-from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, STALLED_S, RerunObserver
-from rigid_proto_ros.rerun_view.rrd_file import FRAME_HEAD, read_session, whole_bytes
+from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, STALLED_S, FileRecorder
+from rigid_proto_ros.rerun_view.rrd_reading import FRAME_HEAD, read_session, whole_bytes
 from rigid_proto_ros.simulation.observer import (
     BodyChanged,
     BodySnapshot,
@@ -37,7 +37,7 @@ def states() -> np.ndarray:
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory, states) -> Path:
     path = tmp_path_factory.mktemp("recording") / "session.rrd"
-    observer = RerunObserver(record=str(path))
+    observer = FileRecorder(str(path))
     flight.fly(observer, states)
     observer.close()
     assert observer.error == ""
@@ -100,7 +100,7 @@ def test_plotted_energies_and_momentum_are_those_of_the_states(recording, states
 
 def test_a_change_of_the_body_moves_the_mesh_from_that_time_on(tmp_path, states):
     path = tmp_path / "change.rrd"
-    observer = RerunObserver(record=str(path))
+    observer = FileRecorder(str(path))
     observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
     observer.on(BodyChanged(0, flight.BODY))
     observer.on(Published(0, states[0]))
@@ -118,7 +118,7 @@ def test_a_change_of_the_body_moves_the_mesh_from_that_time_on(tmp_path, states)
 
 def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
     path = tmp_path / "meshes.rrd"
-    observer = RerunObserver(record=str(path))
+    observer = FileRecorder(str(path))
     flight.fly(observer, states[:20])
     observer.on(MeshChanged(200_000_000, 2.0 * flight.VERTICES, flight.TRIANGLES, "ab" * 32))
     observer.on(BodyChanged(200_000_000, flight.BODY))
@@ -139,7 +139,7 @@ def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
 
 def test_a_reset_keeps_the_run_before_beside_the_new_one_which_begins_with_what_is_then_in_force(tmp_path, states):
     path = tmp_path / "session.rrd"
-    observer = RerunObserver(record=str(path))
+    observer = FileRecorder(str(path))
     flight.fly(observer, states[:50])
     changed = flight.SCENE + "    mass: 2.0\n"
     observer.on(SceneChanged(490_000_000, changed))
@@ -164,13 +164,13 @@ def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path):
     (tmp_path / "full.rrd").symlink_to("/dev/full")
     for name in ("taken/session.rrd", "session.mcap", ".", "full.rrd"):
         with pytest.raises(InputError, match="[Nn]o space" if name == "full.rrd" else "record"):
-            RerunObserver(record=str(tmp_path / name))
+            FileRecorder(str(tmp_path / name))
 
 
 def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_run(tmp_path, states):
     path = tmp_path / "session.rrd"
     errors = []
-    observer = RerunObserver(record=str(path), on_error=errors.append)
+    observer = FileRecorder(str(path), on_error=errors.append)
     flight.fly(observer, states[:20])
     flight.flush(observer)
     observer.on(BodyChanged(200_000_000, None))
@@ -185,12 +185,12 @@ def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_ru
 FULL_IN_FLIGHT = """
 import resource, signal, sys
 import rerun_flight as flight
-from rigid_proto_ros.rerun_view.observer import RerunObserver
-from rigid_proto_ros.rerun_view.rrd_file import read_session
+from rigid_proto_ros.rerun_view.observer import FileRecorder
+from rigid_proto_ros.rerun_view.rrd_reading import read_session
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
 errors = []
-observer = RerunObserver(record=sys.argv[1], on_error=errors.append)
+observer = FileRecorder(sys.argv[1], on_error=errors.append)
 flight.fly(observer, flight.rows(12_000))
 observer.close()
 assert len(errors) == 1 and sys.argv[1] in errors[0], errors
@@ -212,7 +212,7 @@ def test_a_library_that_hangs_on_a_full_disk_is_told_of_within_two_seconds(tmp_p
     """As Rerun does at times once the thread that writes its file has died."""
     path, released = tmp_path / "session.rrd", threading.Event()
     errors: list[str] = []
-    observer = RerunObserver(record=str(path), on_error=errors.append)
+    observer = FileRecorder(str(path), on_error=errors.append)
     flight.fly(observer, states[:20])
     flight.flush(observer)
 
@@ -244,7 +244,7 @@ def test_a_lost_file_stops_the_recording_and_is_reported(tmp_path, states):
     folder.mkdir()
     path = folder / "session.rrd"
     errors = []
-    observer = RerunObserver(record=str(path), on_error=errors.append)
+    observer = FileRecorder(str(path), on_error=errors.append)
     flight.fly(observer, states[:20])
     flight.flush(observer)
     path.unlink()

@@ -14,19 +14,17 @@ import rerun_flight as flight
 from rerun.chunk import RrdReader
 
 from rigid_proto_ros.picture import style
-from rigid_proto_ros.rerun_view import rrd_file as e
-from rigid_proto_ros.rerun_view import viewers
-from rigid_proto_ros.rerun_view.observer import RerunObserver
-from rigid_proto_ros.rerun_view.rrd_file import read_session
+from rigid_proto_ros.rerun_view import live_view, viewers
+from rigid_proto_ros.rerun_view.backend import SIM_TIME, STATE
+from rigid_proto_ros.rerun_view.observer import FileRecorder
 from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started
 
 RUN_WITH_A_STOPPED_VIEWER = """
 import sys, time
 import rerun_flight as flight
 from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started
-from rigid_proto_ros.rerun_view.observer import RerunObserver
-path, states = sys.argv[1], flight.rows(200)
-observer = RerunObserver(record=path, viewer="serve")
+states = flight.rows(200)
+observer = flight.live_view()
 observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
 observer.on(BodyChanged(0, flight.BODY))
 observer.on(Published(0, states[0]))
@@ -38,19 +36,18 @@ while k < 200 and time.monotonic() < deadline:
     observer.on(BodyChanged(k * flight.PERIOD_NS, flight.BODY))
     if k == 150:
         # Thousands of messages are more than the server keeps back for a viewer; how many, the library decides.
-        while not any(stream.behind for stream in observer._streams):
+        while not observer._stream.behind:
             observer.on(BodyChanged(k * flight.PERIOD_NS, flight.BODY))
             time.sleep(0.01)
     k += 1
-behind = any(stream.behind for stream in observer._streams)
+behind = observer._stream.behind
 observer.close()
 print("behind" if behind else "never behind", k, repr(observer.error), flush=True)
 """
 
 
 def test_a_viewer_that_no_longer_reads_holds_up_neither_the_run_nor_its_end(tmp_path):
-    path = tmp_path / "session.rrd"
-    run = flight.child(RUN_WITH_A_STOPPED_VIEWER, path)
+    run = flight.child(RUN_WITH_A_STOPPED_VIEWER)
     watcher = None
     try:
         address = run.stdout.readline().strip()
@@ -67,11 +64,11 @@ def test_a_viewer_that_no_longer_reads_holds_up_neither_the_run_nor_its_end(tmp_
         if watcher is not None:
             watcher.process.kill()
             watcher.process.wait()
-    assert read_session(path).rows.tobytes() == flight.rows(200).tobytes()
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts threads as Linux shows them")
-def test_resets_and_bodies_of_every_size_leave_no_threads_behind(tmp_path):
+@pytest.mark.parametrize("kind", ["file", "live"])
+def test_resets_and_bodies_of_every_size_leave_no_threads_behind(kind, tmp_path):
     def one_more_run() -> None:
         observer.on(Reset())
         for k, row in enumerate(flight.rows(4)):
@@ -79,7 +76,7 @@ def test_resets_and_bodies_of_every_size_leave_no_threads_behind(tmp_path):
             observer.on(Published(k * flight.PERIOD_NS, row))
         flight.flush(observer)
 
-    observer = RerunObserver(record=str(tmp_path / "session.rrd"), viewer="serve")
+    observer = FileRecorder(str(tmp_path / "session.rrd")) if kind == "file" else flight.live_view()
     try:
         observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
         observer.on(BodyChanged(0, flight.BODY))
@@ -99,8 +96,9 @@ def _threads_of_this_process() -> int:
 
 
 @pytest.mark.filterwarnings("ignore:RRD file has no footer")
-def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_body(tmp_path):
-    observer = RerunObserver(viewer="serve", live_memory_limit="4MB")
+def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_body(tmp_path, monkeypatch):
+    monkeypatch.setattr(live_view, "LIVE_MEMORY_LIMIT", "4MB")
+    observer = flight.live_view()
     saved = tmp_path / "seen.rrd"
     watcher = None
     try:
@@ -117,11 +115,14 @@ def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_b
             *(style.BODY_MESH, style.INERTIA_BOX, style.INERTIA_ELLIPSOID),
             *(style.BOUNDING_BOX, style.POINSOT_ELLIPSOID),
         }
-        # Of a part that moves its place is temporal: what is static alone doesn't show it.
-        flight.wait_for(
-            lambda: all(max(found.get(name, [-1])) >= 0 for found in [_entities(saved)] for name in {e.STATE, *shapes})
-        )
-        assert min(_entities(saved)[e.STATE]) > 0, "nothing was dropped, so nothing is shown"
+
+        def complete() -> dict[str, list[int]]:
+            """What was saved, once it has all parts; of one that moves its place is temporal, and shows it alone."""
+            found = _entities(saved)
+            return found if all(max(found.get(name, [-1])) >= 0 for name in {STATE, *shapes}) else {}
+
+        # The file grows: one reading of it is enough.
+        assert min(flight.wait_for(complete)[STATE]) > 0, "nothing was dropped, so nothing is shown"
     finally:
         if watcher is not None:
             watcher.stop()
@@ -137,8 +138,8 @@ def _entities(path: Path) -> dict[str, list[int]]:
         for chunk in RrdReader(path).stream():
             batch = chunk.to_record_batch()
             times = found.setdefault(str(chunk.entity_path).lstrip("/"), [])
-            if e.SIM_TIME in batch.schema.names:
-                times += [int(t.value) for t in batch.column(e.SIM_TIME)]
+            if SIM_TIME in batch.schema.names:
+                times += [int(t.value) for t in batch.column(SIM_TIME)]
             else:
                 times.append(-1)
     except Exception:

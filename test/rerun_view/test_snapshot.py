@@ -15,7 +15,7 @@ from PIL import Image
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli import snapshot as command
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.observer import RerunObserver
+from rigid_proto_ros.rerun_view.observer import FileRecorder
 from rigid_proto_ros.rerun_view.snapshot import DRIVERS, is_one_colour
 
 pytestmark = pytest.mark.drawn
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.drawn
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     path = tmp_path_factory.mktemp("snapshot") / "session.rrd"
-    observer = RerunObserver(record=str(path))
+    observer = FileRecorder(str(path))
     flight.fly(observer, flight.rows(60))
     observer.close()
     return path
@@ -50,7 +50,7 @@ def take(*words: str) -> None:
 def test_the_body_is_in_the_middle_of_the_flight_view_also_from_a_cut_file(tmp_path):
     picture = tmp_path / "flight.png"
     recording = tmp_path / "session.rrd"
-    observer = RerunObserver(record=str(recording))
+    observer = FileRecorder(str(recording))
     # Without gravity: of a body that falls the path is shown, and the body where it has come to.
     flight.fly(observer, flight.rows(60), dataclasses.replace(flight.BODY, gravity=np.zeros(3)))
     observer.close()

@@ -11,7 +11,7 @@ from conftest import needs_rerun
 from ros_process import RosProcess, catches, start_node
 
 from rigid_proto_ros.base.bundled import scene_path
-from rigid_proto_ros.rerun_view.rrd_file import read_session
+from rigid_proto_ros.rerun_view.rrd_reading import read_session
 
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.stress)])
 """One handler serves both."""

@@ -30,8 +30,7 @@ from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench import controls
 from rigid_proto_ros.workbench import page as page_module
 from rigid_proto_ros.workbench.flight import COMPILING
-from rigid_proto_ros.workbench.lesson_course import COURSES
-from rigid_proto_ros.workbench.lesson_panel import FREE
+from rigid_proto_ros.workbench.lessons import COURSES, FREE
 from rigid_proto_ros.workbench.panel import SEE_INTO, motion_words
 from rigid_proto_ros.workbench.readouts import ENERGY, PLOTTED_S, SPEED
 

@@ -17,9 +17,9 @@ from flown_page import FlownPage
 from rigid_proto_ros.base.bundled import scene_names
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
-from rigid_proto_ros.workbench import controls, lesson_panel, readouts
+from rigid_proto_ros.workbench import controls, readouts
 from rigid_proto_ros.workbench import page as page_module
-from rigid_proto_ros.workbench.lesson_course import COURSES, LessonProgress
+from rigid_proto_ros.workbench.lessons import COURSES, FREE, LessonProgress
 from rigid_proto_ros.workbench.panel import PATHS
 
 
@@ -31,15 +31,6 @@ class User(FlownPage):
         self.set("Initial spin [rad/s]", spin)
         self.reset()
 
-    def rewind(self) -> None:
-        """As far back as it goes."""
-        times = [time_ns for time_ns, _ in self.seen.rows]
-        back = min(1e-9 * (times[-1] - times[0]), self.widget("Seconds back").max)
-        self._update(self.widget("Seconds back"), float(back))
-        self.until(lambda: not self.widget("Go on from here").disabled, "moment of the past")
-        self.press("Go on from here")
-        self.fly(0.0)
-
     def push(self, *point: float) -> None:
         """Click at a mesh point from aside, and wait until the poke is over."""
         self.click(point, self.page.state.rotation @ [-0.3, -0.8, -0.5])
@@ -47,7 +38,8 @@ class User(FlownPage):
 
     def push_com(self) -> None:
         """A click on the mark of the centre of mass, which may lie where there is no body."""
-        assert self.page._com.visible and self.page._com._impl.click_cb
+        mark = self.page._com
+        assert mark.visible and mark._impl.click_cb and mark._impl.drag_cb, "it lies before the body"
         self.do(lambda: self.page.flight.do({"force": [0.0, 0.0, -self.page.tools.force]}))
         self.fly(0.06)
 
@@ -123,7 +115,7 @@ STEPS: dict[str, tuple[tuple[tuple, ...], ...]] = {
         (("throw", "0 8 0"), ("throw", "0 0 8"), ("fly", 2.1)),
         (("set_gyroscopic", False), ("throw", "8 0.05 0.05"), ("fly", 2.1)),
     ),
-    "com_or_rim": ((("push_com",),), (("rewind",), ("push", 0.68, 0.0, 0.0)), (("fly", 1.1),)),
+    "com_or_rim": ((("push_com",),), (("reset",), ("push", 0.68, 0.0, 0.0)), (("fly", 1.1),)),
     "dropped_term": (
         (("fly", 2.1),),
         (("set_gyroscopic", True), ("fly", 2.1)),
@@ -136,7 +128,7 @@ STEPS: dict[str, tuple[tuple[tuple, ...], ...]] = {
     ),
     "hollow_box": (
         (("push", 0.095, 0.045, 0.025),),
-        (("rewind",), ("set_model", "bounding_box"), ("push", 0.095, 0.045, 0.025)),
+        (("reset",), ("set_model", "bounding_box"), ("push", 0.095, 0.045, 0.025)),
         (("compare", "solid (true)", "| I₁", "| I₃"), ("fly", 1.1)),
     ),
     "l_bracket": ((("fly", 1.0),), (("see_axes",),), (("set_gyroscopic", False), ("fly", 2.1))),
@@ -153,8 +145,8 @@ STEPS: dict[str, tuple[tuple[tuple, ...], ...]] = {
     "t_handle": ((("fly", 4.1),), (("push", 0.0, 0.0, 0.068), ("fly", 2.1)), (("drag", 0.0, 0.045, 0.0), ("fly", 1.1))),
     "teapot": (
         (("push", 0.12, 0.0, 0.095),),
-        (("rewind",), ("push", -0.125, 0.0, 0.0745), ("rewind",), ("push", 0.0, 0.0, 0.138)),
-        (("rewind",), ("push_com",)),
+        (("reset",), ("push", -0.125, 0.0, 0.0745), ("reset",), ("push", 0.0, 0.0, 0.138)),
+        (("reset",), ("push_com",)),
     ),
     "tennis_racket": (
         (("fly", 3.1),),
@@ -200,7 +192,7 @@ def test_every_sentence_of_every_lesson_has_a_step() -> None:
 
 @pytest.mark.parametrize("name", sorted(STEPS))
 def test_every_step_of_the_lesson_can_be_done_on_the_page_and_gets_its_mark(user: User, name: str) -> None:
-    user.set("Lesson", lesson_panel.FREE)
+    user.set("Lesson", FREE)
     user.said.clear()
     user.pick(lesson(name).title)
     text = user.page.lessons._text

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A flight as columns of Rerun: the streams that take them, and the backend that draws the picture on these.
+"""A flight as columns of Rerun: the stream that takes them, and the backend that draws the picture on it.
 
-A file and viewers have a stream each rather than one with two sinks: replacing a stream's sinks shuts its server down,
-so no file could be begun anew at a reset while somebody watches.
+Timelines: ``sim_time`` (simulated time since the run's start) and ``ros_time`` (wall clock when the row was taken).
 
 Two things are done by functions of the SDK that it doesn't promise (tried with rerun-sdk 0.41.0):
 ``rr.send_blueprint`` keeps a stream of every layout for ever, two threads and a third of a megabyte each, and threads
@@ -11,12 +10,8 @@ and memory of closed recordings are kept until the process ends.
 
 from __future__ import annotations
 
-import os
-import shutil
 import threading
-import time
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,23 +20,31 @@ import rerun as rr
 import rerun_bindings
 from rerun.recording_stream import RecordingStream
 
-from ..base.errors import InputError
-from ..base.files import output_file
 from ..base.provenance import cpu, versions
 from ..picture import style
 from ..picture.backend import Backend, DrawnMesh
 from ..picture.style import Colour
-from . import rrd_file as e
-from .ports import LOOPBACK, PortTakenError, listens
 
 APPLICATION_ID = "rigid_proto_ros"
 """Of live streams: viewers keep one layout for all recordings of an application."""
 
-FLUSH_TIMEOUT_S = 5.0
-"""A disk that takes longer than this to take half a second of data counts as lost."""
+SIM_TIME = "sim_time"
+ROS_TIME = "ros_time"
+
+STATE = "state"
+"""States, exactly."""
+SCENE = "session/scene"
+"""The parameters at the run's start."""
+SESSION_MESH = "session/mesh"
+"""The mesh that the run began with, exactly."""
+EVENTS = "events"
+"""Event lines as logged."""
+REFUSALS = "log/refusals"
+ACCURACY = "log/accuracy"
+"""Why the motion is held to less than its accuracy."""
 
 TAKEN_S = 0.05
-"""A live stream that hasn't taken half a second of data in this time is behind: some viewer doesn't read."""
+"""A stream that hasn't taken half a second of data in this time is behind: some viewer doesn't read."""
 
 INVISIBLE = 1e-9
 """A scale that nobody sees; the viewer refuses 0, which has no inverse."""
@@ -50,8 +53,8 @@ INVISIBLE = 1e-9
 class Stream:
     """A Rerun recording: one run of the simulation, with simulated time from 0.
 
-    meshes: by part the mesh that it was sent last, and how many it was sent. styled: by entity what its style was sent
-    for, a size or a number of columns. arranged: it was sent a layout. behind: what was sent hasn't been taken yet, so
+    meshes: by part the mesh that it was sent last, and how many it was sent. styled: by entity what its look was sent
+    for. arranged: it was sent a layout. behind: what was sent hasn't been taken yet, so
     that nothing more should be; missed: something was left out meanwhile.
     """
 
@@ -109,64 +112,6 @@ class Stream:
         return leaving
 
 
-class FileStream(Stream):
-    """One run in one .rrd file, complete on disk (in the system's cache) after each ``flush``.
-
-    It has no index: the library would gather that in memory, 3 kB for each piece that it writes, 200 MB an hour.
-    """
-
-    def __init__(self, path: Path, recording_id: str, name: str) -> None:
-        self.path = path
-        if path.suffix != ".rrd":
-            raise InputError("record", str(path), "a path that ends in .rrd or .mcap")
-        output_file("record", path)
-        try:
-            # An application of its own: in a viewer that shows another recording, too, it has its own layout.
-            application_id = f"{APPLICATION_ID}_{recording_id[:8]}"
-            super().__init__(rr.FileSink(path, write_footer=False), recording_id, name, application_id)
-            self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
-            self._inode = path.stat().st_ino
-        except (RuntimeError, OSError) as error:
-            raise InputError("record", str(path), f"a file that can be written ({_last_line(error)})") from error
-
-    def flush(self) -> None:
-        """Write out; raises OSError where the data would not arrive in the file of this name."""
-        try:
-            self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
-            if self.path.stat().st_ino == self._inode:
-                return
-            reason = "another file took its place"
-        except RuntimeError as error:
-            full = shutil.disk_usage(self.path.parent).free < 1_000_000
-            reason = "no space left on the disk" if full else _last_line(error)
-        raise OSError(f"{self.path}: {reason}")
-
-    def close(self) -> None:
-        """Write the rest and mark the end; raises OSError as ``flush`` does."""
-        self.flush()
-        self.recording.disconnect()
-        e.mark_end(self.path)
-
-
-def host(port: int, memory_limit: str, recording_id: str, name: str) -> tuple[Stream, str]:
-    """A stream with a gRPC server on loopback, which lives as long as it does, and the address to which other streams
-    send and viewers come. Raises PortTakenError where another process listens on the port.
-    """
-    stream = Stream(rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=memory_limit), recording_id, name)
-    deadline = time.monotonic() + FLUSH_TIMEOUT_S
-    try:
-        # A server that can't listen says so to nobody but who waits for what was sent, and not at once.
-        while time.monotonic() < deadline:
-            stream.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
-            if listens(os.getpid(), port):
-                return stream, f"rerun+http://{LOOPBACK}:{port}/proxy"
-            time.sleep(0.02)
-        raise RuntimeError(f"nothing serves on port {port}")
-    except RuntimeError as error:
-        stream.recording.disconnect()
-        raise PortTakenError(_last_line(error)) from error
-
-
 def forget_closed_recordings() -> None:
     """Give back threads and memory of recordings that are closed. Waits for all others to take what they were sent."""
     users_own = rr.get_global_data_recording()
@@ -179,7 +124,8 @@ def forget_closed_recordings() -> None:
         rr.set_global_data_recording(users_own)
 
 
-def _last_line(error: BaseException) -> str:
+def last_line(error: BaseException) -> str:
+    """What the library says last of an error."""
     return (str(error).strip().splitlines() or [type(error).__name__])[-1]
 
 
@@ -189,8 +135,8 @@ def _last_line(error: BaseException) -> str:
 def time_columns(times_ns: np.ndarray, walls_ns: np.ndarray) -> list[Any]:
     """Both timelines: simulated times (n,) and wall clock times (n,), in ns."""
     return [
-        rr.TimeColumn(e.SIM_TIME, duration=np.asarray(times_ns, np.int64).astype("timedelta64[ns]")),
-        rr.TimeColumn(e.ROS_TIME, timestamp=np.asarray(walls_ns, np.int64).astype("datetime64[ns]")),
+        rr.TimeColumn(SIM_TIME, duration=np.asarray(times_ns, np.int64).astype("timedelta64[ns]")),
+        rr.TimeColumn(ROS_TIME, timestamp=np.asarray(walls_ns, np.int64).astype("datetime64[ns]")),
     ]
 
 
@@ -200,24 +146,28 @@ def scalar_columns(values: np.ndarray) -> Any:
 
 
 class RerunBackend(Backend):
-    """Draws on ``streams``.
+    """Draws on ``stream``, or, where that is None, nothing.
 
-    plotted: the least and the largest value of each plot, by name. paths: where each trail ends.
+    plotted: the least and the largest value of each plot of the run, by name.
     """
 
     def __init__(self) -> None:
-        self.streams: Sequence[Stream] = ()
-        self.plotted: dict[str, tuple[float, float]] = {}
-        self.paths: dict[str, np.ndarray] = {}
+        self.stream: Stream | None = None
         self._size = 1.0
         self._known = self._walls = np.zeros(1, np.int64)
         self._times: list[Any] = []
         self._count = 0
+        self.restart()
+
+    def restart(self) -> None:
+        """Another run: nothing has been plotted, and paths begin anew."""
+        self.plotted: dict[str, tuple[float, float]] = {}
+        self._path_ends: dict[str, np.ndarray] = {}
 
     def send(self, entity: str, *parts: Any) -> None:
         """Log columns of an entity at the times of ``begin``."""
-        for stream in self.streams:
-            stream.send(entity, self._times, *parts)
+        if self.stream is not None:
+            self.stream.send(entity, self._times, *parts)
 
     def begin(self, times_ns: np.ndarray, walls_ns: np.ndarray | None = None) -> None:
         """What follows is of these times (n,) [ns]; walls_ns (n,) [ns]: when they were by the wall's clock, None for
@@ -231,31 +181,33 @@ class RerunBackend(Backend):
         self._count = len(times_ns)
 
     def resize(self, size: float) -> None:
-        """Widths are in this length [m]; streams are sent them as they come to the parts."""
+        """Widths are in this length [m]; the stream is sent them as they come to the parts."""
         self._size = size
 
     def mesh(self, name: str, surface: DrawnMesh | None) -> None:
         """Log a mesh once a run, and hide the one before from now on."""
+        stream = self.stream
+        if stream is None:
+            return
+        number, known = stream.meshes.get(name, (0, None))
+        if known is surface:
+            return
         nowhere = rr.Transform3D.columns(translation=[[0.0, 0.0, 0.0]], scale=[[INVISIBLE] * 3])
-        for stream in self.streams:
-            number, known = stream.meshes.get(name, (0, None))
-            if known is surface:
-                continue
-            if known is not None:
-                stream.send(_mesh_entity(name, number), self._times, nowhere)
-            if surface is None:
-                continue
-            stream.meshes[name] = number + 1, surface
-            entity, own = _mesh_entity(name, number + 1), style.STYLES[name]
-            if number:
-                stream.send(entity, time_columns(np.zeros(1), self._walls[:1]), nowhere)
-            drawn = rr.Mesh3D(
-                vertex_positions=surface.vertices,
-                triangle_indices=surface.triangles,
-                vertex_normals=surface.normals,
-                albedo_factor=(*own.colours[0], round(255 * own.opacity)),
-            )
-            stream.log_static(entity, drawn)
+        if known is not None:
+            stream.send(_mesh_entity(name, number), self._times, nowhere)
+        if surface is None:
+            return
+        stream.meshes[name] = number + 1, surface
+        entity, own = _mesh_entity(name, number + 1), style.STYLES[name]
+        if number:
+            stream.send(entity, time_columns(np.zeros(1), self._walls[:1]), nowhere)
+        drawn = rr.Mesh3D(
+            vertex_positions=surface.vertices,
+            triangle_indices=surface.triangles,
+            vertex_normals=surface.normals,
+            albedo_factor=(*own.colours[0], round(255 * own.opacity)),
+        )
+        stream.log_static(entity, drawn)
 
     def place(
         self,
@@ -267,18 +219,20 @@ class RerunBackend(Backend):
         """Log transforms."""
         scales = None if scale is None else np.tile(scale, (self._count, 1))
         columns = rr.Transform3D.columns(translation=positions, quaternion=attitudes, scale=scales)
-        for stream in self.streams:
-            number, _ = stream.meshes.get(name, (1, None))
-            stream.send(_mesh_entity(name, number), self._times, columns)
+        number, _ = (1, None) if self.stream is None else self.stream.meshes.get(name, (1, None))
+        self.send(_mesh_entity(name, number), columns)
+
+    def _look(self, entity: str, known: float, look: Callable[[], Any]) -> None:
+        """Log how an entity looks, where the stream doesn't know that. known: a size, or how many columns it has."""
+        if self.stream is not None and self.stream.styled.get(entity) != known:
+            self.stream.styled[entity] = known
+            self.stream.log_static(entity, look())
 
     def _draw(self, name: str, archetype: Any, counts: np.ndarray, **values: Any) -> None:
-        """Log parts of a kind, and how they look to the streams that don't know it, or know it of another size."""
+        """Log parts of a kind, and how they look."""
         size = self._size if name.startswith(style.WORLD) else 1.0
         own = style.STYLES[name]
-        for stream in self.streams:
-            if stream.styled.get(name) != size:
-                stream.styled[name] = size
-                stream.log_static(name, archetype.from_fields(colors=list(own.colours), radii=own.width * size))
+        self._look(name, size, lambda: archetype.from_fields(colors=list(own.colours), radii=own.width * size))
         self.send(name, archetype.columns(**values).partition(counts))
 
     def arrows(self, name: str, counts: np.ndarray, vectors: np.ndarray, origins: np.ndarray | None = None) -> None:
@@ -298,8 +252,8 @@ class RerunBackend(Backend):
     def points(self, name: str, counts: np.ndarray, positions: np.ndarray) -> None:
         """Log points; of a trail the straight way from each to the next one."""
         if name in (style.TRAIL, style.COM_TRAIL):
-            before = self.paths.get(name, positions[0])
-            self.paths[name] = positions[-1].copy()
+            before = self._path_ends.get(name, positions[0])
+            self._path_ends[name] = positions[-1].copy()
             self.lines(name, counts, list(np.stack([np.vstack([before, positions[:-1]]), positions], axis=1)))
         else:
             self._draw(name, rr.Points3D, counts, positions=positions)
@@ -307,12 +261,13 @@ class RerunBackend(Backend):
     def labels(self, name: str, counts: np.ndarray, positions: np.ndarray, texts: Sequence[str]) -> None:
         """Log labels as points of no size, below the part; those of loads change, others are logged once."""
         entity, changes = f"{name}/label", name.startswith(style.LOADS)
-        for stream in self.streams:
-            if entity not in stream.styled and len(texts):
-                stream.styled[entity] = 0.0
-                colour, known = style.STYLES[name].colours[0], None if changes else texts[0]
-                look = rr.Points3D.from_fields(colors=colour, radii=0.0, labels=known, show_labels=True)
-                stream.log_static(entity, look)
+        if len(texts):
+            colour, known = style.STYLES[name].colours[0], None if changes else texts[0]
+            self._look(
+                entity,
+                0.0,
+                lambda: rr.Points3D.from_fields(colors=colour, radii=0.0, labels=known, show_labels=True),
+            )
         labels = list(texts) if changes else None
         self.send(entity, rr.Points3D.columns(positions=positions, labels=labels).partition(counts))
 
@@ -322,11 +277,8 @@ class RerunBackend(Backend):
         if finite.size:
             low, high = self.plotted.get(name, (np.inf, -np.inf))
             self.plotted[name] = (min(low, float(finite.min())), max(high, float(finite.max())))
-        for stream in self.streams:
-            if stream.styled.get(name) != values.shape[1]:
-                stream.styled[name] = values.shape[1]
-                names, colours = zip(*style.SERIES[name][: values.shape[1]], strict=True)
-                stream.log_static(name, rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
+        names, colours = zip(*style.SERIES[name][: values.shape[1]], strict=True)
+        self._look(name, len(names), lambda: rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
         self.send(name, scalar_columns(values))
 
 

@@ -1,17 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""The .rrd file: names of what is logged beside the picture's parts, its frames, and reading a recording back.
-
-Timelines: ``sim_time`` (simulated time since the run's start) and ``ros_time`` (wall clock when the row was taken).
-
-An .rrd is a 12-byte header (``RRF2``, version, options), then frames of two little-endian uint64 (kind, length) and
-``length`` bytes; kind 0 ends the stream, an index may stand behind it. Rerun's own reader and ``rerun rrd optimize``
+"""Reading an .rrd back, frame by frame (observer.py has the format): Rerun's own reader and ``rerun rrd optimize``
 refuse most files that were cut.
 """
 
 from __future__ import annotations
 
 import shutil
-import struct
 import tempfile
 import warnings
 from collections.abc import Iterator
@@ -24,25 +18,11 @@ import numpy as np
 from ..base.errors import InputError
 from ..picture.style import BODY_MESH
 from ..session.recorded_session import RecordedSession
-
-SIM_TIME = "sim_time"
-ROS_TIME = "ros_time"
-
-STATE = "state"
-"""States, exactly."""
-SCENE = "session/scene"
-"""The parameters at the run's start."""
-SESSION_MESH = "session/mesh"
-"""The mesh that the run began with, exactly."""
-EVENTS = "events"
-"""Event lines as logged."""
-REFUSALS = "log/refusals"
-ACCURACY = "log/accuracy"
-"""Why the motion is held to less than its accuracy."""
+from .backend import EVENTS, REFUSALS, SCENE, SESSION_MESH, SIM_TIME, STATE
+from .observer import FRAME_HEAD, mark_end
 
 MAGIC = b"RRF2"
 HEADER_BYTES = 12
-FRAME_HEAD = struct.Struct("<QQ")
 KINDS = (0, 1, 2, 3)
 """End, store info, data, blueprint activation."""
 
@@ -174,12 +154,6 @@ def whole_bytes(path: Path) -> tuple[int, bool]:
     if at == HEADER_BYTES:
         raise InputError("session", str(path), "a recording with data; this one ends before its first chunk")
     return at, False
-
-
-def mark_end(path: Path) -> None:
-    """Mark a stream as ended: the library doesn't, where it writes no index."""
-    with open(path, "ab") as file:
-        file.write(FRAME_HEAD.pack(0, 0))
 
 
 def copy_whole(path: Path, copy: Path) -> None:
