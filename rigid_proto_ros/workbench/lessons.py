@@ -46,8 +46,9 @@ class Course:
     ``drag`` and ``reset``, ``set NAME`` of a parameter, ``show NAME`` of a switch, in any order and as often as it is
     listed, then ``watch SECONDS`` of simulated time.
 
-    numbers: the readouts that the lesson speaks of. shows: switches that are off otherwise, and style.STRING_LINE.
-    labels: the parts and contacts that are named in the picture, at most three. speed: simulated seconds per second.
+    numbers: the readouts that the lesson speaks of. shows: switches that are on, and style.STRING_LINE. labels: the
+    parts and contacts that are named in the picture, at most three; an arrow that isn't named isn't drawn. speed:
+    simulated seconds per second.
     """
 
     steps: tuple[tuple[str, ...], ...]
@@ -71,8 +72,7 @@ COURSES = {
     "dropped_term": Course(
         (("watch 2",), ("set gyroscopic", "watch 2"), ("set gyroscopic", "watch 2")),
         (DRIFT, ENERGY, MOMENTUM, SPIN, SPINS),
-        ("Angular velocity ω",),
-        (style.MOMENTUM, style.OMEGA),
+        labels=(style.MOMENTUM, style.OMEGA),
     ),
     "hammer": Course(
         ((ALONE,), ("set inertia_model", ALONE), ("set inertia_model", "poke", "poke")),
@@ -89,8 +89,7 @@ COURSES = {
     "l_bracket": Course(
         (("watch 0.9",), ("show Principal axes",), ("set gyroscopic", "watch 2")),
         (SPIN, SPINS, DRIFT, MOMENTUM, ENERGY),
-        ("Angular velocity ω",),
-        (style.MOMENTUM, style.OMEGA),
+        labels=(style.MOMENTUM, style.OMEGA),
     ),
     "plumb_line": Course(
         (("watch 20",), ("set string.attach", "watch 20"), ("poke",)),

@@ -45,7 +45,7 @@ from .controls import Controls
 from .drawing import ViserBackend
 from .flight import Flight
 from .lessons import Course, LessonPanel
-from .panel import ALWAYS, AT_FIRST, CENTRE_OF_MASS, PARTS, ForcesTab, SessionTab, ShowTab, TimeBar, motion_words
+from .panel import ALWAYS, CENTRE_OF_MASS, ForcesTab, SessionTab, ShowTab, TimeBar, motion_words
 from .pointer import DrawnPose, DrawnPoses, Pointer, Tools, suggested_force
 from .readouts import Readings, ReadoutTab
 from .room import Room
@@ -127,7 +127,7 @@ class Page:
         self._listening = False
         # The picture, and the hand in it.
         self.room = Room(server)
-        shown = {part for name in AT_FIRST for part in PARTS[name]} | {style.BODY_MESH, CONTACTS, *ALWAYS}
+        shown = {style.BODY_MESH, CONTACTS, *ALWAYS}
         self.backend = ViserBackend(server.scene, shown, lambda node: self.pointer.attach(node))
         self.picture = Picture(self.backend, lambda name: name in DESCRIBED or self.backend.wanted(name))
         self._com = server.scene.add_icosphere(
@@ -204,12 +204,12 @@ class Page:
         await asyncio.to_thread(self.live.add_observer, self._told)
         self._open.set()
         begins_anew, self._begins_anew = self._begins_anew, False
-        if not begins_anew:
-            self.lessons.show()
-        elif self.lessons.lesson is not None:
+        if begins_anew and self.lessons.lesson is not None:
             await self.lessons.begin()
         else:
-            self.flight.reset()
+            self.lessons.show()
+            if begins_anew:
+                self.flight.reset()
 
     async def _on_disconnect(self, client: viser.ClientHandle) -> None:
         self.pointer.left(client.client_id)
@@ -475,7 +475,7 @@ class Page:
         return taken
 
     def _on_lesson(self, course: Course) -> None:
-        self.show_tab.show_for(course.shows)
+        self.show_tab.show_for((*course.shows, *course.labels))
         contacts = self.live.scenario.setup.contacts
         body = self.live.scenario.setup.body
         named = [name for name in course.labels if name in contacts]

@@ -56,8 +56,6 @@ PARTS: dict[str, tuple[str, ...]] = {
 ALWAYS = (style.STRING, style.HAND, style.LOADS, style.GHOST_MESH)
 """Parts that are seen wherever they are."""
 
-AT_FIRST = ("Angular momentum L",)
-
 
 class TimeBar:
     """Shared by all pages."""
@@ -288,7 +286,7 @@ class ShowTab:
         with tabs.add_tab("Show"):
             darkened = gui.add_checkbox("Dark", False)
             for name in (SEE_INTO, *PARTS):
-                self._switches[name] = gui.add_checkbox(name, name in AT_FIRST)
+                self._switches[name] = gui.add_checkbox(name, False)
 
         for name, box in self._switches.items():
 
@@ -309,8 +307,8 @@ class ShowTab:
             self._switch(part, shown)
 
     def show_for(self, names: Iterable[str]) -> None:
-        """Switch on what a scene needs, by names of switches or, where there is none, of parts, and off the rest."""
+        """Switch on what a scene needs, by names of switches or of parts, and off the rest."""
         wanted = set(names)
         for name, box in self._switches.items():
-            box.value = name in AT_FIRST or name in wanted
+            box.value = not wanted.isdisjoint((name, *PARTS.get(name, ())))
         self._switch(style.STRING_LINE, style.STRING_LINE in wanted)

@@ -290,6 +290,9 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
     assert page.room._wall.visible == (bool(setup.gravity.any()) and not setup.string.attached)
     labels = [node for node in backend._labels if node.visible]
     assert len(labels) <= 3
+    arrows = {part: backend._nodes.get(part) for part in (style.MOMENTUM, style.OMEGA)}
+    drawn_arrows = {part for part, node in arrows.items() if node is not None and node.visible}
+    assert drawn_arrows <= set(page.lessons.course.labels), "an arrow without a name"
     places = [backend.origin + backend.unit * np.array(node.position) for node in labels]
     assert np.abs(seen(np.reshape(places, (-1, 3)))).max(initial=0.0) < 1.0, "a label is beside the picture"
     assert 3 <= len(page.lessons.course.numbers) <= 5
