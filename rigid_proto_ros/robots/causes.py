@@ -14,7 +14,7 @@ import numpy as np
 
 from ..mass.properties import MassProperties
 from ..mass.tensor import six_from_tensor, tensor_from_six
-from .link_shapes import LinkShapes
+from .link_shapes import LinkShapes, parallel_axis
 
 LIMIT = 1e-3
 """Differences up to this are taken for rounding of printed numbers."""
@@ -58,18 +58,13 @@ def _other_shapes(parts: LinkShapes, mass: float) -> Iterator[tuple[str, MassPro
         yield "the convex hull", hull
 
 
-def _parallel(inertia: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
-    """Inertia about a point ``offset`` away from the COM."""
-    return inertia + mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-
-
 def _wrong_frames(truth: MassProperties, stated: np.ndarray, parts: LinkShapes) -> Iterator[tuple[str, np.ndarray]]:
     """The true tensor about another point or in other axes; stated (3,): the COM that the file gives."""
-    inertia, mass, com, use = truth.inertia, truth.mass, truth.center_of_mass, parts.first
-    yield "taken about the link's origin, not about the COM", _parallel(inertia, mass, com)
-    yield "taken about the mesh's origin, not about the COM", _parallel(inertia, mass, com - use.position)
-    yield "taken about the stated origin, not about the COM", _parallel(inertia, mass, com - stated)
-    yield "moved from the COM to the origin the wrong way round", _parallel(inertia, -mass, com)
+    inertia, mass, com, use = truth.inertia, truth.mass, truth.center_of_mass, parts.first.pose
+    yield "taken about the link's origin, not about the COM", inertia + parallel_axis(mass, com)
+    yield "taken about the mesh's origin, not about the COM", inertia + parallel_axis(mass, com - use.position)
+    yield "taken about the stated origin, not about the COM", inertia + parallel_axis(mass, com - stated)
+    yield "moved from the COM to the origin the wrong way round", inertia - parallel_axis(mass, com)
     yield "in the mesh's axes, not in the link's", use.rotation.T @ inertia @ use.rotation
     moments, axes = np.linalg.eigh(inertia)
     for three in itertools.permutations(moments.tolist()):
@@ -163,7 +158,7 @@ def _is_isotropic(inertia: np.ndarray) -> bool:
 
 def explain_center(given: np.ndarray, truth: MassProperties, parts: LinkShapes) -> tuple[str, ...]:
     """The usual mistake that turns the true COM into ``given`` (3,) [m, link axes]; empty when none does."""
-    com, use = truth.center_of_mass, parts.first
+    com, use = truth.center_of_mass, parts.first.pose
     guesses = [
         ("COM left at the link's origin", np.zeros(3)),
         ("COM at the mesh's origin", use.position),

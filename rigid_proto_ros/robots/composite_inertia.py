@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,8 +13,8 @@ from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor
 from ..mesh.locate import Search
 from ..mesh.reading import load_mesh
-from .link_shapes import Meshes, placed_surface
-from .reading import COLLISION, HERE, VISUAL, Link, Pose, read_robot, valid_numbers
+from .link_shapes import Meshes, check_shape, combined, of_mass, placed, placed_surface
+from .reading import COLLISION, VISUAL, Link, Pose, check_finite, check_inertial, read_robot
 
 
 @dataclass(frozen=True)
@@ -40,13 +39,20 @@ def lump_robot(path: Path, folders: tuple[Path, ...] = ()) -> Lump:
     robot = read_robot(path)
     search = Search(path.parent, folders)
     links = robot.simulated() if robot.simulated else [_computed(link, Meshes(search)) for link in robot.links]
-    with valid_numbers(path.name):  # of the joints, which are read now
-        poses = robot.poses()
+    poses = robot.poses()
+    for name, pose in poses.items():
+        check_finite(f"link {name}", position=pose.position, orientation=pose.rotation)
     lost = next((link.name for link in links if link.name not in poses), None)
     if lost is not None:
         raise InputError("lump", f"link {lost!r} is connected to no other; accepted: one tree of links")
     heavy = [(link, poses[link.name]) for link in links if not link.problem]
-    properties = together(heavy, path.name)
+    if not heavy:
+        raise InputError("lump", path.name, "a file with inertials")
+    for link, _ in heavy:
+        check_inertial(link)
+        if link.mass < 0.0:
+            raise InputError(f"mass of link {link.name}", link.mass, "masses >= 0")
+    properties = combined([placed(link, pose) for link, pose in heavy], path.name)
     check_tensor(properties.inertia, source=f"tensor of {path.name} as one body")
     vertices, triangles, absent = _merged([(link, poses[link.name]) for link in links], search)
     return Lump(
@@ -65,35 +71,12 @@ def _computed(link: Link, meshes: Meshes) -> Link:
     """
     if not link.computed:
         return link
-    solids = []
-    for shape in (shape for shape in link.shapes if shape.role == COLLISION):
-        part = meshes.parts([shape])
-        properties = part.properties(shape.density * part.volume())
-        own = replace(link, mass=properties.mass, center_of_mass=properties.center_of_mass, inertia=properties.inertia)
-        solids.append((own, HERE))
-    whole = together(solids, f"link {link.name}")
-    mass = link.mass if link.mass > 0.0 else whole.mass
-    inertia = whole.inertia * (mass / whole.mass)
-    return replace(link, mass=mass, center_of_mass=whole.center_of_mass, inertia=inertia, problem="")
-
-
-def together(links: list[tuple[Link, Pose]], whole: str) -> MassProperties:
-    """Mass, COM and tensor of all links by the parallel axis theorem, about the common COM."""
-    for link, _ in links:
-        if not 0.0 <= link.mass < math.inf or not np.isfinite(link.inertia).all():
-            raise InputError("lump", f"mass {link.mass:g} of link {link.name}", "finite masses >= 0 and finite tensors")
-    masses = np.array([link.mass for link, _ in links])
-    centers = np.array([pose.rotation @ link.center_of_mass + pose.position for link, pose in links]).reshape(-1, 3)
-    mass = float(masses.sum())
-    if not mass > 0.0:
-        raise InputError("lump", whole, "inertials")
-    center = masses @ centers / mass
-    inertia = np.zeros((3, 3))
-    for (link, pose), own in zip(links, centers, strict=True):
-        offset = own - center
-        inertia += pose.rotation @ link.inertia @ pose.rotation.T
-        inertia += link.mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-    return MassProperties(mass, center, 0.5 * (inertia + inertia.T))
+    parts = [meshes.parts([shape]) for shape in link.shapes if shape.role == COLLISION]
+    solids = [of_mass(solid, part.first.density * solid.mass) for part in parts for solid in part.solids]
+    whole = combined(solids, f"link {link.name}")
+    if link.mass > 0.0:
+        whole = of_mass(whole, link.mass)
+    return replace(link, mass=whole.mass, center_of_mass=whole.center_of_mass, inertia=whole.inertia, problem="")
 
 
 def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
@@ -105,10 +88,10 @@ def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[np.ndarray,
         shown = [shape for shape in link.shapes if shape.role == VISUAL]
         for shape in shown or link.shapes:
             try:
-                mesh = load_mesh(shape.file, search=search) if shape.kind == "mesh" and not shape.problem else None
-                if shape.problem or mesh is not None and not np.isfinite(mesh.vertices).all():
-                    raise InputError(shape.file or shape.kind, shape.problem or "vertices that are not finite")
+                check_shape(shape)
+                mesh = load_mesh(shape.file, search=search) if shape.kind == "mesh" else None
                 points, corners = placed_surface(shape, mesh)
+                check_finite(shape.file or shape.kind, size=float(np.linalg.norm(np.ptp(points, axis=0))))
             except InputError as error:
                 absent.append(f"{link.name}: {error}")
                 continue

@@ -33,7 +33,7 @@ from ..mesh.reading import load_mesh
 from ..mesh.solids import convex_hull
 from .causes import LIMIT, explain_center, explain_inertia
 from .link_shapes import LinkShapes, Meshes
-from .reading import COLLISION, VISUAL, Link, Shape, read_robot
+from .reading import COLLISION, HERE, VISUAL, Link, Shape, check_inertial, read_robot
 
 IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED = "impossible", "impossible for its shape", "explained"
 NOT_UNIFORM, UNIFORM, UNKNOWN = "not uniform", "uniform", "unknown"
@@ -81,14 +81,13 @@ class LinkDiagnosis:
 def impossible_inertial(link: Link) -> str:
     """Why no body has the link's inertial; "" when one has."""
     remedy = "" if np.any(link.inertia) else "; a link that only marks a frame needs no inertial"
-    if not 0.0 < link.mass < math.inf:
+    if not link.mass > 0.0:
         return f"mass {link.mass:g}, which isn't a positive number{remedy}"
-    if not np.all(np.isfinite(link.center_of_mass)):
-        return "a COM that isn't finite"
     try:
+        check_inertial(link)
         check_tensor(link.inertia)
     except InputError as error:
-        return f"no rigid body has this tensor: {error}{remedy}"
+        return f"no rigid body has this: {error}{remedy}"
     return ""
 
 
@@ -171,11 +170,11 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
     if not 0.0 < link.mass < math.inf:  # NaN for a link without an inertial
         return plain
     try:
-        volume, truth = parts.volume(), parts.properties(link.mass)
+        truth = parts.uniform(link.mass)
+        plain = replace(plain, expected=truth)
+        check_inertial(link)
     except InputError as error:
         return replace(plain, note=str(error))
-    if not np.isfinite(link.inertia).all() or not np.isfinite(link.center_of_mass).all():
-        return replace(plain, expected=truth)
     offset = np.abs(link.center_of_mass - truth.center_of_mass)
     center_left = float(np.max(offset - np.minimum(link.center_step, MAX_ROUNDING * parts.diagonal))) / parts.diagonal
     inertia_error, inertia_left = _tensor_error(link, truth)
@@ -184,8 +183,9 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
         causes += explain_inertia(link.inertia, truth, link.center_of_mass, parts)
     if center_left > tolerance:
         causes += explain_center(link.center_of_mass, truth, parts)
-    note = f"density {link.mass / volume:.4g} kg/m³"
-    if not 1.0 <= link.mass / volume <= 25000.0:
+    density = link.mass / sum(solid.mass for solid in parts.solids)
+    note = f"density {density:.4g} kg/m³"
+    if not 1.0 <= density <= 25000.0:
         note += ", which no solid has: units of the mesh or of the mass?"
     return replace(
         plain,
@@ -194,7 +194,6 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
         inertia_error=inertia_error,
         ratio=float(np.sum(link.inertia * truth.inertia) / np.sum(truth.inertia**2)),
         causes=causes,
-        expected=truth,
         note=note,
     )
 
@@ -244,7 +243,7 @@ def _by_mesh(
     body = mesh_body(load_mesh(mesh), accept_open=accept_open)
     shapes = [(link, shape) for link in links for shape in link.shapes if shape.kind == "mesh"]
     pairs = [(link, shape) for link, shape in shapes if Path(shape.file).stem == Path(body.mesh.path).stem]
-    plain = Shape(VISUAL, "mesh", np.eye(3), np.zeros(3), mesh)
+    plain = Shape(VISUAL, "mesh", HERE, mesh)
     pairs = pairs or [(link, plain) for link in links if not link.problem]
     different = {repr((link.name, replace(shape, role="", file="", problem=""))) for link, shape in pairs}
     if len(different) != 1:

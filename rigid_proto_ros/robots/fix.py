@@ -39,11 +39,6 @@ class FixedLink:
     left: str
 
 
-def _places(data: bytes) -> list[tuple[int, int]]:
-    """Where the <inertial> elements begin and end, in the file's order."""
-    return [match.span() for match in _INERTIAL.finditer(data) if match["inertial"]]
-
-
 def _indent(data: bytes, start: int) -> bytes:
     """The line break and white space before the byte ``start``, empty where something else stands before it."""
     line = data.rfind(b"\n", 0, start)
@@ -81,8 +76,9 @@ def fix_robot(
     root = parse_xml(data, path)
     if b"\0" in data:
         raise InputError("fix", path.name, "a file in UTF-8 or another ASCII-compatible encoding")
+    found = [match.span() for match in _INERTIAL.finditer(data) if match["inertial"]]
     # Included files are put into the tree by reading it.
-    places = {id(element): place for element, place in zip(root.iter("inertial"), _places(data), strict=True)}
+    places = {id(element): place for element, place in zip(root.iter("inertial"), found, strict=True)}
     links = robot_of(root, path).links
     meshes = Meshes(Search(path.parent, folders), accept_open)
     write = _WRITERS[str(root.tag)]

@@ -5,47 +5,55 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..mass.from_mesh import MeshBody, mesh_body
-from ..mass.moments import solid_moments
-from ..mass.properties import MassProperties
-from ..mass.tensor import tensor_from_six
+from ..mass.properties import MassProperties, MeshMoments
 from ..mesh.locate import Search
 from ..mesh.reading import Mesh, load_mesh
 from ..mesh.solids import convex_hull
-from .reading import Shape
+from .reading import Link, Pose, Shape, check_finite
 
 SEGMENTS = 48
 """Corners of a round shape's circle; a multiple of 4, so that its box is exact."""
 
 
-def primitive_solid(kind: str, size: tuple[float, ...]) -> tuple[float, np.ndarray]:
-    """(volume, second moments (3,) of x², y², z² over it) of a primitive about its centre, ``size`` as in
-    Shape.
-    """
-    if not size or not all(0.0 < value < math.inf for value in size):
-        raise InputError(kind, size, "finite sizes > 0")
+def check_shape(shape: Shape) -> None:
+    """Raise InputError for a shape that can't be taken."""
+    named = shape.file or shape.kind
+    if shape.problem:
+        raise InputError(named, shape.problem)
+    pose = shape.pose
+    check_finite(named, position=pose.position, orientation=pose.rotation, scale=shape.scale, size=shape.size)
+    if shape.kind != "mesh" and not min(shape.size) > 0.0:
+        raise InputError(f"size of {named}", shape.size, "sizes > 0")
+
+
+def primitive_solid(kind: str, size: tuple[float, ...]) -> MassProperties:
+    """A primitive of density 1 about its centre, ``size`` as in Shape."""
     if kind == "box":
-        return math.prod(size), math.prod(size) * np.square(size) / 12.0
-    if kind in ("sphere", "ellipsoid"):
+        volume = math.prod(size)
+        squares = volume * np.square(size) / 12.0  # the integrals of x², y², z²
+    elif kind in ("sphere", "ellipsoid"):
         axes = np.array(size * 3 if kind == "sphere" else size)
         volume = 4.0 / 3.0 * math.pi * float(np.prod(axes))
-        return volume, volume * axes**2 / 5.0
-    r, length = size
-    volume = math.pi * r * r * length
-    square = np.array([volume * r * r / 4.0, volume * r * r / 4.0, volume * length * length / 12.0])
+        squares = volume * axes**2 / 5.0
+    else:
+        r, length = size
+        volume = math.pi * r * r * length
+        squares = volume * np.array([r * r / 4.0, r * r / 4.0, length * length / 12.0])
     if kind == "capsule":
         # Two half balls whose flat sides lie length/2 from the centre; their centroids 3r/8 beyond.
         ball = 4.0 / 3.0 * math.pi * r**3
         across = ball * r * r / 5.0
         along = across + ball * (length * length / 4.0 + 2.0 * (length / 2.0) * (3.0 * r / 8.0))
-        return volume + ball, square + np.array([across, across, along])
-    return volume, square
+        volume, squares = volume + ball, squares + np.array([across, across, along])
+    return MassProperties(volume, np.zeros(3), np.diag(squares.sum() - squares))
 
 
 def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
@@ -78,7 +86,33 @@ def placed_surface(shape: Shape, mesh: Mesh | None) -> tuple[np.ndarray, np.ndar
         vertices, triangles = mesh.vertices[used] * shape.scale, local.reshape(-1, 3)
         if np.prod(shape.scale) < 0.0:
             triangles = triangles[:, ::-1]
-    return vertices @ shape.rotation.T + shape.position, triangles
+    return vertices @ shape.pose.rotation.T + shape.pose.position, triangles
+
+
+def placed(body: MassProperties | Link, pose: Pose) -> MassProperties:
+    """A body that lies in another frame."""
+    R = pose.rotation
+    return MassProperties(body.mass, R @ body.center_of_mass + pose.position, R @ body.inertia @ R.T)
+
+
+def of_mass(body: MassProperties, mass: float) -> MassProperties:
+    """The same body, heavier or lighter."""
+    return replace(body, mass=mass, inertia=body.inertia * (mass / body.mass))
+
+
+def parallel_axis(mass: float, offset: np.ndarray) -> np.ndarray:
+    """Inertia (3, 3) of a mass about a point that is ``offset`` (3,) away from it."""
+    return mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+
+
+def combined(bodies: Sequence[MassProperties], whole: str) -> MassProperties:
+    """Bodies as one, about their common COM; raises InputError where that has no finite mass above 0."""
+    mass = sum(body.mass for body in bodies)
+    if not 0.0 < mass < math.inf:
+        raise InputError(f"mass of {whole}", mass, "a finite mass or volume > 0")
+    center = sum((body.mass * body.center_of_mass for body in bodies), np.zeros(3)) / mass
+    inertia = sum(body.inertia + parallel_axis(body.mass, body.center_of_mass - center) for body in bodies)
+    return MassProperties(mass, center, 0.5 * (inertia + inertia.T))
 
 
 class Meshes:
@@ -96,12 +130,11 @@ class Meshes:
         """The shapes with their meshes; raises InputError for one that can't be taken."""
         found: list[tuple[Shape, MeshBody | None]] = []
         for shape in shapes:
-            if shape.problem:
-                raise InputError(shape.file or shape.kind, shape.problem)
-            if shape.kind != "mesh":
-                primitive_solid(shape.kind, shape.size)
+            check_shape(shape)
             found.append((shape, self.body(shape.file) if shape.kind == "mesh" else None))
-        return LinkShapes(found)
+        parts = LinkShapes(found)
+        check_finite(parts.names, size=parts.diagonal)
+        return parts
 
 
 class LinkShapes:
@@ -127,58 +160,34 @@ class LinkShapes:
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     @cached_property
-    def _moments(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
-        """Volume, centroid (3,) and second moments (3, 3) about it of each shape, in the link's axes."""
+    def solids(self) -> list[MassProperties]:
+        """Each shape as a solid of density 1, in the link's axes; raises InputError for a mesh that bounds none."""
         found = []
         for shape, body in self.parts:
-            R = shape.rotation
-            if body is None:
-                size, squares = primitive_solid(shape.kind, shape.size)
-                found.append((size, shape.position, R @ np.diag(squares) @ R.T))
-                continue
-            size = body.moments.moments("solid").measure * math.prod(np.abs(shape.scale).tolist())
-            own = body.moments.mass_properties("solid", scale=shape.scale, mass=size)
-            moment = 0.5 * np.trace(own.inertia) * np.eye(3) - own.inertia
-            found.append((size, R @ own.center_of_mass + shape.position, R @ moment @ R.T))
+            own = body and body.moments.mass_properties(scale=shape.scale, density=1.0)
+            found.append(placed(own or primitive_solid(shape.kind, shape.size), shape.pose))
         return found
 
-    def volume(self) -> float:
-        """Volume [m³], what overlaps counted twice; raises InputError for a mesh that bounds none."""
-        return sum(size for size, _, _ in self._moments)
-
-    def properties(self, mass: float) -> MassProperties:
-        """Mass properties of ``mass`` kg spread evenly over the shapes, in the link's axes."""
-        volume, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
-        for size, center, moment in self._moments:
-            volume += size
-            first += size * center
-            second += size * np.outer(center, center) + moment
-        if not 0.0 < volume < math.inf or not np.isfinite(second).all():
-            raise InputError(self.names, f"a volume of {volume:g}; a body needs a finite one > 0")
-        center = first / volume
-        return _spread(mass, center, second / volume - np.outer(center, center))
+    def uniform(self, mass: float) -> MassProperties:
+        """``mass`` kg spread evenly over the shapes, what overlaps counted twice, in the link's axes."""
+        return of_mass(combined(self.solids, self.names), mass)
 
     def summed_about_own_centers(self, mass: float) -> np.ndarray:
         """What comes out (3, 3) when the parts' tensors are added as if all had one centre of mass."""
-        moment = np.sum([own for _, _, own in self._moments], axis=0) / self.volume()
-        return _spread(mass, np.zeros(3), moment).inertia
+        volume = sum(solid.mass for solid in self.solids)
+        return np.sum([solid.inertia for solid in self.solids], axis=0) * (mass / volume)
 
     def box(self, mass: float) -> MassProperties:
         """The box around all, in the first shape's axes, as a solid of ``mass`` kg."""
-        R = self.first.rotation
+        R = self.first.pose.rotation
         local = self.points @ R
-        middle = 0.5 * (local.min(axis=0) + local.max(axis=0))
-        return _spread(mass, R @ middle, R @ np.diag(np.ptp(local, axis=0) ** 2 / 12.0) @ R.T)
+        middle = R @ (0.5 * (local.min(axis=0) + local.max(axis=0)))
+        solid = primitive_solid("box", tuple(np.ptp(local, axis=0).tolist()))
+        return of_mass(placed(solid, Pose(R, middle)), mass)
 
     def hull(self, mass: float) -> MassProperties | None:
         """The convex hull of all as a solid of ``mass`` kg; None when it has no volume."""
         try:
-            hull = solid_moments(*convex_hull(self.points))
+            return MeshMoments(*convex_hull(self.points)).mass_properties(mass=mass)
         except InputError:
             return None
-        return _spread(mass, hull.centroid, tensor_from_six((hull.second / hull.measure).tolist()))
-
-
-def _spread(mass: float, center: np.ndarray, moment: np.ndarray) -> MassProperties:
-    """Mass properties from the variances (3, 3) [m²] of the mass about its centre."""
-    return MassProperties(mass, center, mass * (np.trace(moment) * np.eye(3) - moment))

@@ -50,6 +50,7 @@ class _Source:
         except ImportError:
             raise InputError("robot file", f"MJCF: {is_missing('mujoco', 'robots')}") from None
         self.mujoco: Any = mujoco
+        mujoco.set_mju_user_warning(lambda _: None)  # which would be written into a file beside the robot
         self.text = ElementTree.tostring(root, encoding="unicode")
         self.path = path
 
@@ -101,7 +102,8 @@ def _shape(spec: Any, raw: Any, meshes: dict[str, Any], model: Any, number: int)
     if kind in ("plane", "hfield"):
         return None
     role = rd.COLLISION if raw.contype or raw.conaffinity else rd.VISUAL
-    shape = rd.Shape(role, kind, rd.rotation_from_wxyz(model.geom_quat[number]), model.geom_pos[number].copy())
+    pose = rd.Pose(rd.rotation_from_wxyz(model.geom_quat[number]), model.geom_pos[number].copy())
+    shape = rd.Shape(role, kind, pose)
     if kind == "mesh":
         mesh = meshes.get(raw.meshname)
         if mesh is None or not mesh.file or np.any(mesh.refpos) or mesh.refquat.tolist() != [1.0, 0.0, 0.0, 0.0]:
@@ -136,7 +138,7 @@ def _link(spec: Any, body: Any, name: str, shapes: list[rd.Shape | None], inerti
     if body.ialt.type != type(body.ialt.type).mjORIENTATION_QUAT:
         of = body.compiler
         quaternion = spec.resolve_orientation(degree=of.degree, sequence=of.eulerseq, orientation=body.ialt)
-    center, rotation = [repr(value) for value in body.ipos.tolist()], rd.rotation_from_wxyz(quaternion)
+    center, rotation = " ".join(map(repr, body.ipos.tolist())), rd.rotation_from_wxyz(quaternion)
     return rd.printed_link(bare, repr(body.mass), center, [repr(value) for value in six], rotation, inertial)
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -28,6 +27,9 @@ WATER = 1000.0
 """kg/m³ of a shape of which nothing else is said."""
 MAX_BYTES = 50_000_000
 """Of a robot's file."""
+LARGEST = 1e50
+"""Of masses, lengths and moments [SI units]: the powers and products that are taken of them don't overflow."""
+ZEROS = "0 0 0"
 SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 SIZES = {
     "box": ("size", 3),
@@ -57,13 +59,11 @@ HERE = Pose(np.eye(3), np.zeros(3))
 class Shape:
     """A shape as a link shows it or collides with it: kind "mesh" with ``file`` and scale (3,), or with ``size`` [m] a
     "box" (sides), "cylinder" or "capsule" (radius, length along z, the capsule's without its caps), "sphere" (radius)
-    or "ellipsoid" (semi-axes); rotation (3, 3) and position (3,) [m] in the link's frame; ``problem``: why it can't be
-    taken; density [kg/m³]."""
+    or "ellipsoid" (semi-axes); pose in the link's frame; ``problem``: why it can't be taken; density [kg/m³]."""
 
     role: str
     kind: str
-    rotation: np.ndarray
-    position: np.ndarray
+    pose: Pose
     file: str = ""
     scale: np.ndarray = field(default_factory=lambda: np.ones(3))
     size: tuple[float, ...] = ()
@@ -128,7 +128,7 @@ def parse_xml(data: bytes, path: Path) -> Element:
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
     """Rotation (3, 3) of fixed-axes roll, pitch, yaw [rad], as URDF and SDF have them."""
-    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (math.cos, math.sin))
+    cr, sr, cp, sp, cy, sy = (float(f(a)) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
     return np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -144,23 +144,33 @@ def rotation_from_wxyz(quaternion: ArrayLike) -> np.ndarray:
     return matrix_from_quaternion([x, y, z, w])
 
 
-@contextmanager
-def valid_numbers(file: str) -> Iterator[None]:
-    """Raise InputError for what is no number in a robot file of this name."""
+def floats(name: str, text: str, count: int = 3) -> np.ndarray:
+    """``count`` numbers of a text, which the file calls ``name``; raises InputError for others."""
     try:
-        yield
-    except InputError:
-        raise
-    except (ValueError, TypeError, KeyError) as error:
-        raise InputError("robot file", file, f"valid numbers ({error})") from None
-
-
-def floats(text: str | None, default: str, count: int) -> np.ndarray:
-    """``count`` numbers of a text; raises ValueError for others."""
-    values = np.array([float(word) for word in (text or default).split()])
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.zeros(0)
     if len(values) != count:
-        raise ValueError(f"{text!r} instead of {count} numbers")
+        raise InputError(name, text, f"{count} numbers" if count > 1 else "a number")
     return values
+
+
+def check_finite(what: str, **numbers: ArrayLike) -> None:
+    """Raise InputError for numbers of something, called by their names, that aren't finite or are beyond LARGEST."""
+    for name, values in numbers.items():
+        if not np.all(np.abs(values) <= LARGEST):
+            received = " ".join(f"{value:g}" for value in np.ravel(values))
+            raise InputError(f"{name.replace('_', ' ')} of {what}", received, f"finite numbers up to {LARGEST:g}")
+
+
+def check_inertial(link: Link) -> None:
+    """The same for the numbers of a link's inertial."""
+    check_finite(f"link {link.name}", mass=link.mass, center_of_mass=link.center_of_mass, inertia=link.inertia)
+
+
+def number(name: str, text: str) -> float:
+    """A text that is one number, which the file calls ``name``; raises InputError for others."""
+    return float(floats(name, text, 1)[0])
 
 
 def printed_steps(words: list[str]) -> np.ndarray:
@@ -168,26 +178,28 @@ def printed_steps(words: list[str]) -> np.ndarray:
     decimals = []
     for word in words:
         mantissa, _, exponent = word.strip().lower().partition("e")
-        decimals.append(len(mantissa.partition(".")[2]) - int(exponent or 0))
+        decimals.append(len(mantissa.partition(".")[2]) - float(exponent or 0))
     step = 0.5 * 10.0 ** min(-max(decimals), 300) if any(float(word) for word in words) else 0.0
     return np.full(len(words), step)
 
 
 def printed_link(
-    bare: Link, mass: str, center: list[str], six: list[str], rotation: np.ndarray, element: Element | None
+    bare: Link, mass: str, center: str, six: list[str], rotation: np.ndarray, element: Element | None
 ) -> Link:
-    """The link with an inertial from a file's words: mass, COM (three, or none for 0), and the six entries of the
-    tensor in axes turned by ``rotation``.
+    """The link with an inertial from a file's words: mass, COM, and the six entries of the tensor in axes turned by
+    ``rotation``.
     """
+    of = f"of link {bare.name}"
+    entries = [number(f"{name} {of}", word) for name, word in zip(SIX, six, strict=True)]
     step = tensor_from_six(printed_steps(six).tolist())
     return replace(
         bare,
-        mass=float(mass),
-        center_of_mass=floats(" ".join(center), "0 0 0", 3),
-        inertia=rotation @ tensor_from_six([float(word) for word in six]) @ rotation.T,
+        mass=number(f"mass {of}", mass),
+        center_of_mass=floats(f"COM {of}", center),
+        inertia=rotation @ tensor_from_six(entries) @ rotation.T,
         problem="",
         mass_step=float(printed_steps([mass])[0]),
-        center_step=printed_steps(center) if center else np.zeros(3),
+        center_step=printed_steps(center.split()),
         inertia_step=np.abs(rotation) @ step @ np.abs(rotation).T,
         element=element,
     )
@@ -203,64 +215,65 @@ def robot_of(root: Element, path: Path) -> Robot:
     """The robot below the root of a file; raises InputError for what is none, or holds what are no numbers."""
     if path.suffix == ".xacro" or any("xacro" in str(element.tag) for element in root.iter()):
         raise InputError("robot file", path.name, f"plain URDF: xacro {path} > EXPANDED.urdf")
-    with valid_numbers(path.name):
-        if root.tag == "robot":
-            return Robot([_urdf_link(link) for link in root.iter("link")], lambda: _urdf_poses(root))
-        if root.tag == "sdf":
-            return Robot([_sdf_link(link) for link in root.iter("link")], lambda: _sdf_poses(root))
-        if root.tag == "mujoco":
-            from .mjcf import read_mjcf
+    if root.tag == "robot":
+        return Robot([_urdf_link(link) for link in root.iter("link")], lambda: _urdf_poses(root))
+    if root.tag == "sdf":
+        return Robot([_sdf_link(link) for link in root.iter("link")], lambda: _sdf_poses(root))
+    if root.tag == "mujoco":
+        from .mjcf import read_mjcf
 
-            return read_mjcf(root, path)
+        return read_mjcf(root, path)
     tag = re.sub(r"[^\w:.{}/-]", "?", str(root.tag))[:40]
     accepted = "URDF's <robot>, SDF's <sdf> or MJCF's <mujoco>"
     raise InputError("robot file", f"{path.name} begins with <{tag}>, not with {accepted}")
 
 
-def _sized(shape: Shape, file: str, scale: str | None, text: Callable[[str], str | None]) -> Shape:
-    """The shape with its mesh's file and scale, or the size of its kind as ``text`` gives it by name."""
+def _sized(shape: Shape, link: str, file: str, scale: str, text: Callable[[str], str | None]) -> Shape:
+    """A link's shape with its mesh's file and scale, or the size of its kind as ``text`` gives it by name."""
     if shape.kind == "mesh":
         problem = shape.problem or ("" if file else "a mesh without a file")
-        return replace(shape, file=file, scale=floats(scale, "1 1 1", 3), problem=problem)
+        return replace(shape, file=file, scale=floats(f"scale of a mesh of link {link}", scale), problem=problem)
     if shape.kind not in SIZES:
         return replace(shape, problem=f"a shape <{shape.kind}>, which isn't known here")
     names, count = SIZES[shape.kind]
     words = " ".join(text(name) or "" for name in names.split())
-    return replace(shape, size=tuple(floats(words, "", count).tolist()))
+    return replace(shape, size=tuple(floats(f"{names} of a {shape.kind} of link {link}", words, count).tolist()))
 
 
-def _first_shape(element: Element) -> Element | None:
-    """What an element's <geometry> holds."""
-    geometry = element.find("geometry")
-    return None if geometry is None else next((child for child in geometry if child.tag != "empty"), None)
+def _drawn(link: Element) -> Iterator[tuple[str, Element, Element]]:
+    """(role, the <visual> or <collision>, what its <geometry> holds) of what a link shows and collides with."""
+    for role in (VISUAL, COLLISION):
+        for part in link.findall(role):
+            held = next((child for child in part.iterfind("geometry/*") if child.tag != "empty"), None)
+            if held is not None:
+                yield role, part, held
 
 
 # URDF
 
 
-def _urdf_pose(origin: Element | None) -> Pose:
+def _urdf_pose(origin: Element | None, owner: str) -> Pose:
     words = {} if origin is None else origin.attrib
-    return Pose(rotation_from_rpy(*floats(words.get("rpy"), "0 0 0", 3)), floats(words.get("xyz"), "0 0 0", 3))
+    rpy, xyz = (floats(f"{name} of {owner}", words.get(name, ZEROS)) for name in ("rpy", "xyz"))
+    return Pose(rotation_from_rpy(*rpy), xyz)
 
 
 def _urdf_link(link: Element) -> Link:
-    shapes = []
-    for role in (VISUAL, COLLISION):
-        for part in link.findall(role):
-            pose, of = _urdf_pose(part.find("origin")), _first_shape(part)
-            if of is not None:
-                plain = Shape(role, of.tag, pose.rotation, pose.position)
-                shapes.append(_sized(plain, of.get("filename", ""), of.get("scale"), of.get))
-    bare = Link(link.get("name", "?"), tuple(shapes))
+    name, shapes = link.get("name", "?"), []
+    for role, part, of in _drawn(link):
+        plain = Shape(role, of.tag, _urdf_pose(part.find("origin"), f"a {role} of link {name}"))
+        shapes.append(_sized(plain, name, of.get("filename", ""), of.get("scale", "1 1 1"), of.get))
+    bare = Link(name, tuple(shapes))
     inertial = link.find("inertial")
     if inertial is None:
         return bare
     origin, mass, tensor = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
     if mass is None or tensor is None or mass.get("value") is None:
         return replace(bare, problem="an <inertial> without mass or inertia")
-    center = [] if origin is None else origin.get("xyz", "").split()
+    center = ZEROS if origin is None else origin.get("xyz", ZEROS)
     six = [tensor.get(entry, "0") for entry in SIX]
-    return printed_link(bare, mass.get("value", ""), center, six, _urdf_pose(origin).rotation, inertial)
+    rotation = _urdf_pose(origin, f"the inertial of link {name}").rotation
+    return printed_link(bare, mass.get("value", ""), center, six, rotation, inertial)
 
 
 def _urdf_poses(root: Element) -> dict[str, Pose]:
@@ -271,7 +284,7 @@ def _urdf_poses(root: Element) -> dict[str, Pose]:
         parent, child = ("" if end is None else end.get("link", "") for end in ends)
         if not parent or not child or child in above:
             raise InputError("lump", f"joint {joint.get('name')!r} of {parent!r} and {child!r}", "a tree of links")
-        above[child] = parent, _urdf_pose(joint.find("origin"))
+        above[child] = parent, _urdf_pose(joint.find("origin"), f"joint {joint.get('name', '?')}")
     roots = [link.get("name", "?") for link in root.findall("link") if link.get("name", "?") not in above]
     if len(roots) != 1:
         raise InputError("lump", f"{len(roots)} root links ({', '.join(roots[:4])}); accepted: one tree of links")
@@ -286,10 +299,15 @@ def _urdf_poses(root: Element) -> dict[str, Pose]:
 # SDF
 
 
-def _sdf_pose(element: Element) -> Pose:
+def _text(element: Element, tag: str, default: str) -> str:
+    """What an element's child says, the default where it says nothing."""
+    return (element.findtext(tag) or "").strip() or default
+
+
+def _sdf_pose(element: Element, owner: str) -> Pose:
     """Of an element's <pose>, relative to whatever that is."""
     pose = element.find("pose")
-    values = floats(None if pose is None else pose.text, "0 0 0 0 0 0", 6)
+    values = floats(f"pose of {owner}", _text(element, "pose", f"{ZEROS} {ZEROS}"), 6)
     if pose is not None and pose.get("degrees", "false") in ("true", "1"):
         values[3:] = np.radians(values[3:])
     return Pose(rotation_from_rpy(*values[3:]), values[:3])
@@ -297,32 +315,31 @@ def _sdf_pose(element: Element) -> Pose:
 
 def _sdf_link(link: Element) -> Link:
     name, inertial = link.get("name", "?"), link.find("inertial")
-    density = str(WATER) if inertial is None else inertial.findtext("density", str(WATER))
+    owner, density = f"link {name}", str(WATER) if inertial is None else _text(inertial, "density", str(WATER))
     shapes = []
-    for role in (VISUAL, COLLISION):
-        for part in link.findall(role):
-            own, of, pose = _sdf_pose(part), _first_shape(part), part.find("pose")
-            if of is None:
-                continue
-            relative = "" if pose is None else pose.get("relative_to", "")
-            problem = f"a pose relative to {relative!r}, not to the link" if relative not in ("", name) else ""
-            if of.tag == "mesh" and of.find("submesh") is not None:
-                problem = problem or "one submesh of a mesh file"
-            dense = float(part.findtext("density", density))
-            plain = Shape(role, of.tag, own.rotation, own.position, problem=problem, density=dense)
-            shapes.append(_sized(plain, of.findtext("uri", "").strip(), of.findtext("scale"), of.findtext))
+    for role, part, of in _drawn(link):
+        pose = part.find("pose")
+        relative = "" if pose is None else pose.get("relative_to", "")
+        problem = f"a pose relative to {relative!r}, not to the link" if relative not in ("", name) else ""
+        if of.tag == "mesh" and of.find("submesh") is not None:
+            problem = problem or "one submesh of a mesh file"
+        dense = number(f"density of {owner}", _text(part, "density", density))
+        own = _sdf_pose(part, f"a {role} of {owner}")
+        plain = Shape(role, of.tag, own, problem=problem, density=dense)
+        shapes.append(_sized(plain, name, _text(of, "uri", ""), _text(of, "scale", "1 1 1"), of.findtext))
     bare = Link(name, tuple(shapes))
     if inertial is None:
         return bare
     tensor, mass = inertial.find("inertia"), inertial.findtext("mass")
     if inertial.get("auto", "false") in ("true", "1"):
         computed = replace(bare, problem="the simulator computes its inertial (auto='true')", computed=True)
-        return computed if mass is None else replace(computed, mass=float(mass))
+        return computed if mass is None else replace(computed, mass=number(f"mass of {owner}", mass))
     if tensor is None or mass is None:
         return replace(bare, problem="an <inertial> without mass or inertia")
     six = [tensor.findtext(entry, "1" if entry in ("ixx", "iyy", "izz") else "0") for entry in SIX]
-    center = (inertial.findtext("pose") or "").split()[:3]
-    return printed_link(bare, mass, center, six, _sdf_pose(inertial).rotation, inertial)
+    rotation = _sdf_pose(inertial, f"the inertial of {owner}").rotation
+    center = " ".join(_text(inertial, "pose", ZEROS).split()[:3])
+    return printed_link(bare, mass, center, six, rotation, inertial)
 
 
 def _sdf_poses(root: Element) -> dict[str, Pose]:
@@ -346,7 +363,7 @@ def _sdf_poses(root: Element) -> dict[str, Pose]:
                 base = base or (element.findtext("child") or "").strip()
             if element.tag == "frame":
                 base = base or element.get("attached_to", "")
-            found[name] = pose_of(base, (*below, name)) @ _sdf_pose(element)
+            found[name] = pose_of(base, (*below, name)) @ _sdf_pose(element, f"{element.tag} {name}")
         return found[name]
 
     return {name: pose_of(name) for name in elements}

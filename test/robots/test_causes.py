@@ -173,7 +173,10 @@ def test_a_mesh_may_be_named_for_the_link_that_shows_it(capsys, tmp_path, truth)
         ("<robot name='r'/>", "an inertial or a shape"),
         ("<robot xmlns:xacro='http://ros.org/wiki/xacro'><xacro:include filename='a'/></robot>", "xacro"),
         ('<!DOCTYPE x [<!ENTITY a "b">]><robot/>', "entities"),
-        (urdf([0, 0, 0], [1, 0, 0, 1, 0, 1]).replace('mass value="0.7"', 'mass value="heavy"'), "numbers"),
+        (
+            urdf([0, 0, 0], [1, 0, 0, 1, 0, 1]).replace('mass value="0.7"', 'mass value="heavy"'),
+            "mass of link head: got 'heavy'",
+        ),
     ],
 )
 def test_files_that_cannot_be_judged_are_refused_in_one_line(capsys, tmp_path, text, expected):

@@ -127,10 +127,9 @@ def test_primitives_are_closed_surfaces_of_their_size(tmp_path, kind, attributes
     surface = primitive_surface(kind, size)
     body = mesh_body(Mesh(kind, f"/{kind}.obj", *surface, None, kind))
     assert body.verdict.closed and not body.verdict.inward
-    volume, squares = primitive_solid(kind, size)
-    moments = body.moments.moments("solid")
-    assert 0.985 * volume < moments.measure <= (1.0 + 1e-12) * volume
-    assert moments.second[[0, 3, 5]] == pytest.approx(squares, rel=0.03)
+    exact, inscribed = primitive_solid(kind, size), body.moments.mass_properties(density=1.0)
+    assert 0.985 * exact.mass < inscribed.mass <= (1.0 + 1e-12) * exact.mass
+    assert inscribed.inertia == pytest.approx(exact.inertia, rel=0.03, abs=1e-12)
     if attributes is not None:
         path = tmp_path / "robot.urdf"
         shape = f"<visual><geometry><{kind} {attributes}/></geometry></visual>"
@@ -168,7 +167,7 @@ def test_the_command_writes_a_scene_that_flies(tmp_path, capsys, monkeypatch):
         (["--lump", "two.urdf"], "2 root links"),
         (["--lump", "loop.urdf"], "a tree of links"),
         (["--lump", "empty.urdf"], "inertials"),
-        (["--lump", "pose.urdf"], "valid numbers"),
+        (["--lump", "pose.urdf"], "xyz of joint arms: got 'along'"),
     ],
 )
 def test_what_is_no_one_body_is_refused_in_one_line(tmp_path, capsys, monkeypatch, arguments, words):

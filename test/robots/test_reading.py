@@ -118,3 +118,37 @@ def test_an_inertial_that_gazebo_computes_counts_as_its_collision_shapes(tmp_pat
     density = "<inertial auto='true'><density>50</density></inertial>"
     path = sdf(tmp_path, f'<link name="a">{density}{BOX.format("c", 0, "")}</link>')
     assert lump_robot(path).properties.mass == pytest.approx(50.0, rel=1e-14)
+
+
+SHAPED = {
+    "urdf": '<robot name="r"><link name="a"><visual><origin xyz="{0} 0 0" rpy="0 {1} 0"/><geometry><box size="1 {2} 1"/>'
+    '</geometry></visual><inertial><mass value="6"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
+    '<joint name="j" type="fixed"><parent link="b"/><child link="a"/><origin xyz="{3} 0 0"/></joint><link name="b"/></robot>',
+    "sdf": '<sdf version="1.9"><model name="m"><link name="a"><pose>{3} 0 0 0 0 0</pose><visual name="v">'
+    "<pose>{0} 0 0 0 {1} 0</pose><geometry><box><size>1 {2} 1</size></box></geometry></visual>"
+    "<inertial><mass>6</mass><inertia/></inertial></link></model></sdf>",
+    "xml": '<mujoco><worldbody><body name="a" pos="{3} 0 0"><geom pos="{0} 0 0" euler="0 {1} 0" type="box" '
+    'size=".5 {4} .5"/><inertial pos="0 0 0" mass="6" diaginertia="1 1 1"/></body></worldbody></mujoco>',
+}
+
+
+@pytest.mark.parametrize("word", ["nan", "inf", "1e999", "1e200", "1 2", "x"])
+@pytest.mark.parametrize("file_format", SHAPED)
+def test_numbers_that_no_robot_has_are_named(tmp_path, capsys, file_format, word):
+    if file_format == "xml":
+        pytest.importorskip("mujoco")
+    path, out = tmp_path / f"robot.{file_format}", str(tmp_path / "out")
+    for slot, said in enumerate(("position of box", "orientation of box", "size of box", "position of link a")):
+        words = ["0", "0", "1", "0", "0.5"]
+        words[slot] = words[4] if slot == 1 and word == "1e200" else word  # an angle may have any size
+        words[4] = word if slot == 2 else words[4]
+        path.write_text(SHAPED[file_format].format(*words))
+        for use in (["--compare", str(path)], ["--compare", str(path), "--fix", out], ["--lump", str(path)]):
+            status = main(["inspect", *use])
+            told = capsys.readouterr()
+            if status == 2:
+                assert told.err.count("\n") == 1 and "accepted:" in told.err
+            elif "--lump" in use:
+                assert f"not in the mesh: a: {said}" in told.out or words[slot] == "0.5"
+            else:  # where the link stands is of no concern
+                assert slot == 3 or words[slot] == "0.5" or "unknown" in told.out and said in told.out
