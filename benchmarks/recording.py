@@ -26,7 +26,8 @@ sys.path.insert(0, str(HERE.parent))
 from result_table import ResultTable
 from rigid_proto_ros.base.bundled import example_path
 from rigid_proto_ros.rerun_view.observer import FileRecorder
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.mcap_observer import McapObserver
 from rigid_proto_ros.simulation.observer import Event, Observer, Published

@@ -26,7 +26,7 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
 
 from result_table import ResultTable
-from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.sweep.rows import run_chunk
 from rigid_proto_ros.sweep.study import Study, make_study
 from rigid_proto_ros.sweep.table import cores, run_study

@@ -16,8 +16,7 @@ from workbench_page import bare_page
 from rigid_proto_ros.base.rotation import rotate
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.warm_up import warm_up
-from rigid_proto_ros.scene.offline import read_scene
-from rigid_proto_ros.scene.scenario import Scenario, nanoseconds
+from rigid_proto_ros.scene.scenario import Scenario, nanoseconds, read_scene
 from rigid_proto_ros.simulation.observer import Event, Observer, Published, Reset
 from rigid_proto_ros.workbench.main import Workbench
 from rigid_proto_ros.workbench.pointer import DrawnPose
@@ -99,7 +98,7 @@ class FlownPage:
         """What the physics thread does in so long."""
         loop, simulation = self.live.loop, self.live.loop.simulation
         end_ns = simulation.time_ns + nanoseconds(seconds)
-        while loop._publications.next_ns <= end_ns:
+        while loop.publications.next_ns <= end_ns:
             loop._budget.begin_tick()
             loop._publish_next()
             assert not simulation.failure

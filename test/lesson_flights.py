@@ -9,8 +9,8 @@ import numpy as np
 
 from rigid_proto_ros.base.bundled import example_path
 from rigid_proto_ros.motion.body import Body
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
-from rigid_proto_ros.scene.scenario import nanoseconds
+from rigid_proto_ros.scene.scenario import nanoseconds, read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.simulation.simulation import Simulation
 

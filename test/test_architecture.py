@@ -47,7 +47,7 @@ import numpy as np
 import docs_tables
 from rigid_proto_ros.scene import parameters
 from rigid_proto_ros.base.errors import CommandRefused
-from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
 
 body = {"mesh": "", "inertia_model": "explicit", "explicit_inertia.tensor": [1.0, 0.0, 0.0, 2.0, 0.0, 3.0]}

@@ -23,8 +23,8 @@ import rigid_proto_ros
 from rigid_proto_ros.base.bundled import example_names, example_path, scene_names
 from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.ros import poke_client
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
-from rigid_proto_ros.scene.scenario import nanoseconds
+from rigid_proto_ros.scene.scenario import nanoseconds, read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script, read_script
 
 SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent

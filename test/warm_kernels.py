@@ -19,7 +19,8 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.live.warm_up import warm_up
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.sweep.rows import run_chunk
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.warm_up import warm_up
-from rigid_proto_ros.scene.offline import read_scene
+from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.workbench.main import Workbench
 
 CHROMIUM = os.environ.get("CHROMIUM", shutil.which("chromium") or shutil.which("chromium-browser")) or None

@@ -105,7 +105,7 @@ def page_controls() -> Iterator[str]:
     import viser
 
     from rigid_proto_ros.live.live_simulation import LiveSimulation
-    from rigid_proto_ros.scene.offline import read_scene
+    from rigid_proto_ros.scene.scenario import read_scene
     from rigid_proto_ros.workbench.main import Workbench
 
     labels: set[str] = set()

@@ -36,8 +36,8 @@ def run(args: argparse.Namespace) -> int:
     from ..base.bundled import example_path
     from ..export.flight_record import FlightRecord, frames, source_of_scene
     from ..scene.lessons import lesson
-    from ..scene.offline import OfflineRun, read_scene
-    from ..scene.scenario import nanoseconds
+    from ..scene.scenario import nanoseconds, read_scene
+    from ..scene.scenario_run import OfflineRun
     from ..scene.script import read_script
 
     if not args.html.lower().endswith((".html", ".htm")):

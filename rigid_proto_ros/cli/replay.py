@@ -160,7 +160,7 @@ def given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
         return None
     if not session.missing:
         raise InputError("--scene", path, "no scene: the session has its own")
-    from ..scene.offline import read_scene
+    from ..scene.scenario import read_scene
 
     return read_scene(path, None, lambda text: print(f"rigid_proto: {text}", file=sys.stderr))
 

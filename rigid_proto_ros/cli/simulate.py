@@ -66,12 +66,13 @@ def _instead_of(option: str) -> str:
 
 def run(args: argparse.Namespace) -> int:
     """Run the scene and print its end."""
-    from ..scene.offline import OfflineRun, parse_setting, read_scene, run_with_progress, summary
+    from ..scene.scenario import read_scene
+    from ..scene.scenario_run import OfflineRun, run_with_progress, summary
     from ..scene.script import read_script
     from ..simulation.commands import nanoseconds
     from ..simulation.observer import Observers
 
-    scenario = read_scene(args.scene, dict(parse_setting(s) for s in args.set), _warn)
+    scenario = read_scene(args.scene, dict(map(_setting, args.set)), _warn)
     for warning in scenario.warnings:
         _warn(warning)
     script = read_script(args.script) if args.script else []
@@ -120,6 +121,16 @@ def run(args: argparse.Namespace) -> int:
         return 1
     # A recording that stopped has said so itself.
     return 0 if recorded == files else 2
+
+
+def _setting(text: str) -> tuple[str, object]:
+    """``name=value`` with the value typed as on a ROS command line."""
+    from ..scene.yaml_text import scalar
+
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise InputError("--set", text, "name=value")
+    return name.strip(), scalar(value.strip())
 
 
 def _check_places(files: list[str], bag: str | None) -> None:

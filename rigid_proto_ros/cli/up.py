@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Become the node: signals reach it directly."""
-    from ..scene.offline import read_scene
+    from ..scene.scenario import read_scene
     from ..scene.scene_file import scene_file
     from .executables import own_executable, text_parameter
 

@@ -33,10 +33,9 @@ def run(args: argparse.Namespace) -> int:
     from ..base.interrupts import leave
     from ..live.shutdown import Shutdown
     from ..rerun_view.ports import LOOPBACK
-    from ..scene.offline import scene_values
     from ..scene.parameters import Parameters
     from ..scene.scenario import make_scenario
-    from ..scene.scene_file import scene_file
+    from ..scene.scene_file import scene_file, scene_values
     from ..workbench.main import serve
 
     scene = args.scene or "t_handle"

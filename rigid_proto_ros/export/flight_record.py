@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..base.errors import InputError
-from ..scene.offline import OfflineRun
 from ..scene.scenario import Scenario, publication_ns
+from ..scene.scenario_run import OfflineRun
 from ..session.recorded_session import RecordedSession, Resimulation, resimulation
 from ..simulation.commands import Command
 from ..simulation.observer import (

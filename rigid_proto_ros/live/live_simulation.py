@@ -15,9 +15,9 @@ from typing import Any
 from ..base.errors import CommandRefused, InputError
 from ..motion.state import State
 from ..scene.command_codec import frame_names
-from ..scene.offline import notify_start
 from ..scene.parameters import with_mass_of_density
 from ..scene.scenario import Scenario
+from ..scene.scenario_run import notify_start
 from ..scene.script import entry_of
 from ..simulation.commands import Change, ClearWrench, Command, ReleaseString
 from ..simulation.observer import Observer, Observers, SceneChanged
@@ -62,8 +62,7 @@ class LiveSimulation:
 
     def announce(self) -> None:
         """Tell the observers what is going to fly; once, before ``start``."""
-        notify_start(self.loop.observer, self.scenario)
-        self.loop.simulation.announce()
+        self.loop.announce()
         self.loop.notify_scene()
 
     def start(self, on_crash: Callable[[], None] = lambda: None) -> None:

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..scene.scenario import publication_ns
 from ..simulation.simulation import Simulation
 
 WORK_NS = 8_000_000
@@ -90,40 +89,6 @@ class WorkBudget:
             elif took_ns > WORK_NS // 2:
                 self._slice_ns = max(1, min(rest_ns, self._slice_ns) * (WORK_NS // 4) // took_ns)
         return True
-
-
-class Publications:
-    """The times of publications at ``rate`` a simulated second; ``next_ns`` is the next one's."""
-
-    def __init__(self, rate: float) -> None:
-        self.rate = rate
-        self._number = 0
-
-    @property
-    def next_ns(self) -> int:
-        """Simulated time of the next publication [ns]."""
-        return publication_ns(self._number, self.rate)
-
-    def made(self) -> None:
-        """The next one is made."""
-        self._number += 1
-
-    def restart(self) -> None:
-        """The next one is that of time 0."""
-        self._number = 0
-
-    def find_after(self, now_ns: int) -> None:
-        """The next one is the first after ``now_ns``."""
-        self._number = 0
-        self.pass_over(now_ns)
-
-    def pass_over(self, present_ns: int) -> None:
-        """Make none up to the present; one that is next already stays so."""
-        numerator, denominator = self.rate.as_integer_ratio()
-        # One early, and then on: the estimate is floored and publications are rounded.
-        self._number = max(self._number, present_ns * numerator // (1_000_000_000 * denominator) - 1)
-        while self.next_ns <= present_ns:
-            self._number += 1
 
 
 class Pace:

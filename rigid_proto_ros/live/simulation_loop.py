@@ -18,7 +18,7 @@ from ..simulation.commands import Change
 from ..simulation.observer import Observer, Published
 from ..simulation.setup import Setup
 from .command_receiver import CommandReceiver
-from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Publications, Stamps, Timekeeping, WorkBudget
+from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Stamps, Timekeeping, WorkBudget
 
 ACTIVE_DRAIN_NS = 500_000
 """Between publications at most this often, while commands come in [ns of wall time]."""
@@ -78,7 +78,6 @@ class SimulationLoop(ScenarioRun):
         self.commands = CommandReceiver(self)
         self._has_subscribers = self._has_listeners = True
         self._budget = WorkBudget()
-        self._publications = Publications(scenario.parameters.publish_rate)
         self._pace = Pace(scenario.parameters.real_time_factor, self.stamps.clock)
         self._steps_left = 0
         self._steps_requested = 0
@@ -107,11 +106,8 @@ class SimulationLoop(ScenarioRun):
         super().check_change(scenario)
 
     def replace(self, scenario: Scenario) -> Setup:
-        """Put another scenario in force, its publication rate and real time factor at once."""
+        """Put another scenario in force, its real time factor at once too."""
         setup = super().replace(scenario)
-        if scenario.parameters.publish_rate != self._publications.rate:
-            self._publications.rate = scenario.parameters.publish_rate
-            self._publications.find_after(self.simulation.time_ns)
         if scenario.parameters.real_time_factor != self._pace.factor:
             self._pace.factor = scenario.parameters.real_time_factor
             if not self._pace.followed:
@@ -165,7 +161,7 @@ class SimulationLoop(ScenarioRun):
         self.simulation.log("step", {"periods": periods} if periods > 1 else {})
         # Who has subscribed since the last publication waits for these.
         self._check_listeners()
-        self._publications.find_after(self.simulation.time_ns)
+        self.publications.find_after(self.simulation.time_ns)
         self._steps_left = periods
         self._budget.begin_tick()
         self._step_on()
@@ -211,7 +207,7 @@ class SimulationLoop(ScenarioRun):
             self.ghost.reset(self.scenario)
         elif Published in self.observer.takes:
             self.begin_ghost()
-        self._publications.restart()
+        self.publications.restart()
         self._steps_left = self._steps_requested = 0
         self._anchor()
 
@@ -236,7 +232,7 @@ class SimulationLoop(ScenarioRun):
         self._budget.begin_tick()
         if not self.timekeeping.paused:
             self._present_ns = min(self._simulated_present_ns(), LAST_STAMP_NS)
-            if self._present_ns < self._publications.next_ns:
+            if self._present_ns < self.publications.next_ns:
                 self.catch_up()
 
     def _tick_running(self) -> None:
@@ -254,14 +250,14 @@ class SimulationLoop(ScenarioRun):
         if self._end_ns is not None:
             present_ns = min(present_ns, self._end_ns)
         if not self._has_listeners and self._caught_up and (self._pace.factor > 0.0 or self._pace.followed):
-            self._publications.pass_over(present_ns)
-        due_ns = self._publications.next_ns
+            self.publications.pass_over(present_ns)
+        due_ns = self.publications.next_ns
         while due_ns <= present_ns:
             if not self._publish_next():
                 # Stopped for good, or out of time: then now is as far as it came, and the rest is for the next tick.
                 present_ns = self.simulation.time_ns
                 break
-            due_ns = self._publications.next_ns
+            due_ns = self.publications.next_ns
             if due_ns <= present_ns and self._has_subscribers and self._pace.factor > 0.0 and not self._pace.followed:
                 self.timekeeping.overruns += 1
         self._last_drain_ns = wall_ns
@@ -305,18 +301,15 @@ class SimulationLoop(ScenarioRun):
         """Advance to the next publication and make it; False when the tick's time is over before, or the
         motion stopped.
         """
-        if self._publications.next_ns > LAST_STAMP_NS:
+        if self.publications.next_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
             return False
-        self._caught_up = self._budget.advance(self.simulation, self._publications.next_ns)
+        self._caught_up = self._budget.advance(self.simulation, self.publications.next_ns)
         if self._check_failure() or not self._caught_up:
             return False
         state = self.simulation.state
-        self._publications.made()
-        self.observer.on(Published(state.time_ns, state.row))
-        self.simulation.notify_floor()
-        if self.ghost is not None:
-            self.ghost.advance(state.time_ns)
+        self.publications.pass_over(state.time_ns)
+        self.publish(state.time_ns, state.row)
         self.endpoints.publish(state)
         return True
 
@@ -356,7 +349,7 @@ class SimulationLoop(ScenarioRun):
 
     def _simulated_present_ns(self) -> int:
         anchored_ns = self._pace.anchored_ns
-        present_ns = self._pace.present_ns(self.simulation.time_ns, self._publications.next_ns, self.timekeeping)
+        present_ns = self._pace.present_ns(self.simulation.time_ns, self.publications.next_ns, self.timekeeping)
         if self._pace.anchored_ns != anchored_ns:
             self._begin_anew()
         return present_ns
@@ -377,10 +370,10 @@ class SimulationLoop(ScenarioRun):
         if not self._has_subscribers:
             # Recordings and viewers take states in bundles: theirs are made together, at 1 kHz ten a wake-up.
             return latest_ns
-        publication_ns = self._pace.wall_ns(self._publications.next_ns)
+        publication_ns = self._pace.wall_ns(self.publications.next_ns)
         if self._commands_come:
             # Commands taken a little before a publication show in it; those taken with it would show a period later.
-            early_ns = publication_ns - int(LEAD * 1e9 / (self._publications.rate * factor))
+            early_ns = publication_ns - int(LEAD * 1e9 / (self.publications.rate * factor))
             if early_ns - self._last_drain_ns >= ACTIVE_DRAIN_NS:
                 return min(latest_ns, early_ns)
         return min(latest_ns, publication_ns)

@@ -7,7 +7,7 @@ The node, the offline run and replay all come through here, so that one scene me
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,7 +29,8 @@ from ..simulation.checks import check_start
 from ..simulation.commands import nanoseconds
 from ..simulation.setup import Setup
 from ..simulation.thrusters import make_thruster
-from .parameters import READ_ONLY, Parameters, Value, convert_all, parameter_named
+from .parameters import READ_ONLY, Parameters, Value, convert_all, parameter_named, with_mass_of_density
+from .scene_file import scene_file, scene_values
 from .yaml_text import yaml_value
 
 _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
@@ -125,6 +126,17 @@ def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Sce
     """
     parameters = Parameters().replaced(values)
     return build_scenario(parameters, load_body_mesh(parameters, mesh))
+
+
+def read_scene(
+    name: str, settings: Mapping[str, object] | None = None, warn: Callable[[str], None] = print
+) -> Scenario:
+    """The scenario of a scene file, by path or bundled name, with ``settings`` on top.
+
+    An unknown name in a section for this node raises InputError; in ``/**`` it is warned of. A density among the
+    settings sets the scene's mass, which would win, to 0, as it does in flight.
+    """
+    return make_scenario({**scene_values(scene_file(name), warn), **with_mass_of_density(settings or {})})
 
 
 def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh | None:

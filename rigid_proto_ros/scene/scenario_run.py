@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A scenario in motion: its simulation and its ghost, and the one place where a change of parameters reaches both.
+"""A scenario in motion: its simulation and its ghost, what observers are told of both, and the one place where a change
+of parameters reaches both. Without ROS and a clock: ``OfflineRun``, as fast as the machine goes.
 
 The ghost is a second body that gets the same commands under another tensor or integrator, to be seen beside the first:
 true against box, exact against rk4, where the two part is the lesson. It never acts back, and a run without a viewer
@@ -8,15 +9,31 @@ has none.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Iterable, Mapping
 
-from ..base.errors import InputError
+import numpy as np
+
+from ..base.errors import CommandRefused, InputError
+from ..base.progress import Progress
 from ..mesh.reading import Mesh
+from ..simulation.checks import check_command
 from ..simulation.commands import Change, Command, Listed
-from ..simulation.observer import Event, GhostChanged, GhostPublished, Observer, Refused, SceneChanged, snapshot
+from ..simulation.observer import (
+    Event,
+    GhostChanged,
+    GhostPublished,
+    Observer,
+    Published,
+    Refused,
+    SceneChanged,
+    Started,
+    snapshot,
+)
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
-from .scenario import BodyMesh, Scenario, check_inertia
+from .scenario import BodyMesh, Scenario, check_inertia, publication_ns
+from .script import with_contacts
 
 
 class Ghost(Observer):
@@ -87,6 +104,36 @@ class Ghost(Observer):
             self._observer.on(GhostPublished(until_ns, state.row))
 
 
+class Publications:
+    """The times of publications at ``rate`` a simulated second; ``next_ns`` is the next one's."""
+
+    def __init__(self, rate: float) -> None:
+        self.rate = rate
+        self._number = 0
+
+    @property
+    def next_ns(self) -> int:
+        """Simulated time of the next publication [ns]."""
+        return publication_ns(self._number, self.rate)
+
+    def restart(self) -> None:
+        """The next one is that of time 0."""
+        self._number = 0
+
+    def find_after(self, now_ns: int) -> None:
+        """The next one is the first after ``now_ns``."""
+        self._number = 0
+        self.pass_over(now_ns)
+
+    def pass_over(self, present_ns: int) -> None:
+        """Make none up to the present; one that is next already stays so."""
+        numerator, denominator = self.rate.as_integer_ratio()
+        # One early, and then on: the estimate is floored and publications are rounded.
+        self._number = max(self._number, present_ns * numerator // (1_000_000_000 * denominator) - 1)
+        while self.next_ns <= present_ns:
+            self._number += 1
+
+
 class ScenarioRun:
     """scenario: the one in force. ghost: None until ``begin_ghost``, and where the scenario asks for none."""
 
@@ -95,7 +142,13 @@ class ScenarioRun:
         self.observer = observer or Observer()
         self.simulation = Simulation(scenario.setup, observer)
         self.simulation.setup_of = self.setup_of
+        self.publications = Publications(scenario.parameters.publish_rate)
         self.ghost: Ghost | None = None
+
+    def announce(self) -> None:
+        """Tell the observer what flies: the scene with its mesh, then the body."""
+        notify_start(self.observer, self.scenario)
+        self.simulation.announce()
 
     def begin_ghost(self) -> None:
         """Begin the ghost that the scenario asks for; it gets all commands that are submitted from now on."""
@@ -103,6 +156,13 @@ class ScenarioRun:
         if self.ghost is not None:
             self.simulation.follower = self.ghost.submit
             self.ghost.announce()
+
+    def publish(self, time_ns: int, row: np.ndarray) -> None:
+        """Tell the observer a state, and where the ghost is then."""
+        self.observer.on(Published(time_ns, row))
+        self.simulation.notify_floor()
+        if self.ghost is not None:
+            self.ghost.advance(time_ns)
 
     def check_change(self, scenario: Scenario) -> None:
         """Raises InputError where this scenario can't follow the present one."""
@@ -121,9 +181,12 @@ class ScenarioRun:
         return self.change(command.content)
 
     def replace(self, scenario: Scenario) -> Setup:
-        """Put another scenario in force; the ghost follows, and the observer is notified."""
+        """Put another scenario in force, its publication rate too; the ghost follows, and the observer is notified."""
         self.check_change(scenario)
         self.scenario = scenario
+        if scenario.parameters.publish_rate != self.publications.rate:
+            self.publications.rate = scenario.parameters.publish_rate
+            self.publications.find_after(self.simulation.time_ns)
         # One that isn't there would have missed what was commanded so far: it begins at the next reset.
         if self.ghost is not None:
             self.ghost.change(self.simulation.time_ns, scenario, self.simulation.listed)
@@ -133,3 +196,95 @@ class ScenarioRun:
     def notify_scene(self) -> None:
         """Tell the observer the parameters in force."""
         self.observer.on(SceneChanged(self.simulation.time_ns, self.scenario.text))
+
+
+def notify_start(observer: Observer, scenario: Scenario) -> None:
+    """Tell an observer what flies."""
+    mesh = scenario.body_mesh
+    if mesh is None:
+        observer.on(Started(scenario.text, None, None, ""))
+    else:
+        observer.on(Started(scenario.text, mesh.surface.vertices, mesh.surface.triangles, mesh.mesh.sha256))
+
+
+class OfflineRun(ScenarioRun):
+    """A simulation with its script submitted, as fast as the machine goes; ``advance`` takes it from publication to
+    publication.
+    """
+
+    def __init__(self, scenario: Scenario, script: Iterable[Command] = (), observer: Observer | None = None) -> None:
+        super().__init__(scenario, observer)
+        self._is_observed = observer is not None
+        self._submitted = 0
+        if observer is not None:
+            self.announce()
+            self.begin_ghost()
+        self.submit(script)
+
+    def submit(self, script: Iterable[Command]) -> None:
+        """Take the commands of a script, which act behind those taken before where their times are equal; each is
+        checked in the scene that those before it in the script have made by then. Raises InputError.
+        """
+        planned = self.scenario
+        for command in with_contacts(script, planned.setup.contacts):
+            self._submitted += 1
+            try:
+                if isinstance(command, Change):
+                    planned = planned.with_changes(command.content)
+                checked = (check_command(command, planned.setup), planned.setup)
+                self.simulation.submit(command, command.stamp_ns, (0, self._submitted), checked)
+            except CommandRefused as refusal:
+                place = f"script, command {self._submitted} at {command.stamp_ns / 1e9:g} s"
+                raise InputError(place, refusal.received, refusal.accepted) from None
+
+    def advance(self, until_ns: int) -> bool:
+        """Advance the body to ``until_ns``, notifying the observer every publication; False when the motion failed."""
+        simulation, publications = self.simulation, self.publications
+        while self._is_observed and publications.next_ns <= until_ns:
+            state = simulation.advance(publications.next_ns)
+            if simulation.failure:
+                return False
+            self.publish(state.time_ns, state.row)
+            publications.pass_over(state.time_ns)
+        simulation.advance(until_ns)
+        return not simulation.failure
+
+    def end(self) -> None:
+        """Tell the observer what has held the flight to less than its accuracy."""
+        if self._is_observed:
+            self.simulation.notify_floor(at_end=True)
+
+
+def run_with_progress(run: OfflineRun, duration_ns: int) -> float:
+    """Advance by a hundredth of the duration at a time, and show how far it is; returns the wall time [s]."""
+    start = time.perf_counter()
+    with Progress(f"simulating {duration_ns / 1e9:g} s") as progress:
+        for part in range(1, 101):
+            if not run.advance(duration_ns * part // 100):
+                break
+            progress.fraction(part, 100)
+    run.end()
+    return time.perf_counter() - start
+
+
+def summary(run: OfflineRun, wall_time: float) -> dict:
+    """What ``simulate --json`` prints: the final state, energies and what the run cost."""
+    simulation = run.simulation
+    state = simulation.state
+    return {
+        "time_ns": state.time_ns,
+        "position": state.position.tolist(),
+        "orientation_xyzw": state.orientation_xyzw.tolist(),
+        "linear_velocity": state.linear_velocity.tolist(),
+        "angular_velocity": state.angular_velocity.tolist(),
+        "angular_velocity_body": state.angular_velocity_body.tolist(),
+        "kinetic_energy": simulation.kinetic_energy,
+        "potential_energy": simulation.potential_energy,
+        "angular_momentum": simulation.angular_momentum.tolist(),
+        "integrator": simulation.setup.integrator.name,
+        "steps": simulation.steps,
+        "force_evaluations": simulation.force_evaluations,
+        "accuracy_floor": simulation.accuracy_floor,
+        "wall_time": wall_time,
+        "state_hash": state.sha256(),
+    }

@@ -9,7 +9,7 @@ it.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,6 +17,7 @@ import yaml
 
 from ..base.bundled import scene_names, scene_path
 from ..base.errors import InputError, did_you_mean
+from .parameters import is_ros_parameter, parameter_named
 from .yaml_text import compose_yaml, key_of, read_text, refused, typed
 
 GONE = re.compile(
@@ -87,6 +88,29 @@ def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body
             raise InputError(f"{name}, {parameter}", "a parameter of an earlier version, which this one hasn't")
     scene.wildcard = scene.values.keys() - named
     return scene
+
+
+def scene_values(
+    path: str | Path, warn: Callable[[str], None] = print, node_name: str = "rigid_body"
+) -> dict[str, object]:
+    """The parameters that a scene file gives a node; unknown names as ``read_scene`` has it."""
+    scene = read_scene_file(path, node_name)
+    if scene.unused and not scene.has_section:
+        there = ", ".join(scene.unused[:5])
+        warn(f"{path}: no section is for /{node_name.lstrip('/')} (it has {there}); /** is for every node")
+    values: dict[str, object] = {}
+    for parameter, value in scene.values.items():
+        if is_ros_parameter(parameter):
+            continue
+        try:
+            parameter_named(parameter)
+        except InputError as error:
+            if parameter not in scene.wildcard:
+                raise InputError(f"{path}, {parameter}", error.received, error.accepted) from None
+            warn(f"{path}: {parameter} under /** is not a parameter of this node; ignored")
+            continue
+        values[parameter] = value
+    return values
 
 
 def _sections(path: str, tree: yaml.Node, namespace: str) -> Iterator[tuple[str, yaml.Node]]:

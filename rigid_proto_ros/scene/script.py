@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import random
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from dataclasses import replace
 from itertools import groupby
 from operator import attrgetter
@@ -296,7 +296,7 @@ def _numbers(values: Any, field: str, count: int) -> tuple[float, ...]:
     return tuple(_number(value, field) for value in values)
 
 
-def with_contacts(script: list[Command], contacts: Mapping[str, Vector]) -> list[Command]:
+def with_contacts(script: Iterable[Command], contacts: Mapping[str, Vector]) -> list[Command]:
     """The script with the names of contacts that strings are tied to replaced by their points (mesh coordinates)."""
     resolved: list[Command] = []
     for command in script:

@@ -19,10 +19,9 @@ import numpy as np
 from ..base.errors import InputError, MeshError
 from ..mesh.reading import Mesh, load_mesh
 from ..scene.command_codec import frame_names, of_event
-from ..scene.offline import notify_start
 from ..scene.parameters import Parameters, convert_all
 from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
-from ..scene.scenario_run import ScenarioRun
+from ..scene.scenario_run import ScenarioRun, notify_start
 from ..scene.scene_file import read_scene_text
 from ..simulation.commands import Change, Command
 from ..simulation.observer import BodyChanged, Observer, Published, snapshot
@@ -257,8 +256,7 @@ def play(
         observer.on(BodyChanged(0, snapshot(given.setup)))
     else:
         again = resimulation(session, observer)
-        notify_start(observer, again.scenario)
-        again.simulation.announce()
+        again.announce()
         again.begin_ghost()
     for count, k in enumerate(np.argsort(session.times, kind="stable").tolist()):
         progress(count, len(session.times))
@@ -276,7 +274,4 @@ def play(
             np.allclose(PROJECTIONS[name](computed.tolist()), PROJECTIONS[name](row.tolist()), rtol=1e-12, atol=1e-12)
             for name in session.published
         )
-        observer.on(Published(time_ns, computed if alike else row))
-        again.simulation.notify_floor()
-        if again.ghost is not None:
-            again.ghost.advance(time_ns)
+        again.publish(time_ns, computed if alike else row)

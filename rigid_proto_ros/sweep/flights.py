@@ -26,9 +26,9 @@ from typing import TypeVar
 
 from ..base.errors import CommandRefused, InputError
 from ..motion.state import State
-from ..scene.offline import OfflineRun, read_scene
-from ..scene.scenario import Scenario
-from ..scene.script import expand_script, with_contacts
+from ..scene.scenario import Scenario, read_scene
+from ..scene.scenario_run import OfflineRun
+from ..scene.script import expand_script
 from ..simulation.commands import nanoseconds
 from ..simulation.observer import Observer
 from .table import cores
@@ -58,8 +58,7 @@ class Flight:
 
             observer = McapObserver(record, parameters=scene.parameters, simulated_log=True)
         self._observer = observer
-        self._run = OfflineRun(scene, [], observer)
-        self._commands = 0
+        self._run = OfflineRun(scene, observer=observer)
 
     def __enter__(self) -> Flight:
         return self
@@ -71,13 +70,9 @@ class Flight:
         """Let an entry of a poke script act now, after those given before; with ``t`` at that time [s, simulated] or
         later. Raises InputError for one that can't be taken.
         """
-        simulation, scene = self._run.simulation, self._run.scenario
         # Counted from now, in whole nanoseconds; seconds don't hold them all.
-        start_ns = 0 if "t" in entry else simulation.time_ns
-        commands = expand_script([{"t": 0.0, **entry}], "command", start_ns=start_ns)
-        for command in with_contacts(commands, scene.setup.contacts):
-            simulation.submit(command, command.stamp_ns, (0, self._commands))
-            self._commands += 1
+        start_ns = 0 if "t" in entry else self._run.simulation.time_ns
+        self._run.submit(expand_script([{"t": 0.0, **entry}], "command", start_ns=start_ns))
 
     def step(self, seconds: float) -> State:
         """Simulate so long, and return the state at the end. Raises InputError when the motion fails, or a command is

@@ -22,9 +22,9 @@ from ..base.files import output_file
 from ..motion.integrators import check_supported
 from ..motion.integrators.integrator import ANGULAR_DAMPING
 from ..motion.loads import FORCE, TORQUE
-from ..scene.offline import OfflineRun
 from ..scene.parameters import HUGE, Parameters, Value, parameter_named, with_mass_of_density
 from ..scene.scenario import BodyMesh, Scenario, build_scenario
+from ..scene.scenario_run import OfflineRun
 from ..scene.script import MAX_TIME_S, expand_script
 from ..scene.yaml_text import dump_yaml
 from ..simulation import batch

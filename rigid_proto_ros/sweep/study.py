@@ -20,7 +20,6 @@ import numpy as np
 
 from ..base.bundled import example_names, example_path, study_names, study_path
 from ..base.errors import InputError, did_you_mean
-from ..scene.offline import OfflineRun, scene_values
 from ..scene.parameters import (
     READ_ONLY,
     Parameters,
@@ -30,7 +29,8 @@ from ..scene.parameters import (
     with_mass_of_density,
 )
 from ..scene.scenario import BodyMesh, Scenario, build_scenario, load_body_mesh, make_scenario
-from ..scene.scene_file import scene_file
+from ..scene.scenario_run import OfflineRun
+from ..scene.scene_file import scene_file, scene_values
 from ..scene.script import expand_script
 from ..scene.yaml_text import load_yaml, read_text
 from ..simulation.commands import Command, nanoseconds

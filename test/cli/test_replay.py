@@ -7,8 +7,8 @@ import pytest
 from conftest import needs_rerun
 
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.scene.offline import notify_start
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import notify_start
 from rigid_proto_ros.session.mcap_observer import McapObserver
 
 

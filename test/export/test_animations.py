@@ -18,7 +18,8 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.flight_record import FlightRecord, Source, frames, source_of_scene
 from rigid_proto_ros.export.gltf import INDICES, TRIANGLES, VERTICES, Document
 from rigid_proto_ros.picture.surface import BOX_CORNERS, BOX_TRIANGLES
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import read_script
 
 THROWN = {

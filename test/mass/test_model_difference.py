@@ -13,7 +13,7 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.inspection import model_difference
 from rigid_proto_ros.mass.moments import MODELS
 from rigid_proto_ros.mass.properties import MassProperties
-from rigid_proto_ros.scene.offline import read_scene
+from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.workbench.body_tab import comparison
 
 

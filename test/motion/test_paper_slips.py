@@ -11,8 +11,8 @@ from rigid_proto_ros.base.errors import TensorError
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.mass.tensor import check_tensor, principal_axes
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
-from rigid_proto_ros.scene.scenario import nanoseconds
+from rigid_proto_ros.scene.scenario import nanoseconds, read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 
 

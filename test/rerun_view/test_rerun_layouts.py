@@ -16,7 +16,7 @@ from rerun_flight import cells
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.rerun_view.layout import TITLES, Finished, Subject, blueprint, value_axis
-from rigid_proto_ros.scene.offline import read_scene
+from rigid_proto_ros.scene.scenario import read_scene
 
 FINISHED = Finished(10.0, dict.fromkeys(TITLES, (0.0, 1.0)), True)
 """A run in which everything has been plotted."""

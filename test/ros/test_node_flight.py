@@ -9,7 +9,8 @@ from ros_process import run, running_node
 from rigid_proto_ros.base.bundled import example_path, scene_path
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.rrd_reading import read_session
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.messages import PROJECTIONS
 

@@ -19,8 +19,8 @@ from rigid_proto_ros.base.bundled import example_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.ros import script_sender
 from rigid_proto_ros.ros.poke_client import main as poke_client
-from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.session.messages import PROJECTIONS
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from lesson_flights import Flight, Z, degrees_between, fly
 
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
-from rigid_proto_ros.scene.scenario import nanoseconds
+from rigid_proto_ros.scene.scenario import nanoseconds, read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import read_script
 
 

@@ -14,8 +14,8 @@ from lesson_flights import Z, degrees_between, fly
 import rigid_proto_ros
 from rigid_proto_ros.base.bundled import scene_names
 from rigid_proto_ros.scene.lessons import lesson
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
-from rigid_proto_ros.scene.scenario import nanoseconds
+from rigid_proto_ros.scene.scenario import nanoseconds, read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.simulation.simulation import Simulation
 

@@ -9,9 +9,8 @@ import random
 import pytest
 from flights import SECOND, EventLines
 
-from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.scene.scenario_run import Ghost
+from rigid_proto_ros.scene.scenario_run import Ghost, OfflineRun
 from rigid_proto_ros.scene.script import expand_script
 from rigid_proto_ros.session.recorded_session import decode_event
 from rigid_proto_ros.simulation.commands import Command

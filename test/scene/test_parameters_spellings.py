@@ -10,8 +10,9 @@ from ros_client import RosClient
 from ros_process import running_node
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.scene.offline import read_scene, scene_values
 from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS, READ_ONLY, Parameter
+from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.scene_file import scene_values
 
 NUMERIC = [p for p in (*PARAMETERS.values(), *PATTERNS.values()) if p.type in ("double", "doubles")]
 IDS = [p.name for p in NUMERIC]

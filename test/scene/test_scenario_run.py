@@ -11,8 +11,8 @@ from flights import SECOND
 
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mesh.reading import load_mesh
-from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.simulation.observer import Observer, Refused, SceneChanged
 

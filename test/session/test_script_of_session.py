@@ -9,8 +9,8 @@ from hand_session import SCENE, HandSession, random_hand_session
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.scene.command_codec import of_event
-from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule, schedules
 from rigid_proto_ros.session.as_script import SceneAndScript, script_of_session

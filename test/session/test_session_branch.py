@@ -10,8 +10,8 @@ pytest.importorskip("mcap")
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
-from rigid_proto_ros.scene.scenario import make_scenario, mesh_sha256_of
+from rigid_proto_ros.scene.scenario import make_scenario, mesh_sha256_of, read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script, read_script
 from rigid_proto_ros.session.as_script import branch_at

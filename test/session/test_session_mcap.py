@@ -23,7 +23,8 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.rerun_view.session_files import read_runs
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
+from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.mcap_observer import McapObserver

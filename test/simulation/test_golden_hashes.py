@@ -28,8 +28,9 @@ from rigid_proto_ros.mass.properties import MeshMoments
 from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
 from rigid_proto_ros.scene.parameters import Parameters
+from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.scene.sensor_noise import imu_noise
 from rigid_proto_ros.simulation.simulation import Simulation

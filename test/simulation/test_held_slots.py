@@ -8,8 +8,8 @@ from flights import SECOND, EventLines
 
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.session.recorded_session import Resimulation
 from rigid_proto_ros.simulation.commands import slot_name, slot_number

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 
 TESTS = Path(__file__).parents[1]

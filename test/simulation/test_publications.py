@@ -4,14 +4,28 @@
 from fractions import Fraction
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
-from rigid_proto_ros.scene.scenario import publication_ns
+from rigid_proto_ros.scene.scenario import publication_ns, read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
+from rigid_proto_ros.scene.script import expand_script
+from rigid_proto_ros.simulation.observer import Event, Observer, Published
 
 SECOND = 10**9
 SCENE = read_scene("t_handle")
+
+
+class Told(Observer):
+    takes = frozenset({Published})
+
+    def __init__(self) -> None:
+        self.times_ns: list[int] = []
+
+    def on(self, event: Event) -> None:
+        if isinstance(event, Published):
+            self.times_ns.append(event.time_ns)
 
 
 @given(st.floats(1e-6, 1e4), st.integers(0, 10**7))
@@ -23,6 +37,14 @@ def test_publication_times_are_rounded_exactly(rate, k):
 def test_publication_times_of_well_known_rates():
     assert [publication_ns(k, 3.0) for k in range(4)] == [0, 333_333_333, 666_666_667, SECOND]
     assert publication_ns(10**9 * 60, 60.0) == 10**18
+
+
+@pytest.mark.parametrize(("rate", "after"), [(20.0, [1.0, 1.05, 1.1, 1.15, 1.2]), (5.0, [1.0, 1.2])])
+def test_a_rate_that_a_script_changes_holds_from_the_publication_after_that(rate: float, after: list[float]) -> None:
+    told = Told()
+    script = expand_script([{"t": 0.95, "set": {"publish_rate": rate}}])
+    assert OfflineRun(read_scene("t_handle", {"publish_rate": 10.0}), script, told).advance(12 * SECOND // 10)
+    assert [time_ns * 1e-9 for time_ns in told.times_ns] == pytest.approx([0.1 * k for k in range(10)] + after)
 
 
 def test_the_quaternion_is_never_flipped():

@@ -7,8 +7,8 @@ import pytest
 from flights import SECOND
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
-from rigid_proto_ros.scene.offline import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.session.recorded_session import Resimulation
 from rigid_proto_ros.simulation.observer import LoadBegan, LoadEnded, Logged, Observer

@@ -4,7 +4,7 @@
 import pytest
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.scene.offline import OfflineRun
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.sweep.flights import Flight, fly_all, load_scene
 

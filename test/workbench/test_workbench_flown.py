@@ -22,8 +22,8 @@ from flown_page import FlownPage
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
-from rigid_proto_ros.scene.offline import OfflineRun, read_scene
-from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario import make_scenario, read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.simulation.simulation import Simulation
