@@ -53,10 +53,10 @@ def opened(port: int):
 
 def load(flown) -> tuple[float, float]:
     """Overruns and CPU time, each a second, of this process."""
-    before, cpu, wall = flown.live.loop.timekeeping.overruns, time.process_time(), time.monotonic()
+    before, cpu, wall = flown.live.loop.pace.overruns, time.process_time(), time.monotonic()
     time.sleep(ROUND_S)
     wall = time.monotonic() - wall
-    return (flown.live.loop.timekeeping.overruns - before) / wall, (time.process_time() - cpu) / wall
+    return (flown.live.loop.pace.overruns - before) / wall, (time.process_time() - cpu) / wall
 
 
 def drawn_string_ms(flown) -> list[float]:

@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT))
 
 from rigid_proto_ros.base.bundled import example_path, scene_names, scene_path
 from rigid_proto_ros.cli.main import main as rigid_proto
-from rigid_proto_ros.live.warm_up import warm_up
+from rigid_proto_ros.live.live_simulation import warm_up
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import auto
 from rigid_proto_ros.motion.integrators.stepping import method_table, provide_kernel

@@ -14,8 +14,7 @@ from viser._messages import GuiUpdateMessage
 from workbench_page import bare_page
 
 from rigid_proto_ros.base.rotation import rotate
-from rigid_proto_ros.live.live_simulation import LiveSimulation
-from rigid_proto_ros.live.warm_up import warm_up
+from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
 from rigid_proto_ros.scene.scenario import Scenario, nanoseconds, read_scene
 from rigid_proto_ros.simulation.observer import Event, Observer, Published, Reset
 from rigid_proto_ros.workbench.main import Workbench

@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.publisher import Publisher
 
-from rigid_proto_ros.live.warm_up import warm_up
+from rigid_proto_ros.live.live_simulation import warm_up
 from rigid_proto_ros.ros.node import RigidBodyNode
 from rigid_proto_ros.scene import cdr
 

@@ -17,7 +17,7 @@ from sweep_studies import POKES, study
 from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main as rigid_proto
-from rigid_proto_ros.live.warm_up import warm_up
+from rigid_proto_ros.live.live_simulation import warm_up
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun

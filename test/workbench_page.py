@@ -15,8 +15,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
-from rigid_proto_ros.live.live_simulation import LiveSimulation
-from rigid_proto_ros.live.warm_up import warm_up
+from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.workbench.main import Workbench
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -20,9 +20,6 @@ from ..simulation.setup import Setup
 if TYPE_CHECKING:
     from .simulation_loop import SimulationLoop
 
-TOPICS = ("wrench", "thrusters", "poke", "string", "inertia", "schedule")
-"""What received messages are counted by."""
-
 COUNTED_BY = {
     "wrench": "wrench",
     "thrusters": "thrusters",
@@ -33,18 +30,13 @@ COUNTED_BY = {
 }
 """The counter of each kind of command; all others come by the schedule."""
 
+TOPICS = (*dict.fromkeys(COUNTED_BY.values()), "schedule")
+"""What received messages are counted by."""
+
+Submission = tuple[Command, int, Listed | None, tuple[bytes, Setup]]
+"""What ``Simulation.submit`` takes."""
+
 DAY_NS = 24 * 3600 * 1_000_000_000
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A command of the schedule, ready to be submitted: its place in its list, and what Simulation.submit takes as
-    checked.
-    """
-
-    command: Command
-    listed: Listed | None
-    checked: tuple[bytes, Setup]
 
 
 class CommandReceiver:
@@ -98,38 +90,38 @@ class CommandReceiver:
             listed = read_schedule(text())
             count = len(listed) if isinstance(listed, list) else 1
             commands = with_contacts(expand_schedule(listed), loop.scenario.setup.contacts)
-            entries = self._checked(commands, isinstance(listed, list))
-            times = [self._effective(entry.command.stamp_ns, 0) for entry in entries]
+            taken, counted = self._planned(commands, isinstance(listed, list))
         except InputError as error:
             reason = error.reason if isinstance(error, CommandRefused) else "schedule"
             refusal = CommandRefused(reason, error.field, error.received, error.accepted)
             loop.simulation.refuse(refusal, count)
             raise refusal from None
         else:
-            for counter in ("late", "wall_stamp"):
-                # An entry that stands for several commands counts once.
-                counted = {
-                    entry.command.entry for entry, (_, name) in zip(entries, times, strict=True) if name == counter
-                }
-                self._count(counter, len(counted))
-            for entry, (when_ns, _) in zip(entries, times, strict=True):
-                loop.simulation.submit(entry.command, when_ns, entry.listed, entry.checked)
+            for counter, entries in counted.items():
+                self._count(counter, len(entries))
+            for submission in taken:
+                loop.simulation.submit(*submission)
         finally:
             self.received["schedule"] += count
 
-    def _checked(self, commands: list[Command], is_list: bool) -> list[Entry]:
+    def _planned(self, commands: list[Command], is_list: bool) -> tuple[list[Submission], dict[str, set[int]]]:
         """The commands in order of time, those of one time in the order of the list, each checked in the scene that
-        those before it have made of the present one; raises InputError.
+        those before it have made of the present one; and the entries to be counted by each counter, once though they
+        stand for several commands. Raises InputError.
         """
-        entries, scenario = [], self._loop.scenario
+        taken: list[Submission] = []
+        counted: dict[str, set[int]] = {}
+        scenario = self._loop.scenario
         for k in sorted(range(len(commands)), key=lambda k: commands[k].stamp_ns):
             command = commands[k]
             if isinstance(command, Change):
                 scenario = scenario.with_changes(command.content)
                 command = replace(command, apply=partial(self._loop.setup_of, command, scenario.body_mesh))
             checked = (check_command(command, scenario.setup), scenario.setup)
-            entries.append(Entry(command, (self._schedules, k) if is_list else None, checked))
-        return entries
+            when_ns, counter = self._effective(command.stamp_ns, 0)
+            counted.setdefault(counter, set()).add(command.entry)
+            taken.append((command, when_ns, (self._schedules, k) if is_list else None, checked))
+        return taken, counted
 
     def _effective(self, stamp_ns: int, offset_ns: int) -> tuple[int, str]:
         horizon_ns = nanoseconds(self._loop.scenario.parameters.schedule_horizon)

@@ -1,34 +1,45 @@
 # SPDX-License-Identifier: MIT
 """One body in real time with all that surrounds it: thread, commands, parameters, observers and recording.
 
-The node adds topics, services and ROS parameters to this; the interactive page uses it as it is.
+The thread owns the simulation: it wakes at absolute deadlines and lets the loop do what is due. Everybody else hands
+work over with ``call``; nothing else touches the simulation. The node adds topics, services and ROS parameters to this;
+the interactive page uses it as it is.
 """
 
 from __future__ import annotations
 
+import gc
 import json
+import threading
 import time
+import traceback
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from ..base.errors import CommandRefused, InputError
-from ..motion.state import State
+from ..motion.frames import parse_frame
+from ..motion.state import State, shift_com
 from ..scene.command_codec import frame_names
 from ..scene.parameters import with_mass_of_density
 from ..scene.scenario import Scenario
 from ..scene.scenario_run import notify_start
 from ..scene.script import entry_of
-from ..simulation.commands import Change, ClearWrench, Command, ReleaseString
+from ..simulation.commands import Change, ClearWrench, Command, MoveString, ReleaseString, WrenchCommand
 from ..simulation.observer import Observer, Observers, SceneChanged
+from ..simulation.setup import Setup
+from ..simulation.simulation import Simulation
 from .command_receiver import COUNTED_BY, CommandReceiver
 from .pacing import Stamps
-from .physics_thread import PhysicsThread
 from .simulation_loop import Endpoints, SimulationLoop
-from .warm_up import warm_up
 
 LOOK_S = 0.002
 """Between looks whether a step is made [s]."""
+
+SHORT_NS = 3_000_000
+"""Waits below this [ns] are a plain sleep, a third of the cost of one that a request can end."""
 
 
 class LiveSimulation:
@@ -57,8 +68,12 @@ class LiveSimulation:
         self.loop = SimulationLoop(scenario, Observers(*observers), self.endpoints, self.stamps)
         self._recorder = self._open_recorder(scenario)
         self._watch()
-        self._on_crash: Callable[[], None] = lambda: None
-        self._thread = PhysicsThread(self.loop, lambda: self._on_crash())
+        self._requests: list[tuple[Callable[[], Any], Future]] = []
+        self._wake = threading.Event()
+        self._stopping = False
+        self._thread: threading.Thread | None = None
+
+    # The physics thread
 
     def announce(self) -> None:
         """Tell the observers what is going to fly; once, before ``start``."""
@@ -67,23 +82,76 @@ class LiveSimulation:
 
     def start(self, on_crash: Callable[[], None] = lambda: None) -> None:
         """Simulated time begins. on_crash() is called should the thread end by a fault of the program. What isn't
-        compiled by then (warm_up.py) is compiled in flight, which holds the motion up.
+        compiled by then (``warm_up``) is compiled in flight, which holds the motion up.
         """
-        self._on_crash = on_crash
+        # What start-up has made stays: the garbage collector going through it again would hold up the motion for 0.1 s.
+        gc.freeze()
+        self._thread = threading.Thread(target=self._run, args=(on_crash,), name="physics", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """End the motion, then the observers: what they hold goes out."""
-        self._thread.stop()
+        """End the motion, then the observers: what they hold goes out. Requests that still wait are cancelled."""
+        self._stopping = True
+        self._wake.set()
+        if self._thread is not None:
+            self._thread.join(timeout=5.0)
+        for _, future in self._requests:
+            future.cancel()
         self.loop.simulation.notify_floor(at_end=True)
         self.loop.observer.close()
 
     def call(self, function: Callable[[], Any], timeout_s: float = 10.0) -> Any:
-        """Run a function on the physics thread between two ticks and return what it returns, or raise what it raises.
+        """Run a function on the physics thread between two ticks and return what it returns, or raise what it raises;
+        at once, before the thread is started.
 
         Raises InputError when the thread is too busy to begin it within timeout_s; then it is never run.
         """
-        return self._thread.call(function, timeout_s)
+        if self._thread is None:
+            return function()
+        future: Future = Future()
+        self._requests.append((function, future))
+        self._wake.set()
+        try:
+            return future.result(timeout_s)
+        except TimeoutError:
+            if future.cancel():
+                text = f"the simulation was too busy to begin it within {timeout_s:g} s"
+                raise InputError("request", text) from None
+        # It has begun, so it will end.
+        return future.result()
+
+    def _run(self, on_crash: Callable[[], None]) -> None:
+        loop = self.loop
+        try:
+            loop.start()
+            wake_ns = loop.next_wake_ns()
+            while not self._stopping:
+                rest_ns = wake_ns - time.monotonic_ns()
+                if rest_ns > 0 and not self._requests:
+                    if rest_ns < SHORT_NS:
+                        time.sleep(rest_ns * 1e-9)
+                    else:
+                        self._wake.wait(rest_ns * 1e-9)
+                        self._wake.clear()
+                if self._requests:
+                    self._serve_requests()
+                    wake_ns = loop.next_wake_ns()
+                if wake_ns <= time.monotonic_ns():
+                    loop.tick()
+                    wake_ns = loop.next_wake_ns()
+        except Exception:
+            traceback.print_exc()
+            on_crash()
+
+    def _serve_requests(self) -> None:
+        while self._requests:
+            function, future = self._requests.pop(0)
+            if future.set_running_or_notify_cancel():
+                self.loop.prepare_request()
+                try:
+                    future.set_result(function())
+                except BaseException as error:  # the caller's to handle
+                    future.set_exception(error)
 
     # Reading
 
@@ -105,7 +173,7 @@ class LiveSimulation:
     @property
     def paused(self) -> bool:
         """Whether simulated time stands."""
-        return self.loop.timekeeping.paused
+        return self.loop.paused
 
     # Commands
 
@@ -295,3 +363,28 @@ class LiveSimulation:
         recorder = self.call(give_up)
         if recorder is not None:
             recorder.close()
+
+
+def warm_up(setup: Setup) -> State:
+    """Fly this setup for a moment under a command of each kind that its integrator supports, so that no command waits
+    for kernels that have to be compiled or loaded; returns the last state.
+    """
+    spinning = setup.initial.copy()
+    spinning[10:13] += (0.1, 0.2, 0.3)
+    force = (1e-9 * setup.body.mass, 0.0, 0.0)
+    commands: list[Command] = [MoveString(tuple(setup.initial[:3].tolist()))]
+    for frame in ("world@origin;duration=0.01", "body@origin;duration=0.01", "world@origin;impulse"):
+        commands.append(WrenchCommand(False, parse_frame(frame), force, (0.0, 0.0, 0.0), frame))
+    for command in commands:
+        trial = Simulation(replace(setup, initial=spinning))
+        try:
+            trial.submit(command)
+        except CommandRefused:
+            continue  # an integrator that doesn't support it will refuse it in flight too
+        for until_ns in (1_000_000, 2_000_001):
+            trial.advance(until_ns)
+    # Used by changes in flight that move the COM, by ~/imu and by /diagnostics.
+    shift_com(trial.state.row, 0.0, 0.0, 0.0)
+    trial.specific_force((0.0, 0.0, 0.0))
+    _ = trial.kinetic_energy, trial.angular_momentum
+    return trial.state

@@ -47,15 +47,6 @@ class Stamps:
         return divmod(time_ns + self.offset_ns, 1_000_000_000)
 
 
-@dataclass
-class Timekeeping:
-    """overruns: publications more than a period late. real_time_lost_s: time given up rather than caught up."""
-
-    overruns: int = 0
-    real_time_lost_s: float = 0.0
-    paused: bool = False
-
-
 class WorkBudget:
     """The time that one tick may spend on the motion, which is advanced in slices: they grow while they are cheap and
     shrink when they turn out expensive. The motion doesn't depend on them, so they may follow the wall clock.
@@ -94,11 +85,14 @@ class WorkBudget:
 class Pace:
     """The simulated time that a clock asks for: the wall clock times ``factor``, or ``followed()``, a clock in
     nanoseconds that isn't the wall's. factor 0: as fast as it goes. anchored_ns: what the clock showed at the anchor.
+    overruns: publications more than a period late. real_time_lost_s: time given up rather than caught up.
     """
 
     def __init__(self, factor: float, followed: Callable[[], int] | None = None) -> None:
         self.factor = factor
         self.followed = followed
+        self.overruns = 0
+        self.real_time_lost_s = 0.0
         self.anchor(0)
 
     def anchor(self, simulated_ns: int) -> None:
@@ -112,7 +106,7 @@ class Pace:
         """How far the followed clock was ahead of simulated time at the anchor; 0 while there is none."""
         return self.anchored_ns - self._anchor_simulated_ns if self.followed and self.anchored_ns else 0
 
-    def present_ns(self, reached_ns: int, next_publication_ns: int, timekeeping: Timekeeping) -> int:
+    def present_ns(self, reached_ns: int, next_publication_ns: int) -> int:
         """Simulated time asked for now; time lost beyond MAX_LAG_NS is given up and counted."""
         if self.followed:
             return self._followed_present_ns(reached_ns)
@@ -123,8 +117,8 @@ class Pace:
         expected_ns = max(reached_ns, next_publication_ns)
         lag_ns = (present_ns - expected_ns) / self.factor
         if lag_ns > MAX_LAG_NS:
-            timekeeping.real_time_lost_s += lag_ns * 1e-9
-            timekeeping.overruns += 1
+            self.real_time_lost_s += lag_ns * 1e-9
+            self.overruns += 1
             self.anchor(expected_ns)
             present_ns = expected_ns
         return present_ns

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """One body in real time: when it is advanced, publishes and takes commands. All runs on the physics thread
-(physics_thread.py); where states go and commands come from is up to its endpoints.
+(live_simulation.py); where states go and commands come from is up to its endpoints.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..simulation.commands import Change
 from ..simulation.observer import Observer, Published
 from ..simulation.setup import Setup
 from .command_receiver import CommandReceiver
-from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Stamps, Timekeeping, WorkBudget
+from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Stamps, WorkBudget
 
 ACTIVE_DRAIN_NS = 500_000
 """Between publications at most this often, while commands come in [ns of wall time]."""
@@ -72,13 +72,13 @@ class SimulationLoop(ScenarioRun):
         stamps: Stamps | None = None,
     ) -> None:
         super().__init__(scenario, observer)
-        self.timekeeping = Timekeeping(paused=scenario.parameters.start_paused)
+        self.paused = scenario.parameters.start_paused
         self.stamps = stamps or Stamps()
         self.endpoints = endpoints or Endpoints()
         self.commands = CommandReceiver(self)
         self._has_subscribers = self._has_listeners = True
         self._budget = WorkBudget()
-        self._pace = Pace(scenario.parameters.real_time_factor, self.stamps.clock)
+        self.pace = Pace(scenario.parameters.real_time_factor, self.stamps.clock)
         self._steps_left = 0
         self._steps_requested = 0
         self._commands_come = self._steps_expected = False
@@ -99,7 +99,7 @@ class SimulationLoop(ScenarioRun):
 
     def check_change(self, scenario: Scenario) -> None:
         """Raises InputError where this scenario can't follow the present one."""
-        if self._pace.followed and scenario.parameters.publish_clock:
+        if self.pace.followed and scenario.parameters.publish_clock:
             raise InputError(
                 "publish_clock", True, "false, while simulated time follows the /clock of another (use_sim_time)"
             )
@@ -108,9 +108,9 @@ class SimulationLoop(ScenarioRun):
     def replace(self, scenario: Scenario) -> Setup:
         """Put another scenario in force, its real time factor at once too."""
         setup = super().replace(scenario)
-        if scenario.parameters.real_time_factor != self._pace.factor:
-            self._pace.factor = scenario.parameters.real_time_factor
-            if not self._pace.followed:
+        if scenario.parameters.real_time_factor != self.pace.factor:
+            self.pace.factor = scenario.parameters.real_time_factor
+            if not self.pace.followed:
                 self._anchor()
         return setup
 
@@ -129,10 +129,10 @@ class SimulationLoop(ScenarioRun):
 
     def pause(self, paused: bool) -> None:
         """Stop or resume simulated time; what was sent while it stood is taken before it goes on."""
-        if paused != self.timekeeping.paused:
+        if paused != self.paused:
             if not paused:
                 self.take_commands()
-            self.timekeeping.paused = paused
+            self.paused = paused
             self._steps_left = self._steps_requested = 0
             self.simulation.log("pause", {"data": paused})
             self.simulation.notify_floor()
@@ -146,7 +146,7 @@ class SimulationLoop(ScenarioRun):
         """Advance to this tick's present, or as far towards it as the tick's time allows: what a command means by now.
         Without commands nobody needs it.
         """
-        if not self.timekeeping.paused and self._present_ns > self.simulation.time_ns:
+        if not self.paused and self._present_ns > self.simulation.time_ns:
             self._caught_up = self._budget.advance(self.simulation, self._present_ns)
             self._check_failure()
 
@@ -173,7 +173,7 @@ class SimulationLoop(ScenarioRun):
         Raises InputError while time runs, or when it takes longer than STEP_PATIENCE_S; the step goes on by itself
         then.
         """
-        if not self.timekeeping.paused:
+        if not self.paused:
             raise InputError("step", "the simulation is running; pause it first")
         end = time.monotonic() + STEP_PATIENCE_S
         begun = False
@@ -191,7 +191,7 @@ class SimulationLoop(ScenarioRun):
 
     def request_step(self) -> None:
         """A wrench was taken: paused and in lockstep it is followed by a step."""
-        if self.timekeeping.paused and self.scenario.parameters.lockstep:
+        if self.paused and self.scenario.parameters.lockstep:
             self._steps_requested += 1
 
     @property
@@ -222,7 +222,7 @@ class SimulationLoop(ScenarioRun):
     def tick(self) -> None:
         """Do what is due, for no longer than pacing.WORK_NS."""
         self._budget.begin_tick()
-        if self.timekeeping.paused:
+        if self.paused:
             self._tick_paused()
         else:
             self._tick_running()
@@ -230,7 +230,7 @@ class SimulationLoop(ScenarioRun):
     def prepare_request(self) -> None:
         """Bring simulated time up to now for a request, unless a publication comes first."""
         self._budget.begin_tick()
-        if not self.timekeeping.paused:
+        if not self.paused:
             self._present_ns = min(self._simulated_present_ns(), LAST_STAMP_NS)
             if self._present_ns < self.publications.next_ns:
                 self.catch_up()
@@ -249,7 +249,7 @@ class SimulationLoop(ScenarioRun):
         ends = self._end_ns is not None and present_ns >= self._end_ns
         if self._end_ns is not None:
             present_ns = min(present_ns, self._end_ns)
-        if not self._has_listeners and self._caught_up and (self._pace.factor > 0.0 or self._pace.followed):
+        if not self._has_listeners and self._caught_up and (self.pace.factor > 0.0 or self.pace.followed):
             self.publications.pass_over(present_ns)
         due_ns = self.publications.next_ns
         while due_ns <= present_ns:
@@ -258,15 +258,15 @@ class SimulationLoop(ScenarioRun):
                 present_ns = self.simulation.time_ns
                 break
             due_ns = self.publications.next_ns
-            if due_ns <= present_ns and self._has_subscribers and self._pace.factor > 0.0 and not self._pace.followed:
-                self.timekeeping.overruns += 1
+            if due_ns <= present_ns and self._has_subscribers and self.pace.factor > 0.0 and not self.pace.followed:
+                self.pace.overruns += 1
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
         self._commands_come = self.endpoints.take_commands(wall_ns, False)
-        if ends or not self._has_listeners or self._pace.followed or not self._caught_up:
+        if ends or not self._has_listeners or self.pace.followed or not self._caught_up:
             self.catch_up()
         if ends and self._end_ns is not None and self.simulation.time_ns >= self._end_ns:
-            self.timekeeping.paused = True
+            self.paused = True
             self._on_end()
 
     def _check_listeners(self) -> None:
@@ -282,7 +282,7 @@ class SimulationLoop(ScenarioRun):
     def _tick_paused(self) -> None:
         if self.stepping:
             self._step_on()
-        if self._pace.followed and not self._pace.anchored_ns:
+        if self.pace.followed and not self.pace.anchored_ns:
             # A /clock that had not begun when the pause did.
             self._anchor()
         now_ns = time.monotonic_ns()
@@ -323,8 +323,8 @@ class SimulationLoop(ScenarioRun):
     def _check_failure(self) -> bool:
         if not self.simulation.failure:
             return False
-        if not self.timekeeping.paused:
-            self.timekeeping.paused = True
+        if not self.paused:
+            self.paused = True
             self.endpoints.warn(f"paused in the last good state: {self.simulation.failure}")
         return True
 
@@ -332,15 +332,15 @@ class SimulationLoop(ScenarioRun):
 
     def _anchor(self, stamps_stay: bool = False) -> None:
         """Simulated time goes on from where it is."""
-        self._pace.anchor(self.simulation.time_ns)
+        self.pace.anchor(self.simulation.time_ns)
         self._begin_anew(stamps_stay)
 
     def _begin_anew(self, stamps_stay: bool = False) -> None:
         """Everything that goes by the wall clock is due from now on. Stamps are the followed clock's; the log keeps how
         far they are ahead of simulated time.
         """
-        if not stamps_stay and self._pace.offset_ns != self.stamps.offset_ns:
-            self.stamps.offset_ns = self._pace.offset_ns
+        if not stamps_stay and self.pace.offset_ns != self.stamps.offset_ns:
+            self.stamps.offset_ns = self.pace.offset_ns
             self.simulation.log("clock", {"offset_ns": self.stamps.offset_ns})
         self._last_drain_ns = time.monotonic_ns()
         self._paused_publication_ns = 0
@@ -348,21 +348,21 @@ class SimulationLoop(ScenarioRun):
         self._caught_up = True
 
     def _simulated_present_ns(self) -> int:
-        anchored_ns = self._pace.anchored_ns
-        present_ns = self._pace.present_ns(self.simulation.time_ns, self.publications.next_ns, self.timekeeping)
-        if self._pace.anchored_ns != anchored_ns:
+        anchored_ns = self.pace.anchored_ns
+        present_ns = self.pace.present_ns(self.simulation.time_ns, self.publications.next_ns)
+        if self.pace.anchored_ns != anchored_ns:
             self._begin_anew()
         return present_ns
 
     def next_wake_ns(self) -> int:
         """When ``tick`` is due next [ns of wall time]."""
         latest_ns = self._last_drain_ns + TICK_NS
-        factor = self._pace.factor
+        factor = self.pace.factor
         if self.stepping or self._steps_requested or not self._caught_up:
             return 0
-        if self._pace.followed:
+        if self.pace.followed:
             return min(latest_ns, self._last_drain_ns + FOLLOW_NS)
-        if self.timekeeping.paused:
+        if self.paused:
             waits = self._steps_expected or (self._commands_come and self.scenario.parameters.lockstep)
             return self._last_drain_ns + LOCKSTEP_NS if waits else latest_ns
         if factor == 0.0:
@@ -370,7 +370,7 @@ class SimulationLoop(ScenarioRun):
         if not self._has_subscribers:
             # Recordings and viewers take states in bundles: theirs are made together, at 1 kHz ten a wake-up.
             return latest_ns
-        publication_ns = self._pace.wall_ns(self.publications.next_ns)
+        publication_ns = self.pace.wall_ns(self.publications.next_ns)
         if self._commands_come:
             # Commands taken a little before a publication show in it; those taken with it would show a period later.
             early_ns = publication_ns - int(LEAD * 1e9 / (self.publications.rate * factor))

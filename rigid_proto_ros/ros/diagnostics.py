@@ -38,7 +38,7 @@ WARNED_OF = {
 def values_of(live: LiveSimulation, subscriber: CommandSubscriber | None = None) -> dict[str, object]:
     """Counters and values by the keys of /diagnostics; from any thread."""
     loop = live.loop
-    commands, simulation, timekeeping = loop.commands, loop.simulation, loop.timekeeping
+    commands, simulation = loop.commands, loop.simulation
     # First: whatever happened up to then is counted in what follows.
     time_ns = simulation.time_ns
     momentum = simulation.angular_momentum
@@ -49,8 +49,8 @@ def values_of(live: LiveSimulation, subscriber: CommandSubscriber | None = None)
         "sim_time_ns": time_ns,
         "stamp_offset_ns": loop.stamps.offset_ns,
         "publish_rate": loop.scenario.parameters.publish_rate,
-        "overruns": timekeeping.overruns,
-        "real_time_lost_s": timekeeping.real_time_lost_s,
+        "overruns": loop.pace.overruns,
+        "real_time_lost_s": loop.pace.real_time_lost_s,
         **{f"{topic}_received": received.get(topic, 0) for topic in TOPICS},
         "commands_received": sum(received.values()),
         "refused_total": sum(refused.values()),
@@ -65,7 +65,7 @@ def values_of(live: LiveSimulation, subscriber: CommandSubscriber | None = None)
         "angular_momentum_drift": simulation.angular_momentum_drift,
         "integrator": simulation.setup.integrator.name,
         "accuracy_floor": simulation.accuracy_floor,
-        "state": "paused" if timekeeping.paused else "sleeping" if simulation.at_rest else "flying",
+        "state": "paused" if loop.paused else "sleeping" if simulation.at_rest else "flying",
         "recording": loop.scenario.parameters.record,
         "warning": simulation.failure or live.recording_trouble or simulation.too_coarse,
     }

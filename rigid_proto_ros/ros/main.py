@@ -84,7 +84,7 @@ class NodeProcess(threading.Thread):
         from rclpy.signals import SignalHandlerOptions
 
         from ..base.compilation import notify_when_compiling
-        from ..live.warm_up import warm_up
+        from ..live.live_simulation import warm_up
         from ..scene.scenario import nanoseconds
         from .node import RigidBodyNode
 

@@ -12,8 +12,7 @@ import viser
 
 from ..base.bundled import scene_names
 from ..base.compilation import notify_when_compiling
-from ..live.live_simulation import LiveSimulation
-from ..live.warm_up import warm_up
+from ..live.live_simulation import LiveSimulation, warm_up
 from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
 from ..scene.parameters import Parameters

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
-from rigid_proto_ros.live.live_simulation import LiveSimulation
-from rigid_proto_ros.live.warm_up import warm_up
+from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.parameters import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario

@@ -33,8 +33,7 @@ SCOPES = {"SCOPE_DEFAULT": 0, "SCOPE_TIME": 1, "SCOPE_STATE": 2, "SCOPE_SPAWNED"
 @pytest.fixture
 def services():
     """The services of a flight on a real physics thread, without ROS."""
-    from rigid_proto_ros.live.live_simulation import LiveSimulation
-    from rigid_proto_ros.live.warm_up import warm_up
+    from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
     from rigid_proto_ros.ros.simulation_interfaces import SimulationInterfaces
     from rigid_proto_ros.scene.scenario import make_scenario
 
