@@ -336,7 +336,7 @@ def test_example_is_a_script_that_is_simulated_unrefused(name: str) -> None:
     run = OfflineRun(read_scene(scene[1] if scene else "t_handle"), read_script(example_path(name)))
     assert run.advance(nanoseconds(25.0))
     assert not run.simulation.refused
-    assert not run.simulation.has_pending
+    assert not run.simulation._pending
 
 
 @pytest.mark.parametrize(

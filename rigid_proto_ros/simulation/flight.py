@@ -10,6 +10,7 @@ functions.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -111,6 +112,15 @@ STEP_FLOOR, PULL_FLOOR, SPIN_FLOOR, TENSOR_FLOOR, PLACE_FLOOR, FLOOR_KINDS = ran
 string whose pull is known no better; rates [rad/s] at which the rounding of a spin, or of a tensor given in other axes
 than its own, turns the attitude; the rounding of a place far from the world's origin, in lengths of the body.
 """
+
+FLOORS = (
+    "rounding of 32 units in the last place a step, in steps that short, comes to {:.2g} a second",
+    "rounding of the string's length, which its stiffness multiplies, comes to {:.2g} a second",
+    "rounding of the spin turns the attitude by up to {:.2g} rad a second",
+    "rounding of a slender tensor given in axes other than its own turns the attitude by up to {:.2g} rad a second",
+    "rounding of a position far from the world's origin is {:.2g} of the body's size",
+)
+"""What is said of each of these."""
 
 ROUNDINGS = 2.0
 """ε|ω|t that the exact free step's attitude may err. Measured in 36 flights at 1e3 to 1e6 rad/s: up to 1.1 where the
@@ -311,6 +321,11 @@ def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> N
     place = math.ldexp(1.0, math.frexp(farthest)[1] - 54) / body[of_body.LENGTH]
     if place > max(accuracy * (flight.now_ns - flight.start_ns) * 1e-9, FLOOR):
         floors[PLACE_FLOOR] = max(floors[PLACE_FLOOR], place)
+
+
+def floor_text(floors: Iterable[float]) -> str:
+    """What floors of a flight, by kind, say; empty where there are none."""
+    return "; ".join(text.format(floor) for text, floor in zip(FLOORS, floors, strict=True) if floor)
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)

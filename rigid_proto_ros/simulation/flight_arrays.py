@@ -242,11 +242,6 @@ class FlightArrays:
         """The state now."""
         return State(self.integers[_NOW_NS], self.row.copy())
 
-    @property
-    def acts(self) -> bool:
-        """Whether any load acts."""
-        return bool(self.integers[_ACTING])
-
     def acting(self) -> Iterator[ActingLoad]:
         """The loads that act, in the order in which they began."""
         for row in self._loads[: self.integers[_ACTING]]:

@@ -12,13 +12,19 @@ from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
 from typing import Any
 
+import numpy as np
+
 from ..base.errors import CommandRefused, InputError
+from ..base.rotation import cross, dot, length, times, transposed_times
+from ..base.vectors import Numbers, Vector
 from ..motion.integrators import check_supported
 from ..motion.integrators.integrator import STRING
-from ..motion.loads import Load, load_of_bytes
-from ..motion.state import State, shift_com
+from ..motion.integrators.series_steps import degree_of_motion, fastest_swing
+from ..motion.loads import TORQUE_WORLD, Load, load_of_bytes
+from ..motion.problem import PROBLEM
+from ..motion.state import State, angular_momentum, shift_com
 from ..motion.string import StringState
-from ..motion.variables import MAX_SPEED
+from ..motion.variables import MAX_SPEED, VARIABLES
 from . import flight as fl
 from .checks import check_command, check_load_supported, check_rates, check_start, check_thrust, load_row, needs_of
 from .commands import (
@@ -41,8 +47,7 @@ from .commands import (
     slot_name,
 )
 from .event_log import EventLog
-from .flight_arrays import APPLY, CUT, END_ALL, END_DUE, FINISH, TIMEOUTS, FlightArrays
-from .observables import Observables
+from .flight_arrays import APPLY, CUT, END_ALL, END_DUE, FINISH, TIMEOUTS, ActingLoad, FlightArrays
 from .observer import (
     AccuracyFloor,
     Applied,
@@ -70,14 +75,16 @@ FLOOR_PERIOD_NS = 50_000_000
 """[ns, simulated] How often observers are told how far the motion is held to its accuracy."""
 
 
-class Simulation(Observables):
-    """One body under commands; what can be read off it is in observables.py.
+class Simulation:
+    """One body under commands.
 
     Not for several threads: one owner submits and advances. ``time_ns`` and ``state`` are those last asked for.
     ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: the place
     of the command that acts at this moment in its list, if it is an entry of one. ``logs_timeouts``: a held wrench that
     times out is an event. ``setup_of``: gives the setup that a change leads to which doesn't bring its own.
     """
+
+    time_ns: int
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
         self.setup = setup
@@ -447,6 +454,150 @@ class Simulation(Observables):
             self.failure += "; a string that pushes has no direction where its knot meets its free end"
         arrays.call(FINISH)
         return self.state
+
+    # What can be read off it, at the time it was last advanced to
+
+    @property
+    def acting(self) -> list[ActingLoad]:
+        """The loads that act now: in the order in which they began."""
+        return list(self._arrays.acting())
+
+    @property
+    def flight(self) -> np.record:
+        """All that the compiled flight knows (simulation/flight.py), to be read."""
+        return self._arrays.flight
+
+    @property
+    def steps(self) -> int:
+        """Steps committed since start or reset; sampling takes none."""
+        return int(self.flight.steps_before + fl.steps_of_segment(self.flight))
+
+    @property
+    def force_evaluations(self) -> int:
+        """Evaluations of the equations of motion in those steps."""
+        in_segment = fl.evaluations_of_segment(self.flight, self._arrays.methods)
+        return int(self.flight.evaluations_before + in_segment)
+
+    @property
+    def choice(self) -> str:
+        """Which method advances the body now, and why."""
+        flight = self.flight
+        degree = int(flight.degree)
+        return self._arrays.integrator.methods[int(flight.method)].choice.format(
+            step_s=int(flight.step_ns) * 1e-9,
+            degree=degree,
+            degree_of_motion=degree_of_motion(degree),
+            swing=fastest_swing(flight.problem),
+        )
+
+    @property
+    def accuracy_floor(self) -> str:
+        """Why, since start or reset, rounding and not the accuracy asked for has set what the motion errs; empty where
+        it hasn't, or nothing adapts to the accuracy.
+        """
+        return fl.floor_text(self.floors)
+
+    @property
+    def floors(self) -> list[float]:
+        """The same by kind (flight.FLOOR_KINDS), 0 where it hasn't."""
+        if not self.setup.integrator.chooses and self.setup.integrator.name != "free_body":
+            return [0.0] * fl.FLOOR_KINDS
+        floors = self.flight.floors.copy()
+        fl.note_floors(self.flight, self._arrays.methods, floors)
+        return [float(floor) for floor in floors]
+
+    @property
+    def too_coarse(self) -> str:
+        """Why the fixed step says nothing here, |ω|h or ω_s h being beyond the integrator's limit; empty
+        when it does.
+        """
+        setup = self.setup
+        limit, h = setup.integrator.stability_limit, setup.step_ns * 1e-9
+        spin = length(self.state.angular_velocity_body) * h
+        string = self.string
+        swing = string.frequency * h if string else 0.0
+        if spin > limit:
+            return f"{setup.integrator.name}: |w| step = {spin:.3g}, good up to {limit:g}"
+        if swing > limit:
+            return f"{setup.integrator.name}: string frequency times step = {swing:.3g}, good up to {limit:g}"
+        return ""
+
+    @property
+    def string(self) -> StringState | None:
+        """The string as it is tied, or None."""
+        return self._string.tied
+
+    @property
+    def attach(self) -> Vector:
+        """Where the next target ties the string, in mesh coordinates."""
+        return self._string.attach
+
+    @property
+    def hand_work(self) -> float:
+        """What the hand at the string's free end has worked since start or reset [J]."""
+        return float(self.flight.work_before + self.flight.work)
+
+    @property
+    def string_heat(self) -> float:
+        """What the string's damper has turned to heat since start or reset [J]."""
+        return float(self.flight.lost_before + self.flight.lost)
+
+    @property
+    def potential_energy(self) -> float:
+        """−m g·x, and the string's [J]."""
+        setup = self.setup
+        # Read once: another thread may let it go meanwhile.
+        string = self.string
+        energy = -setup.body.mass * dot(setup.gravity, self.state.position)
+        return energy + (string.potential_energy(setup.body, self.state) if string else 0.0)
+
+    @property
+    def kinetic_energy(self) -> float:
+        """½ m|v|² + ½ ωᵀIω [J]."""
+        return self.state.kinetic_energy(self.setup.body.mass, self.setup.body.inertia)
+
+    @property
+    def angular_momentum(self) -> np.ndarray:
+        """R I ω about the COM (3,) [N m s, world]."""
+        return self.state.angular_momentum(self.setup.body.inertia)
+
+    @property
+    def angular_momentum_drift(self) -> float:
+        """|L − L₀|/|L₀| since the present segment began; 0 while something turns the body, or without spin."""
+        # Torques, and moments of forces, stand behind the forces.
+        if self.string is not None or self.flight.sums[TORQUE_WORLD:].any():
+            return 0.0
+        if self.setup.angular_damping or not self.setup.gyroscopic:
+            return 0.0
+        start = np.array(angular_momentum(self.flight.start, self.setup.body.inertia.ravel()))
+        moved, size = self.angular_momentum - start, length(start)
+        return length(moved) / size if size > 0.0 else 0.0
+
+    @property
+    def at_rest(self) -> bool:
+        """Nothing moves, acts or is about to."""
+        still = not (self.state.row[7:].any() or self.setup.gravity.any())
+        return still and not self.acting and self.string is None and not self._pending
+
+    def accelerations(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the COM (3,) [m/s²] and angular (3,) [rad/s²], both in world axes, now."""
+        linear, angular = self._accelerations()
+        return linear, times(self.state.rotation, angular)
+
+    def specific_force(self, point: Numbers) -> np.ndarray:
+        """What an accelerometer at ``point`` (3,) [m, body axes from the COM] shows now (3,) [m/s², body axes]:
+        Rᵀ(a − g) + ω' × r + ω × (ω × r).
+        """
+        linear, angular = self._accelerations()
+        w = self.state.angular_velocity_body
+        own = transposed_times(self.state.rotation, linear - self.setup.gravity)
+        shown: np.ndarray = own + cross(angular, point) + cross(w, cross(w, point))
+        return shown
+
+    def _accelerations(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the COM (3,) [m/s², world] and angular (3,) [rad/s², body axes], now."""
+        six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(VARIABLES)))
+        return six[:3], six[3:]
 
 
 def _no_change(command: Change) -> Setup:

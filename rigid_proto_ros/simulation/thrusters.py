@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ..base.errors import InputError
@@ -59,20 +58,20 @@ class Push(NamedTuple):
     off_ns: int = NEVER
 
 
-@dataclass
 class ThrusterControl:
-    """The thrusters of a running simulation. due_ns: when something becomes of them by itself. pushes: what
-    each pushes with, in the order of their names.
+    """The thrusters of a running simulation. pushes: what each pushes with, in the order of their names. due_ns: when
+    something becomes of them by itself.
     """
 
-    thrusters: Mapping[str, Thruster]
-    due_ns: int = NEVER
-    last_ns: int = 0
-    times_out: bool = False
-    pushes: list[Push] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
+    def __init__(self, thrusters: Mapping[str, Thruster]) -> None:
+        self.thrusters = thrusters
+        self.last_ns = 0
         self.clear()
+
+    def clear(self) -> None:
+        """Nothing pushes any more, at once."""
+        self.pushes = [Push()] * len(self.thrusters)
+        self.due_ns, self.times_out = NEVER, False
 
     def command(self, forces: Iterable[float], now_ns: int, timeout_ns: int) -> list[tuple[int, Load]]:
         """Push with these forces; returns what each pushes with from now on, by its number, but for those that have to
@@ -88,7 +87,6 @@ class ThrusterControl:
                 continue
             self.pushes[number] = Push(force, before.on_ns if before.force else now_ns)
             loads.append((number, thruster.load(force)))
-        self.times_out = timeout_ns > 0 and any(push.force and push.off_ns == NEVER for push in self.pushes)
         self._find_due(timeout_ns)
         return loads
 
@@ -105,18 +103,13 @@ class ThrusterControl:
         self._find_due(timeout_ns)
         return loads, timed_out
 
-    def clear(self) -> None:
-        """Nothing pushes any more, at once."""
-        self.pushes = [Push()] * len(self.thrusters)
-        self.due_ns, self.times_out = NEVER, False
-
     def change(self, timeout_ns: int, now_ns: int) -> None:
         """The timeout is another one from now on."""
-        self.times_out = timeout_ns > 0 and any(push.force and push.off_ns == NEVER for push in self.pushes)
         self._find_due(timeout_ns)
         self.due_ns = max(self.due_ns, now_ns)
 
     def _find_due(self, timeout_ns: int) -> None:
         self.due_ns = min((push.off_ns for push in self.pushes), default=NEVER)
+        self.times_out = timeout_ns > 0 and any(push.force and push.off_ns == NEVER for push in self.pushes)
         if self.times_out:
             self.due_ns = min(self.due_ns, self.last_ns + timeout_ns)

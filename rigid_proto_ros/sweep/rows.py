@@ -31,7 +31,6 @@ from ..simulation import batch
 from ..simulation import flight as fl
 from ..simulation.checks import check_command, check_start
 from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand
-from ..simulation.observables import floor_text
 from ..simulation.quantities import CONTEXT, STATE, begin, measure_flight
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
@@ -312,7 +311,7 @@ def _table(
         table[name] = np.where(failed, np.nan, results.measured[:, k])
     floors = np.full(len(rows), None, dtype=object)
     for i in np.flatnonzero(results.floors.any(axis=1) & ~failed).tolist():
-        floors[i] = floor_text(results.floors[i])
+        floors[i] = fl.floor_text(results.floors[i])
     table["accuracy_floor"] = floors
     table["failure"] = failures
     return table

@@ -8,7 +8,7 @@ from sweep_studies import HUNG, POKES, PULLED, STRUCTURE, study
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.simulation.batch import new_results
-from rigid_proto_ros.simulation.observables import floor_text
+from rigid_proto_ros.simulation.flight import floor_text
 from rigid_proto_ros.sweep.rows import Chunk, FailedFlight, run_chunk, simulate_row
 
 
