@@ -16,27 +16,17 @@ def rotation(seed: int) -> np.ndarray:
 
 def box(sides=(1.0, 1.0, 1.0), cells: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """A cuboid about the origin, each face cut into cells x cells squares of two triangles."""
-    number: dict[tuple, int] = {}
-    triangles = []
-
-    def vertex(*cell) -> int:
-        return number.setdefault(cell, len(number))
-
+    u, v = (grid.ravel() for grid in np.meshgrid(np.arange(cells), np.arange(cells), indexing="ij"))
+    squares = []
     for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
         for end in (0, cells):
-            for i in range(cells):
-                for j in range(cells):
-                    ring = []
-                    for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
-                        cell = [0, 0, 0]
-                        cell[axis], cell[u], cell[v] = end, i + du, j + dv
-                        ring.append(vertex(*cell))
-                    if end == 0:
-                        ring.reverse()
-                    triangles += [[ring[0], ring[1], ring[2]], [ring[0], ring[2], ring[3]]]
-    vertices = (np.array(list(number), dtype=float) / cells - 0.5) * np.asarray(sides)
-    return vertices, np.array(triangles)
+            corners = np.full((len(u), 4, 3), end)
+            for k, (du, dv) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
+                corners[:, k, (axis + 1) % 3], corners[:, k, (axis + 2) % 3] = u + du, v + dv
+            squares.append(corners if end else corners[:, ::-1])
+    grid, number = np.unique(np.concatenate(squares).reshape(-1, 3), axis=0, return_inverse=True)
+    quads = number.reshape(-1, 4)
+    return (grid / cells - 0.5) * np.asarray(sides), quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
 
 
 def sphere(rings: int, radii=(1.0, 1.0, 1.0)) -> tuple[np.ndarray, np.ndarray]:

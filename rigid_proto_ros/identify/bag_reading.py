@@ -79,7 +79,7 @@ def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     series = [part for part in (one.within(*window) for one in series) if len(part.times_ns)]
     if not series:
         raise InputError("--from", choice.first_s, f"a window with samples of {path} in it")
-    loads = ms.no_loads()
+    loads = ms.load_history()
     if "wrench" in chosen:
         wrench = chosen["wrench"]
         loads = wrench_history(wrench.name, wrench.times_ns, wrench.numbers, *_wrench_frame(wrench, chosen["pose"]))

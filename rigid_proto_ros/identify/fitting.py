@@ -50,11 +50,17 @@ OFFSET_MARGIN_S = 0.05
 """The largest difference of two clocks that is looked for."""
 
 
+USUAL = (
+    "usual causes: positions that aren't in m, rates in degrees, accelerations in g, gravity along another axis"
+    " (--gravity), quaternions that begin with w, a wrench along other axes (--wrench TOPIC@FRAME), clocks"
+)
+
+
 class CannotFlyError(InputError):
     """An estimate with which a flight can't be simulated."""
 
-    def __init__(self, cause: str = "--from and --to exclude parts that are no free motion") -> None:
-        super().__init__("identify", f"the estimate can't be simulated; {cause}")
+    def __init__(self) -> None:
+        super().__init__("identify", f"the estimate can't be simulated; {USUAL}")
 
 
 @dataclass(frozen=True)
@@ -254,38 +260,29 @@ class Estimate:
         return np.inf if there is None else there.cost - self._cost
 
 
-def _first_problem(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> tuple[Problem, float]:
-    """Short segments about the initial estimate, and their length [s]."""
+def fit_flights(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> Estimate:
+    """The most likely values, from these on; raises CannotFlyError."""
     total = sum(flight.duration_s for flight in flights)
     samples = sum(len(flight.pose[0].times_ns) for flight in flights)
     rate = max(flight.high_rate for flight in flights)
     length = max(FIRST_ANGLE / max(rate, 1e-9), total / MOST_SEGMENTS, FEWEST_SAMPLES * total / samples)
+    margin = OFFSET_MARGIN_S if "offset" in unknowns else 0.0
     sigmas = {one.name: noise_by_differences(one) for flight in flights for one in flight.series}
-    segments = sh.cut(flights, length, _margin(unknowns))
-    return Problem(segments, sigmas, initial_values(flights, unknowns, values), unknowns), length
-
-
-def _margin(unknowns: Unknowns) -> float:
-    return OFFSET_MARGIN_S if "offset" in unknowns else 0.0
-
-
-def fit_flights(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: Values) -> Estimate:
-    """The most likely values, from these on; raises CannotFlyError."""
-    problem, length = _first_problem(flights, unknowns, values)
-    starts = [one.begin(local_start(one.flight, one.begin_ns)) for one in problem.segments]
-    while len(problem.segments) > len(flights):
+    values = initial_values(flights, unknowns, values)
+    known: dict[tuple[int, int], np.ndarray] = {}
+    while True:
+        problem = Problem(sh.cut(flights, length, margin), sigmas, values, unknowns)
+        starts = []
+        for one in problem.segments:
+            state = known.get((id(one.flight), one.begin_ns))
+            starts.append(one.begin(local_start(one.flight, one.begin_ns) if state is None else state))
+        if len(problem.segments) <= len(flights):
+            break
         values, starts = problem.solved(starts)
         sigmas = problem.noise_left(values, starts)
         # Segments twice as long begin where every second of these does.
         known = {(id(one.flight), one.begin_ns): start for one, start in zip(problem.segments, starts, strict=True)}
         length *= 2.0
-        problem = Problem(sh.cut(flights, length, _margin(unknowns)), sigmas, values, unknowns)
-        starts = [
-            one.begin(known[id(one.flight), one.begin_ns])
-            if (id(one.flight), one.begin_ns) in known
-            else one.begin(local_start(one.flight, one.begin_ns))
-            for one in problem.segments
-        ]
     for _ in range(5):
         values, starts = problem.solved(starts, 60, 1e-7)
         before, sigmas = problem.sigmas, problem.noise_left(values, starts)

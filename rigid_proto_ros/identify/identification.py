@@ -16,7 +16,7 @@ from ..base.errors import InputError
 from ..mass.export import urdf_inertial
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
-from .fitting import CannotFlyError, Estimate, fit_flights
+from .fitting import USUAL, Estimate, fit_flights
 from .measurements import ACCELERATION, MeasuredFlight, topics_of
 from .unknowns import DEFAULT_FIT, Values, make_unknowns, possible_tensor
 from .verdict import Identifiability, Quantity, ResidualCheck, Unidentified, check_residuals
@@ -25,10 +25,6 @@ GUESSED_RADIUS = 0.1
 """Of the ball that stands for a body of which nothing is known [m]."""
 FEWEST = 8
 """Poses of a flight."""
-USUAL = (
-    "usual causes: positions that aren't in m, rates in degrees, accelerations in g, gravity along another axis"
-    " (--gravity), quaternions that begin with w, a wrench along other axes (--wrench TOPIC@FRAME), clocks"
-)
 MISFIT = "the residuals are larger than the noise, so the numbers may be farther off than their standard deviations say"
 OTHER_UNITS = {"gravity": "m/s²", "offset": "s", "gyro_bias": "rad/s", "accel_bias": "m/s²", "imu_place": "m"}
 DAMPING_UNITS = ("N s/m", "N m s")
@@ -38,8 +34,7 @@ TENSOR_NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 @dataclass(frozen=True)
 class Identification:
     """The estimate, what of it is identified, and the checks of its residuals. guessed: of ``mass``, ``com`` and
-    ``inertia`` what was neither asked for nor given, which has no number. cause: what may be the cause where the
-    residuals are no noise.
+    ``inertia`` what was neither asked for nor given, which has no number.
     """
 
     flights: Sequence[MeasuredFlight]
@@ -48,7 +43,6 @@ class Identification:
     checks: Sequence[ResidualCheck]
     assumed: Sequence[str]
     guessed: frozenset[str] = frozenset()
-    cause: str = ""
 
     @property
     def unidentified(self) -> list[Unidentified]:
@@ -118,8 +112,8 @@ class Identification:
 
     @property
     def remarks(self) -> list[str]:
-        """On the residuals."""
-        return [*filter(None, [self.cause]), *(remark for check in self.checks for remark in check.remarks)]
+        """On the residuals, what usually is the cause first, where they are no noise."""
+        return [*([] if self.fits else [USUAL]), *(remark for check in self.checks for remark in check.remarks)]
 
     @property
     def _other_slots(self) -> list[int]:
@@ -164,17 +158,12 @@ def identify(
             raise InputError("session", f"{flight.name} has {count} samples", f"at least {FEWEST} poses")
     fit = [group for group in fit if not (group == "mass" and known.mass is not None)]
     unknowns = make_unknowns(fit, topics_of(flights))
-    first = _first_values(flights[0], known)
-    try:
-        estimate = fit_flights(flights, unknowns, first)
-    except CannotFlyError:
-        raise CannotFlyError(USUAL) from None
+    estimate = fit_flights(flights, unknowns, _first_values(flights[0], known))
     given = {"mass": known.mass is not None or known.body is not None}
     guessed = frozenset(name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.body is not None))
     checks = check_residuals(flights, estimate)
-    cause = "" if all(check.is_noise for check in checks) else USUAL
     identifiability = Identifiability(estimate, known.length)
-    return Identification(flights, estimate, identifiability, checks, _assumed(flights, known, fit), guessed, cause)
+    return Identification(flights, estimate, identifiability, checks, _assumed(flights, known, fit), guessed)
 
 
 def _first_values(first: MeasuredFlight, known: Known) -> Values:

@@ -50,17 +50,12 @@ class SampledChanges:
     change, -1 for none, and sds_s (e,) [s] say how well its time is known.
     """
 
-    before: np.ndarray
-    after: np.ndarray
-    sds_s: np.ndarray
+    before: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    after: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    sds_s: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __len__(self) -> int:
         return len(self.sds_s)
-
-
-def no_changes() -> SampledChanges:
-    """Of loads whose times are exact."""
-    return SampledChanges(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -73,7 +68,7 @@ class LoadHistory:
     end_ns: np.ndarray
     loads: np.ndarray
     topic: str = ""
-    changes: SampledChanges = field(default_factory=no_changes)
+    changes: SampledChanges = field(default_factory=SampledChanges)
 
     def moved(self, offset_s: float, changes_s: np.ndarray) -> LoadHistory:
         """All loads later by an offset, and the sampled changes (e,) by their own, or as they are for none (0,)."""
@@ -100,15 +95,10 @@ class LoadHistory:
         return Wrenches(np.ascontiguousarray(commands, np.int64), np.ascontiguousarray(self.loads[acts][order]))
 
 
-def load_history(rows: Sequence[tuple[int, int, np.ndarray]]) -> LoadHistory:
-    """Of (begin [ns], end [ns], load (LOAD,))."""
+def load_history(rows: Sequence[tuple[int, int, np.ndarray]] = ()) -> LoadHistory:
+    """Of (begin [ns], end [ns], load (LOAD,)); none for a free flight."""
     begin, end = (np.array([row[k] for row in rows], np.int64) for k in (0, 1))
     return LoadHistory(begin, end, np.array([row[2] for row in rows]).reshape(-1, LOAD))
-
-
-def no_loads() -> LoadHistory:
-    """Of a free flight."""
-    return load_history([])
 
 
 @dataclass(frozen=True)
@@ -121,7 +111,7 @@ class MeasuredFlight:
 
     name: str
     series: tuple[Series, ...]
-    load_history: LoadHistory = field(default_factory=no_loads)
+    load_history: LoadHistory = field(default_factory=load_history)
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     linear_damping: float = 0.0
     angular_damping: float = 0.0

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError
@@ -11,7 +13,7 @@ from ..motion.loads import Load, resolve_load
 from ..scene.command_codec import frame_names, of_event
 from ..scene.scenario import Scenario
 from ..session.recorded_session import RecordedSession, decode_event, session_scenario
-from ..simulation.commands import ClearWrench, WrenchCommand
+from ..simulation.commands import NO_SLOT, ClearWrench, WrenchCommand
 from ..simulation.setup import Setup
 from .measurements import ATTITUDE, POSITION, LoadHistory, MeasuredFlight, Series, load_history
 
@@ -59,12 +61,22 @@ def _series(session: RecordedSession) -> list[Series]:
     ]
 
 
+@dataclass
+class _Acting:
+    """A load and when it acts [ns]; slot: what the next command of the same slot ends."""
+
+    begin_ns: int
+    end_ns: int
+    load: np.ndarray
+    slot: int
+
+
 def _load_history(
     session: RecordedSession, setup: Setup, frames: tuple[str, str], name: str, end_ns: int
 ) -> LoadHistory:
-    """Loads of the event log up to a time, as intervals."""
-    rows: list[tuple[int, int, np.ndarray]] = []
-    held: dict[int, tuple[int, np.ndarray]] = {}
+    """Loads of the event log up to a time, as intervals; impulses are those that begin and end at once."""
+    impulses: list[tuple[int, int, np.ndarray]] = []
+    acting: list[_Acting] = []
     for number, line in enumerate(session.lines, 1):
         time_ns, kind, content = decode_event(line, number)
         if time_ns > end_ns:
@@ -73,41 +85,28 @@ def _load_history(
         if command is None:
             continue
         if isinstance(command, ClearWrench):
-            rows = [(begin, min(end, max(time_ns, begin)), row) for begin, end, row in rows]
-            for wrench in held.values():
-                _let_go(rows, wrench, time_ns, setup)
-            held = {}
+            for one in acting:
+                one.end_ns = min(one.end_ns, time_ns)
             continue
         if not isinstance(command, WrenchCommand):
             reason = f"at {1e-9 * time_ns:g} s {name} has a {kind} event"
             raise InputError("session", f"{reason}: only wrenches and pokes are supported; end before it with --to")
-        row = _tracked(command, setup, name, time_ns)
-        if command.held:
-            if command.slot in held:
-                _let_go(rows, held.pop(command.slot), time_ns, setup)
-            if np.any(row[5:11]):
-                held[command.slot] = (time_ns, row)
-        elif command.frame.impulse:
-            rows.append((time_ns, time_ns, row))
-        else:
-            duration = command.duration_ns if command.duration_ns >= 0 else setup.poke_duration_ns
-            rows.append((time_ns, time_ns + duration, row))
-    for wrench in held.values():
-        _let_go(rows, wrench, end_ns, setup)
-    return load_history(rows)
-
-
-def _let_go(rows: list[tuple[int, int, np.ndarray]], held: tuple[int, np.ndarray], time_ns: int, setup: Setup) -> None:
-    """End a held wrench at a time, or when its timeout came before."""
-    if time_ns > held[0]:
-        timeout = held[0] + setup.wrench_timeout_ns if setup.wrench_timeout_ns else time_ns
-        rows.append((held[0], min(time_ns, timeout), held[1]))
+        load = _tracked(command, setup, name, time_ns)
+        if command.frame.impulse:
+            impulses.append((time_ns, time_ns, load))
+            continue
+        for one in acting:
+            if one.slot == command.slot != NO_SLOT:
+                one.end_ns = min(one.end_ns, time_ns)
+        usual = setup.wrench_timeout_ns or end_ns if command.held else setup.poke_duration_ns
+        lasts = command.duration_ns if command.duration_ns >= 0 else usual
+        acting.append(_Acting(time_ns, min(time_ns + lasts, end_ns), load, command.slot))
+    pushes = [(one.begin_ns, one.end_ns, one.load) for one in acting if one.end_ns > one.begin_ns]
+    return load_history(impulses + pushes)
 
 
 def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> np.ndarray:
     """The load with its point in the tracked frame."""
-    if command.frame.slot and not command.held:
-        raise InputError("session", f"at {1e-9 * time_ns:g} s {name} has a poke in a slot; end before it with --to")
     if command.frame.point[0] == "ray":
         where = f"at {1e-9 * time_ns:g} s {name} has a poke along a ray"
         raise InputError("session", f"{where}: the point it hit isn't in the log; end before it with --to")

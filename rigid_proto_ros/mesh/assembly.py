@@ -57,7 +57,8 @@ class Assembly:
         return np.concatenate(self._vertices), np.concatenate(self._triangles)
 
 
-def _tag(element: ElementTree.Element) -> str:
+def tag_of(element: ElementTree.Element) -> str:
+    """An element's name without its namespace."""
     return str(element.tag).rpartition("}")[2]
 
 
@@ -66,12 +67,12 @@ def _geometry_alone(data: bytes, name: str) -> bytes:
     root = ElementTree.fromstring(data)
     for parent in list(root.iter()):
         for child in list(parent):
-            if _tag(child) in _UNUSED:
+            if tag_of(child) in _UNUSED:
                 parent.remove(child)
-            elif _tag(child) == "instance_controller":
+            elif tag_of(child) == "instance_controller":
                 raise MeshError(name, f"{child.get('url')} deforms its mesh; apply skin or morph before the export")
-            elif _tag(child) in ("convex_mesh", "spline", "brep", "ph", "skew"):
-                raise MeshError(name, f"it has <{_tag(child)}>", "triangles and polygons without holes, not skewed")
+            elif tag_of(child) in ("convex_mesh", "spline", "brep", "ph", "skew"):
+                raise MeshError(name, f"it has <{tag_of(child)}>", "triangles and polygons without holes, not skewed")
     return ElementTree.tostring(root)
 
 

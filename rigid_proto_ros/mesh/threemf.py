@@ -10,7 +10,7 @@ import zipfile
 import numpy as np
 
 from ..base.errors import MeshError
-from .assembly import Assembly
+from .assembly import Assembly, tag_of
 
 UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 SUPPORTS = ("support", "solidsupport")
@@ -20,10 +20,6 @@ MAX_PLACES = 100_000
 _CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 _PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
 _READ = (_CORE, _PRODUCTION, "http://schemas.microsoft.com/3dmanufacturing/material/2015/02")
-
-
-def _tag(element: ElementTree.Element) -> str:
-    return element.tag.rpartition("}")[2]
 
 
 def _matrix(text: str | None) -> np.ndarray:
@@ -97,25 +93,25 @@ class _Package:
             return
         matrix = above @ _matrix(reference.get("transform"))
         for child in found:
-            if _tag(child) == "mesh":
+            if tag_of(child) == "mesh":
                 ratio = self.unit(target) / self.unit(self.root()) if target != path else 1.0
                 self._assembly.add(*self._mesh(child), matrix @ np.diag([ratio, ratio, ratio, 1.0]), f"object {number}")
-            elif _tag(child) == "components":
+            elif tag_of(child) == "components":
                 for component in child:
                     self.place(component, target, matrix, depth + 1)
-            elif _tag(child) != "metadatagroup":
-                raise self.refusal(f"object {number} is made of {_tag(child)}", "objects of mesh and components")
+            elif tag_of(child) != "metadatagroup":
+                raise self.refusal(f"object {number} is made of {tag_of(child)}", "objects of mesh and components")
 
     def _mesh(self, mesh: ElementTree.Element) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (n, 3) and triangles (m, 3) of a mesh element."""
         vertices, triangles = [], []
         for child in mesh:
-            if _tag(child) == "vertices":
+            if tag_of(child) == "vertices":
                 vertices += [[float(vertex.attrib[axis]) for axis in "xyz"] for vertex in child]
-            elif _tag(child) == "triangles":
+            elif tag_of(child) == "triangles":
                 triangles += [[int(triangle.attrib[corner]) for corner in ("v1", "v2", "v3")] for triangle in child]
-            elif _tag(child) != "trianglesets":
-                raise self.refusal(f"a mesh with {_tag(child)}", "meshes of vertices and triangles")
+            elif tag_of(child) != "trianglesets":
+                raise self.refusal(f"a mesh with {tag_of(child)}", "meshes of vertices and triangles")
         return np.array(vertices).reshape(-1, 3), np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 

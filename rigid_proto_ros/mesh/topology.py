@@ -57,21 +57,12 @@ def _root(parent: np.ndarray, i: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _join(parent: np.ndarray, s: int, t: int) -> None:
-    """Put s and t into one set, whose root is its smallest member."""
-    a, b = _root(parent, s), _root(parent, t)
-    if a < b:
-        parent[b] = a
-    elif b < a:
-        parent[a] = b
-
-
-@njit(cache=True, nogil=True)
 def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray:
     """The smallest member of the set that each of 0 to count − 1 is in, when first[k] and second[k] are in one set."""
     parent = np.arange(count)
     for k in range(first.shape[0]):
-        _join(parent, first[k], second[k])
+        a, b = _root(parent, first[k]), _root(parent, second[k])
+        parent[max(a, b)] = min(a, b)  # a set's root is its smallest member
     for i in range(count):
         parent[i] = _root(parent, i)
     return parent

@@ -6,15 +6,19 @@ A mistake is a sentence and what it leads to. One of shape, frame or order may c
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Iterator
 
 import numpy as np
 
-from ..mass.properties import MassProperties
+from ..base.errors import InputError
+from ..mass.properties import MassProperties, MeshMoments
 from ..mass.tensor import six_from_tensor, tensor_from_six
+from ..mesh.solids import convex_hull
 from .link_shapes import LinkShapes, parallel_axis
+from .reading import SIX
 
 LIMIT = 1e-3
 """Differences up to this are taken for rounding of printed numbers."""
@@ -36,7 +40,6 @@ _FACTORS = {
     _POUND: "mass in pounds",
     _POUND * _INCH**2: "tensor in lb in²",
 }
-_NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _LARGEST_POWER = 9
 """Of ten, by which a single entry may be off: from kg m² to g mm²."""
 
@@ -53,32 +56,19 @@ _QUARTER_TURNS = [turn for turn in _TURNS if np.linalg.det(turn) > 0.0]
 def _other_shapes(parts: LinkShapes, mass: float) -> Iterator[tuple[str, MassProperties]]:
     """What other tools and habits put in the place of the solid, in the link's axes."""
     yield "the bounding box", parts.box(mass)
-    hull = parts.hull(mass)
-    if hull is not None:
-        yield "the convex hull", hull
+    with contextlib.suppress(InputError):  # of points in one plane
+        yield "the convex hull", MeshMoments(*convex_hull(parts.points)).mass_properties(mass=mass)
 
 
-def _wrong_frames(truth: MassProperties, stated: np.ndarray, parts: LinkShapes) -> Iterator[tuple[str, np.ndarray]]:
-    """The true tensor about another point or in other axes; stated (3,): the COM that the file gives."""
+def _mistakes(truth: MassProperties, stated: np.ndarray, parts: LinkShapes) -> Iterator[tuple[str, np.ndarray]]:
+    """Each usual mistake, "" for none, and the tensor that it makes of the true one; stated (3,): the COM that the file
+    gives.
+    """
     inertia, mass, com, use = truth.inertia, truth.mass, truth.center_of_mass, parts.first.pose
-    yield "taken about the link's origin, not about the COM", inertia + parallel_axis(mass, com)
-    yield "taken about the mesh's origin, not about the COM", inertia + parallel_axis(mass, com - use.position)
-    yield "taken about the stated origin, not about the COM", inertia + parallel_axis(mass, com - stated)
-    yield "moved from the COM to the origin the wrong way round", inertia - parallel_axis(mass, com)
-    yield "in the mesh's axes, not in the link's", use.rotation.T @ inertia @ use.rotation
-    moments, axes = np.linalg.eigh(inertia)
-    for three in itertools.permutations(moments.tolist()):
-        yield "principal moments on the diagonal, their axes left out", np.diag(three)
-    for turn in _QUARTER_TURNS:  # which axis is called first, and which way it points
-        rotation = axes @ turn
-        turned = rotation.T @ (turn.T @ np.diag(moments) @ turn) @ rotation
-        yield "turned by the conjugate of the principal rotation", turned
-    if len(parts.parts) > 1:
-        yield "parts summed about their own centres", parts.summed_about_own_centers(mass)
-
-
-def _wrong_orders(inertia: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """The true tensor with its six entries in another order or with other signs, or its axes exchanged."""
+    yield "", inertia
+    for name, of in _other_shapes(parts, mass):
+        yield f"tensor of {name}, not of the solid", of.inertia
+    # The true tensor's six entries in another order or with other signs, or its axes exchanged.
     xx, xy, xz, yy, yz, zz = six_from_tensor(inertia)
     orders = {
         "signs of the products: written as plus the integrals of xy, xz, yz": (xx, -xy, -xz, yy, -yz, zz),
@@ -99,6 +89,21 @@ def _wrong_orders(inertia: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         yield f"axes {'xyz'[i]} and {'xyz'[j]} exchanged", exchanged
         quarter = f"a quarter turn about {'xyz'[3 - i - j]} left out (as between y up and z up)"
         yield quarter, exchanged * np.outer(flip, flip)
+    # About another point or in other axes.
+    yield "taken about the link's origin, not about the COM", inertia + parallel_axis(mass, com)
+    yield "taken about the mesh's origin, not about the COM", inertia + parallel_axis(mass, com - use.position)
+    yield "taken about the stated origin, not about the COM", inertia + parallel_axis(mass, com - stated)
+    yield "moved from the COM to the origin the wrong way round", inertia - parallel_axis(mass, com)
+    yield "in the mesh's axes, not in the link's", use.rotation.T @ inertia @ use.rotation
+    moments, axes = np.linalg.eigh(inertia)
+    for three in itertools.permutations(moments.tolist()):
+        yield "principal moments on the diagonal, their axes left out", np.diag(three)
+    for turn in _QUARTER_TURNS:  # which axis is called first, and which way it points
+        rotation = axes @ turn
+        turned = rotation.T @ (turn.T @ np.diag(moments) @ turn) @ rotation
+        yield "turned by the conjugate of the principal rotation", turned
+    if len(parts.parts) > 1:
+        yield "parts summed about their own centres", parts.summed_about_own_centers(mass)
 
 
 def _one_entry(have: np.ndarray, want: np.ndarray) -> str:
@@ -110,7 +115,7 @@ def _one_entry(have: np.ndarray, want: np.ndarray) -> str:
     power = round(math.log10(ratio))
     if not 1 <= abs(power) <= _LARGEST_POWER or abs(ratio / 10.0**power - 1.0) > LIMIT:
         return ""
-    return f"{_NAMES[wrong[0]]} is 10^{power} times the true one"
+    return f"{SIX[wrong[0]]} is 10^{power} times the true one"
 
 
 def _unit(factor: float) -> str | None:
@@ -128,11 +133,8 @@ def explain_inertia(given: np.ndarray, truth: MassProperties, stated: np.ndarray
     """
     if not np.any(given):
         return ("all entries zero",)
-    mistakes = [("", truth.inertia)]
-    mistakes += [(f"tensor of {name}, not of the solid", of.inertia) for name, of in _other_shapes(parts, truth.mass)]
-    mistakes += [*_wrong_orders(truth.inertia), *_wrong_frames(truth, stated, parts)]
     found = []
-    for sentence, wrong in mistakes:
+    for sentence, wrong in _mistakes(truth, stated, parts):
         factor = float(np.sum(given * wrong) / max(np.sum(wrong * wrong), 1e-300))
         unit = _unit(factor) if factor > 0.0 else None
         fits = np.max(np.abs(given - factor * wrong)) <= LIMIT * factor * np.max(np.abs(wrong))

@@ -55,14 +55,9 @@ def lump_robot(path: Path, folders: tuple[Path, ...] = ()) -> Lump:
     properties = combined([placed(link, pose) for link, pose in heavy], path.name)
     check_tensor(properties.inertia, source=f"tensor of {path.name} as one body")
     vertices, triangles, absent = _merged([(link, poses[link.name]) for link in links], search)
-    return Lump(
-        properties,
-        vertices,
-        triangles,
-        tuple((link.name, link.mass) for link, _ in heavy),
-        tuple(link.name for link in links if link.problem),
-        absent,
-    )
+    masses = tuple((link.name, link.mass) for link, _ in heavy)
+    massless = tuple(link.name for link in links if link.problem)
+    return Lump(properties, vertices, triangles, masses, massless, absent)
 
 
 def _computed(link: Link, meshes: Meshes) -> Link:
@@ -91,7 +86,6 @@ def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[np.ndarray,
                 check_shape(shape)
                 mesh = load_mesh(shape.file, search=search) if shape.kind == "mesh" else None
                 points, corners = placed_surface(shape, mesh)
-                check_finite(shape.file or shape.kind, size=float(np.linalg.norm(np.ptp(points, axis=0))))
             except InputError as error:
                 absent.append(f"{link.name}: {error}")
                 continue

@@ -152,16 +152,16 @@ def _words(axis: np.ndarray) -> str:
     return f"({', '.join(f'{value + 0.0:.2g}' for value in np.round(axis, 3))})"
 
 
-def _tensor_error(link: Link, truth: MassProperties) -> tuple[float, float]:
-    """(relative difference of the tensor, how much of it the digits printed don't explain)."""
+def _tensor_error(link: Link, truth: MassProperties) -> tuple[float, float, float]:
+    """(relative difference of the tensor, how much of it the digits printed don't explain, ratio of the sizes)."""
     size = float(np.max(np.abs(truth.inertia)))
     # A rounded mass changes the whole tensor by one factor, rounded entries change each by its own step.
     slack = min(link.mass_step / link.mass, MAX_ROUNDING)
-    factor = float(np.sum(link.inertia * truth.inertia) / np.sum(truth.inertia**2))
-    factor = min(max(factor, 1.0 - slack), 1.0 + slack)
+    ratio = float(np.sum(link.inertia * truth.inertia) / np.sum(truth.inertia**2))
+    factor = min(max(ratio, 1.0 - slack), 1.0 + slack)
     excused = np.minimum(link.inertia_step, MAX_ROUNDING * size)
     left = np.maximum(np.abs(link.inertia - factor * truth.inertia) - excused, 0.0)
-    return float(np.max(np.abs(link.inertia - truth.inertia))) / size, float(np.max(left)) / size
+    return float(np.max(np.abs(link.inertia - truth.inertia))) / size, float(np.max(left)) / size, ratio
 
 
 def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> LinkDiagnosis:
@@ -177,7 +177,7 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
         return replace(plain, note=str(error))
     offset = np.abs(link.center_of_mass - truth.center_of_mass)
     center_left = float(np.max(offset - np.minimum(link.center_step, MAX_ROUNDING * parts.diagonal))) / parts.diagonal
-    inertia_error, inertia_left = _tensor_error(link, truth)
+    inertia_error, inertia_left, ratio = _tensor_error(link, truth)
     causes: tuple[str, ...] = ()
     if inertia_left > tolerance:
         causes += explain_inertia(link.inertia, truth, link.center_of_mass, parts)
@@ -192,7 +192,7 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
         status=EXPLAINED if causes else NOT_UNIFORM if max(inertia_left, center_left) > tolerance else UNIFORM,
         center_of_mass_error=float(np.max(offset)) / parts.diagonal,
         inertia_error=inertia_error,
-        ratio=float(np.sum(link.inertia * truth.inertia) / np.sum(truth.inertia**2)),
+        ratio=ratio,
         causes=causes,
         note=note,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -13,10 +13,9 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..mass.from_mesh import MeshBody, mesh_body
-from ..mass.properties import MassProperties, MeshMoments
+from ..mass.properties import MassProperties
 from ..mesh.locate import Search
 from ..mesh.reading import Mesh, load_mesh
-from ..mesh.solids import convex_hull
 from .reading import Link, Pose, Shape, check_finite
 
 SEGMENTS = 48
@@ -78,7 +77,9 @@ def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[np.ndarray, n
 
 
 def placed_surface(shape: Shape, mesh: Mesh | None) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and triangles (m, 3) of a shape, a mesh or for None a primitive, in the link's frame."""
+    """Vertices (n, 3) and triangles (m, 3) of a shape, a mesh or for None a primitive, in the link's frame; raises
+    InputError where they aren't finite.
+    """
     if mesh is None:
         vertices, triangles = primitive_surface(shape.kind, shape.size)
     else:
@@ -86,7 +87,9 @@ def placed_surface(shape: Shape, mesh: Mesh | None) -> tuple[np.ndarray, np.ndar
         vertices, triangles = mesh.vertices[used] * shape.scale, local.reshape(-1, 3)
         if np.prod(shape.scale) < 0.0:
             triangles = triangles[:, ::-1]
-    return vertices @ shape.pose.rotation.T + shape.pose.position, triangles
+    points = vertices @ shape.pose.rotation.T + shape.pose.position
+    check_finite(shape.file or shape.kind, reach=np.abs(points).max(initial=0.0))
+    return points, triangles
 
 
 def placed(body: MassProperties | Link, pose: Pose) -> MassProperties:
@@ -119,40 +122,29 @@ class Meshes:
     """The meshes that a robot's shapes name, each loaded once; accept_open as in ``mesh_body``."""
 
     def __init__(self, search: Search, accept_open: float = 0.0) -> None:
-        self.search = search
-        self.accept_open = accept_open
-        self.body = functools.cache(self._body)
+        self.body = functools.cache(lambda file: mesh_body(load_mesh(file, search=search), accept_open=accept_open))
 
-    def _body(self, file: str) -> MeshBody:
-        return mesh_body(load_mesh(file, search=self.search), accept_open=self.accept_open)
-
-    def parts(self, shapes: Iterable[Shape]) -> LinkShapes:
+    def parts(self, shapes: Sequence[Shape]) -> LinkShapes:
         """The shapes with their meshes; raises InputError for one that can't be taken."""
-        found: list[tuple[Shape, MeshBody | None]] = []
         for shape in shapes:
             check_shape(shape)
-            found.append((shape, self.body(shape.file) if shape.kind == "mesh" else None))
-        parts = LinkShapes(found)
-        check_finite(parts.names, size=parts.diagonal)
-        return parts
+        return LinkShapes([(shape, self.body(shape.file) if shape.kind == "mesh" else None) for shape in shapes])
 
 
 class LinkShapes:
-    """Shapes, meshes with their body, in a link's frame."""
+    """Shapes, meshes with their body, in a link's frame; points (n, 3): their vertices, round primitives as inscribed
+    surfaces.
+    """
 
     def __init__(self, parts: list[tuple[Shape, MeshBody | None]]) -> None:
         self.parts = parts
         self.first = parts[0][0]
+        self.points = np.concatenate([placed_surface(shape, body.mesh if body else None)[0] for shape, body in parts])
 
     @property
     def names(self) -> str:
         """What the shapes are called: mesh names and kinds."""
         return ", ".join(dict.fromkeys(body.mesh.name if body else shape.kind for shape, body in self.parts))
-
-    @cached_property
-    def points(self) -> np.ndarray:
-        """Vertices (n, 3) of all shapes, round primitives as inscribed surfaces, in the link's frame."""
-        return np.concatenate([placed_surface(shape, body.mesh if body else None)[0] for shape, body in self.parts])
 
     @property
     def diagonal(self) -> float:
@@ -184,10 +176,3 @@ class LinkShapes:
         middle = R @ (0.5 * (local.min(axis=0) + local.max(axis=0)))
         solid = primitive_solid("box", tuple(np.ptp(local, axis=0).tolist()))
         return of_mass(placed(solid, Pose(R, middle)), mass)
-
-    def hull(self, mass: float) -> MassProperties | None:
-        """The convex hull of all as a solid of ``mass`` kg; None when it has no volume."""
-        try:
-            return MeshMoments(*convex_hull(self.points)).mass_properties(mass=mass)
-        except InputError:
-            return None

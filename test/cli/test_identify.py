@@ -46,6 +46,26 @@ def test_a_poked_session_gives_back_the_body_that_was_flown(flight: tuple, capsy
     assert found["inertia"]["izz"]["value"] == pytest.approx(truth["inertia"][2][2], rel=1e-6)
 
 
+def test_held_wrenches_count_as_long_as_they_acted(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    # Each of its own slot: for a time that is longer or shorter than the timeout, replaced, and ended by hand; and a poke
+    # that is ended in the moment in which it begins.
+    script, bag = tmp_path / "held.yaml", tmp_path / "held.mcap"
+    script.write_text(
+        "- {t: 0.1, wrench: {at: {point: [0.0, 0.03, 0.02]}, force: [0.2, 0.1, 0.1], slot: a, duration: 1.9}}\n"
+        "- {t: 0.2, wrench: {at: com, force: [0.0, 0.2, 0.0], slot: b, duration: 0.3}}\n"
+        "- {t: 0.4, wrench: {at: com, force: [0.1, 0.0, 0.3], slot: c}}\n"
+        "- {t: 0.6, at: {point: [0.01, 0.0, 0.02]}, force: [0.0, 0.0, 0.5], slot: c, duration: 1.0}\n"
+        "- {t: 2.2, wrench: {at: com, force: [0.0, 0.3, 0.0]}}\n"
+        "- {t: 2.4, at: com, force: [9.0, 0.0, 0.0]}\n"
+        "- {t: 2.4, service: clear_wrench}\n"
+    )
+    assert main(["simulate", "t_handle", "--script", str(script), "--duration", "3", "--bag", str(bag)]) == 0
+    truth, found = _inspected(capsys), _json(capsys, str(bag))
+    assert found["fits"]
+    assert found["mass"]["value"] == pytest.approx(truth["mass"], rel=1e-6)
+    assert found["inertia"]["iyy"]["value"] == pytest.approx(truth["inertia"][1][1], rel=1e-6)
+
+
 def test_two_sessions_of_one_body_are_fitted_together(flight: tuple, capsys: pytest.CaptureFixture) -> None:
     one, two = (_json(capsys, *[str(flight[0])] * count) for count in (1, 2))
     assert two["mass"]["value"] == pytest.approx(one["mass"]["value"], rel=1e-6)

@@ -40,7 +40,7 @@ def load_history(*pokes) -> ms.LoadHistory:
 def flown(values, start, times_s, load=None):
     """Samples (m, SAMPLE) of a flight from the tracked frame's start (13,) at time 0."""
     times_ns = np.round(np.asarray(times_s) * 1e9).astype(np.int64)
-    wrenches = (load or ms.no_loads()).within(0, int(times_ns[-1]) + 1)
+    wrenches = (load or ms.load_history()).within(0, int(times_ns[-1]) + 1)
     samples, good = tr.fly_rows(sh.flown_rows(np.asarray(start, float)[None], [values]), times_ns, wrenches)
     assert good.all()
     return times_ns, samples[0]
@@ -55,7 +55,7 @@ def mocap(
     position = samples[:, :3] - rot.turned(samples[:, 3:7], com) + noise[0] * rng.standard_normal((len(times), 3))
     attitude = rot.product(samples[:, 3:7], rot.exponential(noise[1] * rng.standard_normal((len(times), 3))))
     series = (ms.Series(topic, ms.POSITION, times, position), ms.Series(topic, ms.ATTITUDE, times, attitude))
-    return ms.MeasuredFlight("flight", series, load or ms.no_loads(), tuple(values.gravity))
+    return ms.MeasuredFlight("flight", series, load or ms.load_history(), tuple(values.gravity))
 
 
 def tumbling(rate=(0.4, 6.0, 0.3), velocity=(0.3, -0.2, 3.0)) -> np.ndarray:

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 from flights import SECOND, bundled_body, flight, spinning, wrench
+from mass_solids import box
 from reference_motion import angle_between, free_motion
 
 from rigid_proto_ros.base.bundled import body_names
@@ -20,13 +21,6 @@ NASA_RATES_AFTER_30_S = np.radians([12.6183907757, -17.3974747618, 31.1195888868
 
 # Unit fractions of the principal axes: a general spin, and one beside the unstable middle axis.
 DIRECTIONS = {"general": (0.6, 0.64, 0.48), "beside the middle axis": (0.01, 1.0, 0.01)}
-
-
-def box_surface(sides) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (8, 3) and outward triangles (12, 3) of a box about the origin."""
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * sides
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
 
 
 # Attitude errors [rad] after 10 s in steps of 1/120 s that docs/benchmarks.md states; measured to two digits.
@@ -52,8 +46,7 @@ def test_nasa_tumbling_brick_from_its_tensor():
 
 
 def test_nasa_tumbling_brick_from_its_mesh():
-    vertices, triangles = box_surface(NASA_SIDES)
-    properties = MeshMoments(vertices, triangles).mass_properties("solid", mass=NASA_MASS)
+    properties = MeshMoments(*box(NASA_SIDES)).mass_properties("solid", mass=NASA_MASS)
     body = make_body(properties.mass, properties.center_of_mass, properties.inertia)
     rates = flight(body, initial=spinning(NASA_RATES)).advance(30 * SECOND).angular_velocity_body
     # The published tensor is rounded to 7 digits of its box.

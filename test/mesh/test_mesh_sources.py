@@ -10,7 +10,6 @@ import pytest
 from judged_meshes import load, volume
 
 from rigid_proto_ros.base.errors import MeshError
-from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.inspection import inspect_mesh
 from rigid_proto_ros.mesh import assembly, reading
@@ -91,29 +90,6 @@ def test_a_binary_ply_with_several_lists_and_one_in_big_endian_are_read(tmp_path
         assert volume(load(tmp_path, "a.ply", header.encode() + rows)) == 1.0
         with pytest.raises(MeshError, match="truncated"):
             load(tmp_path, "cut.ply", (header.encode() + rows)[:-3])
-
-
-def test_a_ply_whose_faces_name_fractions_of_vertices_is_refused(tmp_path):
-    text = mf.ply().replace(b"3 0 1 3", b"3 0 1.5 3", 1).replace(b"list uchar int", b"list uchar float")
-    with pytest.raises(MeshError, match=r"vertex 1\.5"):
-        load(tmp_path, "a.ply", text)
-
-
-@pytest.mark.parametrize(
-    ("name", "data"),
-    [
-        ("long.off", b"OFF\n" + b"9" * 4300 + b" 12 0\n"),
-        ("nul.obj", b"#" * 5000 + b"\nv 0 0 \0\0\0\nf 1 1 1\n"),
-        ("nul.off", b"OFF\n3 1 0\n0 0 0\n\0\0\0 0 0\n1 1 1\n3 0 1 2\n"),
-        ("nul.ply", mf.ply().replace(b"element face", b"elem\0\0ent face", 1)),
-        ("name.ply", mf.ply(announced=99).replace(b"element face", b"element f\x13ce", 1)),
-    ],
-)
-def test_no_traceback_and_no_raw_bytes_in_a_message(tmp_path, capsys, name, data):
-    (tmp_path / name).write_bytes(data)
-    assert main(["inspect", str(tmp_path / name)]) == 2
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1 and all(c.isprintable() or c == "\n" for c in err)
 
 
 def xaml(matrix: str) -> bytes:
