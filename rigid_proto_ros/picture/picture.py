@@ -54,21 +54,6 @@ def angle_to(reference: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.arctan2(np.linalg.norm(np.cross(reference, vectors), axis=1), vectors @ reference)
 
 
-class Ticks:
-    """Picks the first state in each 1/rate s of simulated time."""
-
-    def __init__(self, rate: int) -> None:
-        self._period_ns = 1_000_000_000 // rate
-        self._last: int | None = None
-
-    def choose(self, times_ns: np.ndarray) -> np.ndarray:
-        """Indices of those to show of the times (n,)."""
-        ticks = times_ns // self._period_ns
-        before = int(ticks[0]) - 1 if self._last is None else self._last
-        self._last = int(ticks[-1])
-        return np.flatnonzero(np.diff(ticks, prepend=before) > 0)
-
-
 class Shape:
     """Mesh and body together. size [m]: a length that stands for the body, the diagonal of the mesh's box or of the box
     of equal inertia. tip (3,) [m, body axes]: the vertex farthest from the COM. centre, half_sizes (3,) [m, body axes]:
@@ -100,7 +85,7 @@ class Picture:
         self.shape: Shape | None = None
         self.scales = ArrowScales()
         self._wanted = wanted
-        self._rate = rate
+        self._period_ns = 1_000_000_000 // rate
         self._vertices: np.ndarray | None = None
         self._middle = np.zeros(3)
         self._mesh: DrawnMesh | None = None
@@ -119,7 +104,7 @@ class Picture:
 
     def redraw(self) -> None:
         """The next state is drawn even if it was before: other parts are wanted."""
-        self._ticks = Ticks(self._rate)
+        self._last_tick = -1
 
     # What changes
 
@@ -236,7 +221,10 @@ class Picture:
         if self.ghost is not None:
             self._body_times = np.concatenate([self._body_times, times_ns])
             self._body_attitudes = np.vstack([self._body_attitudes, rows[:, 3:7]])
-        chosen = self._ticks.choose(times_ns)
+        # Of what is only looked at, the first state of each period.
+        ticks = times_ns // self._period_ns
+        chosen = np.flatnonzero(np.diff(ticks, prepend=self._last_tick) > 0)
+        self._last_tick = int(ticks[-1])
         if not len(chosen):
             return
         times_ns, rows = times_ns[chosen], rows[chosen]

@@ -176,7 +176,7 @@ def _poinsot_view() -> Any:
     """The ellipsoid of inertia rolling on the invariable plane."""
     name = "Poinsot: the inertia ellipsoid rolls on the invariable plane"
     overrides = {"/" + style.POINSOT_HERPOLHODE: _last_seconds(HERPOLHODE_SECONDS)}
-    eye, target = np.array([2.8, -2.25, 1.1]), np.array([0.0, 0.0, -0.45])
+    eye, target = np.array([3.2, -2.55, 1.25]), np.array([0.0, 0.0, -0.45])
     return _view(style.POINSOT, "$origin/**", name, eye, target, overrides)
 
 

@@ -99,7 +99,9 @@ class BodyTab:
         return {"explicit_inertia.mass" if explicit else "mass": factor * self._base_mass}
 
     def _tensor_text(self, _: Mapping[str, Any]) -> str:
-        return " ".join(f"{x:.9g}" for x in six_from_tensor(self._flight.scenario.setup.body.inertia))
+        inertia = self._flight.scenario.setup.body.inertia
+        largest = float(np.abs(inertia).max())
+        return " ".join(f"{without_rounding(x, largest):.9g}" for x in six_from_tensor(inertia))
 
     def _set_tensor(self, text: str) -> dict[str, object] | None:
         """The present body with another tensor."""
@@ -169,7 +171,7 @@ def comparison(scenario: Scenario) -> str:
     ]
     moments = principal_axes(true.inertia)[0], principal_axes(approximate.inertia)[0], difference.principal_moments
     for name, a, b, error in zip("₁₂₃", *moments, strict=True):
-        lines.append(f"| I{name} [kg m²] | {a:.5g} | {b:.5g} | **{_per_cent(error)} %** |")
+        lines.append(f"| I{name} [kg m²] | {a:.4g} | {b:.4g} | **{_per_cent(error)} %** |")
     error = approximate.mass / true.mass - 1.0
     lines += [
         f"| principal axes turned by | | | **{turned if turned > TURNED else 0.0:.3g}°** |",
@@ -182,4 +184,5 @@ def comparison(scenario: Scenario) -> str:
 
 
 def _per_cent(error: float) -> str:
-    return f"{100.0 * without_rounding(error):+.3g}"
+    seen = without_rounding(error)
+    return f"{100.0 * seen:+.3g}" if seen else "0"

@@ -47,6 +47,9 @@ GHOST_SIZE = 0.99
 HEAD = 2.6
 """Radius of an arrow's head, in those of its shaft."""
 
+THICKEST = 3.0
+"""How many times as thick arrows are at most: from far off they would be seen in pieces."""
+
 
 class ViserBackend(Backend):
     """on_body(node) is called with each new node that the pointer meets. shown: names of the parts that are to be seen,
@@ -62,6 +65,7 @@ class ViserBackend(Backend):
         self._on_body = on_body
         self.is_new = True
         self._seen_into = False
+        self._thickness = self._label_scale = 1.0
         self._nodes: dict[str, Any] = {}
         self._meshes = 0
         self._there: set[str] = set()
@@ -91,6 +95,24 @@ class ViserBackend(Backend):
         node = self._nodes.get(style.BODY_MESH)
         if node is not None:
             node.opacity = SEEN_INTO if seen_into else None
+
+    def see_from(self, far: float) -> None:
+        """How many times as far off as from a body alone it is seen: arrows are thicker then."""
+        self._thickness = min(far, THICKEST)
+        for name, node in self._nodes.items():
+            if isinstance(node, viser.ArrowsHandle):
+                for side, length in self._arrow_sides(name).items():
+                    setattr(node, side, length)
+
+    def scale_labels(self, scale: float) -> None:
+        """Labels are so many times as large as usual."""
+        self._label_scale = scale
+        for node in self._labels:
+            node.font_screen_scale = scale
+
+    def _arrow_sides(self, name: str) -> dict[str, Any]:
+        radius = self._thickness * style.STYLES[name].width
+        return {"shaft_radius": radius, "head_radius": HEAD * radius, "head_length": 2.0 * HEAD * radius}
 
     def _show(self, name: str) -> None:
         node = self._nodes[name]
@@ -182,15 +204,8 @@ class ViserBackend(Backend):
             points = np.stack([self.drawn(name, first), self.drawn(name, first + vectors[-count:])], axis=1)
             node = self._nodes.get(name)
             if node is None or len(node.points) != count:
-                look = style.STYLES[name]
-                node = self._scene.add_arrows(
-                    f"/{name}",
-                    points,
-                    _colours(look.colours, count),
-                    shaft_radius=look.width,
-                    head_radius=HEAD * look.width,
-                    head_length=2.0 * HEAD * look.width,
-                )
+                colours = _colours(style.STYLES[name].colours, count)
+                node = self._scene.add_arrows(f"/{name}", points, colours, **self._arrow_sides(name))
                 self._nodes[name] = node
             else:
                 node.points = points
@@ -276,7 +291,8 @@ class ViserBackend(Backend):
     def _write(self, labels: Sequence[tuple[str, np.ndarray, str]]) -> None:
         while len(self._labels) < len(labels):
             name = f"/labels/{len(self._labels)}"
-            self._labels.append(self._scene.add_label(name, LABEL, anchor="bottom-left", visible=False))
+            look: dict[str, Any] = {"anchor": "bottom-left", "font_screen_scale": self._label_scale}
+            self._labels.append(self._scene.add_label(name, LABEL, visible=False, **look))
         for k, node in enumerate(self._labels):
             if k < len(labels):
                 name, position, text = labels[k]

@@ -97,6 +97,7 @@ def _recorded(server: viser.ViserServer, record: FlightRecord) -> str:
             size = backend.unit
             room.furnish(size, low / size, high / size, falls)
             room.place(backend.origin, size)
+            backend.see_from(room.far)
             serializer = server.get_scene_serializer()
         if k + 1 < len(times_ns):
             serializer.insert_sleep(1e-9 * float(times_ns[k + 1] - time_ns))

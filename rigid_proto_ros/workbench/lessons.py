@@ -108,7 +108,7 @@ COURSES = {
         labels=(style.MOMENTUM, "tip"),
     ),
     "teapot": Course(
-        (("poke",), ("reset", "poke", "reset", "poke"), ("reset", "poke com")), PUSHED, (CENTRE_OF_MASS,), ()
+        (("poke",), ("reset", "poke", "reset", "poke"), ("reset", "poke com")), PUSHED, (CENTRE_OF_MASS, SEE_INTO), ()
     ),
     "tennis_racket": Course(THREE_THROWS, (SPIN, SPINS, ENERGY, MOMENTUM, DRIFT)),
     "thrown_hammer": Course(

@@ -80,6 +80,9 @@ DESCRIBED = (style.INERTIA_BOX, style.INERTIA_ELLIPSOID)
 
 CONTACTS = f"{style.BODY}/contacts"
 
+CLASS_LABELS = 1.6
+"""Size of the picture's labels in class mode, in their usual one."""
+
 
 class Told(Observer):
     """Takes what the physics thread tells, for the page's thread."""
@@ -450,11 +453,13 @@ class Page:
         self.backend.origin = np.array(start)
         unit = self.backend.unit
         self.room.furnish(unit, (low - start) / unit, (high - start) / unit, falls and not held)
+        self.backend.see_from(self.room.far)
 
     # What the panel asks for
 
     def _for_class(self, on: bool) -> None:
         self._class_mode.switch(on)
+        self.backend.scale_labels(CLASS_LABELS if on else 1.0)
         self.bar.speed.visible = not on
 
     def _switch(self, part: str, shown: bool) -> None:

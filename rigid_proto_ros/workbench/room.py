@@ -37,6 +37,8 @@ LEASH = 0.2
 
 GRID: dict[str, Any] = {
     "infinite_grid": True,
+    # The floor's lines behind a wall that one sees through would be a second grid in the first.
+    "plane_opacity": 1.0,
     "fade_from": "origin",
     "fade_strength": 1.5,
     "cell_thickness": 0.6,
@@ -50,14 +52,15 @@ class Theme(NamedTuple):
     """Colours of a page. shadow: opacity."""
 
     floor: Colour
+    wall: Colour
     cell: Colour
     section: Colour
     sky: Colour
     shadow: float
 
 
-LIGHT = Theme((236, 236, 238), (220, 220, 224), (202, 202, 208), (250, 251, 253), 0.32)
-DARK = Theme((44, 47, 52), (58, 62, 68), (72, 77, 84), (26, 28, 32), 0.5)
+LIGHT = Theme((236, 236, 238), (244, 245, 247), (220, 220, 224), (202, 202, 208), (250, 251, 253), 0.32)
+DARK = Theme((44, 47, 52), (36, 38, 43), (58, 62, 68), (72, 77, 84), (26, 28, 32), 0.5)
 
 
 def distance_to_see(half_sides: np.ndarray) -> float:
@@ -71,7 +74,8 @@ def distance_to_see(half_sides: np.ndarray) -> float:
 
 class Room:
     """Lengths are the picture's units: one is the body's size. The floor stays below the picture's middle while its
-    lines stand still in the world. cell: between lines of its grid.
+    lines stand still in the world. cell: between lines of its grid. far: the camera's distance, in that from which a
+    body alone is seen.
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
@@ -79,7 +83,7 @@ class Room:
         self._scene = scene = server.scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
-        self._floor = scene.add_grid("/room/floor", plane_opacity=1.0, **GRID)
+        self._floor = scene.add_grid("/room/floor", **GRID)
         self._wall = scene.add_grid("/room/wall", plane="xz", **GRID)
         self.paint(False)
         self.furnish(1.0, np.full(3, -0.5), np.full(3, 0.5), False)
@@ -93,6 +97,7 @@ class Room:
         for grid in (self._floor, self._wall):
             grid.cell_color, grid.section_color = theme.cell, theme.section
         self._floor.plane_color, self._floor.shadow_opacity = theme.floor, theme.shadow
+        self._wall.plane_color = theme.wall
         share = np.linspace(0.0, 1.0, SKY_ROWS)[:, np.newaxis] ** 2
         rows = (1.0 - share) * np.array(theme.sky) + share * np.array(theme.floor)
         self._scene.set_background_image(np.repeat(rows[:, np.newaxis].astype(np.uint8), 4, axis=1))
@@ -105,8 +110,9 @@ class Room:
         self._floor_height = float(low[2]) - LEASH
         nearest = 0.5 / BODY_FILLS / SLOPE
         distance = max(nearest, distance_to_see(half_sides))
+        self.far = distance / nearest
         # From further off, thin lines would flicker where they lie close together.
-        self.cell = nice_step(size_m * distance / nearest / CELLS) / size_m
+        self.cell = nice_step(size_m * self.far / CELLS) / size_m
         for grid in (self._floor, self._wall):
             grid.cell_size, grid.section_size, grid.fade_distance = self.cell, 5.0 * self.cell, 3.0 * distance
         self._wall.visible = falls

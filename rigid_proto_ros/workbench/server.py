@@ -175,7 +175,7 @@ _BAR = f".mantine-Paper-root:has(> .mantine-Collapse-root .{MARK})"
 STYLE = f"""<style>
 .mantine-Notification-root {{ max-height: 60vh !important; }}
 .mantine-Button-root {{ height: auto !important; padding-block: 0.25em; }}
-.mantine-Button-label {{ white-space: normal; }}
+.mantine-Button-label {{ white-space: normal; overflow: visible; line-height: 1.3; }}
 .mantine-Notification-root:has(.tabler-icon-check) {{ display: none; }}
 .{MARK} {{ padding: 0 0.6em; font-size: 0.95em; white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }}
 .{MARK} b {{ font-size: 1.35em; font-weight: 500; font-variant-numeric: tabular-nums; }}

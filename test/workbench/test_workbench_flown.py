@@ -17,7 +17,7 @@ import pytest
 
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
-from flown_page import FlownPage
+from flown_page import FlownPage, numbers
 
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.picture import style
@@ -31,7 +31,8 @@ from rigid_proto_ros.workbench import controls
 from rigid_proto_ros.workbench import page as page_module
 from rigid_proto_ros.workbench.flight import COMPILING
 from rigid_proto_ros.workbench.lessons import COURSES, FREE
-from rigid_proto_ros.workbench.panel import SEE_INTO, motion_words
+from rigid_proto_ros.workbench.page import CLASS_LABELS
+from rigid_proto_ros.workbench.panel import CENTRE_OF_MASS, SEE_INTO, motion_words
 from rigid_proto_ros.workbench.readouts import ENERGY, PLOTTED_S, SPEED
 
 
@@ -230,8 +231,18 @@ def test_a_pushed_body_shows_the_force_and_at_most_three_labels(flown: FlownPage
     assert backend._nodes[style.load_part("poke", "force")].visible
     written = [label for label in backend._labels if label.visible]
     assert 1 <= len(written) <= 3
+    sizes = []
+    for on in (True, False):
+        flown.set("Class mode", on)
+        sizes += {label.font_screen_scale for label in written}
+    assert sizes == [CLASS_LABELS, 1.0], "in class mode they are larger"
     flown.fly(2.0)
     assert not backend._nodes[style.load_part("poke", "force")].visible
+
+
+def test_of_a_tensor_no_rounding_is_shown(flown: FlownPage) -> None:
+    assert [x == 0.0 for x in numbers(flown.widget("Tensor").value)] == [False, True, True, False, True, False]
+    assert "| 0 % |" in flown.page.body_tab.table, "the masses of the two models"
 
 
 def test_a_body_of_any_size_fills_the_picture_alike_and_grows_in_sight(flown: FlownPage) -> None:
@@ -293,6 +304,9 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
     arrows = {part: backend._nodes.get(part) for part in (style.MOMENTUM, style.OMEGA)}
     drawn_arrows = {part for part, node in arrows.items() if node is not None and node.visible}
     assert drawn_arrows <= set(page.lessons.course.labels), "an arrow without a name"
+    depth = np.linalg.norm(flown.server.initial_camera.position) * np.tan(0.5 * flown.server.initial_camera.fov)
+    thin = [part for part in drawn_arrows if 2.0 * arrows[part].shaft_radius < 0.008 * depth]
+    assert not thin, "arrows less than three of 800 pixels thick"
     places = [backend.origin + backend.unit * np.array(node.position) for node in labels]
     assert np.abs(seen(np.reshape(places, (-1, 3)))).max(initial=0.0) < 1.0, "a label is beside the picture"
     assert 3 <= len(page.lessons.course.numbers) <= 5
@@ -301,6 +315,12 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
     assert one.question in text.content and not any(sentence in text.content for sentence in one.sentences)
     opacity = backend._nodes[style.BODY_MESH].opacity
     assert (opacity is not None) == (SEE_INTO in page.lessons.course.shows)
+    if CENTRE_OF_MASS in page.lessons.course.shows and opacity is None:
+        towards = (page.state.position - backend.origin) / backend.unit - flown.server.initial_camera.position
+        eye = -backend.unit * towards @ page.state.rotation
+        hit = setup.surface.ray_hit(setup.body.mesh_point(eye), -eye / setup.body.scale)
+        nearer = hit is not None and np.linalg.norm(eye - setup.body.point(hit[0])) < np.linalg.norm(eye)
+        assert not nearer, "the body hides the mark of the centre of mass"
     line = backend._nodes.get(style.STRING_LINE)
     assert (line is not None and line.visible) == (style.STRING_LINE in page.lessons.course.shows)
     flown.press(f"A   {one.choices[0]}")

@@ -224,7 +224,10 @@ def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_button
     asyncio.run_coroutine_threadsafe(lessons.begin(), page.flown.server.get_event_loop()).result(60.0)
     page.until(lambda: longest.choices[2] in page.text, "answers to choose from")
     cut = "labels => Math.max(...labels.map(label => label.scrollWidth - label.clientWidth))"
-    assert page.page.locator(".mantine-Button-label").evaluate_all(cut) <= 0, "an answer that isn't to be read whole"
+    labels = page.page.locator(".mantine-Button-label")
+    assert labels.evaluate_all(cut) <= 0, "an answer that isn't to be read whole"
+    uncut = "labels => labels.every(label => getComputedStyle(label).overflow === 'visible')"
+    assert labels.evaluate_all(uncut), "the foot of a g may be cut off"
 
 
 def test_plots_show_their_curves_also_after_a_lesson_was_begun(page) -> None:
