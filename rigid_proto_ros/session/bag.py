@@ -243,13 +243,16 @@ def _states(content: BagContent, prefix: str, name: str) -> tuple[np.ndarray, St
 
 
 def _cuts(logs: np.ndarray, stamps: np.ndarray, resets: list[int]) -> list[int]:
-    """Where a topic's messages of each run begin, and the end: at the restart of the stamps nearest to each reset."""
-    restarts = np.flatnonzero(np.diff(stamps) < 0) + 1
+    """Where a topic's messages of each run begin, and the end: at the restarts of its stamps."""
+    restarts = (np.flatnonzero(np.diff(stamps) < 0) + 1).tolist()
+    # One each, however late the topic was logged.
+    if len(restarts) == len(resets):
+        return [0, *restarts, len(stamps)]
     cuts = [0]
     for reset in resets:
-        # A reset of a body at time 0 shows in no stamp: there the log decides.
+        # A reset of a body at time 0 shows in no stamp: there the log decides, where no restart is near.
         cut = int(np.searchsorted(logs, reset, side="right"))
-        near = [k for k in restarts.tolist() if abs(int(logs[k]) - reset) < RESET_WINDOW_NS and k >= cuts[-1]]
+        near = [k for k in restarts if abs(int(logs[k]) - reset) < RESET_WINDOW_NS and k >= cuts[-1]]
         cuts.append(max(cuts[-1], min(near, key=lambda k: abs(int(logs[k]) - reset)) if near else cut))
     return [*cuts, len(stamps)]
 
