@@ -18,7 +18,7 @@ ARGUMENTS = (
     ("namespace", "", "namespace of the node"),
     ("script", "", "poke script to send: a path, or the name of a bundled one; empty sends nothing"),
     ("reset", "true", "reset first, so that the script's times are simulated time itself"),
-    ("viewer", "none", "live view in Rerun: none, web or native"),
+    ("viewer", "none", "live view: none, web or native (Rerun), workbench (the interactive page)"),
     ("record", "", "record the session to this .rrd or .mcap file"),
     ("use_sim_time", "false", "simulated time follows /clock"),
 )

@@ -17,7 +17,6 @@ from pathlib import Path
 from ..base.command_line import number_from
 from ..base.errors import InputError
 from ..base.interrupts import end_with_this_thread, with_this_package
-from .options import add_mesh
 
 GRACE_S = 5.0
 """A process that doesn't end within this time of SIGTERM is killed."""
@@ -41,7 +40,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_mesh(parser, "simulate this mesh instead of the bundled T-handle")
+    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh instead of the bundled T-handle")
     parser.add_argument(
         "--duration",
         type=number_from(3.0, 3600.0),

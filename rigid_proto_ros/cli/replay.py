@@ -13,7 +13,7 @@ from ..base.command_line import number_from
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.progress import Progress
-from .options import add_exports, add_session, asked, check_exports, write_exports
+from .exports import add_exports, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
     from ..scene.scenario import Scenario
@@ -33,7 +33,16 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_session(parser, node="the node to send commands to, or the body in a bag with several")
+    parser.add_argument(
+        "session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of ros2 bag record (file or folder)"
+    )
+    parser.add_argument("--scene", metavar="FILE", help="the scene, for a bag without one")
+    parser.add_argument(
+        "--node",
+        metavar="NAME",
+        default="",
+        help="the node to send commands to, or the body in a bag with several",
+    )
     parser.add_argument(
         "--verify", action="store_true", help="simulate it again and compare; exit 1 at the first difference"
     )
@@ -68,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     if args.repair:
         repair(args.session, args.repair)
     runs = read_runs(args.session, "" if args.publish == "commands" else args.node)
-    given = given_scene(args.scene, runs[-1])
+    given = _given_scene(args.scene, runs[-1])
     for number, session in enumerate(runs, 1):
         _print_session(args.session if len(runs) == 1 else f"{args.session}, run {number} of {len(runs)}", session)
     if args.record:
@@ -152,7 +161,7 @@ def _print_difference(difference: Difference, session: RecordedSession) -> None:
             print(f"  {name} differs: {was} recorded, {here} here", file=sys.stderr)
 
 
-def given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
+def _given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
     """The scene of this file, which was given for a session that lacks its own; None without one. Raises InputError
     for a session that has all it needs.
     """

@@ -6,13 +6,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.command_line import Parser, number_from
 from ..base.errors import InputError
 from ..base.files import output_file
-from .options import add_exports, add_json, add_scene, asked, check_exports, write_exports
+from .exports import add_exports, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
@@ -38,7 +39,7 @@ EXAMPLES = (
 
 def add_arguments(parser: Parser) -> None:
     """Declare the command's arguments."""
-    add_scene(parser, "a ROS parameter file, or the name of a bundled scene")
+    parser.add_argument("scene", metavar="SCENE.yaml", help="a ROS parameter file, or the name of a bundled scene")
     parser.add_argument("--script", metavar="POKES.yaml", help="poke script; its times are simulated time")
     parser.add_argument(
         "--duration",
@@ -51,7 +52,7 @@ def add_arguments(parser: Parser) -> None:
     )
     parser.add_argument("--record", metavar="FILE.rrd", help="record the run for Rerun")
     parser.add_argument("--bag", metavar="FILE.mcap", help="record the run as a bag of the node's topics")
-    add_json(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
     add_exports(parser)
     parser.instead_of = _instead_of
 
@@ -91,16 +92,16 @@ def run(args: argparse.Namespace) -> int:
         from ..export.flight_record import FlightRecord
 
         record = FlightRecord()
-    recorders = _recorders(files, scenario.parameters)
-    watching = [*recorders.values(), *filter(None, [record])]
-    try:
+    recorders: dict[str, Recorder] = {}
+    with ExitStack() as closing:
+        for file in files:
+            recorders[file] = _recorder(file, scenario.parameters)
+            closing.callback(recorders[file].close)
+        watching = [*recorders.values(), *filter(None, [record])]
         # Only who records has a ghost.
         flight = OfflineRun(scenario, script, Observers(*watching) if watching else None)
         wall_time = run_with_progress(flight, duration_ns)
         result = summary(flight, wall_time)
-    finally:
-        for recorder in recorders.values():
-            recorder.close()
     recorded = [file for file, recorder in recorders.items() if not recorder.error]
     for reason, count in flight.simulation.refused.items():
         _warn(f"{count} commands refused: {reason}")
@@ -144,21 +145,10 @@ def _check_places(files: list[str], bag: str | None) -> None:
         raise InputError("--bag", files[-1], "another file than that of --record")
 
 
-def _recorders(files: list[str], parameters: Parameters) -> dict[str, Recorder]:
-    """A recorder by file; raises InputError, and then none is left open."""
-    if not files:
-        return {}
+def _recorder(file: str, parameters: Parameters) -> Recorder:
     from ..rerun_view.session_files import make_recorder
 
-    opened: dict[str, Recorder] = {}
-    try:
-        for file in files:
-            opened[file] = make_recorder(file, parameters=parameters, on_error=_warn, simulated_log=True)
-    except InputError:
-        for recorder in opened.values():
-            recorder.close()
-        raise
-    return opened
+    return make_recorder(file, parameters=parameters, on_error=_warn, simulated_log=True)
 
 
 def _warn(message: str) -> None:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
-from .options import add_json
 
 if TYPE_CHECKING:
     from ..sweep.study import Study
@@ -29,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--as-scene", metavar="FILE.yaml", help="with --row: write it as a scene, and its script beside"
     )
-    add_json(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,8 +7,6 @@ import argparse
 import os
 import sys
 
-from .options import add_mesh, add_scene
-
 EXAMPLES = (
     ("rigid_proto up", "the T-handle, with a live view"),
     ("rigid_proto up hammer --viewer web", "another scene, shown in the browser"),
@@ -19,8 +17,8 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_scene(parser, "scene file or bundled name", nargs="?", default="t_handle")
-    add_mesh(parser)
+    parser.add_argument("scene", metavar="SCENE.yaml", nargs="?", default="t_handle", help="scene file or bundled name")
+    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(
         "--viewer",
         choices=("auto", "web", "native", "workbench", "none"),

@@ -7,7 +7,6 @@ import argparse
 import importlib.util
 
 from ..base.errors import InputError, is_missing
-from .options import add_mesh, add_scene
 
 EXAMPLES = (
     ("rigid_proto workbench hammer", "a bundled scene"),
@@ -17,8 +16,8 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_scene(parser, "scene file or bundled name (default t_handle)", nargs="?")
-    add_mesh(parser)
+    parser.add_argument("scene", metavar="SCENE.yaml", nargs="?", help="scene file or bundled name (default t_handle)")
+    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(
         "--port", type=int, metavar="PORT", help="port of the page (default 8080, or the next free one)"
     )

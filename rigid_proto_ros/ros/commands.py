@@ -14,6 +14,8 @@ to drop before they were fetched. What this side's own queue drops when it is fu
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
@@ -29,6 +31,7 @@ from std_srvs.srv import Trigger
 from ..base.errors import CommandRefused, InputError
 from ..live.command_receiver import CommandReceiver
 from ..live.live_simulation import LiveSimulation
+from ..scene import cdr
 from ..scene.command_codec import Names, of_message
 from ..simulation.commands import Command, ThrusterCommand
 from . import qos
@@ -136,51 +139,47 @@ class CommandSubscriber:
         return sum(queue.messages_lost for queue in self._queues)
 
     def take(self, wall_ns: int, at_once: bool = False) -> bool:
-        """Submit everything that has arrived; what is refused is counted and notified of, and the rest goes on.
-        Returns whether something has arrived within the last ACTIVE_NS. Quiet topics are read every QUIET_NS, or now
-        if ``at_once``.
+        """Take every message that has arrived, convert it, and submit its command; what is refused is counted and
+        notified of, and the rest goes on. Returns whether something has arrived within the last ACTIVE_NS. Quiet topics
+        are read every QUIET_NS, or now if ``at_once``.
         """
         if at_once or wall_ns >= self._next_quiet_ns or wall_ns < self._active_until_ns:
             self._next_quiet_ns = wall_ns + QUIET_NS
             for queue in self._queues:
                 for data in queue.take():
                     self._active_until_ns = wall_ns + ACTIVE_NS
-                    try:
-                        self._submit(queue.topic, data)
-                    except CommandRefused:
-                        pass  # counted, and the observer was told
+                    with suppress(CommandRefused):  # counted, and the observer was told
+                        if queue.topic == "schedule":
+                            self._commands.receive_schedule(partial(read_text, data))
+                        else:
+                            convert = partial(read_command, queue.topic, data, self._frames)
+                            self._commands.receive(queue.topic.partition("/")[0], convert)
         return wall_ns < self._active_until_ns
-
-    def _submit(self, topic: str, data: bytes) -> None:
-        if topic == "schedule":
-            self._commands.receive_schedule(lambda: read_message(data, String).data)
-        else:
-            self._commands.receive(topic.partition("/")[0], lambda: read_command(topic, data, self._frames))
 
 
 def read_command(topic: str, data: bytes, frames: Names) -> Command:
     """The command of a message on a topic other than ``schedule``; raises CommandRefused."""
-    if topic == "thrusters":
-        return ThrusterCommand(tuple(read_message(data, Float64MultiArray).data))
     try:
+        if topic == "thrusters":
+            return ThrusterCommand(tuple(deserialize_message(data, Float64MultiArray).data))
         # From its bytes, without a message object.
         return of_message(topic, data, frames)
     except CommandRefused:
         raise
-    except ValueError:
-        raise _undecodable(data, TOPICS[topic]) from None
-
-
-def read_message(data: bytes, message_type: type) -> Any:
-    """A message from its bytes; raises CommandRefused for bytes that are none of its type."""
-    try:
-        return deserialize_message(data, message_type)
     except Exception:  # rclpy's own error types differ between versions and middlewares
-        raise _undecodable(data, message_type) from None
+        raise _undecodable(topic, data) from None
 
 
-def _undecodable(data: bytes, message_type: type) -> CommandRefused:
-    accepted = f"a {message_type.__name__} as little-endian CDR"
+def read_text(data: bytes) -> str:
+    """The text of a message on ``schedule``; raises CommandRefused."""
+    try:
+        return cdr.read_string(data)
+    except ValueError:
+        raise _undecodable("schedule", data) from None
+
+
+def _undecodable(topic: str, data: bytes) -> CommandRefused:
+    accepted = f"a {TOPICS[topic].__name__} as little-endian CDR"
     return CommandRefused("frame", "message", f"{len(data)} bytes that can't be decoded", accepted)
 
 

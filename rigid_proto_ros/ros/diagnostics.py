@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
@@ -26,55 +26,13 @@ REFUSAL_REASONS = (
 )
 
 WARNED_OF = {
-    "refused_total": "{:.0f} refused",
-    "messages_lost": "{:.0f} lost on the way",
+    "refused_total": "{} refused",
+    "messages_lost": "{} lost on the way",
     "queue_full": "messages may have been lost: a queue of commands was full",
-    "overruns": "{:.0f} published late",
+    "overruns": "{} published late",
     "real_time_lost_s": "{:.2g} s behind real time",
 }
 """Counters whose growth makes a report a warning, and what it says of how much they grew."""
-
-
-def values_of(live: LiveSimulation, subscriber: CommandSubscriber | None = None) -> dict[str, object]:
-    """Counters and values by the keys of /diagnostics; from any thread."""
-    loop = live.loop
-    commands, simulation = loop.commands, loop.simulation
-    # First: whatever happened up to then is counted in what follows.
-    time_ns = simulation.time_ns
-    momentum = simulation.angular_momentum
-    # Counted last by the physics thread, so read first: who finds a message received finds its refusal too.
-    received = dict(commands.received)
-    refused = dict(simulation.refused)
-    return {
-        "sim_time_ns": time_ns,
-        "stamp_offset_ns": loop.stamps.offset_ns,
-        "publish_rate": loop.scenario.parameters.publish_rate,
-        "overruns": loop.pace.overruns,
-        "real_time_lost_s": loop.pace.real_time_lost_s,
-        **{f"{topic}_received": received.get(topic, 0) for topic in TOPICS},
-        "commands_received": sum(received.values()),
-        "refused_total": sum(refused.values()),
-        **{f"refused_{reason}": refused.get(reason, 0) for reason in REFUSAL_REASONS},
-        "late": commands.late,
-        "wall_stamp": commands.wall_stamp,
-        "messages_lost": subscriber.messages_lost if subscriber else 0,
-        "queue_full": subscriber.queue_full if subscriber else 0,
-        "kinetic_energy": simulation.kinetic_energy,
-        "potential_energy": simulation.potential_energy,
-        "angular_momentum_norm": float((momentum * momentum).sum()) ** 0.5,
-        "angular_momentum_drift": simulation.angular_momentum_drift,
-        "integrator": simulation.setup.integrator.name,
-        "accuracy_floor": simulation.accuracy_floor,
-        "state": "paused" if loop.paused else "sleeping" if simulation.at_rest else "flying",
-        "recording": loop.scenario.parameters.record,
-        "warning": simulation.failure or live.recording_trouble or simulation.too_coarse,
-    }
-
-
-def increase(key: str, before: Mapping[str, object], now: Mapping[str, object]) -> float:
-    """By how much a counter rose."""
-    past, present = (float(str(values.get(key, 0.0))) for values in (before, now))
-    return present - past
 
 
 class Diagnostics:
@@ -85,27 +43,60 @@ class Diagnostics:
         self._live = live
         self._subscriber = subscriber
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._before = values_of(live, subscriber)
+        self._before = self._values()
         # Steady: the node's own clock stands still with /clock.
         node.create_timer(REPORT_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _values(self) -> dict[str, Any]:
+        """Counters and values by their keys."""
+        loop = self._live.loop
+        commands, simulation = loop.commands, loop.simulation
+        # First: whatever happened up to then is counted in what follows.
+        time_ns = simulation.time_ns
+        momentum = simulation.angular_momentum
+        # Counted last by the physics thread, so read first: who finds a message received finds its refusal too.
+        received = dict(commands.received)
+        refused = dict(simulation.refused)
+        return {
+            "sim_time_ns": time_ns,
+            "stamp_offset_ns": loop.stamps.offset_ns,
+            "publish_rate": loop.scenario.parameters.publish_rate,
+            "overruns": loop.pace.overruns,
+            "real_time_lost_s": loop.pace.real_time_lost_s,
+            **{f"{topic}_received": received.get(topic, 0) for topic in TOPICS},
+            "commands_received": sum(received.values()),
+            "refused_total": sum(refused.values()),
+            **{f"refused_{reason}": refused.get(reason, 0) for reason in REFUSAL_REASONS},
+            "late": commands.late,
+            "wall_stamp": commands.wall_stamp,
+            "messages_lost": self._subscriber.messages_lost,
+            "queue_full": self._subscriber.queue_full,
+            "kinetic_energy": simulation.kinetic_energy,
+            "potential_energy": simulation.potential_energy,
+            "angular_momentum_norm": float((momentum * momentum).sum()) ** 0.5,
+            "angular_momentum_drift": simulation.angular_momentum_drift,
+            "integrator": simulation.setup.integrator.name,
+            "accuracy_floor": simulation.accuracy_floor,
+            "state": "paused" if loop.paused else "sleeping" if simulation.at_rest else "flying",
+            "recording": loop.scenario.parameters.record,
+            "warning": simulation.failure or self._live.recording_trouble or simulation.too_coarse,
+        }
 
     def _report(self) -> None:
         """Publish how it stands, and log that real time is given up."""
         # Before the values are read: what was done before the stamp is in them.
         stamp = self._node.get_clock().now().to_msg()
-        before, values = self._before, values_of(self._live, self._subscriber)
+        before, values = self._before, self._values()
         self._before = values
-        if (lost_s := increase("real_time_lost_s", before, values)) > 0.0:
+        if (lost_s := values["real_time_lost_s"] - before["real_time_lost_s"]) > 0.0:
             self._node.get_logger().warning(
                 f"too much to do here: {lost_s:.2g} s of real time given up; simulated time is behind the wall clock",
                 throttle_duration_sec=WARNING_S,
             )
         if self._publisher.get_subscription_count() == 0:
             return
-        warnings = [
-            text.format(grown) for key, text in WARNED_OF.items() if (grown := increase(key, before, values)) > 0.0
-        ]
-        warnings += filter(None, [str(values["warning"])])
+        warnings = [text.format(grown) for key, text in WARNED_OF.items() if (grown := values[key] - before[key]) > 0]
+        warnings += filter(None, [values["warning"]])
         status = DiagnosticStatus(
             name=f"{self._node.get_fully_qualified_name()}: simulation", hardware_id="simulated rigid body"
         )

@@ -195,7 +195,11 @@ def open_page(node: RigidBodyNode) -> Callable[[], None]:
         raise InputError("viewer", is_missing("viser", "workbench"))
     from ..workbench.main import Workbench
 
-    page = Workbench(node.live, _asked_for("workbench_port", parameters.workbench_port))
+    try:
+        page = Workbench(node.live, _asked_for("workbench_port", parameters.workbench_port))
+    except InputError as error:
+        # By the name that the node knows it by, which isn't the command's option.
+        raise InputError("workbench_port", error.received, error.accepted) from None
     print(f"{node.get_name()}: the workbench is at {page.address}", file=sys.stderr)
     return page.close
 

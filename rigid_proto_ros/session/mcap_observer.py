@@ -78,11 +78,9 @@ class McapObserver(Observer):
         self._world, self._body_frame = frame_names(parameters or Parameters(), node_name)
         self._scene = ""
         self._attached: set[str] = set()
-        self._closed = False
         self._writer: Writer | None = None
         try:
-            self._file = output_file("record", path)
-            self._stream = open(self._file, "wb")  # noqa: SIM115 (closed by the thread)
+            self._stream = open(output_file("record", path), "wb")  # noqa: SIM115 (closed by the thread)
             self._writer = self._begin(node_name)
         except OSError as error:
             accepted = f"a file that can be written ({error.strerror})"
@@ -91,11 +89,6 @@ class McapObserver(Observer):
         self._thread = threading.Thread(target=self._write_until_closed, name="mcap", daemon=True)
         self._thread.start()
 
-    @property
-    def recording(self) -> str:
-        """Path of the file that is being written, or ""."""
-        return str(self._file) if self._writer is not None and not self._closed else ""
-
     def on(self, event: Event) -> None:
         """Take an event from the stepping thread: a state is copied, others wait to be written."""
         if type(event) in self.takes:
@@ -103,9 +96,8 @@ class McapObserver(Observer):
 
     def close(self) -> None:
         """Write what is buffered and finish the file."""
-        if self._closed:
+        if self._mailbox.closed:
             return
-        self._closed = True
         self._mailbox.close()
         if not self._mailbox.emptied_by(self._thread):
             self._stopped("the last states could not be written")
@@ -159,9 +151,6 @@ class McapObserver(Observer):
         if self._writer is not None:
             self._writer.flush()
 
-    def _write_message(self, writer: Writer, name: str, log_time: int, data: bytes) -> None:
-        writer.add_message(self._channels[name], log_time, data, log_time)
-
     def _write(self, writer: Writer, wall_ns: int, event: Event) -> None:
         if isinstance(event, Reset):
             self._run_begins_ns = self._latest_log_ns + 1
@@ -169,35 +158,37 @@ class McapObserver(Observer):
             return
         log_time = self._run_begins_ns + event.time_ns if self._simulated_log else wall_ns
         self._latest_log_ns = max(self._latest_log_ns, log_time)
+        messages: list[tuple[str, bytes]] = []
         match event:
             case Published(time_ns, state):
                 if time_ns // CHUNK_NS != self._chunk:
                     self._chunk = time_ns // CHUNK_NS
                     writer.flush()
                 row = state.tolist()
-                for name in ("pose", "twist"):
-                    data = cdr.stamped_doubles(time_ns, self._world, PROJECTIONS[name](row))
-                    self._write_message(writer, name, log_time, data)
+                messages = [
+                    (name, cdr.stamped_doubles(time_ns, self._world, PROJECTIONS[name](row)))
+                    for name in ("pose", "twist")
+                ]
             case Logged(_, line):
-                self._write_message(writer, "events", log_time, cdr.string(line))
+                messages = [("events", cdr.string(line))]
             case Applied(time_ns, _, load, body, attitude):
-                data = applied_bytes(time_ns, self._body_frame, load, body, attitude)
-                self._write_message(writer, "applied", log_time, data)
+                messages = [("applied", applied_bytes(time_ns, self._body_frame, load, body, attitude))]
             case BodyChanged(time_ns, body):
-                self._write_message(writer, "inertia", log_time, inertia_bytes(time_ns, self._body_frame, body))
+                messages = [("inertia", inertia_bytes(time_ns, self._body_frame, body))]
             case AccuracyFloor(time_ns, floor):
                 # It only rises within a run: the last one says all.
                 writer.flush()
                 writer.add_metadata(FLOOR.format(self._run), {"time_ns": str(time_ns), "floor": floor})
-            case Started(scene=scene) | SceneChanged(scene=scene):
-                self._write_scene(writer, log_time, scene)
+            case Started(scene=scene) | SceneChanged(scene=scene) if scene != self._scene:
+                self._scene = scene
+                messages = [("scene", cdr.string(scene))]
+        for name, data in messages:
+            writer.add_message(self._channels[name], log_time, data, log_time)
+        if isinstance(event, Started | SceneChanged):
+            self._attach_mesh(writer, log_time, event.scene)
 
-    def _write_scene(self, writer: Writer, log_time: int, scene: str) -> None:
-        """Unless it is the one written last; with the mesh's file, once."""
-        if scene == self._scene:
-            return
-        self._scene = scene
-        self._write_message(writer, "scene", log_time, cdr.string(scene))
+    def _attach_mesh(self, writer: Writer, log_time: int, scene: str) -> None:
+        """The file of the mesh that a scene names, once."""
         sha256 = mesh_sha256_of(scene)
         if not sha256 or sha256 in self._attached:
             return

@@ -135,24 +135,3 @@ def test_without_a_duration_a_flight_lasts_ten_seconds_or_one_more_than_its_scri
     assert simulated(capsys, "book", "--script", str(script))["time_ns"] == 13_250_000_000
     assert main(["simulate", "book", "--script", str(script), "--duration", "2"]) == 0
     assert "1 of the script's 2 commands act at or after the end, 2 s" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--set", "integrator=RK4"], "did you mean rk4?"),
-        (["--mesh", "book"], "a parameter is set by --set mesh=VALUE"),
-        (["--publish-rate", "50"], "a parameter is set by --set publish_rate=VALUE"),
-        (["--recrod", "x.rrd"], "did you mean --record?"),
-        (["--bag", "{tmp}/not/there/x.mcap"], "a folder that exists"),
-    ],
-)
-def test_a_slip_is_answered_with_what_was_meant(arguments, said, tmp_path, capsys):
-    arguments = [word.replace("{tmp}", str(tmp_path)) for word in arguments]
-    try:
-        status = main(["simulate", "t_handle", "--duration", "0.1", *arguments])
-    except SystemExit as end:
-        status = end.code
-    err = capsys.readouterr().err
-    assert status == 2 and said in err and err.count("\n") == 1
-    assert not (tmp_path / "not").exists()

@@ -1,28 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Floods of commands: all received, or the loss told."""
 
+import itertools
 import signal
 from contextlib import contextmanager
 
 import pytest
-from command_rig import Commanded, wrench_message
-from conftest import held_domain
+from command_rig import wrench_message
 from ros_client import RosClient
-
-
-@pytest.fixture(scope="module")
-def commanded(ros_environment, tmp_path_factory):
-    """A node of these tests' own."""
-    with held_domain() as domain:
-        rig = Commanded({**ros_environment, "ROS_DOMAIN_ID": str(domain)}, tmp_path_factory.mktemp("flooded"))
-        yield rig
-        rig.close()
-
 
 HARMLESS = wrench_message(0, "world", (0.0, 0.0, 1e-9))
 PUSH = wrench_message(0, "world;impulse", (0.0, 0.0, 1e-9))
 LAST = wrench_message(0, "nowhere")
-"""Refused: who has counted the refusal has taken all that its publisher sent before."""
+"""Refused: who has counted the refusal has taken all that reached it of what its publisher sent before."""
 
 COUNTERS = ("wrench_received", "poke_received", "messages_lost", "queue_full", "refused_total")
 
@@ -33,62 +23,45 @@ def greet(client, publishers: list[str], message: dict) -> None:
     client.acknowledged(*publishers)
 
 
-def gained_when(rig, before: dict[str, int], condition) -> dict[str, int]:
-    """What the counters rose by, once that fulfils the condition."""
-    found = {}
-
-    def gained():
-        report = rig.all_diagnostics(last=1)[-1]
-        found.update({key: int(report[key]) - before[key] for key in COUNTERS})
-        return condition(found) and dict(found)
-
-    try:
-        return rig.until(gained, "the counters")
-    except AssertionError as error:
-        raise AssertionError(f"{error}; they are {found}") from None
-
-
-def taken(gained: dict[str, int]) -> int:
-    return gained["wrench_received"] + gained["poke_received"]
-
-
 def all_known_or_told(rig, before: dict[str, int], sent: int, publishers: int, told: bool = True) -> dict[str, int]:
     """Wait until what was sent is accounted for: received or counted as lost, or else, where that may be, a full queue
     is told. The last message of each publisher is LAST.
     """
+    gained: dict[str, int] = {}
 
-    def accounted_for(gained) -> bool:
-        if gained["refused_total"] < publishers:
-            return False
-        return taken(gained) + gained["messages_lost"] >= sent or (told and gained["queue_full"] > 0)
+    def known() -> int:
+        report = rig.all_diagnostics(last=1)[-1]
+        gained.update({key: int(report[key]) - before[key] for key in COUNTERS})
+        return gained["wrench_received"] + gained["poke_received"] + gained["messages_lost"]
 
-    gained = gained_when(rig, before, accounted_for)
-    known = taken(gained) + gained["messages_lost"]
-    assert gained["refused_total"] == publishers
-    assert known == sent or (told and known < sent and gained["queue_full"] > 0), gained
-    rig.sent += taken(gained)
+    def accounted_for() -> bool:
+        # On a busy machine the middleware may give a stopped node up; then it counts the last ones as lost, too.
+        return known() >= sent or (told and gained["queue_full"] > 0 and gained["refused_total"] == publishers)
+
+    try:
+        rig.until(accounted_for, "account of all")
+    except AssertionError as error:
+        raise AssertionError(f"{error}; they are {gained}") from None
+    rig.diagnostics()
+    assert known() == sent or (told and known() < sent and gained["queue_full"] > 0), gained
+    # A report that finds more lost, or a queue that was full, is a warning that says so.
+    for earlier, later in itertools.pairwise(rig.all_diagnostics()):
+        for key, words in (("messages_lost", "lost on the way"), ("queue_full", "may have been lost")):
+            assert later[key] == earlier[key] or (later["level"] == 1 and words in later["message"])
+    rig.sent += gained["wrench_received"] + gained["poke_received"]
     return gained
 
 
-def flood(rig, publishers: int, messages: int) -> None:
-    """So many publishers send ``messages`` each on one topic, 1000 a second."""
+@pytest.mark.parametrize("messages", [200, pytest.param(30_000, marks=pytest.mark.stress)])
+def test_ten_publishers_at_a_thousand_messages_a_second_are_all_heard_or_a_full_queue_is_told(rig, messages):
     with RosClient(rig.environment, rig.node) as client:
-        names = [f"wrench#{k}" for k in range(publishers)]
+        names = [f"wrench#{k}" for k in range(10)]
         client.advertise(*names)
         before = rig.counters()
         greet(client, names, HARMLESS)
         client.repeat(names, HARMLESS, messages, 1000.0)
         client.repeat(names, LAST, 1)
-        all_known_or_told(rig, before, publishers * (messages + 2), publishers)
-
-
-def test_ten_publishers_at_a_thousand_messages_a_second_are_all_heard_or_a_full_queue_is_told(rig):
-    flood(rig, 10, 200)
-
-
-@pytest.mark.stress
-def test_ten_publishers_at_a_thousand_messages_a_second_for_half_a_minute(rig):
-    flood(rig, 10, 30_000)
+        all_known_or_told(rig, before, 10 * (messages + 2), 10)
 
 
 @contextmanager
@@ -101,18 +74,19 @@ def held_up(rig):
         rig.node_process.process.send_signal(signal.SIGCONT)
 
 
-@pytest.mark.parametrize(("publishers", "kept"), [(2, 1_000), (2, 5_000)])
-def test_with_the_node_held_up_losses_are_counted_exactly_or_a_full_queue_is_told(rig, publishers, kept):
-    """Each sends far more than the ``kept`` messages that it holds for a reader that doesn't answer."""
-    names = [f"poke#{k} of {publishers}, {kept}" for k in range(publishers)]
-    rig.advertise(*names, depth=kept)
-    before = rig.counters()
-    greet(rig, names, PUSH)
-    with held_up(rig):
-        rig.repeat(names, PUSH, 7_000)
-    rig.acknowledged(*names)
-    # The last of each shows what was lost before it.
-    rig.repeat(names, LAST, 1)
-    # Where the node's own queue has room for all that was kept, none but what the middleware counts is lost.
-    gained = all_known_or_told(rig, before, publishers * 7_002, publishers, told=publishers * kept > 5_000)
+@pytest.mark.parametrize("kept", [1_000, 5_000])
+def test_with_the_node_held_up_losses_are_counted_exactly_or_a_full_queue_is_told(rig, kept):
+    """Two publishers send more than the ``kept`` messages that each holds for a reader that doesn't answer."""
+    with RosClient(rig.environment, rig.node) as client:
+        names = ["poke#1", "poke#2"]
+        client.advertise(*names, depth=kept)
+        before = rig.counters()
+        greet(client, names, PUSH)
+        with held_up(rig):
+            client.repeat(names, PUSH, kept + 2_000)
+        client.acknowledged(*names)
+        # The last of each shows what was lost before it.
+        client.repeat(names, LAST, 1)
+        # Where the node's own queue has room for all that was kept, none but what the middleware counts is lost.
+        gained = all_known_or_told(rig, before, 2 * (kept + 2_002), 2, told=2 * kept > 5_000)
     assert gained["messages_lost"] > 0 or gained["queue_full"] > 0

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: MIT
 """What ROS users expect of any node: names, types, QoS, descriptors, namespaces, several at once."""
 
+import importlib.util
+import socket
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -10,48 +13,67 @@ from rcl_interfaces.srv import DescribeParameters
 from ros_client import COMMANDS, LATCHED, TOPICS, RosClient
 from ros_process import running_node
 
+from node_interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.ros.arguments import given_arguments
-from rigid_proto_ros.scene.parameters import PARAMETERS, READ_ONLY, is_ros_parameter
+from rigid_proto_ros.ros.main import make_viewer, open_page
+from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS, READ_ONLY, is_ros_parameter
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
 
-KEYS = [
-    "sim_time_ns",
-    "stamp_offset_ns",
-    "publish_rate",
-    "overruns",
-    "real_time_lost_s",
-    "wrench_received",
-    "poke_received",
-    "string_received",
-    "inertia_received",
-    "commands_received",
-    "refused_total",
-    "refused_frame",
-    "refused_nonfinite",
-    "refused_magnitude",
-    "refused_stamp",
-    "refused_ray_miss",
-    "refused_tensor",
-    "refused_integrator",
-    "refused_schedule",
-    "refused_thrusters",
-    "refused_state",
-    "late",
-    "wall_stamp",
-    "messages_lost",
-    "queue_full",
-    "kinetic_energy",
-    "potential_energy",
-    "angular_momentum_norm",
-    "angular_momentum_drift",
-    "integrator",
-    "state",
-    "recording",
-]
+KEYS = {
+    *("sim_time_ns", "stamp_offset_ns", "publish_rate", "overruns", "real_time_lost_s", "wrench_received"),
+    *("poke_received", "string_received", "inertia_received", "commands_received", "refused_total", "refused_frame"),
+    *("refused_nonfinite", "refused_magnitude", "refused_stamp", "refused_ray_miss", "refused_tensor"),
+    *("refused_integrator", "refused_schedule", "refused_thrusters", "refused_state", "late", "wall_stamp"),
+    *("messages_lost", "queue_full", "kinetic_energy", "potential_energy", "angular_momentum_norm"),
+    *("angular_momentum_drift", "integrator", "state", "recording"),
+}
+NODE = "/rigid_body"
+OF_RCLPY = {
+    SUBSCRIBED: {"/clock"},  # with use_sim_time
+    PUBLISHED: {"/rosout", "/parameter_events"},
+    SERVED: {
+        *(f"{NODE}/{verb}_parameters" for verb in ("describe", "get", "list", "set")),
+        *(f"{NODE}/{name}" for name in ("get_parameter_types", "get_type_description", "set_parameters_atomically")),
+    },
+}
+"""What every rclpy node has."""
 
 
-def test_all_topics_are_reliable_and_the_latched_ones_stay_for_who_comes_late(rig):
+def test_a_running_node_has_exactly_the_listed_topics_and_services(rig) -> None:
+    """With everything on request switched on: the shared node has a thruster."""
+    switches = {i.on_request: True for i in INTERFACES if i.on_request in PARAMETERS}
+    assert rig.set_named(switches, atomically=True)[0][0]
+    looks = {
+        SUBSCRIBED: rig.own.get_subscriber_names_and_types_by_node,
+        PUBLISHED: rig.own.get_publisher_names_and_types_by_node,
+        SERVED: rig.own.get_service_names_and_types_by_node,
+    }
+    missing = {package for package in ("tf2_msgs",) if importlib.util.find_spec(package) is None}
+    for direction, look in looks.items():
+        listed = {
+            i.name.replace("~", NODE): i.type
+            for i in INTERFACES
+            if i.direction == direction and i.type.partition("/")[0] not in missing
+        }
+
+        def found(look=look, own=OF_RCLPY[direction]) -> dict[str, str]:
+            return {name: types[0] for name, types in look("rigid_body", "/") if name not in own}
+
+        rig.until(lambda listed=listed, found=found: listed.keys() <= found().keys(), f"all that is {direction}")
+        assert found() == listed
+
+
+def test_what_is_on_request_names_a_switch() -> None:
+    for interface in INTERFACES:
+        switch = interface.on_request
+        assert not switch or f"{switch}." in PATTERNS or PARAMETERS[switch].type == "bool"
+        assert interface.meaning and not interface.meaning.endswith(".")
+
+
+def test_all_topics_are_reliable_and_overridable_states_keep_10_commands_5000_and_the_latched_ones_the_last(rig):
     def side_of_the_node(name: str) -> list:
         look = rig.own.get_subscriptions_info_by_topic if name in COMMANDS else rig.own.get_publishers_info_by_topic
         return [end.qos_profile for end in look(rig.name(name)) if end.node_name == "rigid_body"]
@@ -60,6 +82,14 @@ def test_all_topics_are_reliable_and_the_latched_ones_stay_for_who_comes_late(ri
         (profile,) = rig.until(lambda name=name: side_of_the_node(name), f"the node's side of {name}")
         durability = "TRANSIENT_LOCAL" if name in LATCHED else "VOLATILE"
         assert (profile.reliability.name, profile.durability.name) == ("RELIABLE", durability)
+    # The middleware doesn't tell how many it keeps; the parameters that override it do.
+    depths = dict.fromkeys(COMMANDS, 5000) | dict.fromkeys(("pose", "twist", "odom", "imu"), 10)
+    depths |= dict.fromkeys(LATCHED, 1) | dict.fromkeys(("applied", "events"), 1000)
+    assert depths.keys() == TOPICS.keys() - {"/clock", "/diagnostics"}
+    ends = {name: "subscription" if name in COMMANDS else "publisher" for name in depths}
+    names = [f"qos_overrides.{rig.name(name)}.{end}" for name, end in ends.items()]
+    assert list(rig.get(*(f"{name}.depth" for name in names)).values()) == list(depths.values())
+    assert set(rig.get(*(f"{name}.history" for name in names)).values()) == {"keep_last"}
 
 
 def test_every_parameter_has_a_descriptor_with_description_bounds_and_read_only_mark(rig):
@@ -75,7 +105,7 @@ def test_every_parameter_has_a_descriptor_with_description_bounds_and_read_only_
 def test_diagnostics_have_all_their_keys_and_warn_for_one_report_after_a_refusal(rig):
     report = rig.diagnostics()
     assert report["name"] == "/rigid_body: simulation"
-    assert set(KEYS) <= report.keys()
+    assert report.keys() >= KEYS
     kinds = ("wrench", "poke", "string", "inertia", "schedule", "thrusters")
     assert int(report["commands_received"]) == sum(int(report[f"{kind}_received"]) for kind in kinds) == rig.sent
     before = report["stamp_ns"]
@@ -169,3 +199,26 @@ def test_two_nodes_of_one_domain_do_not_mix(rig, tmp_path):
         tool.trigger("reset")
         tool.until(lambda: tool.events()[-1]["kind"] == "reset", "the reset")
         assert rig.events() == [] and rig.heard("inertia") == []
+
+
+def test_a_port_that_a_scene_names_is_asked_for_and_a_default_one_may_move(monkeypatch):
+    """What is asked for and taken is refused, and a free one found and printed, where it is served: test_rerun_live.py,
+    test_workbench_server.py.
+    """
+    pytest.importorskip("rerun")
+    monkeypatch.setattr("rigid_proto_ros.rerun_view.observer.RerunObserver", lambda **given: given)
+    default = PARAMETERS["web_port"].default
+    for named, asked in ((9191, 9191), (default, None)):
+        viewer = make_viewer(make_scenario({"viewer": "web", "web_port": named}), "tool")
+        assert (viewer["rerun_port"], viewer["web_port"]) == (None, asked)
+
+
+def test_a_page_whose_port_is_taken_is_refused_by_the_parameters_name():
+    pytest.importorskip("viser")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        live = LiveSimulation(make_scenario({"viewer": "workbench", "workbench_port": port}))
+        with pytest.raises(InputError, match=f"workbench_port: got {port}"):
+            open_page(SimpleNamespace(live=live))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,17 +12,17 @@ from conftest import ENDINGS
 pytest.importorskip("rclpy")
 pytest.importorskip("mcap")
 
-from bag_recorder import BagRecorder
 from command_rig import wrench_message
 from flights import SECOND
-from ros_client import RosClient
-from ros_process import run, running_node
+from ros_client import RosClient, stamp_ns
+from ros_process import running_node
 from scripts import EVERY_KIND
 
 from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
-from rigid_proto_ros.session.messages import read_state
+from rigid_proto_ros.ros import replay_publisher
+from rigid_proto_ros.session.recorded_session import decode_event
 
 
 @pytest.fixture(scope="module")
@@ -32,31 +32,6 @@ def session(tmp_path_factory):
     arguments = ["simulate", "t_handle", "--script", str(folder / "script.yaml"), "--duration", "2"]
     assert main([*arguments, "--bag", str(folder / "s.mcap")]) == 0
     return folder / "s.mcap"
-
-
-def states_of(messages, name: str) -> tuple[list[int], list[list[float]]]:
-    read = [read_state(name, m.data, m.topic) for m in messages if m.topic.endswith(f"/{name}")]
-    return [stamp for stamp, _ in read], [row for _, row in read]
-
-
-def last_reset(messages) -> int:
-    """Where the last run begins."""
-    return max(k for k, m in enumerate(messages) if m.topic.endswith("events") and b'"reset"' in m.data)
-
-
-def events_since_reset(messages) -> list[bytes]:
-    """Without the reset's own and those of pauses."""
-    run = messages[last_reset(messages) :]
-    return [m.data for m in run if m.topic.endswith("events") and b'"pause"' not in m.data][1:]
-
-
-def flown_to(messages) -> int:
-    """The stamp that both pose and twist have reached since the reset [ns]; 0 before it has been heard."""
-    messages = list(messages)
-    if not any(m.topic.endswith("events") and b'"reset"' in m.data for m in messages):
-        return 0
-    run = messages[last_reset(messages) :]
-    return min(max(states_of(run, name)[0], default=0) for name in ("pose", "twist"))
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +46,6 @@ def flyer(ros_environment, tmp_path_factory):
     ):
         client.path = path
         client.meet()
-        client.listen("/clock", wait=False, best_effort=True)
         yield client
 
 
@@ -136,64 +110,78 @@ def test_a_recording_switched_on_in_flight_is_shown_and_verified_from_the_next_r
     assert main(["replay", str(path), "--verify"]) == 0
 
 
-def test_states_go_out_with_their_stamps_to_the_bit(session, flyer):
+@pytest.fixture
+def domain(ros_environment, monkeypatch):
+    """Commands run in this process talk to the nodes of this session."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
+
+
+def test_states_go_out_with_their_stamps_to_the_bit(session, ros_environment, domain):
     """Heard again where who was found late on a busy machine has missed the beginning."""
-
-    def published():
-        flyer.forget("/clock")
-        recorder = BagRecorder(flyer.environment)
-        words = ("replay", session, "--publish", "states", "--speed", "8")
-        done = run("rigid_proto", *words, environment=flyer.environment)
-        messages = recorder.finish()
-        assert done.returncode == 0, done.stderr
-        clock = [tick["clock"] for tick in flyer.heard("/clock")]
-        heard = min(len(clock), *(len(states_of(messages, name)[0]) for name in ("pose", "twist")))
-        return heard > 20 and (messages, clock)
-
-    messages, clock = flyer.until(published, "states and clock that were heard")
     (recorded,) = read_runs(session)
-    assert {t["sec"] * SECOND + t["nanosec"] for t in clock} <= set(recorded.times.tolist())
-    for name in ("pose", "twist"):
-        stamps, rows = states_of(messages, name)
-        # Reliable topics: once a subscriber is matched, nothing is missing.
-        first = recorded.times.tolist().index(stamps[0])
-        assert stamps == recorded.times.tolist()[first:]
-        assert np.array(rows).tobytes() == recorded.published[name].rows[first:].tobytes()
+    with RosClient(ros_environment) as client:
+        client.listen("pose", "twist", wait=False)
+        client.listen("/clock", wait=False, best_effort=True)
+
+        def published() -> bool:
+            client.forget("pose", "twist", "/clock")
+            assert main(["replay", str(session), "--publish", "states", "--speed", "8"]) == 0
+            return min(map(client.heard_count, ("pose", "twist", "/clock"))) > 20
+
+        client.until(published, "states and clock that were heard")
+        clock = [tick["clock"] for tick in client.heard("/clock")]
+        assert {t["sec"] * SECOND + t["nanosec"] for t in clock} <= set(recorded.times.tolist())
+        for name in ("pose", "twist"):
+            # Reliable topics: once a subscriber is matched, nothing is missing.
+            client.until(lambda name=name: client.newest_ns(name) == recorded.end_ns, "the last state")
+            heard = client.heard(name)
+            assert list(map(stamp_ns, heard)) == recorded.times.tolist()[-len(heard) :]
+            rows = [[x for part in message[name].values() for x in part.values()] for message in heard]
+            assert np.array(rows).tobytes() == recorded.published[name].rows[-len(heard) :].tobytes()
 
 
-def test_commands_give_a_node_the_same_motion_to_the_bit(session, flyer, tmp_path):
-    flyer.set(real_time_factor=4.0)
-    other = BagRecorder(flyer.environment, name="flyer")
-    other.until(lambda: any(m.topic.endswith("/pose") for m in list(other.messages)), "the node")
-    done = run(
-        *("rigid_proto", "replay", session, "--publish", "commands", "--node", "/flyer"),
-        environment=flyer.environment,
-        cwd=tmp_path,
-    )
-    assert done.returncode == 0, done.stderr
-    other.until(lambda: flown_to(other.messages) >= 2 * SECOND, "the flight after the reset")
+def test_commands_give_a_node_the_same_motion_to_the_bit(session, flyer, tmp_path, domain):
+    (recorded,), path = read_runs(session), tmp_path / "flown.mcap"
+    flyer.set(record=str(path), real_time_factor=4.0)
+    assert main(["replay", str(session), "--publish", "commands", "--node", "/flyer"]) == 0
+    flyer.fly_until(recorded.end_ns)
+    flyer.set(record="")
+    flown = read_runs(path)[-1]
+    acted = [decode_event(line, number) for number, line in enumerate(flown.lines, 1)]
+    commands = [event for event in acted if event[1] not in ("reset", "pause") and event[2] != {"record": ""}]
+    assert commands == [decode_event(line, number) for number, line in enumerate(recorded.lines, 1)]
+    for name, rows in recorded.published.items():
+        states = flown.published[name]
+        begin = states.times.tolist().index(rows.times[1])
+        assert states.rows[begin:][: len(rows) - 1].tobytes() == rows.rows[1:].tobytes()
+
+
+@pytest.mark.parametrize("speed", [0.5, 20.0])
+def test_states_go_out_at_the_pace_that_is_asked_for(session, monkeypatch, speed):
+    """On a clock that moves by what is slept, and by nothing else."""
+    clock, sent = SimpleNamespace(now_s=5.0), []
+
+    def sleep(seconds: float) -> None:
+        clock.now_s += seconds
+
+    def publisher(message_type, topic: str, _profile):
+        publish = lambda data: sent.append((topic, clock.now_s - 5.0, data))  # noqa: E731
+        return SimpleNamespace(publish=publish, wait_for_all_acked=lambda _: True)
+
+    monkeypatch.setattr(replay_publisher, "time", SimpleNamespace(monotonic=lambda: clock.now_s, sleep=sleep))
+    monkeypatch.setattr(replay_publisher, "_wait_for_subscribers", lambda *_: None)
     (recorded,) = read_runs(session)
-    commands = [json.loads(line) for line in recorded.lines]
-    other.until(lambda: len(events_since_reset(list(other.messages))) >= len(commands), "their events")
-    assert flyer.get("record") == {"record": ""}
-    other.close()
-    messages = other.messages
-    last = last_reset(messages)
-    assert len(events_since_reset(messages)) == len(commands)
-    for name in ("pose", "twist"):
-        stamps, rows = states_of(messages[last:], name)
-        flown = {stamp: row for stamp, row in zip(stamps, rows, strict=True) if stamp <= 2 * SECOND}
-        expected = dict(zip(recorded.times.tolist(), recorded.published[name].rows.tolist(), strict=True))
-        assert sum(stamp > 0 for stamp in flown) >= 199
-        assert all(flown[stamp] == expected[stamp] for stamp in flown if stamp > 0)
+    replay_publisher._send_states(SimpleNamespace(create_publisher=publisher), recorded, speed)
+    for topic in ("/clock", "/rigid_body/pose", "/rigid_body/twist"):
+        at = [time_s for name, time_s, _ in sent if name == topic]
+        assert at == pytest.approx([1e-9 * stamp / speed for stamp in recorded.times.tolist()], abs=1e-9)
 
 
-@pytest.mark.stress
-def test_publishing_to_nobody_ends_in_one_line(session, ros_environment):
-    arguments = ["replay", session, "--publish", "commands", "--node", "/nobody"]
-    done = run("rigid_proto", *arguments, environment=ros_environment)
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1 and "/nobody" in done.stderr
+def test_publishing_to_nobody_ends_in_one_line(session, domain, monkeypatch, capsys):
+    monkeypatch.setattr(replay_publisher, "WAIT_FOR_NODE_S", 0.1)
+    assert main(["replay", str(session), "--publish", "commands", "--node", "/nobody"]) == 2
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1 and "/nobody" in err
 
 
 def test_speed_without_states_to_publish_is_refused(session, capsys):

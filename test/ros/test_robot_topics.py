@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What robot people expect beside pose and twist: an IMU at a contact, a robot description with the mesh, /tf."""
+"""What robot people expect beside pose and twist: an IMU at a contact, and /tf."""
 
 import sys
 from types import SimpleNamespace

@@ -8,6 +8,8 @@ import pytest
 
 pytest.importorskip("mcap")
 
+from flights import SECOND, EventLines
+
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.scenario import make_scenario, mesh_sha256_of, read_scene
@@ -17,9 +19,6 @@ from rigid_proto_ros.scene.script import parse_script, read_script
 from rigid_proto_ros.session.as_script import branch_at
 from rigid_proto_ros.session.messages import PROJECTIONS
 from rigid_proto_ros.session.recorded_session import RecordedSession, resimulation
-from rigid_proto_ros.simulation.observer import Logged, Observer
-
-SECOND = 10**9
 
 SCRIPT = """
 - {t: 0.2, wrench: {at: tip, force: [0.0, 0.02, 0.0], torque: [0.0, 1.0e-4, 0.0], axes: body}}
@@ -112,27 +111,14 @@ ALL_KINDS = """
 """
 
 
-class Lines(Observer):
-    """The session that a run would record."""
-
-    def __init__(self) -> None:
-        self.events: list[tuple[int, str]] = []
-
-    takes = frozenset({Logged})
-
-    def on(self, event) -> None:
-        if isinstance(event, Logged):
-            self.events.append((event.time_ns, event.line))
-
-
 def flown(changes: dict, until_ns: int) -> RecordedSession:
     """A session of all kinds of commands that there are."""
-    scenario, lines = make_scenario({**FEATURES, **changes}), Lines()
-    run = OfflineRun(scenario, parse_script(ALL_KINDS), lines)
+    scenario, told = make_scenario({**FEATURES, **changes}), EventLines()
+    run = OfflineRun(scenario, parse_script(ALL_KINDS), told)
     assert run.advance(until_ns)
     return RecordedSession(
         scene=scenario.text,
-        events=lines.events,
+        events=told.timed,
         times=np.array([until_ns]),
         rows=run.simulation.state.row[None].copy(),
         mesh_sha256=mesh_sha256_of(scenario.text),

@@ -15,6 +15,7 @@ import pytest
 
 pytest.importorskip("mcap_ros2")
 
+from conftest import needs_rerun
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
@@ -24,7 +25,7 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.scenario import read_scene
-from rigid_proto_ros.scene.scenario_run import OfflineRun
+from rigid_proto_ros.scene.scenario_run import OfflineRun, notify_start
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
@@ -185,35 +186,46 @@ def _written(path: Path) -> list:
         return []
 
 
-def _fly_with_trouble(observer: McapObserver, trouble) -> None:
+def test_a_full_disk_stops_the_recording_and_not_the_flight_and_the_rest_is_readable(tmp_path, monkeypatch):
+    said: list[str] = []
+    path, deadline = tmp_path / "s.mcap", time.monotonic() + 180.0
+    observer = McapObserver(path, on_error=said.append, simulated_log=True)
     run = OfflineRun(read_scene("book"), [], observer)
     run.advance(SECOND)
-    path, deadline = Path(observer.recording), time.monotonic() + 180.0
     # The first to be written are the schemas, which are no states yet.
     while not any(len(session.times) for session in _written(path)):
         assert time.monotonic() < deadline, "nothing is written"
         time.sleep(0.05)
-    trouble()
+
+    def flush(self):
+        # As a disk does: a part of it, then no more.
+        path.open("ab").write(b"\x06half a chunk")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("mcap.writer.Writer.flush", flush)
     assert run.advance(4 * SECOND)
     observer.close()
-
-
-def test_a_full_disk_stops_the_recording_and_not_the_flight_and_the_rest_is_readable(tmp_path, monkeypatch):
-    said: list[str] = []
-    path = tmp_path / "s.mcap"
-    observer = McapObserver(path, on_error=said.append, simulated_log=True)
-
-    def fill_up() -> None:
-        def flush(self):
-            # As a disk does: a part of it, then no more.
-            path.open("ab").write(b"\x06half a chunk")
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-        monkeypatch.setattr("mcap.writer.Writer.flush", flush)
-
-    _fly_with_trouble(observer, fill_up)
     assert said == [f"recording stopped: {path}: No space left on device"]
     (session,) = read_runs(path)
     assert not session.complete
     assert 0 < session.end_ns <= SECOND
     assert verify(session) is None
+
+
+def test_a_recording_without_states_has_nothing_to_verify(tmp_path, capsys):
+    recorder = McapObserver(tmp_path / "empty.mcap")
+    notify_start(recorder, read_scene("book"))
+    recorder.close()
+    assert main(["replay", str(tmp_path / "empty.mcap"), "--verify"]) == 2
+    out, err = capsys.readouterr()
+    assert "nothing to verify" in err and err.count("\n") == 1 and "verified" not in out
+
+
+@needs_rerun
+def test_a_node_that_a_recording_does_not_hold_is_refused(tmp_path, capsys):
+    session = str(tmp_path / "s.rrd")
+    assert main(["simulate", "book", "--duration", "0.2", "--record", session]) == 0
+    assert main(["replay", session, "--node", "/rigid_body"]) == 0
+    capsys.readouterr()
+    assert main(["replay", session, "--node", "other"]) == 2
+    assert "accepted: rigid_body" in capsys.readouterr().err
