@@ -1,25 +1,36 @@
 # SPDX-License-Identifier: MIT
-"""The body's tab: mesh, size, mass and tensor, the true one next to an approximate one."""
+"""The body's tab: size, mass and tensor, the true one next to an approximate one, and its mesh.
+
+Meshes that come from a browser are judged as ``inspect`` judges files, asked for unit and up axis, and flown. A body
+reads its mesh by path, so the file lies in a folder made here, for as long as it flies; a saved take carries it.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import math
+import re
+import shutil
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import viser
 
 from ..base.bundled import body_names
-from ..base.errors import InputError
-from ..mass.inspection import model_difference
+from ..base.errors import InputError, MeshError
+from ..mass.from_mesh import PASSING, mesh_body
+from ..mass.inspection import Inspection, inspect_mesh, model_difference
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
+from ..mesh.reading import OWN_FORMATS, load_mesh
 from ..picture.style import without_rounding
 from ..scene.scenario import Scenario
 from .controls import TYPING_S, Controls, parse_numbers
 from .flight import Flight
-from .upload import UploadFolder
 
 OWN_FILE = "(a file)"
 
@@ -186,3 +197,204 @@ def comparison(scenario: Scenario) -> str:
 def _per_cent(error: float) -> str:
     seen = without_rounding(error)
     return f"{100.0 * seen:+.3g}" if seen else "0"
+
+
+# Meshes that come from a browser
+
+MAX_BYTES = 256_000_000
+"""Of one upload: it comes over the page's socket and stands in memory whole. Larger files are named by path."""
+
+ACCEPTED = (*OWN_FORMATS, "glb")
+"""Endings of files that hold all of the mesh: .gltf and .dae may name other files, .3mf is a zip."""
+
+Y_UP = ("glb", "obj")
+"""glTF says so, and most tools write .obj like that; what it says itself, in a comment ``# z up``, comes first."""
+
+Z_UP_COMMENT = re.compile(rb"^#.*\bz[ -]?(?:axis )?(?:is )?up\b", re.IGNORECASE | re.MULTILINE)
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+"""Metres, by the name of what a file's numbers may be in."""
+
+HALF = math.sqrt(0.5)
+UPRIGHT = {"z": [0.0, 0.0, 0.0, 1.0], "y": [HALF, 0.0, 0.0, HALF]}
+"""Attitudes xyzw that turn a file's up axis to the world's z."""
+
+ROOM_SIZE = 20.0
+"""A file whose longest side is more than this isn't in metres: meshes are of things, and most of these
+are in millimetres.
+"""
+
+SENSIBLE_DENSITY = 1000.0
+"""[kg/m³] Water's, the default."""
+
+
+@dataclass(frozen=True)
+class Upload:
+    """name: as shown. path: for the parameter ``mesh``. up: which of its axes points up, as far as is known.
+    inspection: what is known of it.
+    """
+
+    name: str
+    path: str
+    up: str
+    inspection: Inspection
+
+    @property
+    def sides(self) -> np.ndarray:
+        """Sides (3,) of its bounding box, in the file's numbers."""
+        lower, upper = self.inspection.lower, self.inspection.upper
+        return np.zeros(3) if lower is None or upper is None else upper - lower
+
+    @property
+    def likely_unit(self) -> str:
+        """Which of UNITS it is most likely in."""
+        return "m" if self.name.endswith(".glb") or float(self.sides.max()) <= ROOM_SIZE else "mm"
+
+    @property
+    def refusal(self) -> str:
+        """Why it can't fly as a solid as it is, or empty."""
+        return "" if self.inspection.refusal is None else str(self.inspection.refusal)
+
+    @property
+    def verdict(self) -> list[str]:
+        """One line a remark, the severity first."""
+        return [f"{finding.severity}: {finding.message}" for finding in self.inspection.findings]
+
+    def size_and_mass(self, unit: str) -> str:
+        """Its size and mass in one line, its numbers being in this unit and its density SENSIBLE_DENSITY."""
+        metres = UNITS[unit]
+        sides = " × ".join(f"{side * metres:.3g}" for side in self.sides)
+        volume = self.inspection.volume
+        if volume is None:
+            return f"{sides} m"
+        return f"{sides} m, {SENSIBLE_DENSITY * volume * metres**3:.3g} kg at {SENSIBLE_DENSITY:g} kg/m³"
+
+    def scene(self, unit: str, stand_in: dict[str, object]) -> dict[str, object]:
+        """Parameters of a scene of this body alone, at rest; stand_in: how one that isn't closed flies."""
+        return {
+            "mesh": self.path,
+            "scale": [UNITS[unit]] * 3,
+            "density": SENSIBLE_DENSITY,
+            "initial.orientation_xyzw": UPRIGHT[self.up],
+            **stand_in,
+        }
+
+
+def take_upload(file_name: str, data: bytes) -> Upload:
+    """Judge a file and keep it in a folder of its own; a body that is told the same path again sees no change.
+
+    A readable mesh that bounds no solid is kept too; its ``refusal`` says why. Raises MeshError for what is no mesh,
+    and keeps nothing of it.
+    """
+    name, suffix = shown_name(file_name)
+    if suffix not in ACCEPTED:
+        raise MeshError("upload", name, f"a file named .{', .'.join(ACCEPTED)}")
+    if len(data) > MAX_BYTES:
+        limit = f"at most {MAX_BYTES} are accepted, so name a larger file by its path"
+        raise MeshError("upload", f"{name} has {len(data)} bytes; {limit}")
+    path = Path(tempfile.mkdtemp(prefix=PASSING)) / name
+    try:
+        path.write_bytes(data)
+        inspection = inspect_mesh(mesh_body(load_mesh(str(path))))
+    except InputError:
+        shutil.rmtree(path.parent)
+        raise
+    z_up = suffix == "obj" and Z_UP_COMMENT.search(data[:4096])
+    return Upload(name, str(path), "y" if suffix in Y_UP and not z_up else "z", inspection)
+
+
+def shown_name(file_name: str) -> tuple[str, str]:
+    """What is left of a file's name, plain letters, at most 40 before the ending; and the ending itself."""
+    stem, _, suffix = re.split(r"[/\\]", file_name)[-1].rpartition(".")
+    stem = re.sub(r"[^A-Za-z0-9_-]+", "_", stem).strip("_")[:40] or "mesh"
+    suffix = re.sub(r"[^a-z0-9]+", "", suffix.lower())[:8]
+    return f"{stem}.{suffix}", suffix
+
+
+class UploadFolder:
+    """viser's upload button, and what is asked before a file flies. fly(values) begins a scene of these parameters;
+    show_verdict(lines) says what is found of a file. Files lie on the disk for as long as they may fly; ``close``
+    removes all.
+    """
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        flight: Flight,
+        fly: Callable[[dict[str, object]], Any],
+        show_verdict: Callable[[Sequence[str]], None],
+    ) -> None:
+        self._flight = flight
+        self._fly_scene = fly
+        self._show_verdict = show_verdict
+        self.present: Upload | None = None
+        self._taken: list[str] = []
+        with gui.add_folder("Upload"):
+            button = gui.add_upload_button(
+                "Upload a mesh",
+                icon=viser.Icon.UPLOAD,
+                mime_type=",".join(f".{suffix}" for suffix in ACCEPTED),
+                hint=f".{', .'.join(ACCEPTED)}; at most {MAX_BYTES // 1_000_000} MB",
+            )
+            self._unit: Any = gui.add_dropdown(
+                "Its unit", tuple(UNITS), visible=False, hint="Unit of the file's coordinates (scale)"
+            )
+            self._size = gui.add_markdown("", visible=False)
+            self._as_it_is = gui.add_button("Simulate it", visible=False)
+            self._stand_in: Any = gui.add_button_group("Simulate", ("it repaired", "its hull"), visible=False)
+
+        @button.on_upload
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            await self.take(button.value.name, button.value.content)
+
+        @self._unit.on_update
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            self._show_size()
+
+        @self._as_it_is.on_click
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            await self._fly({})
+
+        @self._stand_in.on_click
+        async def _(_: viser.GuiEvent[Any]) -> None:
+            repaired = self._stand_in.value == "it repaired"
+            await self._fly({"mesh_repair": True} if repaired else {"mesh_fallback": "hull"})
+
+    def close(self, kept: str = "") -> None:
+        """Remove all files but this one."""
+        for path in self._taken:
+            if path != kept:
+                shutil.rmtree(Path(path).parent, ignore_errors=True)
+        self._taken = [path for path in self._taken if path == kept]
+
+    async def take(self, name: str, content: bytes) -> None:
+        """Judge a file, and say what is found of it."""
+        self.close(self._flight.scenario.parameters.mesh)
+        try:
+            upload = await asyncio.to_thread(take_upload, name, content)
+        except InputError as error:
+            self._show([f"refused: {error}"], None)
+            return
+        self._taken.append(upload.path)
+        lines = [*upload.verdict, *([f"refused: {upload.refusal}"] if upload.refusal else [])]
+        self._show([f"{upload.name}:", *lines] if lines else [f"{upload.name}: no problems found"], upload)
+
+    def _show(self, lines: list[str], upload: Upload | None) -> None:
+        """The verdict, and what is asked before this upload flies; None: nothing is asked."""
+        self.present = upload
+        self._show_verdict(lines)
+        if upload is not None:
+            self._unit.value = upload.likely_unit
+            self._show_size()
+        self._unit.visible = self._size.visible = upload is not None
+        self._as_it_is.visible = upload is not None and not upload.refusal
+        self._stand_in.visible = upload is not None and bool(upload.refusal)
+
+    def _show_size(self) -> None:
+        if self.present is not None:
+            self._size.content = f"**{self.present.size_and_mass(self._unit.value)}**"
+
+    async def _fly(self, stand_in: dict[str, object]) -> None:
+        upload = self.present
+        if upload is not None and await self._fly_scene(upload.scene(self._unit.value, stand_in)):
+            self._show([f"{upload.name}: simulated"], None)

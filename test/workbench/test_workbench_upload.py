@@ -23,7 +23,7 @@ from rigid_proto_ros.mass.inspection import as_json
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.picture.surface import BOX_CORNERS, BOX_TRIANGLES
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.workbench.upload import MAX_BYTES, UploadFolder, take_upload
+from rigid_proto_ros.workbench.body_tab import MAX_BYTES, UploadFolder, take_upload
 
 BOOK = resolve_mesh("book").read_bytes()
 OPEN = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\n"
