@@ -74,7 +74,7 @@ class LinkDiagnosis:
     def as_dict(self) -> dict:
         """The diagnosis as a JSON object; ``expected`` is in the link's axes."""
         expected = self.expected and self.expected.as_dict()
-        mass = None if math.isnan(self.mass) else self.mass
+        mass = self.mass if math.isfinite(self.mass) else None
         return {**vars(self), "mass": mass, "causes": list(self.causes), "expected": expected}
 
 

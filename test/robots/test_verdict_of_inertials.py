@@ -48,12 +48,13 @@ def verdicts(path) -> dict:
         ("1e-9", (0, 0, 0, 0, 0, 0)),
         ("-1", (1, 0, 0, 1, 0, 1)),
         ("nan", (1, 0, 0, 1, 0, 1)),
+        ("1e999", (1, 0, 0, 1, 0, 1)),
     ],
 )
 def test_what_no_body_has_is_impossible_with_and_without_shapes(tmp_path, capsys, shapes, mass, six):
     path = urdf(tmp_path, (shapes, mass, "0 0 0", six))
     assert main(["inspect", "--compare", str(path), "--json"]) == 1
-    (link,) = json.loads(capsys.readouterr().out)["links"]
+    (link,) = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)["links"]  # NaN and Infinity are no JSON
     assert link["status"] == "impossible" and link["causes"]
     assert any("needs no inertial" in cause for cause in link["causes"]) == (not any(six))
 
