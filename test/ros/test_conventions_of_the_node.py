@@ -206,7 +206,7 @@ def test_a_port_that_a_scene_names_is_asked_for_and_a_default_one_may_move(monke
     test_workbench_server.py.
     """
     pytest.importorskip("rerun")
-    monkeypatch.setattr("rigid_proto_ros.rerun_view.observer.RerunObserver", lambda **given: given)
+    monkeypatch.setattr("rigid_proto_ros.rerun_view.live_view.LiveView", lambda viewer, **given: given)
     default = PARAMETERS["web_port"].default
     for named, asked in ((9191, 9191), (default, None)):
         viewer = make_viewer(make_scenario({"viewer": "web", "web_port": named}), "tool")
