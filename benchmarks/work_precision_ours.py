@@ -23,8 +23,8 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.problem import to_row
 from rigid_proto_ros.motion.string import StringSettings
-from rigid_proto_ros.motion.variables import to_row
 from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.simulation.setup import Setup
 from rigid_proto_ros.simulation.simulation import Simulation

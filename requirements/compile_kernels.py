@@ -21,7 +21,7 @@ from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.live.live_simulation import warm_up
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import auto
-from rigid_proto_ros.motion.integrators.stepping import method_table, provide_kernel
+from rigid_proto_ros.motion.integrators.integrator import method_table, provide_kernel
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.simulation.simulation import Simulation

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Steps as an integrator committed them, each judged against the exact flow from its own start.
 
-The flow is that of the segment's own variables (motion/variables.py), so nothing is lost by converting to world coordinates.
+The flow is that of the segment's own variables (motion/problem.py), so nothing is lost by converting to world coordinates.
 """
 
 from __future__ import annotations

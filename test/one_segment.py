@@ -7,13 +7,19 @@ import numpy as np
 
 from rigid_proto_ros.base.records import new_record
 from rigid_proto_ros.motion.body import LENGTH, Body
-from rigid_proto_ros.motion.integrators.integrator import Integrator
+from rigid_proto_ros.motion.integrators.integrator import Integrator, method_table, provide_kernel, workspace_size
 from rigid_proto_ros.motion.integrators.series_steps import degree_for
-from rigid_proto_ros.motion.integrators.stepping import method_table, provide_kernel, workspace_size
-from rigid_proto_ros.motion.problem import PROBLEM, Environment, begin_body, begin_problem, begin_string
+from rigid_proto_ros.motion.problem import (
+    PROBLEM,
+    VARIABLES,
+    Environment,
+    begin_body,
+    begin_problem,
+    begin_string,
+    to_variables,
+)
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringState
-from rigid_proto_ros.motion.variables import VARIABLES, to_variables
 from rigid_proto_ros.simulation import flight as fl
 
 

@@ -196,18 +196,6 @@ def sine_cosine(x: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def sine(x: float) -> float:
-    """sin x."""
-    return sine_cosine(x)[0]
-
-
-@njit(cache=True, error_model="numpy")
-def cosine(x: float) -> float:
-    """cos x."""
-    return sine_cosine(x)[1]
-
-
-@njit(cache=True, error_model="numpy")
 def _exponential_parts(x: float) -> tuple[int, float, float, float]:
     """n, r and a pair (t, t_low) with eˣ = 2ⁿ (1 + r + t), |r| ≤ ½ log 2; |x| < 1000."""
     whole = (x * (1.0 / 0.6931471805599453) + _TO_NEAREST) - _TO_NEAREST

@@ -18,10 +18,9 @@ from ..base.rotation import rotate_inverse
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import BODY, fill_body
 from ..motion.integrators.auto import AUTO
+from ..motion.integrators.integrator import METHOD, method_table, provide_kernel, workspace_size
 from ..motion.integrators.series_steps import degree_for
-from ..motion.integrators.stepping import METHOD, method_table, provide_kernel, workspace_size
-from ..motion.problem import ENVIRONMENT, PROBLEM, begin_body
-from ..motion.variables import VARIABLES
+from ..motion.problem import ENVIRONMENT, PROBLEM, VARIABLES, begin_body
 from ..simulation import flight as fl
 from ..simulation.commands import NO_SLOT
 

@@ -26,7 +26,7 @@ from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, arm, fill_body
 from ..motion.integrators.auto import FASTEST
-from ..motion.integrators.stepping import provide_kernel
+from ..motion.integrators.integrator import provide_kernel
 from ..motion.loads import is_within_magnitude
 from ..motion.problem import ENVIRONMENT_FIELDS, KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_body
 from ..motion.state import fill_initial_row

@@ -11,13 +11,9 @@ from ..base.rotation import transposed_times
 from ..base.vectors import Vector
 from ..motion.integrators import check_supported
 from ..motion.integrators.auto import FASTEST
-from ..motion.integrators.integrator import (
-    ANGULAR_DAMPING,
-    NO_GYROSCOPIC_TERM,
-    STRING,
-    needs_of_load,
-)
+from ..motion.integrators.integrator import NO_GYROSCOPIC_TERM, STRING, needs_of_load
 from ..motion.loads import Load, light_row, resolve_load
+from ..motion.problem import ENVIRONMENT_NEEDS
 from ..motion.state import State
 from ..motion.string import most_yielding
 from .commands import Command, MoveString, ThrusterCommand, WrenchCommand
@@ -116,13 +112,11 @@ def _check_rate(parameter: str, value: float, most: float, unit: str, rate: floa
 
 def needs_of(setup: Setup, loads: Iterable[Load], tied: bool) -> frozenset[str]:
     """What the scene asks of its integrator."""
-    needs: set[str] = set()
+    needs = {need for name, need in ENVIRONMENT_NEEDS.items() if getattr(setup, name)}
     for load in loads:
         needs |= needs_of_load(load)
     if not setup.gyroscopic:
         needs.add(NO_GYROSCOPIC_TERM)
-    if setup.angular_damping:
-        needs.add(ANGULAR_DAMPING)
     if tied:
         needs.add(STRING)
     return frozenset(needs)

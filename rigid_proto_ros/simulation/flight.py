@@ -20,12 +20,21 @@ from ..base.rotation import norm
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
 from ..motion.integrators.equations import accelerations, parts_of, tension_margin
-from ..motion.integrators.integrator import ADAPTIVE, NOTHING, ONE_STEP
-from ..motion.integrators.series_steps import CONTROL, FLOOR, begin_control
-from ..motion.integrators.stepping import commit, is_provided, reach
+from ..motion.integrators.integrator import ADAPTIVE, CONTROL, NOTHING, ONE_STEP, commit, is_provided, reach
+from ..motion.integrators.series_steps import FLOOR, begin_control
 from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
-from ..motion.problem import PROBLEM, STRING, begin_problem, begin_string
-from ..motion.variables import HAND_WORK, HEAT, MAX_SPEED, VARIABLES, to_good_row, to_variables
+from ..motion.problem import (
+    HAND_WORK,
+    HEAT,
+    MAX_SPEED,
+    PROBLEM,
+    STRING,
+    VARIABLES,
+    begin_problem,
+    begin_string,
+    to_good_row,
+    to_variables,
+)
 from .commands import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE
 
 FLIGHT = record_type(
@@ -151,7 +160,7 @@ def begin_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, roo
     """Begin a segment at ``start``: what acts is summed afresh, in the order in which it began, and the method is
     chosen.
 
-    loads: the table. methods: motion/integrators/stepping.py. room: for the workspace of the adaptive ones.
+    loads: the table. methods: motion/integrators/integrator.py. room: for the workspace of the adaptive ones.
     """
     for k in range(LOADS_SIZE):
         flight.sums[k] = 0.0

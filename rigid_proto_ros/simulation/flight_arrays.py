@@ -14,7 +14,7 @@ from numba import float64, from_dtype, int64, types
 from ..base.compilation import entry_of, njit
 from ..base.records import place_of
 from ..base.simd import aligned
-from ..motion.integrators.stepping import METHOD, provide_kernel
+from ..motion.integrators.integrator import METHOD, provide_kernel
 from ..motion.loads import Load, load_of_row
 from ..motion.state import State
 from ..motion.string import StringState

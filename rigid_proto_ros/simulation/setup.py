@@ -13,9 +13,8 @@ import numpy as np
 from ..base.records import new_record
 from ..base.rotation import length
 from ..motion.body import LENGTH, Body
-from ..motion.integrators.integrator import Integrator
+from ..motion.integrators.integrator import Integrator, method_table, workspace_size
 from ..motion.integrators.series_steps import degree_for
-from ..motion.integrators.stepping import method_table, workspace_size
 from ..motion.problem import PROBLEM, Environment, begin_body
 from ..motion.string import StringSettings
 from ..motion.surface import Surface

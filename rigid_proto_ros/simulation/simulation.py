@@ -21,10 +21,9 @@ from ..motion.integrators import check_supported
 from ..motion.integrators.integrator import STRING
 from ..motion.integrators.series_steps import degree_of_motion, fastest_swing
 from ..motion.loads import TORQUE_WORLD, Load, load_of_bytes
-from ..motion.problem import PROBLEM
+from ..motion.problem import MAX_SPEED, PROBLEM, VARIABLES
 from ..motion.state import State, angular_momentum, shift_com
 from ..motion.string import StringState
-from ..motion.variables import MAX_SPEED, VARIABLES
 from . import flight as fl
 from .checks import check_command, check_load_supported, check_rates, check_start, check_thrust, load_row, needs_of
 from .commands import (

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from ..base.errors import InputError, MeshError
 from ..base.files import output_file
 from ..motion.integrators import check_supported
-from ..motion.integrators.integrator import ANGULAR_DAMPING
 from ..motion.loads import FORCE, TORQUE
+from ..motion.problem import ENVIRONMENT_NEEDS
 from ..scene.parameters import HUGE, Parameters, Value, parameter_named, with_mass_of_density
 from ..scene.scenario import BodyMesh, Scenario, build_scenario
 from ..scene.scenario_run import OfflineRun
@@ -93,8 +93,8 @@ class BatchMaker:
         body_mesh = body_mesh_of(parameters)
         self._setup = setup = build_scenario(parameters, body_mesh).setup
         check_start(setup)
-        if any(v.target.parameter == "angular_damping" for v in study.vary):
-            check_supported(setup.integrator, frozenset({ANGULAR_DAMPING}))
+        varied = {v.target.parameter for v in study.vary}
+        check_supported(setup.integrator, frozenset(need for name, need in ENVIRONMENT_NEEDS.items() if name in varied))
         if setup.string.attached and setup.initial_string_mass:
             raise NotBatchable
         self._row = batch_row(parameters, body_mesh)

@@ -15,8 +15,7 @@ from reference_motion import angle_between, free_motion
 from problems import P1
 from rigid_proto_ros.base.records import new_record
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.problem import PROBLEM
-from rigid_proto_ros.motion.variables import VARIABLES
+from rigid_proto_ros.motion.problem import PROBLEM, VARIABLES
 
 EPSILON = 2.0**-52
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])

@@ -10,9 +10,9 @@ from one_segment import new_variables
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import NO_GYROSCOPIC_TERM, STRING
 from rigid_proto_ros.motion.integrators.series import taylor_steps_of_degree
+from rigid_proto_ros.motion.problem import to_row
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringSettings
-from rigid_proto_ros.motion.variables import to_row
 
 FLOOR = 2e-15
 """What rounding leaves after a second of these motions: errors of the orders' tests lie at least 1e3 times above it."""

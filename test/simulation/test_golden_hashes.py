@@ -171,15 +171,20 @@ def arguments() -> tuple[np.ndarray, np.ndarray]:
 
 
 OF_ONE = {
-    **dict.fromkeys(("sine", "cosine", "inverse_tangent", "logarithm"), 0),
-    **dict.fromkeys(("exponential_of", "expm1"), 1),
+    "sine": (lambda x: el.sine_cosine(x)[0], 0),
+    "cosine": (lambda x: el.sine_cosine(x)[1], 0),
+    "inverse_tangent": (el.inverse_tangent, 0),
+    "logarithm": (el.logarithm, 0),
+    "exponential_of": (el.exponential_of, 1),
+    "expm1": (el.expm1, 1),
 }
 """Elementary functions of one argument, and which of ``arguments`` they are given."""
 
 
 def function_of_one(name: str) -> str:
     """Hash of the values of an elementary function."""
-    return digest(np.array([getattr(el, name)(x) for x in arguments()[OF_ONE[name]].tolist()]))
+    function, given = OF_ONE[name]
+    return digest(np.array([function(x) for x in arguments()[given].tolist()]))
 
 
 def angles() -> str:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Integrators by name.
 
-An integrator takes the variables of a segment (motion/variables.py) forward in time under the segment's problem
+An integrator takes the variables of a segment (motion/problem.py) forward in time under the segment's problem
 (motion/problem.py). It keeps two promises: a step is a function of the variables, the problem and the step size alone,
 and ``advance`` commits only steps at full length, so that sampling the motion never changes it.
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
-from ..variables import damping_functions, is_good
+from ..problem import damping_functions, is_good
 from .equations import stretch
 from .free_body import free_body_steps
 from .integrator import (

@@ -2,7 +2,7 @@
 """The equations of motion in principal axes, as integrators evaluate them.
 
 q xyzw takes principal to world axes, w = ω is in principal axes, d and u are the added displacement and velocity in
-world axes (motion/variables.py), p is the segment's problem (motion/problem.py). ``taut`` says whether the string's law
+world axes (motion/problem.py), p is the segment's problem (motion/problem.py). ``taut`` says whether the string's law
 of tension holds; where it changes is found by integrators/string_law.py.
 """
 

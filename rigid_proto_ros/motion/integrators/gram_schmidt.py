@@ -17,9 +17,9 @@ from ...base.compilation import njit
 from ...base.records import copy_numbers
 from ...base.rotation import matrix_elements, norm
 from ...base.vectors import Quaternion, Vector
-from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY
 from .equations import accelerations, parts_of
-from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator, Kernel
+from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
 from .runge_kutta import ONE_STAGE, repeated
 
 _Matrix = tuple[Vector, Vector, Vector]
@@ -124,7 +124,7 @@ EULER = Integrator(
     source="The 2019 paper, section on integration; Hairer, Nørsett and Wanner (1993), section II.1",
     limits="Explicit: gains energy at every step, useless beyond |ω|h of about 0.1.",
     stability_limit=0.1,
-    supports=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
+    supports=EVALUATED | {NO_GYROSCOPIC_TERM},
     kernel=_steps(ONE_STAGE),
 )
 
@@ -135,6 +135,6 @@ MIDPOINT = Integrator(
     source="The 2019 paper, section on integration; Hairer, Nørsett and Wanner (1993), section II.1",
     limits="Explicit: energy drifts with h³ per step; diverges beyond |ω|h of about 1.",
     stability_limit=0.3,
-    supports=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
+    supports=EVALUATED | {NO_GYROSCOPIC_TERM},
     kernel=_steps(np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 1.0]])),
 )

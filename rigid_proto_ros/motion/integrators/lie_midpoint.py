@@ -25,7 +25,7 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize, rotate
 from ...base.vectors import Quaternion, Vector
-from ..variables import is_good
+from ..problem import is_good
 from .equations import parts_of, torque
 from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 

@@ -21,9 +21,9 @@ from ...base.compilation import njit
 from ...base.records import copy_numbers
 from ...base.rotation import exponential, multiply, normalize
 from ...base.simd import Packed, filled, four, joined, load, number, store
-from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good
 from .equations import accelerations, parts_of, stretch, tension_margin
-from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, STRING, Integrator, Kernel
+from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
 from .string_law import is_one_sided, shortening_heat
 
 Step = Callable[[np.ndarray, np.record, float, bool, np.ndarray, np.ndarray, np.ndarray], None]
@@ -170,7 +170,7 @@ RK4 = Integrator(
     source="Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.1",
     limits="Explicit: diverges beyond |ω|h of about 2.8; energy drifts with h⁵ per step.",
     stability_limit=1.0,
-    supports=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
+    supports=EVALUATED | {NO_GYROSCOPIC_TERM},
     kernel=explicit(
         np.array(
             [
@@ -257,7 +257,7 @@ DOP853 = Integrator(
     source="Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.10",
     limits="Explicit: accurate up to |ω|h of about 1, diverges beyond about 4.",
     stability_limit=2.0,
-    supports=LOADS | {ANGULAR_DAMPING, STRING},
+    supports=EVALUATED,
     kernel=explicit(DOP853_TABLEAU),
 )
 
@@ -292,6 +292,6 @@ SEMI_IMPLICIT_EULER = Integrator(
     limits="First order; a string stays bounded up to ω_s h of about 2, "
     "a spinning body gains energy beyond |ω|h of 0.1.",
     stability_limit=0.1,
-    supports=LOADS | {ANGULAR_DAMPING, STRING},
+    supports=EVALUATED,
     kernel=semi_implicit_euler_steps,
 )

@@ -36,8 +36,8 @@ from ...base.simd import (
     store,
     triple,
 )
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good
 from ..string import NO_DIRECTION
-from ..variables import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good
 from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
 
 
@@ -229,7 +229,7 @@ TAYLOR = Integrator(
 # Loads of any kind, and a string
 
 # Columns of the coefficient array c (degree + 2, MOTION_COLUMNS); the first 15 are the variables of
-# motion/variables.py. What products take, sixteen numbers at once, in fours: ω and q as above; q's numbers each four
+# motion/problem.py. What products take, sixteen numbers at once, in fours: ω and q as above; q's numbers each four
 # times, and (a, l); q three times, and (a, l); R's columns, and n; each component of ω × r, and l, four times; the
 # force F three times, and T four times.
 _LEFT, _RIGHT, _SPREAD, _REPEATED, _COLUMNS, _SWING, _FORCE = 16, 32, 48, 64, 80, 96, 112

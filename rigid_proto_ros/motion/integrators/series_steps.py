@@ -26,11 +26,11 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.elementary import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of, logarithm
-from ...base.records import copy_numbers, record_type
+from ...base.records import copy_numbers
 from ...base.rotation import norm
 from ...base.simd import Packed, aligned, filled, four, joined, largest, load
+from ..problem import ATTITUDE, HEAT, VARIABLES, damping_functions, is_good
 from ..string import most_yielding
-from ..variables import ATTITUDE, HEAT, VARIABLES, damping_functions, is_good
 from .series import (
     A_KNOT,
     MOTION_COLUMNS,
@@ -53,30 +53,6 @@ from .string_law import (
     next_law,
     shortening_heat,
 )
-
-CONTROL = record_type(
-    [
-        ("accuracy", np.float64),  # local error rate asked for [1/s]
-        ("degree", np.int64),  # of the series of the spin
-        ("accepted_ns", np.int64),  # length of the step that waits for its commitment; 0 for none
-        ("elapsed_ns", np.int64),  # committed since the segment's start
-        ("steps", np.int64),  # committed
-        ("evaluations", np.int64),  # in committed steps, one for each series
-        ("pending", np.int64),  # evaluations spent on the step that waits
-        # The largest [1/s] that rounding, and not the accuracy, has allowed a step; and where it is most of all the
-        # rounding of a string's pull.
-        ("floor_rate", np.float64),
-        ("pull_floor_rate", np.float64),
-        ("failed", np.bool_),  # a nanosecond would be too long a step, or the motion ran away
-        ("series", np.bool_),  # the workspace holds the series from the committed variables on
-        # Of the step that waits, where the string's law changes within it:
-        ("law", np.float64),  # the string's law at its start
-        ("switch", np.float64),  # time after which the last series holds and no more the first [s]; infinite for none
-        ("last_start", np.float64),  # where the last series starts [s]
-        ("last_law", np.float64),  # the law of the last series
-    ]
-)
-"""What is kept between calls."""
 
 LONGEST = 1e6
 """Longest step [s]: 10¹⁵ ns are exact in a double."""
