@@ -10,13 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from flights import SECOND, flight_setup, wrench
-from random_scenes import log_uniform, random_turn
+from random_scenes import log_uniform, random_turn, turned_body
 from reference_flights import DIRECTIONS, error, fly, numbers
 from scipy.spatial.transform import Rotation
 
 from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.mesh.reading import load_mesh
-from rigid_proto_ros.motion.body import Body, make_body
 from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.commands import MoveString
@@ -81,7 +80,7 @@ class Scene:
 def make_scene(features: dict, rng: np.random.Generator, accuracy: float = 1e-9) -> Scene:
     """A scene of these features, all else at random."""
     f, size = features, features["scale"] * log_uniform(rng, 0.3, 3.0)
-    body = _body(rng, size)
+    body = turned_body(rng, log_uniform(rng, 0.1, 10.0) * size**3, 0.3 * size, 0.05)
     reach = np.sqrt(body.principal_moments.max() / body.mass)
     arm = reach * rng.normal(size=3) if f["knot"] == "off" else np.zeros(3)
     turn = random_turn(rng)
@@ -207,15 +206,6 @@ def share(scene: Scene, row_at, accuracy: float, end_s: float = END_S) -> float:
     if allowed > CHAOS:
         return share(scene, row_at, accuracy, 0.5 * end_s)
     return found / allowed
-
-
-def _body(rng, size) -> Body:
-    """A few kg at a metre; anything from stick to ball, turned in its mesh."""
-    mass = log_uniform(rng, 0.1, 10.0) * size**3
-    second = mass * (0.3 * size) ** 2 * np.array([1.0, log_uniform(rng, 0.05, 1.0), log_uniform(rng, 0.05, 1.0)])
-    turn = random_turn(rng)
-    inertia = turn @ np.diag(second.sum() - second) @ turn.T
-    return make_body(mass, np.zeros(3), 0.5 * (inertia + inertia.T))
 
 
 def _loads(rng, body, reach, size):

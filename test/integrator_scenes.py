@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from one_segment import OneSegment, make_problem
+from flights import SECOND, flight, wrench
 from reference_motion import angle_between, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
 from problems import P2
 from rigid_proto_ros.base.rotation import cross
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import (
     ANGULAR_DAMPING,
     BODY_FORCE,
@@ -25,72 +24,73 @@ from rigid_proto_ros.motion.integrators.integrator import (
     Integrator,
 )
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.motion.string import StringSettings, StringState, tie
+from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.simulation.simulation import Simulation
 
 TENSOR = ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9))
 MASS = 2.0
+BODY = make_body(MASS, (0.0, 0.0, 0.0), TENSOR)
 ROW = (0.3, -0.2, 0.1, 0.2, -0.4, 0.4, 0.8, 0.4, 0.1, -0.3, 0.9, 1.3, -0.6)
 POINT, FORCE = P2.wrenches[0].point, P2.wrenches[0].force
+FORCE_WORLD, TORQUE_WORLD, TORQUE_BODY = (0.4, -0.7, 0.5), (0.2, 0.3, -0.4), (-0.3, 0.2, 0.4)
+ZERO = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What acts: keys of the integrators' needs, and always gravity and linear damping."""
+    """What acts: keys of the integrators' needs, and always gravity, linear damping and a world force."""
 
     needs: frozenset
     string: StringSettings | None = None
 
-    def problem_and_start(self) -> tuple[np.ndarray, State]:
-        """The core's problem and the state it starts from."""
-        body, state = make_body(MASS, (0.0, 0.0, 0.0), TENSOR), State(0, np.array(ROW))
-        wanted = self._values()
-        sums = ("force_world", "force_body", "torque_world", "torque_body", "moment")
-        loads = np.concatenate([np.ravel(wanted[name]) for name in sums])
-        problem = make_problem(
-            body,
-            loads,
-            wanted["gravity"],
-            wanted["linear_damping"],
-            wanted["angular_damping"],
-            wanted["gyroscopic"],
-            state,
-            self.tied(body, state),
-        )
-        return problem, state
-
-    def tied(self, body, state) -> StringState | None:
-        return tie(self.string, self.string.attach, self.string.target, body, state, 0) if self.string else None
-
-    def reference(self, times) -> list:
-        """Rows of 13 mpf at the times [s]."""
-        return _reference(self, tuple(times))
-
-    def _values(self) -> dict:
-        force_world, force_body = np.array((0.4, -0.7, 0.5)), np.array(FORCE)
-        world, body = WORLD_TORQUE in self.needs, BODY_FORCE in self.needs
-        torque = BODY_TORQUE in self.needs
-        point = np.array(POINT)
+    @property
+    def around(self) -> dict:
+        """What acts beside wrenches and a string."""
         return {
             "gravity": np.array((0.0, 0.0, -9.81)),
-            "force_world": force_world,
-            "force_body": force_body if body else np.zeros(3),
-            "torque_world": np.array((0.2, 0.3, -0.4)) if world else np.zeros(3),
-            "torque_body": (cross(point, force_body) if body else 0.0) + np.array((-0.3, 0.2, 0.4))
-            if torque
-            else np.zeros(3),
-            "moment": point[:, None] * force_world if world else np.zeros((3, 3)),
             "linear_damping": 0.3,
             "angular_damping": 0.2 if ANGULAR_DAMPING in self.needs else 0.0,
             "gyroscopic": NO_GYROSCOPIC_TERM not in self.needs,
         }
 
+    @property
+    def wrenches(self) -> list[tuple]:
+        """Axes, point, force, torque of each."""
+        at_point = "point/" + ",".join(map(repr, POINT))
+        found = [("world", "com", FORCE_WORLD, ZERO)]
+        if WORLD_TORQUE in self.needs:
+            found = [("world", at_point, FORCE_WORLD, TORQUE_WORLD)]
+        torque, force = BODY_TORQUE in self.needs, BODY_FORCE in self.needs
+        if torque or force:
+            point = at_point if torque and force else "com"
+            found.append(("body", point, FORCE if force else ZERO, TORQUE_BODY if torque else ZERO))
+        return found
+
+    def simulation(self, integrator: str, step_ns: int = SECOND // 1000, accuracy: float = 1e-9) -> Simulation:
+        """A simulation that all of it acts in from the start."""
+        simulation = flight(
+            BODY,
+            integrator=integrator,
+            step_s=step_ns / SECOND,
+            accuracy=accuracy,
+            initial=ROW,
+            string=self.string or StringSettings(),
+            **self.around,
+        )
+        for axes, point, force, torque in self.wrenches:
+            simulation.submit(wrench(f"{axes}@{point};slot={axes}", force, torque))
+        return simulation
+
+    def reference(self, times) -> list:
+        """Rows of 13 mpf at the times [s]."""
+        return _reference(self, tuple(times))
+
 
 @lru_cache(maxsize=64)
 def _reference(scene: Scene, times):
-    values, string = scene._values(), None
+    string = None
     if scene.string is not None:
-        body, state = make_body(MASS, (0.0, 0.0, 0.0), TENSOR), State(0, np.array(ROW))
-        tied = scene.tied(body, state)
+        tied = scene.simulation("auto").string
         string = ReferenceString(
             tied.attach,
             tuple(tied.target),
@@ -99,13 +99,18 @@ def _reference(scene: Scene, times):
             tied.rest_length,
             tied.bilateral,
         )
-    problem = ReferenceProblem(
-        mass=MASS,
-        inertia=TENSOR,
-        moment=tuple(tuple(float(x) for x in row) for row in values.pop("moment")),
-        **{k: tuple(float(x) for x in v) if isinstance(v, np.ndarray) else v for k, v in values.items()},
-        string=string,
-    )
+    loads = {}
+    for axes, point, force, torque in scene.wrenches:
+        if axes == "world":
+            loads |= {"force_world": force, "torque_world": torque}
+            if point != "com":
+                loads["moment"] = tuple(tuple(r * f for f in force) for r in POINT)
+        else:
+            arm = ZERO if point == "com" else POINT
+            turned = tuple(float(a + b) for a, b in zip(torque, cross(arm, force), strict=True))
+            loads |= {"force_body": force, "torque_body": turned}
+    around = {**scene.around, "gravity": tuple(map(float, scene.around["gravity"]))}
+    problem = ReferenceProblem(mass=MASS, inertia=TENSOR, **around, **loads, string=string)
     return reference_motion(problem, ROW, times, digits=20)
 
 
@@ -114,13 +119,9 @@ def scene_for(integrator: Integrator, **changes) -> Scene:
     return Scene(integrator.supports - {STRING, NO_GYROSCOPIC_TERM}, **changes)
 
 
-def flown(integrator: Integrator | str, scene: Scene, step_ns: int, until_ns: int) -> State:
+def flown(name: str, scene: Scene, step_ns: int, until_ns: int) -> State:
     """The state at ``until_ns`` by fixed steps."""
-    integrator = INTEGRATORS[integrator] if isinstance(integrator, str) else integrator
-    problem, start = scene.problem_and_start()
-    segment = OneSegment(start, problem, integrator, step_ns)
-    segment.advance(until_ns)
-    return segment.look(until_ns)
+    return scene.simulation(name, step_ns).advance(until_ns)
 
 
 def error(state: State, reference) -> float:

@@ -24,13 +24,17 @@ def random_turn(rng: np.random.Generator) -> np.ndarray:
     return q * np.sign(np.linalg.det(q))
 
 
-def random_body(rng: np.random.Generator) -> Body:
-    """0.1 to 10 kg, a few cm to a metre, anything from stick to ball, turned in its mesh."""
-    mass, size = log_uniform(rng, 0.1, 10.0), log_uniform(rng, 0.03, 1.0)
-    second = mass * size**2 * np.array([1.0, log_uniform(rng, 0.01, 1.0), log_uniform(rng, 0.01, 1.0)])
+def turned_body(rng: np.random.Generator, mass: float, reach: float, thinnest: float) -> Body:
+    """Anything from stick (1 to ``thinnest``) to ball, turned in its mesh."""
+    second = mass * reach**2 * np.array([1.0, log_uniform(rng, thinnest, 1.0), log_uniform(rng, thinnest, 1.0)])
     turn = random_turn(rng)
     inertia = turn @ np.diag(second.sum() - second) @ turn.T
     return make_body(mass, np.zeros(3), 0.5 * (inertia + inertia.T))
+
+
+def random_body(rng: np.random.Generator) -> Body:
+    """0.1 to 10 kg, a few cm to a metre."""
+    return turned_body(rng, log_uniform(rng, 0.1, 10.0), log_uniform(rng, 0.03, 1.0), 0.01)
 
 
 def random_scene(seed: int, integrator: str, accuracy: float = 1e-9, step_s: float = 1e-3) -> Simulation:

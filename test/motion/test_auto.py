@@ -4,12 +4,10 @@
 import numpy as np
 import pytest
 from flights import AT_REST, SECOND, flight, spinning, wrench
-from integrator_scenes import MASS, TENSOR, Scene, error
-from one_segment import OneSegment
+from integrator_scenes import BODY, Scene, error
 from reference_motion import angle_between, free_motion
 
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import (
     ANGULAR_DAMPING,
     BODY_FORCE,
@@ -19,7 +17,6 @@ from rigid_proto_ros.motion.integrators.integrator import (
 )
 from rigid_proto_ros.motion.string import StringSettings
 
-BODY = make_body(MASS, (0.0, 0.0, 0.0), TENSOR)
 GRAVITY = np.array((0.0, 0.0, -9.81))
 STRING = StringSettings(attached=True, attach=(0.1, 0.15, 0.2), target=(0.0, 0.0, 2.0), frequency=20.0, rest_length=1.0)
 
@@ -84,12 +81,10 @@ SCENES = {
 def test_the_global_error_follows_the_accuracy(scene, accuracy):
     scene = SCENES[scene]
     reference = scene.reference([1.0])[0]
-    problem, start = scene.problem_and_start()
-    segment = OneSegment(start, problem, INTEGRATORS["auto"], SECOND // 1000, accuracy)
-    segment.advance(SECOND)
+    simulation = scene.simulation("auto", accuracy=accuracy)
     # Local rates add up to at most the accuracy here, rounding aside: measured up to 0.4 of it.
-    assert error(segment.look(SECOND), reference) <= accuracy + 1e-13
-    assert segment.steps < 60
+    assert error(simulation.advance(SECOND), reference) <= accuracy + 1e-13
+    assert simulation.steps < 60
 
 
 def test_a_smaller_accuracy_is_no_worse_and_the_error_grows_as_the_docs_say():

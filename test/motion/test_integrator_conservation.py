@@ -3,14 +3,11 @@
 
 import numpy as np
 import pytest
-from flights import spinning
-from one_segment import make_problem, new_variables
+from flights import flight, spinning
 
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.loads import LOADS_SIZE
-from rigid_proto_ros.motion.state import State
 
 MOMENTS = np.array((1.0, 2.0, 3.0))
 BODY = make_body(1.0, (0.0, 0.0, 0.0), np.diag(MOMENTS))
@@ -18,10 +15,11 @@ STEPPED = [name for name, integrator in INTEGRATORS.items() if integrator.kernel
 SPINS = [(0.9, 1.1, -0.7), (1.3, -0.2, 0.4), (-0.3, 0.5, 1.2)]
 
 
-def free_problem(spin, body=BODY):
-    row = spinning(spin)
-    problem = make_problem(body, np.zeros(LOADS_SIZE), np.zeros(3), 0.0, 0.0, True, State(0, row))
-    return problem, new_variables(row, problem)
+def free_problem(spin):
+    """A segment's problem and the variables at its start."""
+    simulation = flight(BODY, initial=spinning(spin))
+    simulation.advance(1)
+    return simulation.flight.problem, simulation.flight.variables.copy()
 
 
 def energy_and_momentum(y):

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from flights import SECOND
 from integrator_scenes import Scene, error, flown, scene_for
-from one_segment import new_variables
 
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import NO_GYROSCOPIC_TERM, STRING
@@ -57,10 +56,11 @@ def test_order_under_loads(name):
 def test_order_of_taylor_series_is_their_degree(degree):
     scene = scene_for(INTEGRATORS["taylor"])
     reference = scene.reference([1.0])[0]
-    problem, start = scene.problem_and_start()
-    errors = []
+    simulation = scene.simulation("taylor")
+    simulation.advance(1)
+    problem, errors = simulation.flight.problem, []
     for n in STEPS:
-        y, row = new_variables(start.row, problem), np.empty(13)
+        y, row = simulation.flight.variables.copy(), np.empty(13)
         assert taylor_steps_of_degree(y, problem, 1.0 / n, n, degree) == n
         to_row(y, problem, 1.0, row)
         errors.append((n, error(State(SECOND, row), reference)))

@@ -5,6 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -37,21 +38,9 @@ def moller_trumbore(surface: Surface, origin, direction) -> float:
 
 def blob(seed: int) -> Surface:
     """A cube cut fine, its corners shifted at random: closed, with triangles in all directions."""
-    rng = np.random.default_rng(seed)
-    surface = CUBE
-    for _ in range(2):
-        vertices, triangles, middle = surface.vertices.tolist(), [], {}
-        for t in surface.triangles.tolist():
-            m = []
-            for i, j in ((0, 1), (1, 2), (2, 0)):
-                key = tuple(sorted((t[i], t[j])))
-                if key not in middle:
-                    middle[key] = len(vertices)
-                    vertices.append((0.5 * (np.array(vertices[key[0]]) + np.array(vertices[key[1]]))).tolist())
-                m.append(middle[key])
-            triangles += [[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], m]
-        surface = Surface(np.array(vertices), np.array(triangles))
-    return Surface(surface.vertices + rng.uniform(-0.04, 0.04, surface.vertices.shape), surface.triangles)
+    mesh = trimesh.Trimesh(CUBE.vertices, CUBE.triangles).subdivide().subdivide()
+    shifts = np.random.default_rng(seed).uniform(-0.04, 0.04, mesh.vertices.shape)
+    return Surface(mesh.vertices + shifts, np.ascontiguousarray(mesh.faces))
 
 
 @settings(max_examples=60, deadline=None)
