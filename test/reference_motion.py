@@ -10,33 +10,35 @@ from __future__ import annotations
 from functools import lru_cache
 
 import mpmath
+import numpy as np
 from mpmath import mp, mpf
 
 DIGITS = 50
 
 
 def angle_between(q, matrix) -> float:
-    """Angle [rad] of the rotation from a reference attitude, matrix 3 × 3 mpf, to a quaternion q (4,) xyzw of doubles."""
+    """Angle [rad] of the rotation from a reference attitude, matrix (3, 3) mpf, to a quaternion q (4,) xyzw of doubles."""
     with mp.workdps(DIGITS):
-        R = rotation_of([float(c) for c in q])
-        squares = sum((R[i][j] - matrix[i][j]) ** 2 for i in range(3) for j in range(3))
+        squares = ((rotation_of([float(c) for c in q]) - matrix) ** 2).sum()
         # |A - B|² = 8 sin²(angle/2) for two rotations: exact, and without cancellation for small angles.
         return float(2 * mpmath.asin(min(mpf(1), mpmath.sqrt(squares / 8))))
 
 
 def rotation_of(q):
-    """Rotation matrix 3 × 3 mpf, body to world, of a quaternion xyzw, normalized in high precision."""
+    """Rotation matrix (3, 3) mpf, body to world, of a quaternion xyzw, normalized in high precision."""
     x, y, z, w = (mpf(c) for c in q)
     s = 2 / (x * x + y * y + z * z + w * w)
-    return [
-        [1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
-        [s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)],
-        [s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)],
-    ]
+    return np.array(
+        [
+            [1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
+            [s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)],
+            [s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)],
+        ]
+    )
 
 
 def free_motion(inertia, angular_velocity_body, time, orientation_xyzw=(0, 0, 0, 1), digits=DIGITS):
-    """Torque-free rotation in closed form: (R 3 × 3, ω body 3) at ``time``, all mpf.
+    """Torque-free rotation in closed form: R (3, 3) and ω body (3,) at ``time``, all mpf.
 
     inertia 3 × 3 [kg m², body axes], three different moments; ω body [rad/s] not on a principal axis; time [s].
     Source: Landau and Lifshitz, Mechanics (1976), section 37; the precession angle by the incomplete elliptic integral Π.
@@ -52,20 +54,17 @@ def _free_motion(inertia, w0, time, q0, digits):
     # Near a separatrix or on thin rods the closed form cancels; 30 guard digits pay for that.
     with mp.workdps(digits + 30):
         moments, axes = mpmath.eigsy(mpmath.matrix([list(row) for row in inertia]))
-        axes = [[axes[i, j] for j in range(3)] for i in range(3)]
-        if _determinant(axes) < 0:
-            axes = [[row[0], row[1], -row[2]] for row in axes]
-        w = _transposed_times(axes, w0)
+        axes = np.array(axes.tolist())
+        axes[:, 2] *= mpmath.sign(axes[:, 0] @ np.cross(axes[:, 1], axes[:, 2]))
+        w = axes.T @ w0
         first, second, third = moments
         # dn belongs to the axis about which the body circulates: the largest moment's, or else the smallest's.
         if third * (third - second) * w[2] ** 2 < first * (second - first) * w[0] ** 2:
-            swap = [[0, 0, 1], [0, -1, 0], [1, 0, 0]]
-            axes = _product(axes, swap)
-            w = _transposed_times(swap, w)
+            swap = np.array([[0, 0, 1], [0, -1, 0], [1, 0, 0]])
+            axes, w = axes @ swap, swap.T @ w
             first, third = third, first
         R, w = _circulating(first, second, third, w, time)
-        start = _product(rotation_of(q0), axes)
-        return _product(start, _product(R, _transpose(axes))), _times(axes, w)
+        return rotation_of(q0) @ axes @ R @ axes.T, axes @ w
 
 
 def _circulating(A, B, C, w, time):
@@ -80,12 +79,12 @@ def _circulating(A, B, C, w, time):
     u0 = mpmath.ellipf(phase0, k2)
     u = u0 + rate * time
     sn, cn, dn = (mpmath.ellipfun(name, u, m=k2) for name in ("sn", "cn", "dn"))
-    turned = [a * cn, b * sn, c * dn]
+    turned = np.array([a * cn, b * sn, c * dn])
     # The amplitude am u, continuous over all turns.
     phase = mpmath.atan2(sn, cn)
     phase += 2 * mp.pi * mpmath.nint((u / quarter * mp.pi / 2 - phase) / (2 * mp.pi))
-    m0, m1 = [A * w[0], B * w[1], C * w[2]], [A * turned[0], B * turned[1], C * turned[2]]
-    L2 = sum(x * x for x in m0)
+    m0, m1 = np.array([A, B, C]) * w, np.array([A, B, C]) * turned
+    L2 = m0 @ m0
     L, twice_energy = mpmath.sqrt(L2), A * w[0] ** 2 + B * w[1] ** 2 + C * w[2] ** 2
     # φ' = L (2E − m₃²/C)/(L² − m₃²), m₃ = C c dn u: its integral is linear in t plus Π.
     rest = (A * a) ** 2
@@ -94,40 +93,12 @@ def _circulating(A, B, C, w, time):
         mpmath.ellippi(n, phase, k2) - mpmath.ellippi(n, phase0, k2)
     )
     cosine, sine = mpmath.cos(precession), mpmath.sin(precession)
-    turn = [[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]]
-    return _product(_transpose(_node_frame(m0)), _product(turn, _node_frame(m1))), turned
+    turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+    return _node_frame(m0).T @ turn @ _node_frame(m1), turned
 
 
 def _node_frame(m):
     """Rows: the line of nodes m × e₃, m × node, m, all unit: body to the frame whose third axis is L."""
-    size = mpmath.sqrt(sum(x * x for x in m))
-    node_size = mpmath.hypot(m[0], m[1])
-    node = [m[1] / node_size, -m[0] / node_size, mpf(0)]
-    unit = [x / size for x in m]
-    return [node, _cross(unit, node), unit]
-
-
-def _cross(a, b):
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def _times(matrix, vector):
-    return [sum(matrix[i][j] * vector[j] for j in range(3)) for i in range(3)]
-
-
-def _transposed_times(matrix, vector):
-    return [sum(matrix[j][i] * vector[j] for j in range(3)) for i in range(3)]
-
-
-def _transpose(a):
-    return [[a[j][i] for j in range(3)] for i in range(3)]
-
-
-def _product(a, b):
-    return [[sum(a[i][k] * b[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
-
-
-def _determinant(a):
-    return sum(
-        a[0][k] * (a[1][(k + 1) % 3] * a[2][(k + 2) % 3] - a[1][(k + 2) % 3] * a[2][(k + 1) % 3]) for k in range(3)
-    )
+    node = np.array([m[1], -m[0], mpf(0)]) / mpmath.hypot(m[0], m[1])
+    unit = m / mpmath.sqrt(m @ m)
+    return np.array([node, np.cross(unit, node), unit])

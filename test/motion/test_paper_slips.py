@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from flights import SECOND, flight, spinning
+from reference_motion import angle_between, rotation_of
 
 from rigid_proto_ros.base.errors import TensorError
-from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.mass.tensor import check_tensor, principal_axes
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.scene.scenario import nanoseconds, read_scene
@@ -24,15 +24,9 @@ def flown(scene: str, duration_s: float, script: str = "[]", **changes) -> Offli
     return run
 
 
-def angle_between(p: np.ndarray, q: np.ndarray) -> float:
-    """Angle [rad] from one attitude xyzw to another."""
-    difference = np.linalg.norm(matrix_from_quaternion(p) - matrix_from_quaternion(q))
-    return 2.0 * float(np.arcsin(min(1.0, difference / np.sqrt(8.0))))
-
-
 @pytest.mark.parametrize("integrator, order", [("euler", 1), ("midpoint", 2)])
 def test_global_orders_are_one_below_the_local_errors(integrator: str, order: int) -> None:
-    exact = flown("t_handle", 1.0, integrator="rk4", step=1e-4).simulation.state.orientation_xyzw
+    exact = rotation_of(flown("t_handle", 1.0, integrator="rk4", step=1e-4).simulation.state.orientation_xyzw)
     errors = [
         angle_between(flown("t_handle", 1.0, integrator=integrator, step=h).simulation.state.orientation_xyzw, exact)
         for h in (1e-3, 5e-4, 2.5e-4)
@@ -53,11 +47,11 @@ def test_mislabelled_products_of_inertia_turn_the_principal_axes() -> None:
     # No rigid body has such a tensor, so a scene refuses it; let fly all the same, it turns otherwise from the start.
     with pytest.raises(TensorError):
         check_tensor(mislabelled)
-    attitudes = [
+    turned, mistaken = (
         flight(make_body(true.mass, np.zeros(3), tensor), initial=spinning([0.0, 0.0, 6.0])).advance(SECOND)
         for tensor in (I, mislabelled)
-    ]
-    apart = np.degrees(angle_between(*(state.orientation_xyzw for state in attitudes)))
+    )
+    apart = np.degrees(angle_between(mistaken.orientation_xyzw, rotation_of(turned.orientation_xyzw)))
     assert apart == pytest.approx(ATTITUDE_OFF, abs=0.5)
 
 
