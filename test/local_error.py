@@ -14,7 +14,7 @@ from reference_motion import angle_between, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
 from rigid_proto_ros.motion.integrators.series_steps import floor_of_step, heavier, scales
-from rigid_proto_ros.motion.integrators.string_law import PULLS, knot_at, law_of
+from rigid_proto_ros.motion.integrators.string_law import PULLS, law_of
 from rigid_proto_ros.simulation.flight import steps_of_segment
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -41,7 +41,7 @@ class CommittedStep:
         """What rounding may err in this step by itself."""
         p, ends = self.problem, ((self.before, self.begin_ns), (self.after, self.end_ns))
         begin, end = (scales(y, p, time_ns * 1e-9) for y, time_ns in ends)
-        pulls = p.has_string and any(law_of(y, p, knot_at(y, p)) == PULLS for y, _ in ends)
+        pulls = p.has_string and any(law_of(y, p) == PULLS for y, _ in ends)
         return floor_of_step(self.before, p, heavier(end, begin)[0], pulls, self.length)
 
 

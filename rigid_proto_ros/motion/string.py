@@ -192,10 +192,6 @@ class StringState:
         ex, ey, ez = self.free_end(state.time_ns)
         return span_of(rx, ry, rz, state.row, ex, ey, ez)
 
-    def stretch(self, body: Body, state: State) -> float:
-        """x = l − rest length [m]; negative when slack."""
-        return length_of(*self._span(body, state)) - self.rest_length
-
     def potential_energy(self, body: Body, state: State) -> float:
         """½ k x² while it pulls [J]."""
         return energy_of(self._span(body, state), self.stiffness, self.rest_length, self.bilateral)

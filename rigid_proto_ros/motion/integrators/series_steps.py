@@ -323,7 +323,7 @@ def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, 
     series, last = c, c[2 * (degree + 2)]
     start = y
     knot = knot_at(y, p)
-    law = law_of(y, p, knot)
+    law = law_of(y, p)
     control.law, control.switch = law, math.inf
     gone = 0.0
     parts = 0

@@ -23,7 +23,7 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import norm
 from ..string import NO_DIRECTION
-from .equations import knot_of
+from .equations import knot_of, stretch
 from .series import A_KNOT, DISTANCE, STRETCH, TENSION, Knot, distance_series, stretch_at
 
 SLACK, PULLS, SHORTENS = 0.0, 1.0, 2.0
@@ -60,15 +60,13 @@ def knot_at(y: np.ndarray, p: np.record) -> Knot:
 
 
 @njit(cache=True, error_model="numpy")
-def law_of(y: np.ndarray, p: np.record, knot: Knot) -> float:
-    """The law at variables y with the knot there."""
+def law_of(y: np.ndarray, p: np.record) -> float:
+    """The law at variables y."""
     if not is_one_sided(p):
         return PULLS
-    ax, ay, az, length, x = knot
+    x, rate = stretch(y, p)
     if x <= 0.0:
         return SLACK
-    _, (vx, vy, vz) = knot_of(y, p)
-    rate = (ax * vx + ay * vy + az * vz) / length
     return PULLS if p.stiffness * x + p.string_damping * rate > 0.0 else SHORTENS
 
 
