@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""How kernels are compiled and kept: ``njit`` for this package, and word of it when something is being compiled.
+"""How kernels are compiled and kept: ``njit`` for this package, and word of it when something is being compiled; and
+records that are read by name, ``p.moments``, in Python and in compiled functions alike.
 
 numba keeps compiled code on disk and compiles anew when the file of a function has changed, but not when a file has
 that this one imports from, though its functions are compiled in. After an update the old numbers would go on for ever.
@@ -19,6 +20,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
 _ABSENT: Any = None
 """What Python takes for a module that isn't there."""
 # numba imports these wherever they are installed, a third of its own time: coverage is of use while something is
@@ -36,8 +39,6 @@ finally:
     for _name in _HIDDEN:
         del sys.modules[_name]
 arraymath._HAVE_BLAS = importlib.util.find_spec("scipy") is not None  # noqa: SLF001  # for kernels of others
-
-__all__ = ["INTERPRETED", "entry_of", "intrinsic", "njit", "notify_when_compiling", "source_stamp"]
 
 _CONFIG: Any = config  # its settings are made when it is imported
 Emitted = tuple[Any, Any]
@@ -208,3 +209,33 @@ def notify_when_compiling(notify: Callable[[], None]) -> Iterator[None]:
 
     with event.install_listener("numba:compile", Listener()):
         yield
+
+
+# Records of numbers by name
+
+
+def record_type(fields: list[tuple[Any, ...]]) -> np.dtype[Any]:
+    """The type of records with these fields (name, type) or (name, type, length), each where the processor likes it."""
+    return np.dtype((np.record, np.dtype(fields, align=True)))
+
+
+def new_record(kind: np.dtype[Any]) -> np.record:
+    """A record of zeros."""
+    record: np.record = np.zeros(1, kind)[0]
+    return record
+
+
+def place_of(kind: np.dtype[Any], name: str) -> int:
+    """Where a field begins [bytes]."""
+    fields = kind.fields
+    assert fields is not None
+    return int(fields[name][1])
+
+
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+def copy_numbers(of: np.ndarray, to: np.ndarray) -> None:
+    """The first numbers of one array to all of another, one by one: numba's own way with slices looks first whether the
+    two share memory, and makes room for a copy if they do.
+    """
+    for k in range(to.shape[0]):
+        to[k] = of[k]

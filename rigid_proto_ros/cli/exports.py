@@ -7,10 +7,9 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ..base.command_line import number_from
+from ..base.command_line import Progress, number_from
 from ..base.errors import InputError
 from ..base.files import output_file
-from ..base.progress import Progress
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord, Source

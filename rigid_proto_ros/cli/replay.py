@@ -9,10 +9,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.command_line import number_from
+from ..base.command_line import Progress, number_from
 from ..base.errors import InputError
 from ..base.files import output_file
-from ..base.progress import Progress
 from .exports import add_exports, asked, check_exports, write_exports
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ import importlib.util
 import tempfile
 from pathlib import Path
 
+from ..base.command_line import Progress
 from ..base.errors import InputError, is_missing
-from ..base.progress import Progress
 
 EXAMPLES = (("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "what the viewer shows at 4 s"),)
 

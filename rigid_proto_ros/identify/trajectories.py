@@ -12,8 +12,7 @@ from functools import cache, cached_property
 import numpy as np
 from numba import from_dtype, int64, types
 
-from ..base.compilation import njit
-from ..base.records import copy_numbers
+from ..base.compilation import copy_numbers, njit
 from ..base.rotation import rotate_inverse
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import BODY, fill_body

@@ -29,9 +29,8 @@ from typing import Any
 
 import numpy as np
 
-from ..base.compilation import njit
+from ..base.compilation import new_record, njit, record_type
 from ..base.elementary import expm1
-from ..base.records import new_record, record_type
 from ..base.rotation import multiply
 from . import body as of_body
 from . import loads as of_loads

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from ..base.command_line import Progress
 from ..base.errors import CommandRefused, InputError
-from ..base.progress import Progress
 from ..mesh.reading import Mesh
 from ..simulation.checks import check_command
 from ..simulation.commands import Change, Command, Listed

@@ -14,8 +14,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..base.compilation import njit
-from ..base.records import copy_numbers, record_type
+from ..base.compilation import copy_numbers, njit, record_type
 from ..base.rotation import norm
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment

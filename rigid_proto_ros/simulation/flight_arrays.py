@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, from_dtype, int64, types
 
-from ..base.compilation import entry_of, njit
-from ..base.records import place_of
+from ..base.compilation import entry_of, njit, place_of
 from ..base.simd import aligned
 from ..motion.integrators.integrator import METHOD, provide_kernel
 from ..motion.loads import Load, load_of_row

@@ -12,9 +12,8 @@ import math
 
 import numpy as np
 
-from ..base.compilation import njit
+from ..base.compilation import copy_numbers, njit
 from ..base.elementary import inverse_tangent_of
-from ..base.records import copy_numbers
 from ..base.rotation import norm, rotate
 from ..motion.state import angular_momentum, kinetic_energy
 

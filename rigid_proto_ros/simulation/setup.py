@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.records import new_record
+from ..base.compilation import new_record
 from ..base.rotation import length
 from ..motion.body import LENGTH, Body
 from ..motion.integrators.integrator import Integrator, method_table, workspace_size

@@ -14,9 +14,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from ..base.command_line import Progress
 from ..base.errors import InputError, is_missing
 from ..base.files import whole_file
-from ..base.progress import Progress
 from ..base.provenance import cpu, versions
 from ..scene.script import expand_script
 from .rows import Chunk, run_chunk

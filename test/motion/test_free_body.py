@@ -13,7 +13,7 @@ from random_scenes import log_uniform
 from reference_motion import angle_between, free_motion
 
 from problems import P1
-from rigid_proto_ros.base.records import new_record
+from rigid_proto_ros.base.compilation import new_record
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.problem import PROBLEM, VARIABLES
 

@@ -13,8 +13,7 @@ import math
 
 import numpy as np
 
-from ...base.compilation import njit
-from ...base.records import copy_numbers
+from ...base.compilation import copy_numbers, njit
 from ...base.rotation import matrix_elements, norm
 from ...base.vectors import Quaternion, Vector
 from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY

@@ -23,8 +23,7 @@ from numba import boolean, float64, from_dtype, int64, types
 from numba.core import cgutils
 from numba.core.types.function_type import CompileResultWAP
 
-from ...base.compilation import INTERPRETED, Emitted, intrinsic, njit
-from ...base.records import record_type
+from ...base.compilation import INTERPRETED, Emitted, intrinsic, njit, record_type
 from ..loads import Load
 from ..problem import ENVIRONMENT_NEEDS, PROBLEM
 

@@ -17,8 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...base.compilation import njit
-from ...base.records import copy_numbers
+from ...base.compilation import copy_numbers, njit
 from ...base.rotation import exponential, multiply, normalize
 from ...base.simd import Packed, filled, four, joined, load, number, store
 from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good

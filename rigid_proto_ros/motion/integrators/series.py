@@ -18,8 +18,7 @@ import math
 
 import numpy as np
 
-from ...base.compilation import njit
-from ...base.records import copy_numbers
+from ...base.compilation import copy_numbers, njit
 from ...base.rotation import norm, normalize
 from ...base.simd import (
     Packed,
