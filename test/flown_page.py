@@ -56,7 +56,7 @@ class FlownPage:
         self.page.flight.say = self.said.append
         self._socket = bare_page(self.server.get_port())
         self.browser = self._socket.__enter__()
-        self.until(lambda: self.page.picture.body is not None, "body")
+        self.until(lambda: self.page.picture.setup is not None, "body")
         self.fly(0.0)
 
     def end(self) -> None:

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from flights import flight_setup
 
+from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.simulation.observer import (
     BodyChanged,
-    BodySnapshot,
     LoadBegan,
     LoadEnded,
     Logged,
@@ -25,6 +26,7 @@ from rigid_proto_ros.simulation.observer import (
     ShownLoad,
     Started,
 )
+from rigid_proto_ros.simulation.setup import Setup
 
 VERTICES = np.array(
     [[x, y, z] for x in (0.0, 0.3) for y in (0.0, 0.2) for z in (0.0, 0.1)],
@@ -43,7 +45,14 @@ COM = np.array([0.3, 0.1, 0.05])
 MASS = 12.0
 INERTIA = np.diag([0.05, 0.37, 0.4])
 GRAVITY = np.array([0.0, 0.0, -9.81])
-BODY = BodySnapshot(MASS, COM, INERTIA, SCALE, GRAVITY, "solid", "rk4")
+
+
+def setup_of(mass: float = MASS, com=COM, inertia=INERTIA, scale=SCALE, gravity=GRAVITY) -> Setup:
+    """What observers are told of a body."""
+    return flight_setup(make_body(mass, com, inertia, scale), gravity=np.array(gravity, dtype=float))
+
+
+SETUP = setup_of()
 SCENE = "rigid_body:\n  ros__parameters:\n    mesh: brick.obj\n"
 SHA256 = "5e" * 32
 
@@ -69,10 +78,10 @@ def live_view(**options: Any):
     return LiveView("native", report=lambda _: None, **options)
 
 
-def fly(observer: Observer, states: np.ndarray, body: BodySnapshot = BODY) -> None:
+def fly(observer: Observer, states: np.ndarray, setup: Setup = SETUP) -> None:
     """A run of ``states``: a poke from 200 to 400 ms, a wrench from 305 ms to the end, a refusal at 500 ms."""
     observer.on(Started(SCENE, VERTICES, TRIANGLES, SHA256))
-    observer.on(BodyChanged(0, body))
+    observer.on(BodyChanged(0, setup))
     for k, row in enumerate(states):
         time_ns = k * PERIOD_NS
         observer.on(Published(time_ns, row))

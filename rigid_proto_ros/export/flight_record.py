@@ -14,7 +14,6 @@ from ..session.recorded_session import RecordedSession, Resimulation, resimulati
 from ..simulation.commands import Command
 from ..simulation.observer import (
     BodyChanged,
-    BodySnapshot,
     Event,
     GhostChanged,
     GhostPublished,
@@ -25,6 +24,7 @@ from ..simulation.observer import (
     Started,
     StringChanged,
 )
+from ..simulation.setup import Setup
 
 Source = Callable[[Observer], OfflineRun | Resimulation]
 """Makes the flight anew, with an observer that has it fly its ghost too."""
@@ -71,9 +71,9 @@ class FlightRecord(Observer):
         """The states (n, 13) in STATE_FIELDS order."""
         return np.array(list(self.states.values())).reshape(-1, 13)
 
-    def bodies(self, kind: type[BodyChanged | GhostChanged]) -> list[BodySnapshot]:
-        """The body, or the ghost, at the start and after each change."""
-        return [event.body for event in self.changes if isinstance(event, kind)]
+    def setups(self, kind: type[BodyChanged | GhostChanged]) -> list[Setup]:
+        """Of the body, or the ghost, at the start and after each change."""
+        return [event.setup for event in self.changes if isinstance(event, kind)]
 
 
 def frames(record: FlightRecord, source: Source | None, fps: float) -> tuple[FlightRecord, str]:

@@ -22,7 +22,8 @@ from ..picture import style
 from ..picture.backend import DrawnMesh
 from ..picture.style import Colour
 from ..scene.scene_file import read_scene_text
-from ..simulation.observer import BodyChanged, BodySnapshot, GhostChanged, MeshChanged, Started
+from ..simulation.observer import BodyChanged, GhostChanged, MeshChanged, Started
+from ..simulation.setup import Setup
 from .flight_record import FlightRecord
 from .tracks import BODIES, MESHES, Tracks
 
@@ -163,7 +164,7 @@ def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
             root,
             translation=track.positions[0].tolist(),
             rotation=track.attitudes[0].tolist(),
-            extras=_mass_properties(record.bodies(kind)[0]),
+            extras=_mass_properties(record.setups(kind)[0]),
         )
         document.animate(node, "translation", seconds, track.positions)
         document.animate(node, "rotation", seconds, track.attitudes)
@@ -193,13 +194,13 @@ def _draw_surface(document: Document, node: int, name: str, surface: DrawnMesh, 
     document.lists["nodes"][node]["mesh"] = document.mesh(f"{name} mesh", attributes, corners, TRIANGLES, material)
 
 
-def _mass_properties(body: BodySnapshot) -> dict[str, Any]:
+def _mass_properties(setup: Setup) -> dict[str, Any]:
     """Of the body at the start, for those who read a node's extras: SI units, the tensor about the centre of mass."""
     return {
-        "mass": body.mass,
-        "center_of_mass": np.asarray(body.center_of_mass).tolist(),
-        "inertia": np.asarray(body.inertia).tolist(),
-        "inertia_model": body.inertia_model,
+        "mass": setup.body.mass,
+        "center_of_mass": setup.body.center_of_mass.tolist(),
+        "inertia": setup.body.inertia.tolist(),
+        "inertia_model": setup.inertia_model,
     }
 
 

@@ -119,7 +119,8 @@ def _add_physics(stage: Usd.Stage, record: FlightRecord) -> bool:
     """
     from pxr import Gf, UsdPhysics
 
-    body, *later = record.bodies(BodyChanged)
+    start, *later = record.setups(BodyChanged)
+    body = start.body
     row = record.rows[0]
     prim = stage.GetPrimAtPath("/flight/body")
     rigid = UsdPhysics.RigidBodyAPI.Apply(prim)
@@ -134,10 +135,10 @@ def _add_physics(stage: Usd.Stage, record: FlightRecord) -> bool:
     mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
     mass.CreatePrincipalAxesAttr(Gf.Quatf(w, x, y, z))
     scene = UsdPhysics.Scene.Define(stage, "/flight/physics_scene")
-    pull = float(np.linalg.norm(body.gravity))
+    pull = float(np.linalg.norm(start.gravity))
     scene.CreateGravityMagnitudeAttr(pull)
-    scene.CreateGravityDirectionAttr(Gf.Vec3f(*(body.gravity / pull if pull else [0.0, 0.0, -1.0])))
-    return any(own.mass != body.mass or not np.array_equal(own.inertia, body.inertia) for own in later)
+    scene.CreateGravityDirectionAttr(Gf.Vec3f(*(start.gravity / pull if pull else [0.0, 0.0, -1.0])))
+    return any(own.body.mass != body.mass or not np.array_equal(own.body.inertia, body.inertia) for own in later)
 
 
 def _draw_string(stage: Usd.Stage, string: dict[int, np.ndarray | None], codes: list[float], width: float) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..base.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ..mass.tensor import equimomental_shapes, principal_axes
+from ..motion.body import Body
 from ..simulation.observer import (
     BodyChanged,
-    BodySnapshot,
     Event,
     GhostChanged,
     LoadBegan,
@@ -21,6 +21,7 @@ from ..simulation.observer import (
     StringChanged,
 )
 from ..simulation.quantities import attitude_angle
+from ..simulation.setup import Setup
 from . import style
 from .arrows import ArrowScales, Loads
 from .backend import Backend, DrawnMesh
@@ -41,12 +42,12 @@ LINE_SIZES = 1.1
 """Body sizes that the line of a string that pulls is drawn on beyond its knot."""
 
 
-def energies(rows: np.ndarray, body: BodySnapshot) -> np.ndarray:
+def energies(rows: np.ndarray, setup: Setup) -> np.ndarray:
     """Energies (n, 3) [J] of states (n, 13): translational, rotational, gravity's."""
-    velocity, w = rows[:, 7:10], rows[:, 10:13]
+    body, velocity, w = setup.body, rows[:, 7:10], rows[:, 10:13]
     translational = 0.5 * body.mass * np.einsum("ni,ni->n", velocity, velocity)
     rotational = 0.5 * np.einsum("ni,ij,nj->n", w, body.inertia, w)
-    return np.column_stack([translational, rotational, -body.mass * (rows[:, 0:3] @ body.gravity)])
+    return np.column_stack([translational, rotational, -body.mass * (rows[:, 0:3] @ setup.gravity)])
 
 
 def angle_to(reference: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -60,7 +61,7 @@ class Shape:
     of the box along the mesh axes; these without a mesh None. moments (3,), axes (3, 3): principal, ascending.
     """
 
-    def __init__(self, vertices: np.ndarray | None, body: BodySnapshot) -> None:
+    def __init__(self, vertices: np.ndarray | None, body: Body) -> None:
         self.moments, self.axes = principal_axes(body.inertia)
         self.box_sides, self.semi_axes = equimomental_shapes(body.mass, self.moments)
         self.tip = self.centre = self.half_sizes = None
@@ -80,8 +81,8 @@ class Picture:
 
     def __init__(self, backend: Backend, wanted: Callable[[str], bool] = lambda _: True, rate: int = RATE) -> None:
         self.backend = backend
-        self.body: BodySnapshot | None = None
-        self.ghost: BodySnapshot | None = None
+        self.setup: Setup | None = None
+        self.ghost: Setup | None = None
         self.shape: Shape | None = None
         self.scales = ArrowScales()
         self._wanted = wanted
@@ -115,10 +116,10 @@ class Picture:
                 self._set_mesh(time_ns, vertices, triangles)
             case MeshChanged(time_ns=time_ns, vertices=vertices, triangles=triangles):
                 self._set_mesh(time_ns, vertices, triangles)
-            case BodyChanged(time_ns, body):
-                self._set_body(time_ns, body)
-            case GhostChanged(time_ns, body):
-                self.set_ghost(time_ns, body)
+            case BodyChanged(time_ns, setup):
+                self._set_body(time_ns, setup)
+            case GhostChanged(time_ns, setup):
+                self.set_ghost(time_ns, setup)
             case LoadBegan(time_ns, load_id, load):
                 self.loads.began(time_ns, load_id, load)
             case LoadEnded(time_ns, load_id):
@@ -138,19 +139,19 @@ class Picture:
         self.backend.begin(np.array([time_ns]))
         self._describe_mesh(self.backend)
 
-    def _set_body(self, time_ns: int, body: BodySnapshot) -> None:
-        """The body is this one from ``time_ns`` on."""
+    def _set_body(self, time_ns: int, setup: Setup) -> None:
+        """The body is that of this setup from ``time_ns`` on."""
         size = 0.0 if self.shape is None else self.shape.size
-        self.body = body
-        self.shape = Shape(self._vertices, body)
+        self.setup = setup
+        self.shape = Shape(self._vertices, setup.body)
         self._poinsot.set_body(self.shape.moments, self.shape.axes)
         self.backend.begin(np.array([time_ns]))
         if self.shape.size != size:
             self.backend.resize(self.shape.size)
         self._describe_body(self.backend)
 
-    def set_ghost(self, time_ns: int, ghost: BodySnapshot | None) -> None:
-        """The ghost is this one from ``time_ns`` on."""
+    def set_ghost(self, time_ns: int, ghost: Setup | None) -> None:
+        """The ghost is the body of this setup from ``time_ns`` on."""
         first = self.ghost is None
         self.ghost = ghost
         self.backend.begin(np.array([time_ns]))
@@ -172,9 +173,10 @@ class Picture:
             backend.mesh(style.GHOST_MESH, self._mesh)
 
     def _describe_body(self, backend: Backend) -> None:
-        body, shape = self.body, self.shape
-        if body is None or shape is None:
+        setup, shape = self.setup, self.shape
+        if setup is None or shape is None:
             return
+        body = setup.body
         if self._mesh is not None:
             place = self._middle * body.scale - body.center_of_mass
             backend.place(style.BODY_MESH, place[np.newaxis], scale=body.scale)
@@ -197,9 +199,9 @@ class Picture:
             self._poinsot.describe(backend)
 
     def _describe_ghost(self, backend: Backend) -> None:
-        ghost = self.ghost
-        if ghost is None:
+        if self.ghost is None:
             return
+        ghost = self.ghost.body
         moments, axes = principal_axes(ghost.inertia)
         if self._mesh is not None:
             place = self._middle * ghost.scale - ghost.center_of_mass
@@ -212,7 +214,7 @@ class Picture:
 
     def draw(self, times_ns: np.ndarray, rows: np.ndarray) -> None:
         """States (n, 13) at times (n,) [ns] of the present body, all those since the call before."""
-        if self.body is None or self.shape is None or not len(times_ns):
+        if self.setup is None or self.shape is None or not len(times_ns):
             return
         backend = self.backend
         backend.begin(times_ns)
@@ -229,7 +231,7 @@ class Picture:
             return
         times_ns, rows = times_ns[chosen], rows[chosen]
         backend.begin(times_ns)
-        body = self.body
+        body = self.setup.body
         R = matrix_from_quaternion(rows[:, 3:7])
         spin = np.einsum("nij,nj->ni", R, rows[:, 10:13])
         L = np.einsum("nij,jk,nk->ni", R, body.inertia, rows[:, 10:13])
@@ -255,10 +257,10 @@ class Picture:
 
         string_energy (n,) [J] is None as long as the run has had no string.
         """
-        assert self.body is not None and self.shape is not None
+        assert self.setup is not None and self.shape is not None
         if self._momentum_at_start is None:
             self._momentum_at_start = L[0].copy()
-        own, backend = energies(rows, self.body), self.backend
+        own, backend = energies(rows, self.setup), self.backend
         total = own.sum(axis=1) if string_energy is None else own.sum(axis=1) + string_energy
         shown = [own, total] if string_energy is None else [own, total, string_energy]
         backend.scalars(style.ENERGY, np.column_stack(shown))
@@ -266,7 +268,7 @@ class Picture:
         angle = np.degrees(angle_to(self._momentum_at_start, L))
         backend.scalars(style.ANGULAR_MOMENTUM_ANGLE, angle[:, np.newaxis])
         backend.scalars(style.ANGULAR_VELOCITY_PRINCIPAL, rows[:, 10:13] @ self.shape.axes)
-        if np.any(self.body.gravity) or rows[:, 7:10].any():
+        if np.any(self.setup.gravity) or rows[:, 7:10].any():
             backend.scalars(style.POSITION, rows[:, 0:3])
 
     def _draw_motion(self, spin: np.ndarray, L: np.ndarray) -> None:
@@ -289,16 +291,14 @@ class Picture:
             self.backend.labels(name, counts, LABEL_BEYOND * drawn, [symbol] * len(drawn))
 
     def _draw_string(self, string: StringRows, rows: np.ndarray) -> None:
-        assert self.body is not None and self.shape is not None
+        assert self.setup is not None and self.shape is not None
         backend, tied, counts = self.backend, string.tied, string.tied.astype(int)
         directions, pulls = string.directions, string.pulls
         distances = np.linalg.norm(np.cross(directions, rows[tied, 0:3] - string.free), axis=1)
         if self._wanted(style.STRING):
             slack = np.linalg.norm(string.knots - string.free, axis=1) < string.lengths
             strips = list(np.stack([string.free, string.knots], axis=1))
-            curves = string_curves(
-                string.free[slack], string.knots[slack], string.lengths[slack], np.asarray(self.body.gravity)
-            )
+            curves = string_curves(string.free[slack], string.knots[slack], string.lengths[slack], self.setup.gravity)
             for k, curve in zip(np.flatnonzero(slack), curves, strict=True):
                 strips[k] = curve
             colours = [style.STRING_COLOUR if pull else style.SLACK_COLOUR for pull in pulls]

@@ -210,16 +210,16 @@ class RerunObserver(Observer):
         arranged is undone in between.
         """
         picture, tied = self._picture, self._picture.string.was_tied
-        body, shape = picture.body, picture.shape
-        if body is None or shape is None or (stream.arranged and finished is None):
+        setup, shape = picture.setup, picture.shape
+        if setup is None or shape is None or (stream.arranged and finished is None):
             return
         tip = 0.0 if shape.tip is None else float(np.linalg.norm(shape.tip))
         subject = Subject(
             reach=max(shape.size, REACH_PER_TIP * tip),
             ghost=picture.ghost is not None,
-            falls=bool(np.any(body.gravity)) and not tied,
+            falls=bool(np.any(setup.gravity)) and not tied,
             tied=tied,
-            dropped_term=not body.gyroscopic,
+            dropped_term=not setup.gyroscopic,
         )
         stream.send_layout(blueprint(subject, finished))
 

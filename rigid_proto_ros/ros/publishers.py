@@ -178,8 +178,9 @@ class EventPublisher(Observer):
             case SceneChanged(_, scene):
                 # All parameters, and the mesh's hash in a comment, as a parameter file.
                 self._scene.publish(cdr.string(scene))
-            case BodyChanged(time_ns, body):
-                self._inertia.publish(inertia_bytes(time_ns + self.stamps.offset_ns, self._body_frame, body))
+            case BodyChanged(time_ns, setup):
+                stamp_ns = time_ns + self.stamps.offset_ns
+                self._inertia.publish(inertia_bytes(stamp_ns, self._body_frame, setup.body))
             case Applied(time_ns) if self._applied.get_subscription_count():
                 # About the COM in the body's frame, which TF knows. What its sender said of point, axes, slot and
                 # duration stands in its event.

@@ -28,7 +28,6 @@ from ..simulation.observer import (
     Refused,
     SceneChanged,
     Started,
-    snapshot,
 )
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
@@ -56,7 +55,7 @@ class Ghost(Observer):
 
     def announce(self) -> None:
         """Tell the observer what the ghost is."""
-        self._observer.on(GhostChanged(self.simulation.time_ns, snapshot(self.simulation.setup)))
+        self._observer.on(GhostChanged(self.simulation.time_ns, self.simulation.setup))
 
     def watch(self, observer: Observer) -> None:
         """Tell another observer from now on."""
@@ -89,7 +88,7 @@ class Ghost(Observer):
         self._shown = setup is not None
         if setup is not None:
             self.simulation.submit(Change({}, lambda: setup), max(time_ns, self.simulation.time_ns), listed)
-            self._observer.on(GhostChanged(time_ns, snapshot(setup)))
+            self._observer.on(GhostChanged(time_ns, setup))
 
     def reset(self, scenario: Scenario) -> None:
         """Time 0 and the initial state."""

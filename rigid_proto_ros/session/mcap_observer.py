@@ -173,8 +173,8 @@ class McapObserver(Observer):
                 messages = [("events", cdr.string(line))]
             case Applied(time_ns, _, load, body, attitude):
                 messages = [("applied", applied_bytes(time_ns, self._body_frame, load, body, attitude))]
-            case BodyChanged(time_ns, body):
-                messages = [("inertia", inertia_bytes(time_ns, self._body_frame, body))]
+            case BodyChanged(time_ns, setup):
+                messages = [("inertia", inertia_bytes(time_ns, self._body_frame, setup.body))]
             case AccuracyFloor(time_ns, floor):
                 # It only rises within a run: the last one says all.
                 writer.flush()

@@ -18,7 +18,7 @@ from ..base.vectors import vector
 from ..motion.body import Body
 from ..motion.loads import Load
 from ..scene import cdr
-from ..simulation.observer import STATE_FIELDS, BodySnapshot
+from ..simulation.observer import STATE_FIELDS
 
 _TIME = "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec"
 _HEADER = "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id"
@@ -133,7 +133,7 @@ def _undecodable(topic: str, message_type: str) -> InputError:
     return InputError(topic, f"a message can't be decoded as {message_type} in little-endian CDR")
 
 
-def inertia_bytes(time_ns: int, body_frame: str, body: BodySnapshot) -> bytes:
+def inertia_bytes(time_ns: int, body_frame: str, body: Body) -> bytes:
     """A geometry_msgs/InertiaStamped: COM in scaled mesh coordinates, tensor about it in mesh axes."""
     (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = body.inertia.tolist()
     numbers = (body.mass, *body.center_of_mass.tolist(), ixx, ixy, ixz, iyy, iyz, izz)

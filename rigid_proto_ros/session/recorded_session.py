@@ -24,7 +24,7 @@ from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
 from ..scene.scenario_run import ScenarioRun, notify_start
 from ..scene.scene_file import read_scene_text
 from ..simulation.commands import Change, Command
-from ..simulation.observer import BodyChanged, Observer, Published, snapshot
+from ..simulation.observer import BodyChanged, Observer, Published
 from ..simulation.setup import Setup
 from .messages import PROJECTIONS
 
@@ -253,7 +253,7 @@ def play(
         if given is None:
             raise InputError("session", ", ".join(session.missing), "--scene FILE, to draw it")
         notify_start(observer, given)
-        observer.on(BodyChanged(0, snapshot(given.setup)))
+        observer.on(BodyChanged(0, given.setup))
     else:
         again = resimulation(session, observer)
         again.announce()

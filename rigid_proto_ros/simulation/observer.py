@@ -30,24 +30,6 @@ velocity [rad/s, body axes]."""
 
 
 @dataclass(frozen=True)
-class BodySnapshot:
-    """The body as it is from some simulated time on.
-
-    mass [kg], center_of_mass (3,) [m, mesh axes, after ``scale``], inertia (3, 3) [kg m², about the COM, body axes],
-    scale (3,), gravity (3,) [m/s², world], inertia_model by name, integrator by name, gyroscopic as configured.
-    """
-
-    mass: float
-    center_of_mass: np.ndarray
-    inertia: np.ndarray
-    scale: np.ndarray
-    gravity: np.ndarray
-    inertia_model: str
-    integrator: str
-    gyroscopic: bool = True
-
-
-@dataclass(frozen=True)
 class ShownLoad:
     """One command as it acts: ``kind`` is ``wrench``, ``poke``, ``impulse`` or ``thruster``.
 
@@ -85,21 +67,6 @@ class ShownString:
         done = np.clip((times_ns - self.begin_ns) / lasts_ns, 0.0, 1.0) if lasts_ns > 0 else np.ones(len(times_ns))
         places: np.ndarray = self.origin + done[:, np.newaxis] * (np.asarray(self.target, dtype=float) - self.origin)
         return places
-
-
-def snapshot(setup: Setup) -> BodySnapshot:
-    """The body of a setup as observers are told of it."""
-    body = setup.body
-    return BodySnapshot(
-        body.mass,
-        body.center_of_mass,
-        body.inertia,
-        body.scale,
-        setup.gravity,
-        setup.inertia_model,
-        setup.integrator.name,
-        setup.gyroscopic,
-    )
 
 
 def shown_load(kind: str, load: Load, body: Body) -> ShownLoad:
@@ -148,10 +115,10 @@ class SceneChanged(NamedTuple):
 
 
 class BodyChanged(NamedTuple):
-    """The body is this one from ``time_ns`` on; comes once at the start and again at every change."""
+    """The body is the one of this setup from ``time_ns`` on; comes once at the start and again at every change."""
 
     time_ns: int
-    body: BodySnapshot
+    setup: Setup
 
 
 class MeshChanged(NamedTuple):
@@ -220,10 +187,10 @@ class AccuracyFloor(NamedTuple):
 
 
 class GhostChanged(NamedTuple):
-    """A second body that gets the same commands is this one from ``time_ns`` on."""
+    """A second body that gets the same commands is the one of this setup from ``time_ns`` on."""
 
     time_ns: int
-    body: BodySnapshot
+    setup: Setup
 
 
 class GhostPublished(NamedTuple):

@@ -61,7 +61,6 @@ from .observer import (
     StringChanged,
     shown_load,
     shown_string,
-    snapshot,
 )
 from .setup import Setup
 from .string_control import StringControl
@@ -110,7 +109,7 @@ class Simulation:
 
     def introduce(self, observer: Observer) -> None:
         """Tell an observer that comes in flight about the body, what acts on it and the string."""
-        observer.on(BodyChanged(self.time_ns, snapshot(self.setup)))
+        observer.on(BodyChanged(self.time_ns, self.setup))
         for acting in self.acting:
             shown = shown_load(acting.shown_kind, acting.load, self.setup.body)
             observer.on(LoadBegan(self.time_ns, acting.load_id, shown))
@@ -118,7 +117,7 @@ class Simulation:
 
     def announce(self) -> None:
         """Tell the observer about the body as it is now."""
-        self.observer.on(BodyChanged(self.time_ns, snapshot(self.setup)))
+        self.observer.on(BodyChanged(self.time_ns, self.setup))
 
     def notify_floor(self, at_end: bool = False) -> None:
         """Tell the observer what holds the motion to less than its accuracy, where that changed: from time to time, and

@@ -76,7 +76,7 @@ def _recorded(server: viser.ViserServer, record: FlightRecord) -> str:
     changes, times_ns, rows, ghosts = record.changes, record.times_ns, record.rows, record.ghosts
     room = Room(server)
     shown = set(SHOWN)
-    falls = any(isinstance(event, BodyChanged) and np.any(event.body.gravity) for event in changes)
+    falls = any(isinstance(event, BodyChanged) and np.any(event.setup.gravity) for event in changes)
     if falls:
         shown.add(style.COM_TRAIL)
     backend = ViserBackend(server.scene, shown, lambda _: None)

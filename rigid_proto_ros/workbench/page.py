@@ -23,7 +23,6 @@ from ..picture.picture import Picture
 from ..scene.scenario import Scenario
 from ..simulation.observer import (
     BodyChanged,
-    BodySnapshot,
     Event,
     GhostChanged,
     GhostPublished,
@@ -39,6 +38,7 @@ from ..simulation.observer import (
     Started,
     StringChanged,
 )
+from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
 from .body_tab import BodyTab
 from .controls import Controls
@@ -145,7 +145,7 @@ class Page:
         self._loads: dict[int, LoadBegan] = {}
         self._strings: list[StringChanged] = []
         self._ghost_row: np.ndarray | None = None
-        self._hidden_ghost: BodySnapshot | None = None
+        self._hidden_ghost: Setup | None = None
         self._drawn_moment_ns: int | None = None
         self._new_scene = True
         self._scenes_seen = 0
@@ -288,8 +288,8 @@ class Page:
                 self.picture.on(event)
                 self.backend.is_new = False
                 self._body_changed()
-            case GhostChanged(time_ns, body):
-                self.picture.set_ghost(time_ns, body if self.live.scenario.ghost is not None else None)
+            case GhostChanged(time_ns, setup):
+                self.picture.set_ghost(time_ns, setup if self.live.scenario.ghost is not None else None)
                 self._ghost_row = None
             case SceneChanged():
                 self._scene_changed()

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.mass.tensor import principal_axes
+from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.picture.arrows import FIRST, LONGEST, ArrowScales
 from rigid_proto_ros.picture.picture import Picture, Shape, angle_to
@@ -20,7 +21,6 @@ from rigid_proto_ros.picture.string import POINTS, string_curves
 from rigid_proto_ros.picture.surface import ball_mesh, box_mesh, shaded_surface
 from rigid_proto_ros.simulation.observer import (
     BodyChanged,
-    BodySnapshot,
     GhostChanged,
     LoadBegan,
     LoadEnded,
@@ -30,6 +30,7 @@ from rigid_proto_ros.simulation.observer import (
     StringChanged,
 )
 from rigid_proto_ros.simulation.quantities import attitude_angle
+from rigid_proto_ros.simulation.setup import Setup
 
 MOMENTS = st.tuples(*[st.floats(0.1, 10.0)] * 3).map(
     lambda s: np.sort(np.array([s[1] + s[2], s[0] + s[2], s[0] + s[1]])),
@@ -53,8 +54,7 @@ def test_the_polhode_has_the_bodys_energy_and_momentum_and_passes_through_its_sp
 @settings(deadline=None, max_examples=30)
 @given(MOMENTS, st.floats(0.01, 100.0))
 def test_box_and_ellipsoid_have_the_mass_and_the_tensor_they_stand_for(moments, mass):
-    body = BodySnapshot(mass, np.zeros(3), np.diag(moments), np.ones(3), np.zeros(3), "explicit", "rk4")
-    shape = Shape(None, body)
+    shape = Shape(None, make_body(mass, np.zeros(3), np.diag(moments)))
     a = shape.box_sides
     box = mass / 12.0 * np.array([a[1] ** 2 + a[2] ** 2, a[0] ** 2 + a[2] ** 2, a[0] ** 2 + a[1] ** 2])
     b = shape.semi_axes
@@ -100,15 +100,15 @@ def times(count: int, first: int = 0) -> np.ndarray:
     return flight.PERIOD_NS * np.arange(first, first + count)
 
 
-def pictured(body: BodySnapshot = flight.BODY) -> tuple[Picture, Drawn]:
+def pictured(setup: Setup = flight.SETUP) -> tuple[Picture, Drawn]:
     drawn = Drawn()
     picture = Picture(drawn)
     picture.on(Started("", flight.VERTICES, flight.TRIANGLES, ""))
-    picture.on(BodyChanged(0, body))
+    picture.on(BodyChanged(0, setup))
     return picture, drawn
 
 
-WEIGHTLESS = BodySnapshot(flight.MASS, flight.COM, flight.INERTIA, flight.SCALE, np.zeros(3), "solid", "rk4")
+WEIGHTLESS = flight.setup_of(gravity=np.zeros(3))
 
 
 def test_arrows_are_as_long_as_their_values_through_all_runs_of_a_body():
@@ -268,9 +268,7 @@ def test_the_drawn_ellipsoid_touches_the_drawn_plane_where_the_spin_ends():
 
 def test_the_ghost_is_compared_with_the_body_at_equal_times():
     picture, drawn = pictured()
-    picture.on(
-        GhostChanged(0, BodySnapshot(12.0, flight.COM, np.eye(3), flight.SCALE, flight.GRAVITY, "explicit", "rk4"))
-    )
+    picture.on(GhostChanged(0, flight.setup_of(inertia=np.eye(3))))
     body, ghost = flight.rows(30, seed=1), flight.rows(30, seed=2)
     picture.draw(times(20), body[:20])
     picture.draw_ghost(times(12), ghost[:12])
@@ -288,7 +286,7 @@ def test_a_mesh_far_from_its_origin_is_drawn_to_single_precision_of_its_size():
     picture = Picture(drawn)
     picture.on(Started("", far, flight.TRIANGLES, ""))
     com = np.array([0.15, 0.1, 0.05]) + 1e7
-    picture.on(BodyChanged(0, BodySnapshot(1.0, com, np.eye(3), np.ones(3), np.zeros(3), "solid", "rk4")))
+    picture.on(BodyChanged(0, flight.setup_of(1.0, com, np.eye(3), np.ones(3), np.zeros(3))))
     place, _, scale = drawn.places[style.BODY_MESH]
     corners = drawn.meshes[style.BODY_MESH].vertices * scale + place
     assert np.allclose(np.ptp(corners, axis=0), [0.3, 0.2, 0.1], rtol=1e-6)
@@ -312,7 +310,7 @@ def test_what_is_not_wanted_is_not_drawn():
     drawn = Drawn()
     picture = Picture(drawn, wanted=lambda name: name == style.OMEGA)
     picture.on(Started("", flight.VERTICES, flight.TRIANGLES, ""))
-    picture.on(BodyChanged(0, flight.BODY))
+    picture.on(BodyChanged(0, flight.SETUP))
     picture.draw(times(20), flight.rows(20))
     moving = {name for name in drawn.parts if name.startswith((style.CENTRE, style.POINSOT, "plots", style.TRAIL))}
     assert moving == {style.OMEGA, style.OMEGA + "/label"}

@@ -114,7 +114,7 @@ def told():
     print("flushed", before, flush=True)
 observer._flush = told
 observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
-observer.on(BodyChanged(0, flight.BODY))
+observer.on(BodyChanged(0, flight.SETUP))
 for k, row in enumerate(states):
     observer.on(Published(k * flight.PERIOD_NS, row))
     published = k + 1

@@ -195,9 +195,9 @@ def test_recordings_opened_in_one_viewer_have_their_own_layouts_without_errors(t
         observer = FileRecorder(str(path))
         flight.fly(observer, flight.rows(80))
         observer.on(MeshChanged(780_000_000, 0.5 * flight.VERTICES, flight.TRIANGLES, "ab" * 32))
-        observer.on(BodyChanged(780_000_000, flight.BODY))
+        observer.on(BodyChanged(780_000_000, flight.SETUP))
         if ghost:
-            observer.on(GhostChanged(780_000_000, flight.BODY))
+            observer.on(GhostChanged(780_000_000, flight.SETUP))
             observer.on(Published(800_000_000, flight.rows(81)[80]))
             observer.on(GhostPublished(800_000_000, flight.rows(80)[79]))
         observer.close()

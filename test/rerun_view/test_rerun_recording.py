@@ -18,7 +18,6 @@ from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, STALLED_S, FileR
 from rigid_proto_ros.rerun_view.rrd_reading import FRAME_HEAD, read_session, whole_bytes
 from rigid_proto_ros.simulation.observer import (
     BodyChanged,
-    BodySnapshot,
     MeshChanged,
     Published,
     Reset,
@@ -102,15 +101,15 @@ def test_a_change_of_the_body_moves_the_mesh_from_that_time_on(tmp_path, states)
     path = tmp_path / "change.rrd"
     observer = FileRecorder(str(path))
     observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
-    observer.on(BodyChanged(0, flight.BODY))
+    observer.on(BodyChanged(0, flight.SETUP))
     observer.on(Published(0, states[0]))
-    heavier = BodySnapshot(24.0, flight.COM + 0.01, 2.0 * flight.INERTIA, flight.SCALE, flight.GRAVITY, "solid", "rk4")
+    heavier = flight.setup_of(24.0, flight.COM + 0.01, 2.0 * flight.INERTIA)
     observer.on(BodyChanged(5_000_000, heavier))
     observer.on(Published(flight.PERIOD_NS, states[1]))
     observer.close()
     times, translations = cells(path, style.BODY_MESH, "Transform3D:translation")
     assert times == [0, 5_000_000]
-    assert np.allclose(translations[1], translations[0] + flight.COM - heavier.center_of_mass, atol=1e-8)
+    assert np.allclose(translations[1], translations[0] + flight.COM - heavier.body.center_of_mass, atol=1e-8)
     _, energies = cells(path, style.ENERGY, "Scalars:scalars")
     velocity = states[1, 7:10]
     assert np.isclose(energies[1][0], 0.5 * 24.0 * velocity @ velocity, rtol=1e-13)
@@ -121,7 +120,7 @@ def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
     observer = FileRecorder(str(path))
     flight.fly(observer, states[:20])
     observer.on(MeshChanged(200_000_000, 2.0 * flight.VERTICES, flight.TRIANGLES, "ab" * 32))
-    observer.on(BodyChanged(200_000_000, flight.BODY))
+    observer.on(BodyChanged(200_000_000, flight.SETUP))
     observer.on(Published(200_000_000, states[20]))
     observer.on(Reset())
     observer.on(Published(0, states[21]))

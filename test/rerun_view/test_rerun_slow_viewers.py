@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -26,18 +25,18 @@ from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, S
 states = flight.rows(200)
 observer = flight.live_view()
 observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
-observer.on(BodyChanged(0, flight.BODY))
+observer.on(BodyChanged(0, flight.SETUP))
 observer.on(Published(0, states[0]))
 print(observer.live_address, flush=True)
 sys.stdin.readline()
 k, deadline = 1, time.monotonic() + 150.0
 while k < 200 and time.monotonic() < deadline:
     observer.on(Published(k * flight.PERIOD_NS, states[k]))
-    observer.on(BodyChanged(k * flight.PERIOD_NS, flight.BODY))
+    observer.on(BodyChanged(k * flight.PERIOD_NS, flight.SETUP))
     if k == 150:
         # Thousands of messages are more than the server keeps back for a viewer; how many, the library decides.
         while not observer._stream.behind:
-            observer.on(BodyChanged(k * flight.PERIOD_NS, flight.BODY))
+            observer.on(BodyChanged(k * flight.PERIOD_NS, flight.SETUP))
             time.sleep(0.01)
     k += 1
 behind = observer._stream.behind
@@ -72,14 +71,14 @@ def test_resets_and_bodies_of_every_size_leave_no_threads_behind(kind, tmp_path)
     def one_more_run() -> None:
         observer.on(Reset())
         for k, row in enumerate(flight.rows(4)):
-            observer.on(BodyChanged(k, replace(flight.BODY, scale=flight.SCALE * 10.0 ** (k % 2))))
+            observer.on(BodyChanged(k, flight.setup_of(scale=flight.SCALE * 10.0 ** (k % 2))))
             observer.on(Published(k * flight.PERIOD_NS, row))
         flight.flush(observer)
 
     observer = FileRecorder(str(tmp_path / "session.rrd")) if kind == "file" else flight.live_view()
     try:
         observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
-        observer.on(BodyChanged(0, flight.BODY))
+        observer.on(BodyChanged(0, flight.SETUP))
         for _ in range(3):
             one_more_run()
         before = _threads_of_this_process()
@@ -103,7 +102,7 @@ def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_b
     watcher = None
     try:
         observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
-        observer.on(BodyChanged(0, flight.BODY))
+        observer.on(BodyChanged(0, flight.SETUP))
         states = flight.rows(1000)
         for k in range(40_000):
             observer.on(Published(k * 1_000_000, states[k % 1000]))

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import io
 
 import numpy as np
@@ -52,7 +51,7 @@ def test_the_body_is_in_the_middle_of_the_flight_view_also_from_a_cut_file(tmp_p
     recording = tmp_path / "session.rrd"
     observer = FileRecorder(str(recording))
     # Without gravity: of a body that falls the path is shown, and the body where it has come to.
-    flight.fly(observer, flight.rows(60), dataclasses.replace(flight.BODY, gravity=np.zeros(3)))
+    flight.fly(observer, flight.rows(60), flight.setup_of(gravity=np.zeros(3)))
     observer.close()
     recording.write_bytes(recording.read_bytes()[:-2000])
     take(str(recording), "--at", "0.3", "-o", str(picture), "--size", "1000x600")
