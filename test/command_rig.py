@@ -86,9 +86,19 @@ class Commanded(RosClient):
         self.forget("events")
         self.start_over(paused=False)
 
+    def stand(self) -> int:
+        """Pause; the time that stands [ns], once all states from before have been heard: one topic may be far behind
+        another on a busy machine, but each keeps its order, and a paused node says its state again and again.
+        """
+        self.pause(True)
+        standing_ns = int(self.diagnostics()["sim_time_ns"])
+        for topic in ("pose", "twist", "odom"):
+            self.until(lambda topic=topic: self.newest_ns(topic) == standing_ns, "state of the time that stands")
+        return standing_ns
+
     def start_over(self, paused: bool) -> None:
         """Time 0, paused or running; nothing heard of what was before."""
-        self.pause(True)
+        self.stand()
         self.forget("pose", "twist", "odom")
         resets = len(self.events("reset"))
         self.trigger("reset")

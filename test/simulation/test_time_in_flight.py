@@ -22,13 +22,12 @@ def position(pose: dict) -> list[float]:
 
 
 def test_while_paused_ten_states_a_second_go_out_with_the_frozen_stamp_and_commands_wait_for_the_resume(rig):
-    rig.pause(True)
+    frozen_ns = rig.stand()
     rig.publish("poke", wrench_message(0, "world@tip;impulse", (1e-3, 0.0, 0.0)))
     rig.until_received(rig.sent)
     rig.forget("pose")
     rig.until(lambda: rig.heard_count("pose") >= 4, "states while paused")
-    frozen = {stamp_ns(m) for m in rig.heard("pose")}
-    assert len(frozen) == 1
+    assert {stamp_ns(m) for m in rig.heard("pose")} == {frozen_ns}
     assert len({tuple(position(m)) for m in rig.heard("pose")}) == 1
     assert not rig.events("poke")
     assert rig.diagnostics()["state"] == "paused"
@@ -47,7 +46,7 @@ def test_while_paused_ten_states_a_second_go_out_with_the_frozen_stamp_and_comma
     rig.until(counted, "a second with ten states")
     assert rig.pause(False)["success"]
     (poke,) = rig.wait_event("poke")
-    assert poke["time_ns"] == frozen.pop()
+    assert poke["time_ns"] == frozen_ns
 
 
 def test_step_goes_on_by_one_publication_period_and_is_refused_while_running(rig):
@@ -170,15 +169,19 @@ def test_the_pace_is_the_real_time_factor_and_changes_no_bit_of_the_motion(rig):
 def test_clock_is_published_on_request_with_the_states_stamps(rig):
     assert rig.set(publish_clock=True)[0][0]
     rig.listen("/clock", best_effort=True)
-    rig.until(lambda: rig.heard_count("/clock") >= 20, "/clock")
-    clocks = [m["clock"]["sec"] * SECOND + m["clock"]["nanosec"] for m in rig.heard("/clock")]
-    assert clocks == sorted(clocks)
-    assert all(c % (10 * MS) == 0 for c in clocks)
+
+    def clocks() -> list[int]:
+        return [m["clock"]["sec"] * SECOND + m["clock"]["nanosec"] for m in rig.heard("/clock")]
+
+    rig.until(lambda: rig.heard_count("/clock") >= 20 and clocks()[-1] >= 500 * MS, "/clock")
+    assert clocks() == sorted(clocks())
+    assert all(c % (10 * MS) == 0 for c in clocks())
     assert rig.set(publish_clock=False)[0][0]
     rig.start_over(paused=False)
     rig.forget("/clock")
     rig.until(lambda: rig.now_ns() >= 300 * MS, "time going on")
-    assert rig.heard_count("/clock") == 0
+    # Those that come late on a busy machine are of the time before the reset.
+    assert all(c >= 500 * MS for c in clocks())
     # On again, by the one publisher.
     assert rig.set(publish_clock=True)[0][0]
     rig.until(lambda: rig.heard_count("/clock") >= 5, "/clock again")
@@ -241,12 +244,14 @@ def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_envir
             reaches(1434 * MS)
             last = report()
             assert (last["overruns"], last["real_time_lost_s"]) == ("0", "0.0")
-            stamps = [stamp_ns(m) for m in client.heard("pose")]
             # /clock's time, set back with it; at 0 before it was heard.
             later = start + 100 * MS - 1234 * MS
             wanted = [start + k * 10 * MS for k in range(124)] + [later + k * 10 * MS for k in range(124, 144)]
+            client.until(lambda: client.newest_ns("pose") == wanted[-1], "last state")
+            stamps = [stamp_ns(m) for m in client.heard("pose")]
             assert [s for s in stamps if s not in (0, start)] == wanted[1:]
             assert last["stamp_offset_ns"] == str(later)
+            client.until(lambda: len(client.events()) >= 4, "last event")
             found = [(e["kind"], e["time_ns"], e["content"].get("offset_ns")) for e in client.events()]
             assert found == [
                 ("clock", 0, start),
@@ -263,6 +268,7 @@ def test_asleep_states_still_go_out_and_it_wakes_at_a_command(rig):
     rig.set(initial__angular_velocity=[0.0] * 3, initial__linear_velocity=[0.0] * 3, gravity=[0.0] * 3)
     rig.start_over(paused=False)
     assert rig.diagnostics()["state"] == "sleeping"
+    rig.until(lambda: rig.now_ns() > 0, "time going on")
     rig.forget("pose")
     rig.until(lambda: rig.heard_count("pose") >= 10, "states of a sleeper")
     stamps = [stamp_ns(m) for m in rig.heard("pose")]
