@@ -124,8 +124,8 @@ class Picture:
                 self.loads.began(time_ns, load_id, load)
             case LoadEnded(time_ns, load_id):
                 self.loads.ended(time_ns, load_id)
-            case StringChanged(time_ns, string):
-                self.string.change(time_ns, string)
+            case StringChanged():
+                self.string.change(event)
 
     def _set_mesh(self, time_ns: int, vertices: np.ndarray | None, triangles: np.ndarray | None) -> None:
         """Another mesh: vertices (n, 3) [mesh coordinates], triangles (m, 3); a BodyChanged follows."""

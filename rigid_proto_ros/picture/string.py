@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..simulation.observer import ShownString
+from ..motion.string import StringState
+from ..simulation.observer import StringChanged
 
 POINTS = 25
 """Of a slack string's curve."""
@@ -69,36 +70,35 @@ class Strings:
     """The string of one run, by the times from which it is tied as it is."""
 
     def __init__(self) -> None:
-        self._changes: list[tuple[int, ShownString | None]] = []
+        self._changes: list[StringChanged] = []
         self.was_tied = False
         """Whether the run has had a string."""
 
-    def change(self, time_ns: int, string: ShownString | None) -> None:
+    def change(self, event: StringChanged) -> None:
         """Another target, another knot, tied or let go."""
-        self._changes.append((time_ns, string))
-        self.was_tied = self.was_tied or string is not None
+        self._changes.append(event)
+        self.was_tied = self.was_tied or event.string is not None
 
     @property
     def tied(self) -> bool:
         """Whether there is a string now."""
-        return bool(self._changes) and self._changes[-1][1] is not None
+        return bool(self._changes) and self._changes[-1].string is not None
 
-    def _spells(self, times_ns: np.ndarray) -> Iterator[tuple[slice, ShownString]]:
-        """The string that is tied at each of the times (n,), by slices of them."""
-        begins = np.searchsorted(times_ns, [change_ns for change_ns, _ in self._changes], side="left").tolist()
-        for begin, end, (_, string) in zip(begins, [*begins, len(times_ns)][1:], self._changes, strict=True):
-            if string is not None and end > begin:
-                yield slice(begin, end), string
+    def _spells(self, times_ns: np.ndarray) -> Iterator[tuple[slice, StringState, np.ndarray]]:
+        """The string that is tied at each of the times (n,) with its knot, by slices of them."""
+        begins = np.searchsorted(times_ns, [change.time_ns for change in self._changes], side="left").tolist()
+        for begin, end, change in zip(begins, [*begins, len(times_ns)][1:], self._changes, strict=True):
+            if change.string is not None and change.arm is not None and end > begin:
+                yield slice(begin, end), change.string, change.arm
 
     def rows(self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray) -> StringRows:
         """The string at times (n,), ascending, of states (n, 13) with attitudes R (n, 3, 3)."""
         tied, pulls = np.zeros((2, len(rows)), dtype=bool)
         (free, knots), (lengths, energies) = np.zeros((2, len(rows), 3)), np.zeros((2, len(rows)))
-        for at, string in self._spells(times_ns):
-            attach = np.asarray(string.attach, dtype=float)
+        for at, string, arm in self._spells(times_ns):
             tied[at] = True
-            free[at] = string.free_end(times_ns[at])
-            knots[at] = rows[at, 0:3] + R[at] @ attach
+            free[at] = [string.free_end(time_ns) for time_ns in times_ns[at].tolist()]
+            knots[at] = rows[at, 0:3] + R[at] @ arm
             lengths[at] = 0.0 if string.bilateral else string.rest_length
             stretch = np.linalg.norm(knots[at] - free[at], axis=1) - string.rest_length
             pulls[at] = string.bilateral | (stretch > 0.0)
@@ -107,5 +107,5 @@ class Strings:
 
     def forget_before(self, time_ns: int) -> None:
         """Keep what later states need."""
-        while len(self._changes) > 1 and self._changes[1][0] <= time_ns:
+        while len(self._changes) > 1 and self._changes[1].time_ns <= time_ns:
             self._changes.pop(0)

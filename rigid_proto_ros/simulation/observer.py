@@ -44,44 +44,11 @@ class ShownLoad:
     torque: np.ndarray
 
 
-@dataclass(frozen=True)
-class ShownString:
-    """A tied string. attach (3,) [m, body axes from the COM] is the knot; the free end goes evenly from ``origin`` at
-    begin_ns to ``target`` at end_ns (3,) [m, world] and stays there. stiffness [N/m], damping [N s/m], rest_length [m];
-    a ``bilateral`` one also pushes.
-    """
-
-    attach: np.ndarray
-    origin: np.ndarray
-    target: np.ndarray
-    begin_ns: int
-    end_ns: int
-    stiffness: float
-    damping: float
-    rest_length: float
-    bilateral: bool
-
-    def free_end(self, times_ns: np.ndarray) -> np.ndarray:
-        """Places (n, 3) [m, world] of the free end at times (n,) [ns]."""
-        lasts_ns = self.end_ns - self.begin_ns
-        done = np.clip((times_ns - self.begin_ns) / lasts_ns, 0.0, 1.0) if lasts_ns > 0 else np.ones(len(times_ns))
-        places: np.ndarray = self.origin + done[:, np.newaxis] * (np.asarray(self.target, dtype=float) - self.origin)
-        return places
-
-
 def shown_load(kind: str, load: Load, body: Body) -> ShownLoad:
     """A load as observers are told of it."""
     axes = "world" if load.axes == "world" else "body"
     force = np.asarray(load.force) if axes == "world" else load.own_force(body)
     return ShownLoad(kind, axes, load.arm(body), force, np.asarray(load.torque))
-
-
-def shown_string(tied: StringState | None, body: Body) -> ShownString | None:
-    """A string as observers are told of it."""
-    if tied is None:
-        return None
-    ends = (tied.origin, tied.target, tied.begin_ns, tied.end_ns)
-    return ShownString(tied.arm(body), *ends, tied.stiffness, tied.damping, tied.rest_length, tied.bilateral)
 
 
 class Started(NamedTuple):
@@ -158,10 +125,13 @@ class Applied(NamedTuple):
 
 
 class StringChanged(NamedTuple):
-    """The string is tied like this from ``time_ns`` on, or not at all; comes again at every target."""
+    """The string is tied like this from ``time_ns`` on, or not at all; comes again at every target. arm (3,) [m, body
+    axes]: from the COM to its knot.
+    """
 
     time_ns: int
-    string: ShownString | None
+    string: StringState | None
+    arm: np.ndarray | None
 
 
 class Logged(NamedTuple):

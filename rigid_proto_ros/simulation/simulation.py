@@ -60,7 +60,6 @@ from .observer import (
     Reset,
     StringChanged,
     shown_load,
-    shown_string,
 )
 from .setup import Setup
 from .string_control import StringControl
@@ -113,7 +112,7 @@ class Simulation:
         for acting in self.acting:
             shown = shown_load(acting.shown_kind, acting.load, self.setup.body)
             observer.on(LoadBegan(self.time_ns, acting.load_id, shown))
-        observer.on(StringChanged(self.time_ns, shown_string(self.string, self.setup.body)))
+        observer.on(self._string_as_tied())
 
     def announce(self) -> None:
         """Tell the observer about the body as it is now."""
@@ -136,13 +135,17 @@ class Simulation:
         if LoadBegan in self.observer.takes:
             self.observer.on(LoadBegan(self.time_ns, load_id, shown_load(kind, load, self.setup.body)))
 
+    def _string_as_tied(self) -> StringChanged:
+        tied = self.string
+        return StringChanged(self.time_ns, tied, None if tied is None else tied.arm(self.setup.body))
+
     def _notify_string(self) -> None:
         """Tell the observer about the string, where it changed since it was last told."""
         if self.string is self._told_string:
             return
         self._told_string = self.string
         if StringChanged in self.observer.takes:
-            self.observer.on(StringChanged(self.time_ns, shown_string(self.string, self.setup.body)))
+            self.observer.on(self._string_as_tied())
 
     def log(self, kind: str, content: dict[str, Any]) -> None:
         """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever causes it."""

@@ -297,10 +297,10 @@ class Page:
                 self._reset()
             case LoadBegan() | LoadEnded():
                 self._load_changed(event)
-            case StringChanged(_, string):
+            case StringChanged():
                 self._strings.append(event)
                 self.picture.on(event)
-                if string is not None and self.pointer.dragging:
+                if event.string is not None and self.pointer.dragging:
                     self.lessons.did("drag")
             case Refused(message=message):
                 self.flight.say(f"Refused: {message}")

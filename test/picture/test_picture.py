@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.motion.body import make_body
+from rigid_proto_ros.motion.state import State
+from rigid_proto_ros.motion.string import StringSettings, tie
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.picture.arrows import FIRST, LONGEST, ArrowScales
 from rigid_proto_ros.picture.picture import Picture, Shape, angle_to
@@ -25,7 +27,6 @@ from rigid_proto_ros.simulation.observer import (
     LoadBegan,
     LoadEnded,
     ShownLoad,
-    ShownString,
     Started,
     StringChanged,
 )
@@ -208,8 +209,9 @@ def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let
     rows[:, 2], rows[:, 9] = 0.01 * np.arange(60), 1.0
     knot, hand = np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.8])
     picture, drawn = pictured()
-    picture.on(StringChanged(0, ShownString(knot, hand, hand, 0, 0, 50.0, 0.0, 0.4, False)))
-    picture.on(StringChanged(495_000_000, None))
+    settings, body = StringSettings(stiffness=50.0, damping_ratio=0.0, rest_length=0.4), flight.SETUP.body
+    picture.on(StringChanged(0, tie(settings, body.mesh_point(knot), hand, body, State(0, rows[0]), 0), knot))
+    picture.on(StringChanged(495_000_000, None, None))
     picture.draw(times(60), rows)
     strips = drawn.rows(style.STRING)
     assert [t for t, own in strips.items() if own] == times(50).tolist()

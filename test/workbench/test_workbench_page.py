@@ -100,7 +100,7 @@ def test_a_drag_draws_the_string_from_the_grabbed_point_to_the_pointer_and_the_b
     page.until(lambda: apart(page.pixel(string.points[0, 0]), (x + 150.0, y - 90.0)) < NEAR, "string to the pointer")
     page.drawn()
     tied = page.flown.live.loop.simulation.string
-    grabbed = np.asarray(page.flown.page.picture.string._changes[-1][1].attach) / page.flown.page.backend.unit
+    grabbed = page.flown.page.picture.string._changes[-1].arm / page.flown.page.backend.unit
     start = page.pixel(grabbed)
     assert tied is not None and apart(start, (x, y)) < NEAR, "the knot isn't where the mouse went down"
 
