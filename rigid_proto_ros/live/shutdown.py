@@ -6,7 +6,6 @@ by hanging.
 from __future__ import annotations
 
 import faulthandler
-import select
 import signal
 import socket
 import sys
@@ -47,11 +46,6 @@ class Shutdown:
     def request(self) -> None:
         """End the wait, from any thread."""
         self._request.send(b"\0")
-
-    @property
-    def requested(self) -> bool:
-        """Whether the shutdown was requested."""
-        return bool(select.select([self._waited], [], [], 0.0)[0])
 
     def wait(self) -> int:
         """Return when the shutdown was requested: the number of the signal that did it, or 0."""

@@ -46,10 +46,6 @@ class ArrowScales:
         lengths = np.minimum(values / known, LONGEST * size)
         return np.where(lengths < LEAST * size, 0.0, lengths)
 
-    def per_metre(self, kind: str) -> float:
-        """The value of an arrow a metre long; 0 where there hasn't been any."""
-        return self._per_metre.get(kind, 0.0)
-
     def forget(self) -> None:
         """Another body: scales of its own."""
         self._per_metre.clear()
