@@ -29,8 +29,8 @@ observer.on(BodyChanged(0, flight.SETUP))
 observer.on(Published(0, states[0]))
 print(observer.live_address, flush=True)
 sys.stdin.readline()
-k, deadline = 1, time.monotonic() + 150.0
-while k < 200 and time.monotonic() < deadline:
+k = 1
+while k < 200:
     observer.on(Published(k * flight.PERIOD_NS, states[k]))
     observer.on(BodyChanged(k * flight.PERIOD_NS, flight.SETUP))
     if k == 150:
@@ -54,7 +54,8 @@ def test_a_viewer_that_no_longer_reads_holds_up_neither_the_run_nor_its_end(tmp_
         watcher = viewers.ViewerProcess("--connect", address, "--save", str(saved))
         flight.wait_for(lambda: saved.exists() and saved.stat().st_size > 10_000)
         watcher.process.send_signal(signal.SIGSTOP)
-        said, _ = run.communicate("go\n", timeout=flight.WAIT_S)
+        # Nothing but a stopped viewer could hold it up for so long, however busy the machine is.
+        said, _ = run.communicate("go\n", timeout=4.0 * flight.WAIT_S)
         assert said.splitlines()[-1] == "behind 200 ''"
         assert run.returncode == 0
     finally:

@@ -3,6 +3,7 @@
 
 import itertools
 import signal
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -13,6 +14,9 @@ HARMLESS = wrench_message(0, "world", (0.0, 0.0, 1e-9))
 PUSH = wrench_message(0, "world;impulse", (0.0, 0.0, 1e-9))
 LAST = wrench_message(0, "nowhere")
 """Refused: who has counted the refusal has taken all that reached it of what its publisher sent before."""
+
+HELD_UP_S = 10.0
+"""The middleware gives up a process that says nothing for 20 s, and counts nothing that it misses from then on."""
 
 COUNTERS = ("wrench_received", "poke_received", "messages_lost", "queue_full", "refused_total")
 
@@ -77,16 +81,33 @@ def held_up(rig):
 @pytest.mark.parametrize("kept", [1_000, 5_000])
 def test_with_the_node_held_up_losses_are_counted_exactly_or_a_full_queue_is_told(rig, kept):
     """Two publishers send more than the ``kept`` messages that each holds for a reader that doesn't answer."""
-    with RosClient(rig.environment, rig.node) as client:
-        names = ["poke#1", "poke#2"]
+    names = ["poke#1", "poke#2"]
+
+    def send_all(client: RosClient) -> tuple[dict[str, int], bool]:
+        """The counters before, and whether the node was held up for so short that all is accounted for."""
+        rig.sent = int(rig.diagnostics()["commands_received"])
         client.advertise(*names, depth=kept)
         before = rig.counters()
         greet(client, names, PUSH)
         with held_up(rig):
+            start = time.monotonic()
             client.repeat(names, PUSH, kept + 2_000)
-        client.acknowledged(*names)
-        # The last of each shows what was lost before it.
-        client.repeat(names, LAST, 1)
-        # Where the node's own queue has room for all that was kept, none but what the middleware counts is lost.
-        gained = all_known_or_told(rig, before, 2 * (kept + 2_002), 2, told=2 * kept > 5_000)
+            return before, time.monotonic() - start < HELD_UP_S
+
+    for _ in range(5):
+        with RosClient(rig.environment, rig.node) as client:
+            before, accountable = send_all(client)
+            if accountable:
+                judge(rig, client, names, kept, before)
+                return
+    pytest.skip(f"the machine is so busy that the node was held up for more than {HELD_UP_S:g} s, five times")
+
+
+def judge(rig, client: RosClient, names: list[str], kept: int, before: dict[str, int]) -> None:
+    """What the node has counted of all that was sent."""
+    client.acknowledged(*names)
+    # The last of each shows what was lost before it.
+    client.repeat(names, LAST, 1)
+    # Where the node's own queue has room for all that was kept, none but what the middleware counts is lost.
+    gained = all_known_or_told(rig, before, 2 * (kept + 2_002), 2, told=2 * kept > 5_000)
     assert gained["messages_lost"] > 0 or gained["queue_full"] > 0
