@@ -33,7 +33,7 @@ FLAGS = [*SOFTWARE_GL, "--webgl-antialiasing-mode=none", "--disable-gpu-composit
 PATIENCE_S = 150.0
 """[s] Software WebGL compiles its shaders first, and on a busy machine nothing else moves meanwhile."""
 
-DRAWN_MS = 100
+DRAWN_MS = 300
 """[ms] Between two pictures: software WebGL would draw as often as it is let, and leave nothing of a core."""
 
 SAID_S = 0.06
