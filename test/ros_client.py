@@ -132,6 +132,7 @@ class RosClient:
         """Wait for a condition; returns its value."""
         deadline = time.monotonic() + READY_S
         while not (found := condition()):
+            assert self._thread.is_alive(), "this client's executor has ended by an error"
             assert time.monotonic() < deadline, f"no {what} within {READY_S} s"
             time.sleep(pause_s)
         return found
@@ -149,7 +150,8 @@ class RosClient:
             name = self.name(topic)
             messages = self._received.setdefault(name, [])
             if name in self._subscriptions:
-                self.own.destroy_subscription(self._subscriptions[name])
+                # On the executor's own thread: it waits for this subscription's events, and stops at a handle that is gone.
+                self._executor.create_task(self.own.destroy_subscription, self._subscriptions[name])
             profile = _profile(latched=topic in LATCHED, best_effort=best_effort)
             subscription = self.own.create_subscription(TOPICS[topic], name, messages.append, profile)
             self._subscriptions[name] = subscription

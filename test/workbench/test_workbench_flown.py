@@ -341,7 +341,7 @@ def test_before_time_begins_the_body_is_seen_above_the_floor() -> None:
     flown = Waiting("t_handle")
     try:
         page = flown.page
-        flown.until(lambda: page.backend._nodes[style.MOMENTUM].visible, "arrow of L")
+        flown.until(lambda: (arrow := page.backend._nodes.get(style.MOMENTUM)) and arrow.visible, "arrow of L")
         assert page.room._floor.position[2] < -0.5
     finally:
         flown.end()
