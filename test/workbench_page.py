@@ -36,6 +36,18 @@ PATIENCE_S = 150.0
 DRAWN_MS = 300
 """[ms] Between two pictures: software WebGL would draw as often as it is let, and leave nothing of a core."""
 
+RARELY_DRAWN = """pause_ms => {
+  const request = window.requestAnimationFrame, cancelled = new Set();
+  let last = 0;
+  window.requestAnimationFrame = draw => {
+    const number = ++last;
+    setTimeout(() => request(time => cancelled.delete(number) || draw(time)), pause_ms);
+    return number;
+  };
+  window.cancelAnimationFrame = number => { cancelled.add(number); };
+}"""
+"""A page with this drawn picture by picture, so far apart; a request that is cancelled draws none."""
+
 SAID_S = 0.06
 """[s] A page says at most every 0.05 s where the pointer is."""
 
@@ -74,13 +86,11 @@ class Flown:
 class Browser:
     """One browser page of it."""
 
-    def __init__(self, chromium, flown: Flown, size: tuple[int, int] = (1000, 600), drawn_ms: int = DRAWN_MS) -> None:
+    def __init__(self, chromium, flown: Flown, size: tuple[int, int] = (1000, 600)) -> None:
         self.flown = flown
         self.page = chromium.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=True)
         self.page.set_default_timeout(PATIENCE_S * 1e3)
-        self.page.add_init_script(
-            f"const draw = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => draw(f), {drawn_ms})"
-        )
+        self.page.add_init_script(f"({RARELY_DRAWN})({DRAWN_MS})")
         known = set(flown.server.get_clients())
         self.page.goto(flown.workbench.address)
         self.page.wait_for_selector("canvas")

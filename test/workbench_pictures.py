@@ -24,7 +24,6 @@ from rigid_proto_ros.workbench.panel import motion_words
 SIZE, MOVING_SIZE = (1400, 800), (800, 450)
 RATE = 10
 """[1/s] Pictures of the moving one, and of simulated time, which is shown as fast as it is."""
-DRAWN_MS = 300
 
 PAUSED = Flight.paused
 
@@ -41,7 +40,7 @@ def main() -> None:
     )
     try:
         with chromium(SOFTWARE_GL) as started:
-            page = Browser(started, flown, MOVING_SIZE, DRAWN_MS)
+            page = Browser(started, flown, MOVING_SIZE)
             draw_moving(page, args.folder / "flight.gif")
             page.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
             begin(page, lesson("true_or_box_tensor"))

@@ -49,18 +49,16 @@ def test_what_makes_no_file_is_refused_in_one_line(arguments, words, tmp_path, c
 
 def test_in_a_browser_the_body_moves_without_a_server_and_without_the_network(tmp_path) -> None:
     sync_api = pytest.importorskip("playwright.sync_api")
-    from workbench_page import CHROMIUM, NO_CHROMIUM, SEE_THROUGH, SOFTWARE_GL
+    from workbench_page import CHROMIUM, DRAWN_MS, FLAGS, NO_CHROMIUM, RARELY_DRAWN, SEE_THROUGH
 
     if CHROMIUM is None:
         pytest.skip(NO_CHROMIUM)
     file = tmp_path / "lesson.html"
     assert main(["lesson", "t_handle", "--html", str(file), "--duration", "2"]) == 0
     with sync_api.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_GL)
-        page = browser.new_page(viewport={"width": 1100, "height": 450})
-        # Software WebGL draws as often as it is let, and leaves nothing of a core.
-        draw = "const draw = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => draw(f), 100)"
-        page.add_init_script(draw)
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        page = browser.new_page(viewport={"width": 700, "height": 320})
+        page.add_init_script(f"({RARELY_DRAWN})({DRAWN_MS})")
         asked: list[str] = []
         page.on("request", lambda request: asked.append(request.url))
         page.goto(file.as_uri())
