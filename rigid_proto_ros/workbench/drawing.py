@@ -41,8 +41,8 @@ LABEL = "-"
 LINE_PIXELS = 3.0
 """Thickness of lines, however far off they are: those of a telephone's picture would be seen in pieces."""
 
-GHOST_SIZE = 0.99
-"""A ghost that lies exactly in its body would show through in patches."""
+GHOST_INSET = 0.003
+"""How far the ghost's surface lies within the body's, in parts of its size: exactly in it, it would show in patches."""
 
 HEAD = 2.6
 """Radius of an arrow's head, in those of its shaft."""
@@ -156,16 +156,19 @@ class ViserBackend(Backend):
             return
         look = style.STYLES[name]
         solid = look.opacity >= 1.0
+        vertices = surface.vertices
+        if name == style.GHOST_MESH:
+            vertices = vertices - GHOST_INSET * np.ptp(vertices, axis=0).max() * surface.normals
         # A name of its own: browsers give a node the pose of the one that had its name before.
         self._meshes += 1
         self._nodes[name] = self._scene.add_mesh_simple(
             f"/{name}_{self._meshes}",
-            surface.vertices,
+            vertices,
             surface.triangles,
             color=look.colours[0],
             opacity=None if solid else look.opacity,
             side="double",
-            scale=self._size_of(name) / self.unit,
+            scale=1.0 / self.unit,
             cast_shadow=solid,
             visible=False,
         )
@@ -191,10 +194,7 @@ class ViserBackend(Backend):
         if attitudes is not None:
             node.wxyz = wxyz(attitudes[-1])
         if scale is not None:
-            node.scale = tuple((self._size_of(name) * scale / self.unit).tolist())
-
-    def _size_of(self, name: str) -> float:
-        return GHOST_SIZE if name == style.GHOST_MESH else 1.0
+            node.scale = tuple((scale / self.unit).tolist())
 
     def arrows(self, name: str, counts: np.ndarray, vectors: np.ndarray, origins: np.ndarray | None = None) -> None:
         """The arrows of the last state."""

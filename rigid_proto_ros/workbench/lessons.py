@@ -48,7 +48,7 @@ class Course:
 
     numbers: the readouts that the lesson speaks of. shows: switches that are on, and style.STRING_LINE. labels: the
     parts and contacts that are named in the picture, at most three; an arrow that isn't named isn't drawn. speed:
-    simulated seconds per second.
+    simulated seconds per second. reveals: switches that are on once the question is answered.
     """
 
     steps: tuple[tuple[str, ...], ...]
@@ -56,6 +56,7 @@ class Course:
     shows: tuple[str, ...] = ()
     labels: tuple[str, ...] = (style.MOMENTUM,)
     speed: float = 1.0
+    reveals: tuple[str, ...] = ()
 
 
 PUSHED = (SPEED, SPIN, TRANSLATIONAL, ROTATIONAL, MOMENTUM)
@@ -77,8 +78,9 @@ COURSES = {
     "hammer": Course(
         ((ALONE,), ("set inertia_model", ALONE), ("set inertia_model", "poke", "poke")),
         (SPEED, SPIN, COM_PLACE, ENERGY, MOMENTUM),
-        (CENTRE_OF_MASS, SEE_INTO),
+        (SEE_INTO,),
         (style.MOMENTUM, "head", "grip"),
+        reveals=(CENTRE_OF_MASS,),
     ),
     "hollow_box": Course(
         (("poke",), ("set inertia_model", "reset", "poke"), (ALONE,)),
@@ -94,8 +96,9 @@ COURSES = {
     "plumb_line": Course(
         (("watch 20",), ("set string.attach", "watch 20"), ("poke",)),
         (SPEED, SPIN, ENERGY, COM_PLACE),
-        (CENTRE_OF_MASS, SEE_INTO, style.STRING_LINE),
+        (SEE_INTO, style.STRING_LINE),
         (),
+        reveals=(CENTRE_OF_MASS,),
     ),
     "spinning_top": Course(
         (("poke",), (TURN, "reset", "poke"), (TURN, "reset", "poke")),
@@ -198,8 +201,8 @@ SPACE = f'<div class="{ANSWERS}"></div>'
 
 
 class LessonPanel:
-    """on_lesson(course) is called when one begins, or none. for_class(on): class mode, with nothing but picture, lesson
-    and three buttons, begins or ends.
+    """on_lesson(course) is called when one begins, or none; reveal(names) with the switches that its answer turns on;
+    for_class(on) when class mode, with nothing but picture, lesson and three buttons, begins or ends.
     """
 
     def __init__(
@@ -209,11 +212,13 @@ class LessonPanel:
         flight: Flight,
         readings: Readings,
         on_lesson: Callable[[Course], None],
+        reveal: Callable[[Sequence[str]], None],
         for_class: Callable[[bool], None],
     ) -> None:
         self._flight = flight
         self._readings = readings
         self._on_lesson = on_lesson
+        self._reveal = reveal
         self._lessons: dict[str, Lesson] = {lesson.title: lesson for lesson in lessons()}
         self._progress = LessonProgress()
         self._guess: int | None = None
@@ -311,6 +316,7 @@ class LessonPanel:
         """A guess, or none: the motion shows what is right."""
         if self._asked:
             self._guess, self._asked = choice, False
+            self._reveal(self.course.reveals)
             self._flight.pause(False)
             self._show_text()
 

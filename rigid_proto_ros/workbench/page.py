@@ -170,7 +170,15 @@ class Page:
         self.bar = TimeBar(gui, self.controls, flight)
         self._class_mode = ClassMode(self.server)
         tabs = gui.add_tab_group()
-        self.lessons = LessonPanel(gui, tabs, flight, self.readings, self._on_lesson, self._for_class)
+        self.lessons = LessonPanel(
+            gui,
+            tabs,
+            flight,
+            self.readings,
+            self._on_lesson,
+            lambda switches: self.show_tab.switch_on(switches),
+            self._for_class,
+        )
         self.body_tab = BodyTab(gui, tabs, self.controls, flight, self._fly)
         self.forces_tab = ForcesTab(gui, tabs, self.controls, self.tools, flight)
         self.readout_tab = ReadoutTab(gui, tabs, self.readings)

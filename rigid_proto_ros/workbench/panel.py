@@ -312,3 +312,8 @@ class ShowTab:
         for name, box in self._switches.items():
             box.value = not wanted.isdisjoint((name, *PARTS.get(name, ())))
         self._switch(style.STRING_LINE, style.STRING_LINE in wanted)
+
+    def switch_on(self, names: Iterable[str]) -> None:
+        """Turn these switches on, by their names."""
+        for name in names:
+            self._switches[name].value = True

@@ -123,7 +123,6 @@ class LivePlot:
     ) -> None:
         self._title, self._unit, self._least = title, unit, least
         self._range = PlotRange(0, -1.0, 1.0)
-        self.columns = len(series)
         styles = [
             {"label": "t"},
             *({"label": name, "stroke": style.css(colour), "width": 1.5} for name, colour in series),
@@ -139,6 +138,16 @@ class LivePlot:
             legend={"show": len(series) > 1, "live": False},
             padding=PADDING,
         )
+
+    @property
+    def shown(self) -> bool:
+        """Whether it is there."""
+        return bool(self._handle.visible)
+
+    @shown.setter
+    def shown(self, shown: bool) -> None:
+        if self._handle.visible != shown:
+            self._handle.visible = shown
 
     @property
     def _scales(self) -> Any:
@@ -172,7 +181,9 @@ class Readings:
 
     @property
     def samples(self) -> np.ndarray:
-        """(n, 10): time [s], five energies [J], ω in principal axes (3), angle of L [°]."""
+        """(n, 10): time [s]; energies [J] translational, rotational, of gravity, total, of the string; ω in principal
+        axes (3); angle of L [°].
+        """
         return np.array(self._samples)
 
     def is_due(self, time_ns: int) -> bool:
@@ -197,7 +208,7 @@ class Readings:
         if self._samples and time_s < self._samples[-1][0]:
             self._samples.clear()
         if self.is_due(state.time_ns):
-            energies = (translational, rotational, gravity, string_energy, total)
+            energies = (translational, rotational, gravity, total, string_energy)
             self._samples.append((time_s, *energies, *w.tolist(), angle))
         while self._samples[0][0] < time_s - PLOTTED_S:
             self._samples.popleft()
@@ -226,18 +237,17 @@ class ReadoutTab:
         self._readings = readings
         with tabs.add_tab("Plots"):
             self._numbers = gui.add_html("")
-            self._plots = (
-                LivePlot(
-                    gui,
-                    style.ENERGY_TITLE,
-                    style.ENERGY_UNIT,
-                    (*style.ENERGY_SERIES, *style.STRING_ENERGY_SERIES, *style.TOTAL_ENERGY_SERIES),
-                ),
-                LivePlot(gui, style.OMEGA_TITLE, style.OMEGA_UNIT, style.OMEGA_SERIES),
-                LivePlot(
-                    gui, style.MOMENTUM_ANGLE_TITLE, style.ANGLE_UNIT, style.MOMENTUM_ANGLE_SERIES, least=FLAT_ANGLE
-                ),
+            free = (*style.ENERGY_SERIES, *style.TOTAL_ENERGY_SERIES)
+            self._free, self._held = (
+                LivePlot(gui, style.ENERGY_TITLE, style.ENERGY_UNIT, series)
+                for series in (free, (*free, *style.STRING_ENERGY_SERIES))
             )
+            spin = LivePlot(gui, style.OMEGA_TITLE, style.OMEGA_UNIT, style.OMEGA_SERIES)
+            angle = LivePlot(
+                gui, style.MOMENTUM_ANGLE_TITLE, style.ANGLE_UNIT, style.MOMENTUM_ANGLE_SERIES, least=FLAT_ANGLE
+            )
+        self._held.shown = False
+        self._columns = {self._free: (1, 5), self._held: (1, 6), spin: (6, 9), angle: (9, 10)}
         self._numbers_due_s = self._plots_due_s = 0.0
 
     def draw(self, now_s: float) -> None:
@@ -252,7 +262,9 @@ class ReadoutTab:
         if now_s >= self._plots_due_s and len(samples) > 1:
             self._plots_due_s = now_s + PLOTS_S
             ages = samples[:, 0] - samples[-1, 0]
-            first = 1
-            for plot in self._plots:
-                plot.show(ages, samples[:, first : first + plot.columns])
-                first += plot.columns
+            # A string that has held nothing for as long as is plotted isn't named.
+            self._held.shown = bool(samples[:, 5].any())
+            self._free.shown = not self._held.shown
+            for plot, (first, end) in self._columns.items():
+                if plot.shown:
+                    plot.show(ages, samples[:, first:end])

@@ -72,6 +72,10 @@ def test_a_lesson_that_asks_begins_at_its_time_0_with_its_ghost_however_fast_tim
         ghost, start = flown.node(style.GHOST), flown.scenario.setup.initial
         assert flown.live.state.time_ns == flown.page.state.time_ns == 0
         assert np.allclose(np.roll(ghost.wxyz, -1), start[3:7])
+        outer, inner = (node.vertices[node.faces] for node in map(flown.node, (style.BODY_MESH, style.GHOST_MESH)))
+        outward = np.cross(outer[:, 1] - outer[:, 0], outer[:, 2] - outer[:, 0])
+        apart = flown.node(style.GHOST_MESH).position - flown.node(style.BODY_MESH).position
+        assert np.einsum("ij,ij->i", inner.mean(axis=1) + apart - outer.mean(axis=1), outward).max() < 0.0
         flown.do(lambda: flown.page.lessons.answer(0))
         flown.fly(1.0)
         assert not np.allclose(np.roll(ghost.wxyz, -1), start[3:7])
@@ -145,7 +149,7 @@ def test_plots_are_drawn_against_seconds_before_now_also_after_a_jump_of_time(fl
     for seconds in (30.0, 5.0):
         flown.fly(seconds)
         tab = flown.page.readout_tab
-        for plot in tab._plots[:3]:
+        for plot in filter(lambda plot: plot.shown, tab._columns):
             drawn = flown.until(lambda plot=plot: len(plot._handle.data[0]) > 10 and plot._handle.data, "plot")
             assert plot._handle.scales["x"]["range"] == (-PLOTTED_S, 0.0)
             assert drawn[0][-1] == 0.0
@@ -170,19 +174,24 @@ def test_a_branch_begins_at_the_moment_looked_at_to_which_reset_returns(flown: F
 
 
 def test_the_energy_holds_the_string_of_its_moment_also_of_one_that_is_looked_back_at(flown: FlownPage) -> None:
+    flown.fly(0.2)
+    flown.until(lambda: flown.page.readout_tab._free.shown, "plot without a string")
+    assert not flown.page.readout_tab._held.shown
     flown.do(lambda: flown.page.flight.do({"string": {"attach": "tip", "target": [0.3, 0.0, 0.2]}}))
     flown.fly(0.2)
+    tab = flown.page.readout_tab
+    flown.until(lambda: tab._held.shown and not tab._free.shown, "plot with the string's energy")
     simulation = flown.live.loop.simulation
     tied = simulation.string.potential_energy(simulation.setup.body, simulation.state)
-    total, held = flown.page.readings.samples[-1][5], flown.page.readings.samples[-1][4]
+    total, held = flown.page.readings.samples[-1][4:6]
     assert held == pytest.approx(tied, rel=1e-9) and tied > 0.0
     flown.fly(0.1)
     flown.do(lambda: flown.page.flight.do({"string": "release"}))
     flown.fly(0.5)
-    assert flown.page.readings.samples[-1][4] == 0.0
+    assert flown.page.readings.samples[-1][5] == 0.0
     flown._update(flown.widget("Seconds back"), 0.6)
     moment_ns = flown.until(lambda: flown.page.flight.moment_ns, "moment of the past")
-    assert moment_ns == 200_000_000
+    assert moment_ns == 400_000_000
     assert flown.until(lambda: flown.page.state.time_ns == moment_ns, "state of the past")
     assert float(flown.page.readings.values[ENERGY].split()[0]) == pytest.approx(total, rel=1e-4)
     assert flown.page.picture.string.tied
@@ -321,10 +330,13 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
         hit = setup.surface.ray_hit(setup.body.mesh_point(eye), -eye / setup.body.scale)
         nearer = hit is not None and np.linalg.norm(eye - setup.body.point(hit[0])) < np.linalg.norm(eye)
         assert not nearer, "the body hides the mark of the centre of mass"
+    course = page.lessons.course
+    assert page._com.visible == (CENTRE_OF_MASS in course.shows), "the mark answers the question before it is asked"
     line = backend._nodes.get(style.STRING_LINE)
     assert (line is not None and line.visible) == (style.STRING_LINE in page.lessons.course.shows)
     flown.press(f"A   {one.choices[0]}")
     assert not flown.live.paused and "You said **A**" in text.content
+    flown.until(lambda: page._com.visible == (CENTRE_OF_MASS in course.shows + course.reveals), "centre of mass")
     assert all(sentence in text.content for sentence in one.sentences)
     for _ in range(8):
         flown.fly(0.25)
