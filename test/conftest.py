@@ -88,9 +88,9 @@ def ros_environment(ros_domain_id: int) -> dict[str, str]:
     return {**os.environ, "ROS_DOMAIN_ID": str(ros_domain_id)}
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def commanded(ros_environment, tmp_path_factory):
-    """A flying node and a client of it, in a domain of their own, shared by all tests of commands (test/command_rig.py)."""
+    """A flying node and a client of it, in a domain of their own, shared by a file's tests (test/command_rig.py)."""
     from command_rig import Commanded
 
     with held_domain() as domain:

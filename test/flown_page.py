@@ -20,7 +20,7 @@ from rigid_proto_ros.simulation.observer import Event, Observer, Published, Rese
 from rigid_proto_ros.workbench.main import Workbench
 from rigid_proto_ros.workbench.pointer import DrawnPose
 
-PATIENCE_S = 20.0
+PATIENCE_S = 180.0
 
 
 class Rows(Observer):

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import ModuleType
 
@@ -130,9 +131,9 @@ def test_ctrl_c_ends_the_set_up_in_one_line(tmp_path: Path) -> None:
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as made:
         while not (tmp_path / "started").exists() and made.poll() is None:
-            pass
+            time.sleep(0.01)
         os.killpg(made.pid, signal.SIGINT)
-        told = made.communicate(timeout=60)[1]
+        told = made.communicate(timeout=180)[1]
     assert made.returncode == 130
     assert told.strip().splitlines() == ["make setup: interrupted; the next make begins anew"]
 

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 from PIL import Image
-from workbench_page import SOFTWARE_GL, Browser, Flown, chromium
+from workbench_page import PATIENCE_S, SOFTWARE_GL, Browser, Flown, chromium
 
 from rigid_proto_ros.rerun_view.ports import any_free_port
 from rigid_proto_ros.scene.lessons import Lesson, lesson
@@ -61,7 +61,7 @@ def begin(page: Browser, shown: Lesson, ghost: str = "") -> None:
     flown = page.flown
     Flight.paused = PAUSED
     flown.page.lessons.name(shown.name)
-    asyncio.run_coroutine_threadsafe(flown.page.lessons.begin(), flown.server.get_event_loop()).result(60.0)
+    asyncio.run_coroutine_threadsafe(flown.page.lessons.begin(), flown.server.get_event_loop()).result(PATIENCE_S)
     page.until(lambda: shown.question in page.text, "question")
     if ghost:
         flown.live.set_parameters({"ghost.inertia_model": ghost})

@@ -17,7 +17,7 @@ import pytest
 
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
-from flown_page import FlownPage, numbers
+from flown_page import PATIENCE_S, FlownPage, numbers
 
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.picture import style
@@ -364,13 +364,13 @@ def test_a_lesson_that_is_picked_while_kernels_are_compiled_begins_when_they_are
 
     def compile_something() -> None:
         numba.njit(lambda: 1.0)()
-        assert compiled.wait(20.0)
+        assert compiled.wait(PATIENCE_S)
 
     page.flight.prepare(compile_something, lambda: None)
     picking = flown.begin_to_set("Lesson", lesson("hammer").title)
     flown.until(lambda: f"{COMPILING} …" in page.bar._line.content, "word of what is waited for")
     compiled.set()
-    picking.result(20.0)
+    picking.result(PATIENCE_S)
     flown.until(lambda: page.lessons._asked, "question")
     assert resolve_mesh(flown.scenario.parameters.mesh) == resolve_mesh("hammer")
     assert lesson("hammer").question in page.lessons._text.content

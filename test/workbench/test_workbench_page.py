@@ -15,7 +15,7 @@ import pytest
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 pytest.importorskip("playwright.sync_api", reason="playwright is not installed: nothing drives a browser")
 
-from workbench_page import CHROMIUM, FLAGS, NO_CHROMIUM, Browser, Flown, chromium
+from workbench_page import CHROMIUM, FLAGS, NO_CHROMIUM, PATIENCE_S, Browser, Flown, chromium
 
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
@@ -59,7 +59,7 @@ def fly(page: Browser, scene) -> None:
         await flown.page.flight.fly(scene, paused=False)
         flown.page.lessons.leave()
 
-    asyncio.run_coroutine_threadsafe(begin(), flown.server.get_event_loop()).result(60.0)
+    asyncio.run_coroutine_threadsafe(begin(), flown.server.get_event_loop()).result(PATIENCE_S)
     shown = flown.page
     page.until(lambda: shown._scenes_seen == shown.flight.scenes_begun and not shown._undrawn, "another body")
     page.drawn(3)
@@ -221,7 +221,7 @@ def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_button
 
     lessons, longest = page.flown.page.lessons, lesson("true_or_box_tensor")
     lessons.name(longest.name)
-    asyncio.run_coroutine_threadsafe(lessons.begin(), page.flown.server.get_event_loop()).result(60.0)
+    asyncio.run_coroutine_threadsafe(lessons.begin(), page.flown.server.get_event_loop()).result(PATIENCE_S)
     page.until(lambda: longest.choices[2] in page.text, "answers to choose from")
     cut = "labels => Math.max(...labels.map(label => label.scrollWidth - label.clientWidth))"
     labels = page.page.locator(".mantine-Button-label")

@@ -15,6 +15,8 @@ import pytest
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
+from workbench_page import PATIENCE_S
+
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
@@ -69,7 +71,7 @@ def test_the_address_is_told_while_kernels_that_the_mesh_needs_are_compiled(caps
         assert capsys.readouterr().out == ""
         numba.njit(lambda: 1.0)()
         address = re.search(r"The workbench is at http://127.0.0.1:(\d+)", capsys.readouterr().out)
-        connection = http.client.HTTPConnection(LOOPBACK, int(address[1]), timeout=20)
+        connection = http.client.HTTPConnection(LOOPBACK, int(address[1]), timeout=PATIENCE_S)
         connection.request("GET", "/")
         assert connection.getresponse().status == 200
         connection.close()
@@ -80,7 +82,7 @@ def test_the_address_is_told_while_kernels_that_the_mesh_needs_are_compiled(caps
 
 
 def title(server) -> str:
-    connection = http.client.HTTPConnection(LOOPBACK, server.get_port(), timeout=20)
+    connection = http.client.HTTPConnection(LOOPBACK, server.get_port(), timeout=PATIENCE_S)
     connection.request("GET", "/", headers={"Accept-Encoding": "gzip"})
     (found,) = re.findall("<title>(.*)</title>", connection.getresponse().read().decode())
     connection.close()
@@ -106,7 +108,7 @@ def test_an_address_that_leads_nowhere_is_refused_before_anything_starts(argumen
 
 
 def status(server, path: str = "/", **headers: str) -> int:
-    connection = http.client.HTTPConnection(LOOPBACK, server.get_port(), timeout=20)
+    connection = http.client.HTTPConnection(LOOPBACK, server.get_port(), timeout=PATIENCE_S)
     connection.request("GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
     found = connection.getresponse().status
     connection.close()
@@ -156,7 +158,7 @@ def test_what_one_page_sets_another_one_shows(server) -> None:
     with connect(address, subprotocols=[protocol]) as one, connect(address, subprotocols=[protocol]) as other:
         update = {"type": "GuiUpdateMessage", "uuid": field._impl.uuid, "updates": {"value": "0.28125"}}
         one.send(msgspec.msgpack.encode(update))
-        while b"0.28125" not in other.recv(timeout=20):
+        while b"0.28125" not in other.recv(timeout=PATIENCE_S):
             pass
     # What the node has in force is shown on all of them, whoever set it.
     controls.update({"mass": 0.5}, at_once=True)
