@@ -133,13 +133,18 @@ def test_damage_inside_is_refused_in_one_line(recording, tmp_path, capsys):
 # A node killed
 
 
-def starved_s(pid: int) -> float:
-    """How long the threads of a process have waited for a core [s]."""
-    waits = 0
+def waits_ns(pid: int) -> dict[str, int]:
+    """How long each thread of a process has waited for a core [ns], by its number."""
+    waits = {}
     for task in Path(f"/proc/{pid}/task").glob("*/schedstat"):
         with suppress(OSError):  # the thread has ended meanwhile
-            waits += int(task.read_text().split()[1])
-    return 1e-9 * waits
+            waits[task.parent.name] = int(task.read_text().split()[1])
+    return waits
+
+
+def starved_ns(before: dict[str, int], after: dict[str, int]) -> int:
+    """How long the threads that are there after have waited since."""
+    return sum(wait - before.get(thread, 0) for thread, wait in after.items())
 
 
 def states_end_ns(path: Path) -> int:
@@ -162,24 +167,25 @@ def kill_while_recording(environment: dict[str, str], folder: Path, ending: str,
     path = folder / f"session{ending}"
     values = {"record": str(path), "publish_rate": 200}
     node = start_node(environment, folder / "node", values, "--params-file", scene_path("t_handle"))
-    seen: list[tuple[float, int]] = []  # how long the node had starved, and then where the file ended
+    # How long the node had waited for a core, and then where the file ended.
+    seen: list[tuple[dict[str, int], int]] = []
 
     def recorded_for_long_enough() -> bool:
-        seen.append((starved_s(node.pid), states_end_ns(path)))
+        seen.append((waits_ns(node.pid), states_end_ns(path)))
         _, end_ns = seen[-1]
         return client.heard_count("pose") and time.monotonic() > earliest and end_ns >= 0
 
     try:
         with RosClient(environment) as client:
             node.wait_for("is simulating")
-            seen.append((starved_s(node.pid), -1))
+            seen.append((waits_ns(node.pid), -1))
             client.meet()
             client.publish("poke", wrench_message(0, "world@tip;impulse", (0.0, 0.001, 0.0)))
             earliest = time.monotonic() + after_s
             client.until(recorded_for_long_enough, "states on the topic and in the file")
             # Stopped, it waits for no core while that is read.
             node.process.send_signal(signal.SIGSTOP)
-            starved = starved_s(node.pid)
+            waited = waits_ns(node.pid)
             node.process.kill()
             node.process.wait()
             last = max(stamp_ns(message) for topic in ("pose", "twist") for message in client.heard(topic, last=1))
@@ -189,8 +195,8 @@ def kill_while_recording(environment: dict[str, str], folder: Path, ending: str,
     (session,) = read_runs(path)
     assert not session.complete
     # A second of what the machine let the node have since the last flush: a thread that gets no core flushes nothing.
-    starved -= max(before for before, end_ns in seen if end_ns < session.end_ns)
-    assert last - session.end_ns <= SECOND * (1.0 + max(0.0, starved))
+    starved = min(starved_ns(before, waited) for before, end_ns in seen if end_ns < session.end_ns)
+    assert last - session.end_ns <= SECOND + starved
     assert verify(session) is None
     repaired = folder / f"repaired{ending}"
     assert main(["replay", str(path), "--repair", str(repaired)]) == 0
