@@ -8,6 +8,7 @@ import math
 import os
 import re
 import shutil
+import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -59,6 +60,13 @@ NEXT_PICTURE = """() => new Promise(done => {
   requestAnimationFrame(() => done(true));
   setTimeout(() => done(false), 10000);
 })"""
+
+
+def any_free_port() -> int:
+    """A loopback port that the system says is free."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
 
 class Flown:

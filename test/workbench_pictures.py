@@ -14,9 +14,8 @@ import time
 from pathlib import Path
 
 from PIL import Image
-from workbench_page import PATIENCE_S, SOFTWARE_GL, Browser, Flown, chromium
+from workbench_page import PATIENCE_S, SOFTWARE_GL, Browser, Flown, any_free_port, chromium
 
-from rigid_proto_ros.rerun_view.ports import any_free_port
 from rigid_proto_ros.scene.lessons import Lesson, lesson
 from rigid_proto_ros.workbench.flight import Flight
 from rigid_proto_ros.workbench.panel import motion_words

@@ -67,9 +67,8 @@ def spread_mass(
     reference: np.ndarray,
     second: np.ndarray,
     points: np.ndarray,
-) -> tuple[float, np.ndarray, np.ndarray, Principal, np.ndarray, np.ndarray]:
-    """Of a mass [kg] spread over a mesh: total, COM (3,), inertia (3, 3), its principal moments and axes, the scaled
-    reference (3,) and the COM from it (3,).
+) -> tuple[float, np.ndarray, np.ndarray, Principal]:
+    """Of a mass [kg] spread over a mesh: total, COM (3,), inertia (3, 3), its principal moments and axes.
 
     measure, reference, center and center_low (3,), second (6,): the moments at unit density. scale (3,) of the mesh;
     left (3,): what of it the moments don't have in them yet. points (k, 4): ballast in mesh coordinates.
@@ -86,25 +85,25 @@ def spread_mass(
     total, moved, inertia, principal = loaded(mass, place, matrix, scale, reference * (left / scale), points)
     if points.shape[0]:
         com = base + moved
-    return total, com, inertia, principal, base, moved
+    return total, com, inertia, principal
 
 
 @njit(cache=True, nogil=True)
 def given_mass(
     mass: float, center: np.ndarray, inertia: np.ndarray, scale: np.ndarray, points: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray, Principal, np.ndarray, np.ndarray]:
+) -> tuple[float, np.ndarray, np.ndarray, Principal]:
     """The same of a given mass [kg], COM (3,) in mesh coordinates and inertia (3, 3) about it, which ``scale`` doesn't
-    touch; the COM is the reference.
+    touch.
     """
     base = scale * center
     if points.shape[0] == 0:
-        return mass, base, inertia, principal_axes_kernel(inertia), base, np.zeros(3)
+        return mass, base, inertia, principal_axes_kernel(inertia)
     half_trace = 0.5 * (inertia[0, 0] + inertia[1, 1] + inertia[2, 2])
     second = -inertia
     for k in range(3):
         second[k, k] = half_trace - inertia[k, k]
     total, moved, gathered, principal = loaded(mass, np.zeros(3), second, scale, center, points)
-    return total, base + moved, gathered, principal, base, moved
+    return total, base + moved, gathered, principal
 
 
 @njit(cache=True, error_model="numpy")

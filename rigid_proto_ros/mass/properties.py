@@ -25,16 +25,13 @@ Surface = tuple[np.ndarray, np.ndarray]
 class MassProperties:
     """mass [kg], center_of_mass (3,) [m, mesh axes, after scale], inertia (3, 3) [kg m², about the COM, mesh axes].
 
-    warnings: what the tensor check had to say. center_from_reference (3,) is center_of_mass minus ``reference`` (3,),
-    a point near the bounding box's centre; far from the origin it keeps the digits that center_of_mass can't hold.
+    warnings: what the tensor check had to say.
     """
 
     mass: float
     center_of_mass: np.ndarray
     inertia: np.ndarray
     warnings: tuple[str, ...] = ()
-    reference: np.ndarray | None = None
-    center_from_reference: np.ndarray | None = None
 
     def as_dict(self) -> dict:
         """Mass, COM and inertia as a JSON object."""
@@ -160,7 +157,7 @@ class MeshMoments:
         if com == "solid":
             solid = self.moments("solid")
             place, low, base = ((s / left) * of for of in (solid.center, solid.center_low, solid.reference))
-        total, center_of_mass, inertia, principal, reference, center = spread_mass(
+        total, center_of_mass, inertia, principal = spread_mass(
             own, moments.measure, s, left, place, low, base, moments.second, points
         )
         warnings = ()
@@ -169,7 +166,7 @@ class MeshMoments:
                 warnings = check_tensor(inertia, source=f"{model} model of {self.name}")
             except TensorError as error:
                 raise TensorError(f"inertia_model {model}", f"{self.name}: {error.received}", error.accepted) from None
-        return MassProperties(total, center_of_mass, inertia, warnings, reference, center)
+        return MassProperties(total, center_of_mass, inertia, warnings)
 
 
 def explicit_mass_properties(
@@ -193,7 +190,7 @@ def explicit_mass_properties(
     inertia = tensor_from_six(tensor6)
     warnings = check_tensor(inertia, source="explicit_inertia.tensor")
     points = _checked_ballast(ballast)
-    total, center_of_mass, inertia, _, reference, moved = given_mass(float(mass), center, inertia, s, points)
+    total, center_of_mass, inertia, _ = given_mass(float(mass), center, inertia, s, points)
     if len(points):
         warnings = check_tensor(inertia, source="explicit_inertia.tensor with ballast")
-    return MassProperties(total, center_of_mass, inertia, warnings, reference, moved)
+    return MassProperties(total, center_of_mass, inertia, warnings)

@@ -66,10 +66,3 @@ def listens(process_id: int, port: int) -> bool:
         return any(os.readlink(f"{folder}/{name}") in sockets for name in os.listdir(folder))
     except OSError:
         return False  # it has ended, or closed one meanwhile
-
-
-def any_free_port() -> int:
-    """A loopback port that the system says is free."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.bind((LOOPBACK, 0))
-        return probe.getsockname()[1]

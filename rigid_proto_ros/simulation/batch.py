@@ -152,7 +152,7 @@ def _explicit(own: np.record, ballast: np.ndarray) -> _Made:
     if ballast.shape[0] > 0:
         good = good and is_plainly_good(principal_axes_kernel(inertia)[0])
     center = own.explicit_inertia_center_of_mass
-    total, com, gathered, principal, _, _ = given_mass(mass, center, inertia, own.scale, ballast)
+    total, com, gathered, principal = given_mass(mass, center, inertia, own.scale, ballast)
     return total, com, gathered, principal, good and is_plainly_good(principal[0])
 
 
@@ -168,7 +168,7 @@ def _spread(own: np.record, ballast: np.ndarray) -> _Made:
         for k in range(3):
             uniform = uniform and abs(s[k]) == abs(s[0])
             left[k] = math.copysign(abs(s[0]), s[k])
-    total, com, inertia, principal, _, _ = spread_mass(
+    total, com, inertia, principal = spread_mass(
         mass, own.measure, s, left, own.center, own.center_low, own.reference, own.second, ballast
     )
     return total, com, inertia, principal, uniform and 1e-300 < mass < math.inf and is_plainly_good(principal[0])

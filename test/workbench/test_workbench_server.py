@@ -15,11 +15,11 @@ import pytest
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
-from workbench_page import PATIENCE_S
+from workbench_page import PATIENCE_S, any_free_port
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.ports import LOOPBACK, any_free_port
+from rigid_proto_ros.rerun_view.ports import LOOPBACK
 from rigid_proto_ros.workbench.controls import Controls
 from rigid_proto_ros.workbench.main import TITLE, serve
 from rigid_proto_ros.workbench.server import make_server, refusal, stop_server
