@@ -46,9 +46,9 @@ class Course:
     ``drag`` and ``reset``, ``set NAME`` of a parameter, ``show NAME`` of a switch, in any order and as often as it is
     listed, then ``watch SECONDS`` of simulated time.
 
-    numbers: the readouts that the lesson speaks of. shows: switches that are on, and style.STRING_LINE. labels: the
-    parts and contacts that are named in the picture, at most three; an arrow that isn't named isn't drawn. speed:
-    simulated seconds per second. reveals: switches that are on once the question is answered.
+    numbers: the readouts that the lesson speaks of. shows: switches that are on, or parts. labels: the parts and
+    contacts that are named in the picture, at most three; an arrow that isn't named isn't drawn. speed: simulated
+    seconds per second. reveals: switches that are on once the question is answered.
     """
 
     steps: tuple[tuple[str, ...], ...]
@@ -103,7 +103,8 @@ COURSES = {
     "spinning_top": Course(
         (("poke",), (TURN, "reset", "poke"), (TURN, "reset", "poke")),
         (SPIN, SPINS, MOMENTUM, ENERGY, SPEED),
-        labels=(style.MOMENTUM, "stem"),
+        (style.PRINCIPAL_AXES,),
+        (style.MOMENTUM, "stem"),
     ),
     "t_handle": Course(
         (("watch 4",), ("poke", "watch 2"), ("drag", ALONE)),
@@ -124,6 +125,7 @@ COURSES = {
     "top_on_string": Course(
         (("watch 2",), (TURN, "reset", "watch 2"), (TURN, "reset", ALONE)),
         (SPIN, SPEED, MOMENTUM, ENERGY, COM_PLACE),
+        (style.PRINCIPAL_AXES,),
     ),
     "true_or_box_tensor": Course(
         (("watch 2",), ("set inertia_model", "reset", ALONE), (ALONE,)),

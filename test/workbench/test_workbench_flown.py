@@ -330,6 +330,9 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
         hit = setup.surface.ray_hit(setup.body.mesh_point(eye), -eye / setup.body.scale)
         nearer = hit is not None and np.linalg.norm(eye - setup.body.point(hit[0])) < np.linalg.norm(eye)
         assert not nearer, "the body hides the mark of the centre of mass"
+    axes = backend._nodes.get(style.PRINCIPAL_AXES)
+    is_round = name in ("spinning_top", "top_on_string")
+    assert (axes is not None and axes.visible) == is_round, "what is round is seen to spin by its axes alone"
     course = page.lessons.course
     assert page._com.visible == (CENTRE_OF_MASS in course.shows), "the mark answers the question before it is asked"
     line = backend._nodes.get(style.STRING_LINE)
