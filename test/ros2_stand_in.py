@@ -32,7 +32,8 @@ def publish(node, options: list[str], topic: str, kind: str, text: str) -> None:
     given = dict(zip(options[0::2], options[1::2], strict=False)) if options != ["--once"] else {}
     message = MESSAGES[kind]()
     fill(message, yaml.safe_load(text))
-    publisher = node.create_publisher(MESSAGES[kind], topic, 10)
+    # As deep as the messages are many: at ten times the rate a node that gets no core for 0.1 s would lose some.
+    publisher = node.create_publisher(MESSAGES[kind], topic, 1000)
     while not publisher.get_subscription_count():
         time.sleep(0.02)
     for k in range(int(given.get("--times", 1))):
