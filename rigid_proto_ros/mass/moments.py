@@ -45,6 +45,7 @@ _UNIT_ROUNDOFF = 2.0**-53
 _Pair = tuple[float, float]  # the nearest double, and what it lacks
 _Pairs = tuple[_Pair, _Pair, _Pair]
 _Point = tuple[float, float, float]
+_Central = tuple[float, np.ndarray, np.ndarray]  # what ``_central`` returns
 
 
 @dataclass(frozen=True)
@@ -87,17 +88,57 @@ def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
     return (x0, y0, z0), (x1, y1, z1), zero == 0.0
 
 
-def _surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for an empty mesh, or a triangle
-    with a vertex that isn't there.
-    """
+@njit(cache=True, nogil=True)
+def _leads_outside(triangles: np.ndarray, count: int) -> bool:
+    """Whether a triangle uses a vertex that isn't one of ``count``."""
+    signs, last = np.int64(0), np.int64(count - 1)
+    for vertex in triangles.ravel():  # contiguous, so that this makes no copy
+        signs |= vertex | (last - vertex)
+    return signs < 0
+
+
+def _arrays(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for an empty mesh."""
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
     if triangles.shape[0] == 0 or vertices.shape[0] == 0:
         raise MeshError("mesh", "there are no faces; a surface has at least one triangle")
-    if int(triangles.view(np.uint64).max()) >= vertices.shape[0]:  # a negative number is a huge one
-        raise MeshError("mesh", f"a face uses a vertex outside 0 to {vertices.shape[0] - 1}")
     return vertices, triangles
+
+
+def _refuse_outside(outside: bool, count: int) -> None:
+    if outside:
+        raise MeshError("mesh", f"a face uses a vertex outside 0 to {count - 1}")
+
+
+def _refuse_place(finite: bool, size: float) -> None:
+    if not finite:
+        raise MeshError("mesh", "a vertex coordinate is not finite")
+    if size == 0.0:
+        raise MeshError("mesh", "all vertices lie in one point")
+
+
+def _surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``_arrays``; raises MeshError also for a triangle with a vertex that isn't there."""
+    vertices, triangles = _arrays(vertices, triangles)
+    _refuse_outside(_leads_outside(triangles, vertices.shape[0]), vertices.shape[0])
+    return vertices, triangles
+
+
+@njit(cache=True, nogil=True)
+def _place(vertices: np.ndarray) -> tuple[bool, np.ndarray, float, float]:
+    """Whether all coordinates are finite, and what ``_exact_reference`` returns; the size is 0 for a single point."""
+    lower, upper, finite = _bounds(vertices)
+    reference, size = np.zeros(3), 0.0
+    if not finite or lower == upper:
+        return finite, reference, 1.0, size
+    for k in range(3):
+        low, high = lower[k], upper[k]
+        middle = 0.5 * low + 0.5 * high
+        if 0.5 * high - 0.5 * low <= 0.25 * abs(middle):
+            reference[k] = middle
+        size = max(size, abs(low - reference[k]), abs(high - reference[k]))
+    return finite, reference, math.ldexp(1.0, -math.frexp(size)[1]), size
 
 
 def _exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
@@ -107,18 +148,9 @@ def _exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
     0. Returns (reference (3,), power of two that brings the largest |v − reference| to about 1, that largest).
     Raises MeshError for coordinates that are not finite, or all equal.
     """
-    lower, upper, finite = _bounds(vertices)
-    if not finite:
-        raise MeshError("mesh", "a vertex coordinate is not finite")
-    if lower == upper:
-        raise MeshError("mesh", "all vertices lie in one point")
-    reference, size = np.zeros(3), 0.0
-    for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
-        middle = 0.5 * low + 0.5 * high
-        if 0.5 * high - 0.5 * low <= 0.25 * abs(middle):
-            reference[k] = middle
-        size = max(size, abs(low - reference[k]), abs(high - reference[k]))
-    return reference, math.ldexp(1.0, -math.frexp(size)[1]), size
+    finite, reference, factor, size = _place(vertices)
+    _refuse_place(finite, size)
+    return reference, factor, size
 
 
 @njit(cache=True, nogil=True)
@@ -147,15 +179,9 @@ def _central(
     return measure, center / factor, second / factor / factor
 
 
-def _moments(
-    sums: np.ndarray,
-    reference: np.ndarray,
-    factor: float,
-    divisors: tuple[float, float, float],
-    dimension: int,
-) -> Moments:
-    """From raw sums as ``_central`` takes them; mass is spread over what has a measure of that dimension."""
-    measure, center, second = _central(sums, factor, *divisors)
+def _moments(central: _Central, reference: np.ndarray, factor: float, dimension: int) -> Moments:
+    """From what ``_central`` returns; mass is spread over what has a measure of that dimension."""
+    measure, center, second = central
     if measure == 0.0:
         raise MeshError("mesh", "the surface encloses no volume" if dimension == 3 else "the surface has no area")
     unit = factor**-dimension
@@ -280,6 +306,33 @@ def _compensated_sums(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return sums
 
 
+@njit(cache=True, nogil=True)
+def _solid_of(
+    vertices: np.ndarray, triangles: np.ndarray, place: tuple[np.ndarray, float, float], plain: bool, pairs: bool
+) -> _Central:
+    """``_central`` of the solid's sums: in plain doubles, in pairs, or, with neither, in pairs where it needs them."""
+    reference, factor, size = place
+    if not pairs:
+        sums, edges = _blocked_sums(vertices, triangles, reference, factor)
+        rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
+        if plain or rounding <= ROUNDING_LIMIT * abs(sums[0, 0]):
+            return _central(sums, factor, 6.0, 24.0, 120.0)
+    return _central(_compensated_sums((vertices - reference) * factor, triangles), factor, 6.0, 24.0, 120.0)
+
+
+@njit(cache=True, nogil=True)
+def _solid(
+    vertices: np.ndarray, triangles: np.ndarray, plain: bool, pairs: bool
+) -> tuple[bool, bool, np.ndarray, float, float, _Central]:
+    """Whether a triangle leads outside, what ``_place`` returns, and ``_solid_of``, of a mesh that is none nothing."""
+    outside = _leads_outside(triangles, vertices.shape[0])
+    finite, reference, factor, size = _place(vertices)
+    central = (0.0, np.zeros((3, 2)), np.zeros(6))
+    if not outside and finite and size > 0.0:
+        central = _solid_of(vertices, triangles, (reference, factor, size), plain, pairs)
+    return outside, finite, reference, factor, size, central
+
+
 def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "auto") -> Moments:
     """Moments of the solid that ``triangles`` (m, 3) over ``vertices`` (n, 3) bound, exact to about 1e-14.
 
@@ -288,15 +341,12 @@ def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "a
     ``path``: one of PATHS. Raises MeshError for an empty or non-finite mesh, a vertex number out of range, or zero
     volume.
     """
-    vertices, triangles = _surface(vertices, triangles)
-    reference, factor, size = _exact_reference(vertices)
-    if path == "blocked" or (path == "auto" and triangles.shape[0] > SMALL_MESH):
-        sums, edges = _blocked_sums(vertices, triangles, reference, factor)
-        rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
-        if path == "blocked" or rounding <= ROUNDING_LIMIT * abs(sums[0, 0]):
-            return _moments(sums, reference, factor, (6.0, 24.0, 120.0), 3)
-    sums = _compensated_sums((vertices - reference) * factor, triangles)
-    return _moments(sums, reference, factor, (6.0, 24.0, 120.0), 3)
+    vertices, triangles = _arrays(vertices, triangles)
+    pairs = path == "compensated" or (path == "auto" and triangles.shape[0] <= SMALL_MESH)
+    outside, finite, reference, factor, size, central = _solid(vertices, triangles, path == "blocked", pairs)
+    _refuse_outside(outside, vertices.shape[0])
+    _refuse_place(finite, size)
+    return _moments(central, reference, factor, 3)
 
 
 @njit(cache=True, nogil=True)
@@ -347,7 +397,7 @@ def shell_moments(vertices: np.ndarray, triangles: np.ndarray, polygon_starts: n
     reference, factor, _ = _exact_reference(vertices)
     starts = np.arange(len(triangles) + 1) if polygon_starts is None else np.asarray(polygon_starts, np.int64)
     sums = _shell_sums((vertices - reference) * factor, triangles, starts)
-    return _moments(sums, reference, factor, (1.0, 3.0, 12.0), 2)
+    return _moments(_central(sums, factor, 1.0, 3.0, 12.0), reference, factor, 2)
 
 
 def referenced_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -377,7 +427,8 @@ def point_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     vertices, triangles = _surface(vertices, triangles)
     points = referenced_vertices(vertices, triangles)
     reference, factor, _ = _exact_reference(points)
-    return _moments(_point_sums((points - reference) * factor), reference, factor, (1.0, 1.0, 1.0), 0)
+    sums = _point_sums((points - reference) * factor)
+    return _moments(_central(sums, factor, 1.0, 1.0, 1.0), reference, factor, 0)
 
 
 def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
