@@ -91,7 +91,7 @@ def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
 @njit(cache=True, nogil=True)
 def _leads_outside(triangles: np.ndarray, count: int) -> bool:
     """Whether a triangle uses a vertex that isn't one of ``count``."""
-    signs, last = np.int64(0), np.int64(count - 1)
+    signs, last = 0, count - 1
     for vertex in triangles.ravel():  # contiguous, so that this makes no copy
         signs |= vertex | (last - vertex)
     return signs < 0
