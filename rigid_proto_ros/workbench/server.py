@@ -156,6 +156,9 @@ PICTURE_SHARE = 56
 BESIDE_SHARE = 60
 """[%] Of the width, of a picture that has the panel beside it."""
 
+PRINTED_PICTURE = "8cm"
+"""Height of the picture on paper: below it the lesson has room for question, numbers and answers on the same page."""
+
 PANEL_PIXELS = 380
 """Width of the panel beside the picture, until a user drags its edge."""
 
@@ -170,7 +173,10 @@ _DOCKED_PICTURE = '[style*="position: absolute; inset: 0px "]:has(canvas)'
 _CANVAS = "canvas[data-engine]"  # three.js marks its own; the plots have others
 _SCROLLED = ".mantine-ScrollArea-viewport"
 
-_BAR = f".mantine-Paper-root:has(> .mantine-Collapse-root .{MARK})"
+_BAR = f'.mantine-Paper-root:has(> [style*="box-sizing: border-box"] .{MARK})'
+
+# A part that hides what overflows is what a bar in it sticks to, and it doesn't scroll.
+_CLIPPED = f'[style*="overflow: hidden"][style*="min-height: 0px"]:has(.{MARK})'
 
 STYLE = f"""<style>
 .mantine-Notification-root {{ max-height: 60vh !important; }}
@@ -183,6 +189,7 @@ STYLE = f"""<style>
 .{MARK} span {{ opacity: 0.7; }}
 .mantine-Input-input {{ text-overflow: ellipsis; }}
 {_BAR} {{ position: sticky; top: 0; z-index: 20; background: var(--mantine-color-body); margin-top: 0.4em; }}
+{_CLIPPED} {{ overflow: clip !important; }}
 .{ANSWERS} {{ display: none; }}
 @media (max-width: {NARROW}) {{
   {_SHEET} {{ max-height: {100 - PICTURE_SHARE}% !important; width: 100% !important; }}
@@ -207,7 +214,8 @@ STYLE = f"""<style>
     position: static !important; overflow: visible !important; flex: none !important;
     height: auto !important; min-height: auto !important; max-height: none !important;
   }}
-  .mantine-Notifications-root, {_BAR} {{ display: none; }}
+  .mantine-Notifications-root, {_BAR}, [role="tablist"] {{ display: none !important; }}
+  {_CANVAS} {{ height: {PRINTED_PICTURE} !important; width: auto !important; }}
   .{ANSWERS} {{ display: block; height: 12em;
     background: repeating-linear-gradient(transparent 0 1.9em, #999 1.9em calc(1.9em + 1px)); }}
 }}
