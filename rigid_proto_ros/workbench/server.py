@@ -175,9 +175,6 @@ _SCROLLED = ".mantine-ScrollArea-viewport"
 
 _BAR = f'.mantine-Paper-root:has(> [style*="box-sizing: border-box"] .{MARK})'
 
-# A part that hides what overflows is what a bar in it sticks to, and it doesn't scroll.
-_CLIPPED = f'[style*="overflow: hidden"][style*="min-height: 0px"]:has(.{MARK})'
-
 STYLE = f"""<style>
 .mantine-Notification-root {{ max-height: 60vh !important; }}
 .mantine-Button-root {{ height: auto !important; padding-block: 0.25em; }}
@@ -189,7 +186,6 @@ STYLE = f"""<style>
 .{MARK} span {{ opacity: 0.7; }}
 .mantine-Input-input {{ text-overflow: ellipsis; }}
 {_BAR} {{ position: sticky; top: 0; z-index: 20; background: var(--mantine-color-body); margin-top: 0.4em; }}
-{_CLIPPED} {{ overflow: clip !important; }}
 .{ANSWERS} {{ display: none; }}
 @media (max-width: {NARROW}) {{
   {_SHEET} {{ max-height: {100 - PICTURE_SHARE}% !important; width: 100% !important; }}
