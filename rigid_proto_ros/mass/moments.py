@@ -307,30 +307,23 @@ def _compensated_sums(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True)
-def _solid_of(
-    vertices: np.ndarray, triangles: np.ndarray, place: tuple[np.ndarray, float, float], plain: bool, pairs: bool
-) -> _Central:
-    """``_central`` of the solid's sums: in plain doubles, in pairs, or, with neither, in pairs where it needs them."""
-    reference, factor, size = place
-    if not pairs:
-        sums, edges = _blocked_sums(vertices, triangles, reference, factor)
-        rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
-        if plain or rounding <= ROUNDING_LIMIT * abs(sums[0, 0]):
-            return _central(sums, factor, 6.0, 24.0, 120.0)
-    return _central(_compensated_sums((vertices - reference) * factor, triangles), factor, 6.0, 24.0, 120.0)
-
-
-@njit(cache=True, nogil=True)
 def _solid(
     vertices: np.ndarray, triangles: np.ndarray, plain: bool, pairs: bool
 ) -> tuple[bool, bool, np.ndarray, float, float, _Central]:
-    """Whether a triangle leads outside, what ``_place`` returns, and ``_solid_of``, of a mesh that is none nothing."""
+    """Whether a triangle leads outside, what ``_place`` returns, and ``_central`` of the solid's sums: in plain
+    doubles, in pairs, or, with neither, in pairs where it needs them. A mesh that is none has sums of 0.
+    """
     outside = _leads_outside(triangles, vertices.shape[0])
     finite, reference, factor, size = _place(vertices)
-    central = (0.0, np.zeros((3, 2)), np.zeros(6))
+    sums = np.zeros((10, 2))
     if not outside and finite and size > 0.0:
-        central = _solid_of(vertices, triangles, (reference, factor, size), plain, pairs)
-    return outside, finite, reference, factor, size, central
+        if not pairs:
+            sums, edges = _blocked_sums(vertices, triangles, reference, factor)
+            rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
+            pairs = not (plain or rounding <= ROUNDING_LIMIT * abs(sums[0, 0]))
+        if pairs:
+            sums = _compensated_sums((vertices - reference) * factor, triangles)
+    return outside, finite, reference, factor, size, _central(sums, factor, 6.0, 24.0, 120.0)
 
 
 def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "auto") -> Moments:
