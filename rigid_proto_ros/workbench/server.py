@@ -175,6 +175,9 @@ _SCROLLED = ".mantine-ScrollArea-viewport"
 
 _BAR = f'.mantine-Paper-root:has(> [style*="box-sizing: border-box"] .{MARK})'
 
+# What folds away with the panel hides what overflows: a bar in it would stick to that, which doesn't scroll.
+_FOLDING = f'[style*="overflow: hidden"][style*="min-height: 0px"]:has(.{MARK})'
+
 STYLE = f"""<style>
 .mantine-Notification-root {{ max-height: 60vh !important; }}
 .mantine-Button-root {{ height: auto !important; padding-block: 0.25em; }}
@@ -186,6 +189,7 @@ STYLE = f"""<style>
 .{MARK} span {{ opacity: 0.7; }}
 .mantine-Input-input {{ text-overflow: ellipsis; }}
 {_BAR} {{ position: sticky; top: 0; z-index: 20; background: var(--mantine-color-body); margin-top: 0.4em; }}
+{_FOLDING} {{ overflow: clip !important; min-width: 0; }}
 .{ANSWERS} {{ display: none; }}
 @media (max-width: {NARROW}) {{
   {_SHEET} {{ max-height: {100 - PICTURE_SHARE}% !important; width: 100% !important; }}

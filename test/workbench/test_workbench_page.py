@@ -164,9 +164,14 @@ def test_a_drag_beside_the_body_turns_the_camera_and_touches_nothing(page) -> No
 def test_body_string_and_controls_of_time_are_in_sight_in_windows_of_every_size(page) -> None:
     fly(page, lesson("top_on_string").path.read_text("utf-8"))
     page.flown.live.pause(True)
+    page.tab("Body")
+    scrolled = []
     for width, height in ((1400, 800), (800, 360), (768, 1024), (390, 844)):
         page.page.set_viewport_size({"width": width, "height": height})
         page.drawn(3)
+        # Also of a panel that is scrolled to its end.
+        panel = page.page.locator(".mantine-ScrollArea-viewport").first
+        scrolled.append(panel.evaluate("panel => { panel.scrollTop = 9999; return panel.scrollTop; }"))
         for name in ("Play", "Step", "Reset"):
             box = page.page.locator("button:visible", has_text=name).first.bounding_box()
             assert box["x"] >= 0.0 and box["x"] + box["width"] <= width, name
@@ -185,6 +190,7 @@ def test_body_string_and_controls_of_time_are_in_sight_in_windows_of_every_size(
         cut = page.page.locator(".rp-bar").first.evaluate("bar => bar.scrollWidth - bar.clientWidth")
         page.flown.page.flight.busy("")
         assert cut <= 0
+    assert max(scrolled) > 150.0, "no panel was too long for its window"
     # On a telephone, too, the string is seen whole.
     string = page.until(lambda: page.flown.node(style.STRING), "string")
     picture, ends = page.look(), page.pixel(string.points[0])
