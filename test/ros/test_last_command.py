@@ -19,11 +19,11 @@ def kilogram(rig):
 
 
 def acceleration(rig) -> float:
-    """Along x [m/s²] over the newest states heard, all from after the last command has acted."""
+    """Along x [m/s²] over states from after the last command has acted."""
     rig.until_received(rig.sent)
     acted_ns = int(rig.diagnostics()["sim_time_ns"]) + 100 * MS
-    rig.until(lambda: rig.now_ns() > acted_ns + 100 * MS, "states after it")
-    first, *_, last = rig.heard("twist", last=10)
+    rig.fly_until(acted_ns + 200 * MS)
+    first, *_, last = rig.heard("twist", after=acted_ns)
     gained = last["twist"]["linear"]["x"] - first["twist"]["linear"]["x"]
     return round(gained / (1e-9 * (stamp_ns(last) - stamp_ns(first))), 6)
 
