@@ -2,7 +2,7 @@
 """Vectors of doubles in processor registers, for compiled kernels: several numbers go through each operation at once.
 
 Operations are those of IEEE 754 on every number by itself, in the order written and never contracted to a fused one:
-the bits are those of the same operations on single numbers. The one fused operation, of single numbers, is asked for.
+the bits are those of the same operations on single numbers. The one fused operation is asked for by its name.
 """
 
 from __future__ import annotations
@@ -251,18 +251,31 @@ overload(operator.mul)(_operation("fmul"))
 overload(operator.truediv)(_operation("fdiv"))
 
 
-def _fused_exactly(a: float, b: float, c: float) -> float:
+@overload(operator.neg)
+def _negated(vector: Any) -> Any:
+    def implementation(vector: Any) -> Any:
+        return -1.0 * vector
+
+    return implementation if isinstance(vector, Doubles) else None
+
+
+def _fused_exactly(a: Any, b: Any, c: Any) -> Any:
+    if isinstance(a, np.ndarray):
+        return np.array([_fused_exactly(*of_one) for of_one in zip(a, b, c, strict=True)])
     if not all(map(math.isfinite, (a, b, c))):
         return a * b + c
     return float(Fraction(a) * Fraction(b) + Fraction(c))
 
 
 @_operation_on_vectors(_fused_exactly)
-def fused_multiply_add(_typing_context: Any, _a: Any, _b: Any, _c: Any) -> Emitted:
-    """a b + c, rounded once."""
+def fused_multiply_add(_typing_context: Any, a: Any, _b: Any, _c: Any) -> Emitted:
+    """a b + c, rounded once; of three numbers, or of three vectors."""
+    kind = a if isinstance(a, Doubles) else types.float64
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
         # Where the processor has no such operation LLVM calls fma of the C library, which rounds once, too.
-        return builder.fma(*arguments)
+        each = arguments[0].type
+        name = f"llvm.fma.v{kind.count}f64" if isinstance(kind, Doubles) else "llvm.fma.f64"
+        return builder.call(builder.module.declare_intrinsic(name, (), ir.FunctionType(each, [each] * 3)), arguments)
 
-    return types.float64(types.float64, types.float64, types.float64), code
+    return kind(kind, kind, kind), code

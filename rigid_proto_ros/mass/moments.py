@@ -20,17 +20,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.compilation import njit
 from ..base.errors import MeshError
 from ..base.exact_arithmetic import pair_add, pair_divide, pair_multiply, two_sum
-from ..base.simd import Packed, filled, load, number
+from ..base.simd import Packed, filled, load, number, store
 
-SMALL_MESH = 1024
-"""Up to this many triangles the compensated sums cost well under a millisecond, so they are always taken."""
+SMALL_MESH = 32
+"""Up to this many triangles the compensated sums cost less than the call, so they are always taken."""
 ROUNDING_LIMIT = 5e-14
 """Above this estimated relative rounding of the volume the compensated sums take over; typical errors are 10 times
 smaller than the estimate on meshes of more than SMALL_MESH triangles."""
@@ -42,14 +42,11 @@ _LANES = 8
 """Triangles side by side in vector registers; a compiler left to choose their order would choose it by processor."""
 _UNIT_ROUNDOFF = 2.0**-53
 
-_Pair = tuple[float, float]  # the nearest double, and what it lacks
-_Pairs = tuple[_Pair, _Pair, _Pair]
+_Pair = tuple[Packed, Packed]  # the nearest doubles, and what they lack
 _Point = tuple[float, float, float]
-_Central = tuple[float, np.ndarray, np.ndarray]  # what ``_central`` returns
 
 
-@dataclass(frozen=True)
-class Moments:
+class Moments(NamedTuple):
     """Mass distribution at unit density; lengths in mesh units.
 
     measure: volume, area or number of points. reference (3,): a point near the bounding box's centre. center (3,):
@@ -71,7 +68,7 @@ class Moments:
     def outward(self) -> Moments:
         """The same solid wound outward."""
         sign = math.copysign(1.0, self.measure)
-        return replace(self, measure=sign * self.measure, second=sign * self.second)
+        return self._replace(measure=sign * self.measure, second=sign * self.second)
 
 
 @njit(cache=True, nogil=True)
@@ -106,28 +103,23 @@ def _arrays(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np
     return vertices, triangles
 
 
-def _refuse_outside(outside: bool, count: int) -> None:
+def _refuse(outside: bool, finite: bool, size: float, count: int) -> None:
     if outside:
         raise MeshError("mesh", f"a face uses a vertex outside 0 to {count - 1}")
-
-
-def _refuse_place(finite: bool, size: float) -> None:
     if not finite:
         raise MeshError("mesh", "a vertex coordinate is not finite")
     if size == 0.0:
         raise MeshError("mesh", "all vertices lie in one point")
 
 
-def _surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """``_arrays``; raises MeshError also for a triangle with a vertex that isn't there."""
-    vertices, triangles = _arrays(vertices, triangles)
-    _refuse_outside(_leads_outside(triangles, vertices.shape[0]), vertices.shape[0])
-    return vertices, triangles
-
-
 @njit(cache=True, nogil=True)
-def _place(vertices: np.ndarray) -> tuple[bool, np.ndarray, float, float]:
-    """Whether all coordinates are finite, and what ``_exact_reference`` returns; the size is 0 for a single point."""
+def _exact_reference(vertices: np.ndarray) -> tuple[bool, np.ndarray, float, float]:
+    """A point near the bounding box's centre from which no vertex differs by more than a double holds exactly.
+
+    Per axis: the centre c if the box's half extent is at most |c|/4, since v − c is then exact (Sterbenz), otherwise
+    0. Returns (whether all coordinates are finite, reference (3,), power of two that brings the largest |v − reference|
+    to about 1, that largest, which is 0 where all vertices are one point).
+    """
     lower, upper, finite = _bounds(vertices)
     reference, size = np.zeros(3), 0.0
     if not finite or lower == upper:
@@ -141,51 +133,70 @@ def _place(vertices: np.ndarray) -> tuple[bool, np.ndarray, float, float]:
     return finite, reference, math.ldexp(1.0, -math.frexp(size)[1]), size
 
 
-def _exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """A point near the bounding box's centre from which no vertex differs by more than a double holds exactly.
-
-    Per axis: the centre c if the box's half extent is at most |c|/4, since v − c is then exact (Sterbenz), otherwise
-    0. Returns (reference (3,), power of two that brings the largest |v − reference| to about 1, that largest).
-    Raises MeshError for coordinates that are not finite, or all equal.
-    """
-    finite, reference, factor, size = _place(vertices)
-    _refuse_place(finite, size)
-    return reference, factor, size
-
-
 @njit(cache=True, nogil=True)
 def _central(
-    sums: np.ndarray, factor: float, measure_divisor: float, first_divisor: float, second_divisor: float
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """Measure, centroid (3, 2) from the reference and second moments (6,) about it, from the raw sums (10, 2) of
-    (v − reference)·factor, each to be divided by its divisor; all but the measure are still in units of 1/factor.
+    sums: np.ndarray, reference: np.ndarray, factor: float, divisors: tuple[float, float, float], dimension: int
+) -> np.ndarray:
+    """The numbers (16,) of Moments, in its order, from the raw sums (10, 2) of (v − reference)·factor over what has a
+    measure of that dimension; divisors: of the measure, the first and the second moments.
 
     The subtraction that cancels is done in pairs. A measure of 0 leaves the rest undefined.
     """
-    center, first, second = np.zeros((3, 2)), np.zeros((3, 2)), np.zeros(6)
-    measure, measure_low = pair_divide(sums[0, 0], sums[0, 1], measure_divisor, 0.0)
+    numbers, first, center = np.zeros(16), np.zeros((3, 2)), np.zeros((3, 2))
+    measure, measure_low = pair_divide(sums[0, 0], sums[0, 1], divisors[0], 0.0)
     if measure == 0.0:
-        return 0.0, center, second
+        return numbers
+    unit = 1.0
+    for _ in range(dimension):
+        unit /= factor
+    numbers[0] = measure * unit
     for k in range(3):
-        first[k] = pair_divide(sums[1 + k, 0], sums[1 + k, 1], first_divisor, 0.0)
+        first[k] = pair_divide(sums[1 + k, 0], sums[1 + k, 1], divisors[1], 0.0)
         center[k] = pair_divide(first[k, 0], first[k, 1], measure, measure_low)
+        numbers[1 + k], numbers[4 + k], numbers[7 + k] = reference[k], center[k, 0] / factor, center[k, 1] / factor
     slot = 0
     for i in range(3):
         for j in range(i, 3):
-            raw, raw_low = pair_divide(sums[4 + slot, 0], sums[4 + slot, 1], second_divisor, 0.0)
+            raw, raw_low = pair_divide(sums[4 + slot, 0], sums[4 + slot, 1], divisors[2], 0.0)
             moved, moved_low = pair_multiply(first[i, 0], first[i, 1], center[j, 0], center[j, 1])
-            second[slot] = pair_add(raw, raw_low, -moved, -moved_low)[0]
+            numbers[10 + slot] = pair_add(raw, raw_low, -moved, -moved_low)[0] / factor / factor * unit
             slot += 1
-    return measure, center / factor, second / factor / factor
+    return numbers
 
 
-def _moments(central: _Central, reference: np.ndarray, factor: float, dimension: int) -> Moments:
-    """From what ``_central`` returns; mass is spread over what has a measure of that dimension."""
-    measure, center, second = central
+def _moments(numbers: np.ndarray, no_measure: str) -> Moments:
+    measure = numbers.item(0)
     if measure == 0.0:
-        raise MeshError("mesh", "the surface encloses no volume" if dimension == 3 else "the surface has no area")
-    unit = factor**-dimension
-    return Moments(measure * unit, reference, center[:, 0].copy(), center[:, 1].copy(), second * unit)
+        raise MeshError("mesh", no_measure)
+    return Moments(measure, numbers[1:4], numbers[4:7], numbers[7:10], numbers[10:])
+
+
+@njit(cache=True, nogil=True)
+def _gather(vertices: np.ndarray, triangles: np.ndarray, start: int, corners: np.ndarray) -> int:
+    """Put the corners of the next triangles from ``start`` on side by side into ``corners`` (9, n), a, b and c.
+
+    Their number is a multiple of _LANES: what is missing are triangles without an extent.
+    """
+    count = min(corners.shape[1], triangles.shape[0] - start)
+    for t in range(count):
+        for corner in range(3):
+            i = triangles[start + t, corner]
+            for k in range(3):
+                corners[3 * corner + k, t] = vertices[i, k]
+    whole = -(-count // _LANES) * _LANES
+    corners[3:6, count:whole] = corners[:3, count:whole]
+    corners[6:, count:whole] = corners[:3, count:whole]
+    return whole
+
+
+@njit(cache=True, nogil=True)
+def _corner(corners: np.ndarray, corner: int, t: int, reference: np.ndarray, factor: float) -> tuple[Packed, ...]:
+    """x, y and z of a corner of _LANES triangles, from the reference in units of 1/factor."""
+    zero, first = filled(0.0, _LANES), 3 * corner * corners.shape[1] + t
+    x = load(corners, first, zero)
+    y = load(corners, first + corners.shape[1], zero)
+    z = load(corners, first + 2 * corners.shape[1], zero)
+    return (x - reference[0]) * factor, (y - reference[1]) * factor, (z - reference[2]) * factor
 
 
 @njit(cache=True, nogil=True)
@@ -203,33 +214,17 @@ def _blocked_sums(
 
     Also Σ(|b − a|² + |c − a|²), which measures how much d can round.
     """
-    rx, ry, rz = reference[0], reference[1], reference[2]
     sums = np.zeros((10, 2))
     edges = 0.0
-    corners = np.zeros((9, _BLOCK))  # a, b and c of triangles side by side
+    corners = np.zeros((9, _BLOCK))
     zero = filled(0.0, _LANES)
     for start in range(0, triangles.shape[0], _BLOCK):
         v0, vx, vy, vz, size = zero, zero, zero, zero, zero
         xx, xy, xz, yy, yz, zz = zero, zero, zero, zero, zero, zero
-        count = min(_BLOCK, triangles.shape[0] - start)
-        for t in range(count):
-            for corner in range(3):
-                i = triangles[start + t, corner]
-                for k in range(3):
-                    corners[3 * corner + k, t] = vertices[i, k]
-        whole = -(-count // _LANES) * _LANES
-        corners[3:6, count:whole] = corners[:3, count:whole]  # triangles without an extent
-        corners[6:, count:whole] = corners[:3, count:whole]
-        for t in range(0, whole, _LANES):
-            ax = (load(corners, t, zero) - rx) * factor
-            ay = (load(corners, _BLOCK + t, zero) - ry) * factor
-            az = (load(corners, 2 * _BLOCK + t, zero) - rz) * factor
-            bx = (load(corners, 3 * _BLOCK + t, zero) - rx) * factor
-            by = (load(corners, 4 * _BLOCK + t, zero) - ry) * factor
-            bz = (load(corners, 5 * _BLOCK + t, zero) - rz) * factor
-            cx = (load(corners, 6 * _BLOCK + t, zero) - rx) * factor
-            cy = (load(corners, 7 * _BLOCK + t, zero) - ry) * factor
-            cz = (load(corners, 8 * _BLOCK + t, zero) - rz) * factor
+        for t in range(0, _gather(vertices, triangles, start, corners), _LANES):
+            ax, ay, az = _corner(corners, 0, t, reference, factor)
+            bx, by, bz = _corner(corners, 1, t, reference, factor)
+            cx, cy, cz = _corner(corners, 2, t, reference, factor)
             ux, uy, uz = bx - ax, by - ay, bz - az
             wx, wy, wz = cx - ax, cy - ay, cz - az
             d = ax * (uy * wz - uz * wy) + ay * (uz * wx - ux * wz) + az * (ux * wy - uy * wx)
@@ -271,50 +266,66 @@ def _minor(p: _Pair, q: _Pair, r: _Pair, s: _Pair) -> _Pair:
 
 
 @njit(cache=True, nogil=True)
-def _point(points: np.ndarray, i: int) -> _Point:
-    return points[i, 0], points[i, 1], points[i, 2]
-
-
-@njit(cache=True, nogil=True)
-def _sum(a: _Point, b: _Point, sign: float) -> _Pairs:
+def _sum(a: tuple[Packed, ...], b: tuple[Packed, ...], sign: float) -> tuple[_Pair, ...]:
     """a + sign·b, exactly."""
     return two_sum(a[0], sign * b[0]), two_sum(a[1], sign * b[1]), two_sum(a[2], sign * b[2])
 
 
 @njit(cache=True, nogil=True)
-def _compensated_sums(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def _add(sums: np.ndarray, slot: int, p: _Pair) -> None:
+    """Add to a sum of ``sums`` (10, 2, _LANES)."""
+    high = 2 * slot * _LANES
+    total = load(sums, high, p[0]), load(sums, high + _LANES, p[0])
+    total = _plus(total, p)
+    store(sums, high, total[0])
+    store(sums, high + _LANES, total[1])
+
+
+@njit(cache=True, nogil=True)
+def _compensated_sums(
+    vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float
+) -> np.ndarray:
     """The solid's ten sums (10, 2) in pairs (about 104 bits), for bodies so thin that a double's products round too
-    much; ``points`` (n, 3) are vertices less the reference, exactly."""
+    much: from the reference every corner is exact."""
+    of_lanes = np.zeros((10, 2, _LANES))
+    corners = np.zeros((9, _BLOCK))
+    zero = filled(0.0, _LANES)
+    for start in range(0, triangles.shape[0], _BLOCK):
+        for t in range(0, _gather(vertices, triangles, start, corners), _LANES):
+            a = _corner(corners, 0, t, reference, factor)
+            b = _corner(corners, 1, t, reference, factor)
+            c = _corner(corners, 2, t, reference, factor)
+            u, w = _sum(b, a, -1.0), _sum(c, a, -1.0)
+            d = _times(_minor(u[1], w[2], u[2], w[1]), (a[0], zero))
+            d = _plus(d, _times(_minor(u[2], w[0], u[0], w[2]), (a[1], zero)))
+            d = _plus(d, _times(_minor(u[0], w[1], u[1], w[0]), (a[2], zero)))
+            p, q, r = _sum(a, b, 1.0), _sum(b, c, 1.0), _sum(c, a, 1.0)
+            _add(of_lanes, 0, d)
+            slot = 4
+            for i in range(3):
+                _add(of_lanes, 1 + i, _times(d, _plus(p[i], (c[i], zero))))
+                for j in range(i, 3):
+                    # s sᵀ + a aᵀ + b bᵀ + c cᵀ as (a + b)(a + b)ᵀ + (b + c)(b + c)ᵀ + (c + a)(c + a)ᵀ.
+                    bracket = _plus(_plus(_times(p[i], p[j]), _times(q[i], q[j])), _times(r[i], r[j]))
+                    _add(of_lanes, slot, _times(d, bracket))
+                    slot += 1
     sums = np.zeros((10, 2))
-    for t in range(triangles.shape[0]):
-        a, b, c = _point(points, triangles[t, 0]), _point(points, triangles[t, 1]), _point(points, triangles[t, 2])
-        u, w = _sum(b, a, -1.0), _sum(c, a, -1.0)
-        d = _times(_minor(u[1], w[2], u[2], w[1]), (a[0], 0.0))
-        d = _plus(d, _times(_minor(u[2], w[0], u[0], w[2]), (a[1], 0.0)))
-        d = _plus(d, _times(_minor(u[0], w[1], u[1], w[0]), (a[2], 0.0)))
-        p, q, r = _sum(a, b, 1.0), _sum(b, c, 1.0), _sum(c, a, 1.0)
-        sums[0] = _plus((sums[0, 0], sums[0, 1]), d)
-        slot = 4
-        for i in range(3):
-            moved = _times(d, _plus(p[i], (c[i], 0.0)))
-            sums[1 + i] = _plus((sums[1 + i, 0], sums[1 + i, 1]), moved)
-            for j in range(i, 3):
-                # s sᵀ + a aᵀ + b bᵀ + c cᵀ as (a + b)(a + b)ᵀ + (b + c)(b + c)ᵀ + (c + a)(c + a)ᵀ.
-                bracket = _plus(_plus(_times(p[i], p[j]), _times(q[i], q[j])), _times(r[i], r[j]))
-                sums[slot] = _plus((sums[slot, 0], sums[slot, 1]), _times(d, bracket))
-                slot += 1
+    for k in range(10):
+        for lane in range(_LANES):
+            sums[k] = pair_add(sums[k, 0], sums[k, 1], of_lanes[k, 0, lane], of_lanes[k, 1, lane])
     return sums
 
 
 @njit(cache=True, nogil=True)
 def _solid(
     vertices: np.ndarray, triangles: np.ndarray, plain: bool, pairs: bool
-) -> tuple[bool, bool, np.ndarray, float, float, _Central]:
-    """Whether a triangle leads outside, what ``_place`` returns, and ``_central`` of the solid's sums: in plain
-    doubles, in pairs, or, with neither, in pairs where it needs them. A mesh that is none has sums of 0.
+) -> tuple[bool, bool, float, np.ndarray]:
+    """Whether a triangle leads outside, whether all coordinates are finite, the size of ``_exact_reference``, and
+    ``_central`` of the solid's sums: in plain doubles, in pairs, or, with neither, in pairs where it needs them. A mesh
+    that is none has sums of 0.
     """
     outside = _leads_outside(triangles, vertices.shape[0])
-    finite, reference, factor, size = _place(vertices)
+    finite, reference, factor, size = _exact_reference(vertices)
     sums = np.zeros((10, 2))
     if not outside and finite and size > 0.0:
         if not pairs:
@@ -322,8 +333,8 @@ def _solid(
             rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
             pairs = not (plain or rounding <= ROUNDING_LIMIT * abs(sums[0, 0]))
         if pairs:
-            sums = _compensated_sums((vertices - reference) * factor, triangles)
-    return outside, finite, reference, factor, size, _central(sums, factor, 6.0, 24.0, 120.0)
+            sums = _compensated_sums(vertices, triangles, reference, factor)
+    return outside, finite, size, _central(sums, reference, factor, (6.0, 24.0, 120.0), 3)
 
 
 def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "auto") -> Moments:
@@ -336,10 +347,28 @@ def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "a
     """
     vertices, triangles = _arrays(vertices, triangles)
     pairs = path == "compensated" or (path == "auto" and triangles.shape[0] <= SMALL_MESH)
-    outside, finite, reference, factor, size, central = _solid(vertices, triangles, path == "blocked", pairs)
-    _refuse_outside(outside, vertices.shape[0])
-    _refuse_place(finite, size)
-    return _moments(central, reference, factor, 3)
+    outside, finite, size, numbers = _solid(vertices, triangles, path == "blocked", pairs)
+    _refuse(outside, finite, size, vertices.shape[0])
+    return _moments(numbers, "the surface encloses no volume")
+
+
+def _surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``_arrays``; raises MeshError also for a triangle with a vertex that isn't there."""
+    vertices, triangles = _arrays(vertices, triangles)
+    _refuse(_leads_outside(triangles, vertices.shape[0]), True, 1.0, vertices.shape[0])
+    return vertices, triangles
+
+
+def _reference(vertices: np.ndarray) -> tuple[np.ndarray, float]:
+    """Reference and factor of ``_exact_reference``; raises MeshError for coordinates not finite, or all equal."""
+    finite, reference, factor, size = _exact_reference(vertices)
+    _refuse(False, finite, size, vertices.shape[0])
+    return reference, factor
+
+
+@njit(cache=True, nogil=True)
+def _point(points: np.ndarray, i: int) -> _Point:
+    return points[i, 0], points[i, 1], points[i, 2]
 
 
 @njit(cache=True, nogil=True)
@@ -387,10 +416,10 @@ def shell_moments(vertices: np.ndarray, triangles: np.ndarray, polygon_starts: n
     area.
     """
     vertices, triangles = _surface(vertices, triangles)
-    reference, factor, _ = _exact_reference(vertices)
+    reference, factor = _reference(vertices)
     starts = np.arange(len(triangles) + 1) if polygon_starts is None else np.asarray(polygon_starts, np.int64)
     sums = _shell_sums((vertices - reference) * factor, triangles, starts)
-    return _moments(_central(sums, factor, 1.0, 3.0, 12.0), reference, factor, 2)
+    return _moments(_central(sums, reference, factor, (1.0, 3.0, 12.0), 2), "the surface has no area")
 
 
 def referenced_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -419,9 +448,9 @@ def point_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     """Equal point masses at the referenced vertices, the measure being their number (the 2019 paper's eq. 7)."""
     vertices, triangles = _surface(vertices, triangles)
     points = referenced_vertices(vertices, triangles)
-    reference, factor, _ = _exact_reference(points)
+    reference, factor = _reference(points)
     sums = _point_sums((points - reference) * factor)
-    return _moments(_central(sums, factor, 1.0, 1.0, 1.0), reference, factor, 0)
+    return _moments(_central(sums, reference, factor, (1.0, 1.0, 1.0), 0), "there are no points")
 
 
 def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
