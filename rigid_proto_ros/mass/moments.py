@@ -31,9 +31,10 @@ from ..base.simd import Packed, filled, load, number, store
 
 SMALL_MESH = 16
 """Up to this many triangles the compensated sums cost less than the call, so they are always taken."""
-ROUNDING_LIMIT = 2e-14
-"""Above this estimated relative rounding of the volume the compensated sums take over. Of 1,500 random convex hulls
-the error of volume and tensor was a tenth of the estimate at the median and at most four times as large."""
+ROUNDING_LIMIT = 5e-14
+"""Above this estimated relative rounding of the volume the compensated sums take over. Below it no volume, centroid or
+tensor of 3,000 random convex hulls, many of them thin, and of 548 parts of robots erred by more than 1.1e-14.
+"""
 PATHS = ("auto", "blocked", "compensated")
 """How a solid is summed up: in doubles, block by block, in pairs of doubles, or in pairs where doubles don't do."""
 _BLOCK = 256
