@@ -44,7 +44,6 @@ ALLOWED = {
     ("motion/loads.py", "sum"): "asked only whether it is finite",
     ("mass/exact_moments.py", "sum"): FRACTIONS,
     ("mass/exact_moments.py", "**"): FRACTIONS,
-    ("mass/moments.py", "**"): "of a power of two, exact",
     ("scene/sensor_noise.py", "np.random"): "noise, which moves nothing",
     ("sweep/sampling.py", "**"): "of decimal numbers, whose digits are fixed",
     ("sweep/sampling.py", "np.random"): "whole numbers of Philox, which the golden hashes compare",

@@ -22,8 +22,7 @@ def acceleration(rig) -> float:
     """Along x [m/s²] over states from after the last command has acted."""
     rig.until_received(rig.sent)
     acted_ns = int(rig.diagnostics()["sim_time_ns"]) + 100 * MS
-    rig.fly_until(acted_ns + 200 * MS)
-    first, *_, last = rig.heard("twist", after=acted_ns)
+    first, *_, last = rig.until(lambda: len(m := rig.heard("twist", after=acted_ns)) >= 5 and m, "five later twists")
     gained = last["twist"]["linear"]["x"] - first["twist"]["linear"]["x"]
     return round(gained / (1e-9 * (stamp_ns(last) - stamp_ns(first))), 6)
 
