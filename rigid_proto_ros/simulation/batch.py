@@ -61,7 +61,7 @@ ROW = record_type(
         # The same in all rows of a batch: strings, then what of mesh and model doesn't change with the numbers above.
         ("string_attached", np.bool_),  # at time 0
         ("string_bilateral", np.bool_),
-        ("model", np.int64),  # EXPLICIT, ORDINARY or SHELL
+        ("model", np.int64),  # EXPLICIT, ORDINARY or STRETCHED
         ("solid_measure", np.float64),  # volume at unit scale; NaN when the surface bounds none
         ("measure", np.float64),  # of the model: volume, area or number of points
         ("reference", np.float64, 3),
@@ -77,7 +77,7 @@ NUMBERS = tuple(name for name, *_ in _NUMBERS)
 PARAMETERS = (*NUMBERS, "string_attached", "string_bilateral")
 """Fields that parameters give."""
 
-EXPLICIT, ORDINARY, SHELL = range(3)
+EXPLICIT, ORDINARY, STRETCHED = range(3)
 
 CERTAIN = 0.999
 """Of a limit: nearer to it the simulation decides."""
@@ -164,7 +164,7 @@ def _spread(own: np.record, ballast: np.ndarray) -> _Made:
         mass = own.density * own.solid_measure * abs(s[0] * s[1] * s[2])
     left = s.copy()
     uniform = True
-    if own.model == SHELL:
+    if own.model == STRETCHED:
         for k in range(3):
             uniform = uniform and abs(s[k]) == abs(s[0])
             left[k] = math.copysign(abs(s[0]), s[k])
