@@ -28,13 +28,13 @@ from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import (
-    ANGULAR_DAMPING,
     BODY_FORCE,
     BODY_TORQUE,
     NO_GYROSCOPIC_TERM,
     STRING,
     WORLD_TORQUE,
 )
+from rigid_proto_ros.motion.problem import ENVIRONMENT_NEEDS
 from rigid_proto_ros.scene.lessons import lesson, lessons
 from rigid_proto_ros.scene.parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
 
@@ -75,7 +75,7 @@ def parameters() -> str:
 
 def integrators() -> str:
     """What each integrator is and doesn't support."""
-    needs = (BODY_TORQUE, WORLD_TORQUE, BODY_FORCE, ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM)
+    needs = (BODY_TORQUE, WORLD_TORQUE, BODY_FORCE, *ENVIRONMENT_NEEDS.values(), STRING, NO_GYROSCOPIC_TERM)
     rows = []
     for integrator in INTEGRATORS.values():
         lacks = [need for need in needs if need not in integrator.supports]

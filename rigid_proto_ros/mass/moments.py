@@ -510,3 +510,5 @@ MODELS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray | None], Moments]
 """How mass is spread over vertices, triangles and polygon_starts: the moments of each of INERTIA_MODELS that a mesh
 has.
 """
+STRETCHED = ("shell",)
+"""Models whose measure stretches by direction, so that a scale that isn't uniform takes a new pass."""

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..base.errors import InputError, MeshError, TensorError
 from . import MODEL_COMS
 from .closed_form import given_mass, is_plainly_good, spread_mass
-from .moments import MODELS, Moments
+from .moments import MODELS, STRETCHED, Moments
 from .tensor import check_tensor, tensor_from_six
 
 SCALE_LIMITS = (1e-9, 1e9)
@@ -99,14 +99,14 @@ class MeshMoments:
         return self.vertices, self.triangles
 
     def moments(self, model: str, scale: ArrayLike = (1.0, 1.0, 1.0)) -> Moments:
-        """Unscaled moments of ``model`` at unit density, outward; ``scale`` counts for the shell alone.
+        """Unscaled moments of ``model`` at unit density, outward; ``scale`` counts for STRETCHED alone.
 
         A shell's area elements stretch by direction, so a non-uniform scale takes a new pass over the surface; it is
         kept per ratio of the components. Its moments are then those of the shape stretched by scale/|scale_x|.
         """
         if model not in MODELS:
             raise InputError("inertia_model", model, ", ".join(MODELS))
-        stretch = np.abs(scale_vector(scale)) if model == "shell" else np.ones(3)
+        stretch = np.abs(scale_vector(scale)) if model in STRETCHED else np.ones(3)
         stretch = stretch / stretch[0]
         key = (model, *stretch.tolist())
         if key not in self._moments:
@@ -152,7 +152,7 @@ class MeshMoments:
         moments = self.moments(model, s)
         own = self.body_mass(scale=s, mass=mass, density=density)
         # The shell's pass already stretched the shape: what is left is the uniform part and the mirroring.
-        left = np.copysign(abs(s[0]), s) if model == "shell" else s
+        left = np.copysign(abs(s[0]), s) if model in STRETCHED else s
         place, low, base = moments.center, moments.center_low, moments.reference
         if com == "solid":
             solid = self.moments("solid")

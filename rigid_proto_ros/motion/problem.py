@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What an integrator is given for one segment: the problem p, a record, and the variables y.
+"""What an integrator is given for one segment: the problem p, a record, what acts by it, and the variables y.
 
 Within a segment all commands are constant. Everything is in principal axes (the body's, turned so that the tensor is
 diagonal): I₁ ≤ I₂ ≤ I₃, torques τ and arms r. The motion is
@@ -31,7 +31,8 @@ import numpy as np
 
 from ..base.compilation import new_record, njit, record_type
 from ..base.elementary import expm1
-from ..base.rotation import multiply
+from ..base.rotation import multiply, rotate, rotate_inverse
+from ..base.vectors import Quaternion, Vector
 from . import body as of_body
 from . import loads as of_loads
 from .string import free_end_at
@@ -181,6 +182,43 @@ def begin_string(
     p.string_damping = string[C]
     p.rest_length = string[REST]
     p.bilateral = string[PUSHES] != 0.0 or string[REST] == 0.0
+
+
+# What acts beside the string, as the equations of motion take it. q xyzw takes principal to world axes, w = ω is in
+# principal axes, u is the added velocity in world axes.
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def undamped_torque(q: Quaternion, p: np.record) -> Vector:
+    """Torque of the loads about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R)."""
+    tx, ty, tz = p.torque_body[0], p.torque_body[1], p.torque_body[2]
+    if p.has_world_torque:
+        W, M = p.torque_world, p.moment
+        x, y, z = rotate_inverse(*q, W[0], W[1], W[2])
+        # Row i of M R is Rᵀ times row i of M; vee takes (M R)₁₂ − (M R)₂₁ and so on, counted from 0.
+        _, m01, m02 = rotate_inverse(*q, M[0], M[1], M[2])
+        m10, _, m12 = rotate_inverse(*q, M[3], M[4], M[5])
+        m20, m21, _ = rotate_inverse(*q, M[6], M[7], M[8])
+        tx += x + (m12 - m21)
+        ty += y + (m20 - m02)
+        tz += z + (m01 - m10)
+    return tx, ty, tz
+
+
+@njit(cache=True, error_model="numpy", allocates=False)
+def torque(q: Quaternion, w: Vector, p: np.record) -> Vector:
+    """Torque of loads and damping about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R) − c_ω ω."""
+    tx, ty, tz = undamped_torque(q, p)
+    c = p.damping_angular
+    return tx - c * w[0], ty - c * w[1], tz - c * w[2]
+
+
+@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+def acceleration(q: Quaternion, u: Vector, p: np.record) -> Vector:
+    """u' without the string's part (world axes): its constant part, R g_b and −c_v u."""
+    own, added, c = p.acceleration_body, p.acceleration_added, p.damping_linear
+    ax, ay, az = rotate(*q, own[0], own[1], own[2])
+    return ax + (added[0] - c * u[0]), ay + (added[1] - c * u[1]), az + (added[2] - c * u[2])
 
 
 # Where the variables stand in their row.

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -77,7 +76,7 @@ class RigidBodyNode(Node):
         self.live = LiveSimulation(scenario, self.get_name(), [events, *filter(None, [viewer])], endpoints, clock)
         self.loop, self.call = self.live.loop, self.live.call
         events.stamps = self.live.stamps
-        self.states = StatePublisher(self, frames, self._specific_force, self.live.stamps)
+        self.states = StatePublisher(self, frames, self.loop, self.live.stamps)
         self.states.configure(scenario.parameters)
         subscriber = CommandSubscriber(self, self.live.commands, frames, bool(scenario.parameters.thrusters))
         self._parameters_in_flight = LiveParameters(self, super().set_parameters_atomically, self.live, self.states)
@@ -97,13 +96,6 @@ class RigidBodyNode(Node):
             return None
         clock = self.get_clock()
         return lambda: clock.now().nanoseconds
-
-    def _specific_force(self) -> np.ndarray:
-        """At the contact that ~/imu is mounted at, or the COM; on the physics thread."""
-        contact, simulation = self.loop.scenario.parameters.imu_contact, self.loop.simulation
-        body = simulation.setup.body
-        point = body.point(simulation.setup.contacts[contact]).tolist() if contact else (0.0, 0.0, 0.0)
-        return simulation.specific_force(point)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """All changes of parameters come here, on the executor's thread: checked, and handed to the physics thread."""

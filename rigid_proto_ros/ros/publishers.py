@@ -25,6 +25,7 @@ from ..live.pacing import Stamps
 from ..motion.state import State
 from ..scene import cdr
 from ..scene.parameters import Parameters
+from ..scene.scenario_run import ScenarioRun
 from ..scene.sensor_noise import ImuNoise, imu_noise
 from ..session.messages import PROJECTIONS, applied_bytes, inertia_bytes
 from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Refused, SceneChanged
@@ -44,16 +45,13 @@ def _publisher(node: Node, message_type: type, topic: str, profile: QoSProfile) 
 class StatePublisher:
     """Pose, twist, odometry, IMU, /clock and /tf of one body. Use ``configure`` for what parameters switch on and off.
 
-    frames: the world's and the body's. specific_force() gives what an accelerometer at the chosen contact shows at the
-    present state.
+    frames: the world's and the body's. run: what flies, for what follows from more than the state.
     """
 
-    def __init__(
-        self, node: Node, frames: tuple[str, str], specific_force: Callable[[], np.ndarray], stamps: Stamps
-    ) -> None:
+    def __init__(self, node: Node, frames: tuple[str, str], run: ScenarioRun, stamps: Stamps) -> None:
         self._node = node
         self._stamps = stamps
-        self._specific_force = specific_force
+        self._run = run
         self._frames = frames
         self._imu_frame = frames[1]
         self._topics: Topics = [
@@ -123,6 +121,13 @@ class StatePublisher:
     def _odometry(self, time_ns: int, row: list[float]) -> bytes:
         # An Odometry's twist is in the child frame: body axes.
         return cdr.odometry(time_ns + self._stamps.offset_ns, self._frames, PROJECTIONS["odom"](row))
+
+    def _specific_force(self) -> np.ndarray:
+        """At the contact that ~/imu is mounted at, or the COM; on the physics thread."""
+        contact, simulation = self._run.scenario.parameters.imu_contact, self._run.simulation
+        body = simulation.setup.body
+        point = body.point(simulation.setup.contacts[contact]).tolist() if contact else (0.0, 0.0, 0.0)
+        return simulation.specific_force(point)
 
     def _imu_message(self, time_ns: int, row: list[float]) -> Imu:
         """Attitude, angular velocity and specific force, both in body axes, at the contact that was chosen."""

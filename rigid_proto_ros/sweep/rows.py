@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import InputError, MeshError
 from ..base.files import output_file
+from ..mass.moments import STRETCHED
 from ..motion.integrators import check_supported
 from ..motion.loads import FORCE, TORQUE
 from ..motion.problem import ENVIRONMENT_NEEDS
@@ -69,7 +70,7 @@ def batch_row(parameters: Parameters, body_mesh: BodyMesh | None) -> NDArray[np.
         row["solid_measure"] = body_mesh.moments.moments("solid").measure
     except MeshError:
         row["solid_measure"] = np.nan
-    row["model"] = batch.SHELL if parameters.inertia_model == "shell" else batch.ORDINARY
+    row["model"] = batch.STRETCHED if parameters.inertia_model in STRETCHED else batch.ORDINARY
     places = moments if parameters.inertia_model_com == "model" else body_mesh.moments.moments("solid")
     row["measure"], row["second"] = moments.measure, moments.second
     row["reference"], row["center"], row["center_low"] = places.reference, places.center, places.center_low
@@ -99,6 +100,8 @@ class BatchMaker:
             raise NotBatchable
         self._row = batch_row(parameters, body_mesh)
         self._ballast = np.array([m for m in parameters.point_masses if m[0] > 0.0], dtype=float).reshape(-1, 4)
+        if batch.begins_otherwise(self._row, self._ballast, setup):
+            raise NotBatchable
         self._table, entries = _commands_of(typical.script, setup)
         self._written = [_place_of(v, typical.script, entries) if v.target.entry else None for v in study.vary]
         if any(self._written) and not setup.integrator.supports_loads:

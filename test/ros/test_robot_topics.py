@@ -17,6 +17,7 @@ from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.ros.publishers import StatePublisher
 from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 
 SECOND = 10**9
 
@@ -90,7 +91,7 @@ def tf2_stand_in(monkeypatch):
 
 def test_the_transform_is_the_pose(tf2_stand_in):
     node, published = tf2_stand_in
-    states = StatePublisher(node, ("world", "body"), lambda: np.zeros(3), Stamps())
+    states = StatePublisher(node, ("world", "body"), OfflineRun(make_scenario({})), Stamps())
     states.configure(Parameters(publish_tf=True))
     state = State(3 * SECOND + 7, np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.9, 0, 0, 0, 0, 0, 0]))
     states.pack_all(state)

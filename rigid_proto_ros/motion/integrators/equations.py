@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The equations of motion in principal axes, as integrators evaluate them.
+"""The equations of motion in principal axes, as integrators evaluate them, and the string's force. The other forces are
+in motion/problem.py.
 
 q xyzw takes principal to world axes, w = ω is in principal axes, d and u are the added displacement and velocity in
 world axes (motion/problem.py), p is the segment's problem (motion/problem.py). ``taut`` says whether the string's law
@@ -13,6 +14,7 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import norm, rotate, rotate_inverse
 from ...base.vectors import Quaternion, Vector
+from ..problem import acceleration, torque
 from ..string import NO_DIRECTION
 
 
@@ -20,31 +22,6 @@ from ..string import NO_DIRECTION
 def parts_of(y: np.ndarray) -> tuple[Quaternion, Vector, Vector, Vector]:
     """q, ω, d and u of the variables y."""
     return (y[0], y[1], y[2], y[3]), (y[4], y[5], y[6]), (y[7], y[8], y[9]), (y[10], y[11], y[12])
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def undamped_torque(q: Quaternion, p: np.record) -> Vector:
-    """Torque of the loads about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R)."""
-    tx, ty, tz = p.torque_body[0], p.torque_body[1], p.torque_body[2]
-    if p.has_world_torque:
-        W, M = p.torque_world, p.moment
-        x, y, z = rotate_inverse(*q, W[0], W[1], W[2])
-        # Row i of M R is Rᵀ times row i of M; vee takes (M R)₁₂ − (M R)₂₁ and so on, counted from 0.
-        _, m01, m02 = rotate_inverse(*q, M[0], M[1], M[2])
-        m10, _, m12 = rotate_inverse(*q, M[3], M[4], M[5])
-        m20, m21, _ = rotate_inverse(*q, M[6], M[7], M[8])
-        tx += x + (m12 - m21)
-        ty += y + (m20 - m02)
-        tz += z + (m01 - m10)
-    return tx, ty, tz
-
-
-@njit(cache=True, error_model="numpy", allocates=False)
-def torque(q: Quaternion, w: Vector, p: np.record) -> Vector:
-    """Torque of loads and damping about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R) − c_ω ω."""
-    tx, ty, tz = undamped_torque(q, p)
-    c = p.damping_angular
-    return tx - c * w[0], ty - c * w[1], tz - c * w[2]
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -101,14 +78,12 @@ def accelerations(
 ) -> tuple[Vector, Vector, float, float]:
     """ω' (principal axes), u' (world axes), power of the hand, power lost in the string's damper, for a unit q.
 
-    I ω' = τ − ω × Iω, without the gyroscopic term τ; u' is its constant part, R g_b, −c_v u and the string's F/m.
+    I ω' = τ − ω × Iω, without the gyroscopic term τ; u' is what ``acceleration`` gives and the string's F/m.
     """
     if not p.translates:
         return angular_acceleration(w, torque(q, w, p), p), (0.0, 0.0, 0.0), 0.0, 0.0
     tx, ty, tz = torque(q, w, p)
-    own, added, c = p.acceleration_body, p.acceleration_added, p.damping_linear
-    ax, ay, az = rotate(*q, own[0], own[1], own[2])
-    ax, ay, az = ax + (added[0] - c * u[0]), ay + (added[1] - c * u[1]), az + (added[2] - c * u[2])
+    ax, ay, az = acceleration(q, u, p)
     work, heat = 0.0, 0.0
     if p.has_string:
         force, about_com, work, heat = string_pull(q, w, d, u, p, taut)

@@ -25,8 +25,8 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize, rotate
 from ...base.vectors import Quaternion, Vector
-from ..problem import is_good
-from .equations import parts_of, torque
+from ..problem import is_good, torque
+from .equations import parts_of
 from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 
 _MAX_ITERATIONS = 60
