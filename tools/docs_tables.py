@@ -186,7 +186,7 @@ def figures() -> str:
     for tool in ("trimesh", "igl.moments"):
         rows.append((tool, _error(masses[tool, "ellipsoid 100k", "+1e6"]["inertia_error"]), "", "", ""))
     heads = (f"{title}, to {_attitude_error(default[problem]):.0e} rad" for problem, title in _MOTIONS.items())
-    return _table(("tool", "error of the inertia of a mesh 10⁶ m off", *heads), rows)
+    return _table(("tool", "inertia error of a mesh 10⁶ m from the origin", *heads), rows)
 
 
 _WEIGHS = {"MuJoCo": "MuJoCo compile, exact"}
