@@ -61,7 +61,7 @@ class Tracks(Backend):
         """Keep the mesh; raises InputError for another one in flight."""
         if surface is not None and self._surfaces.setdefault(name, surface) is not surface:
             reason = f"the mesh changes at {self._times[0] / 1e9:.9g} s"
-            raise InputError("session", reason, "a flight of one mesh, for --gltf and --usd")
+            raise InputError("session", reason, "a simulation without a change of mesh, for --gltf and --usd")
 
     def place(
         self,

@@ -68,7 +68,7 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
         path.unlink()
         if not stage.GetRootLayer().Export(str(path)):
             raise InputError("--usd", file, "a file that can be written")
-    return ["mass or tensor change: the body's are those of the start"] if changed else []
+    return ["mass or tensor change: the file has the values at the start"] if changed else []
 
 
 def _animate(prim: UsdGeom.Xform, codes: list[float], positions: np.ndarray, attitudes: np.ndarray) -> None:

@@ -115,7 +115,7 @@ class LiveSimulation:
             return future.result(timeout_s)
         except TimeoutError:
             if future.cancel():
-                text = f"the simulation was too busy to begin it within {timeout_s:g} s"
+                text = f"the simulation was too busy to start this request within {timeout_s:g} s"
                 raise InputError("request", text) from None
         # It has begun, so it will end.
         return future.result()

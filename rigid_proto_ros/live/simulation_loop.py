@@ -101,7 +101,7 @@ class SimulationLoop(ScenarioRun):
         """Raises InputError where this scenario can't follow the present one."""
         if self.pace.followed and scenario.parameters.publish_clock:
             raise InputError(
-                "publish_clock", True, "false, while simulated time follows the /clock of another (use_sim_time)"
+                "publish_clock", True, "false, while simulated time follows the /clock of another node (use_sim_time)"
             )
         super().check_change(scenario)
 

@@ -141,7 +141,7 @@ def _ended(log: Any) -> InputError:
     if "adapter" in words.lower() or "render context" in words:
         return InputError("snapshot", f"there is no graphics adapter that the viewer can draw with; install {DRIVERS}")
     last = (words.strip().splitlines() or ["no message"])[-1]
-    return InputError("snapshot", last, f"a viewer that starts; if it is the drivers: {DRIVERS}")
+    return InputError("snapshot", last, f"a viewer that starts; if drivers are missing: {DRIVERS}")
 
 
 def show(client: Any, recording: Path) -> None:

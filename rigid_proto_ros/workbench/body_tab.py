@@ -53,8 +53,8 @@ class BodyTab:
         self._base_scale = self._base_mass = 1.0
         with tabs.add_tab("Body"):
             with gui.add_folder("Size and mass"):
-                controls.factor("Size ×", "All three scales together (scale)", 1.0, self._size_factor, self._set_size)
-                hint = "Times the original mass, without ballast (mass)"
+                controls.factor("Size ×", "Factor on all three scales (scale)", 1.0, self._size_factor, self._set_size)
+                hint = "Factor on the original mass, without ballast (mass)"
                 controls.factor("Mass ×", hint, 2.0, self._mass_factor, self._set_mass)
                 controls.numbers("density", "Density [kg/m³]")
             with gui.add_folder("Inertia"):
@@ -64,7 +64,7 @@ class BodyTab:
                 tensor = gui.add_text("Tensor", "", hint=hint)
             with gui.add_folder("Mesh"):
                 mesh = gui.add_dropdown(
-                    "Body", (OWN_FILE, *body_names()), initial_value=OWN_FILE, hint="Bundled (mesh)"
+                    "Body", (OWN_FILE, *body_names()), initial_value=OWN_FILE, hint="A bundled mesh (mesh)"
                 )
                 self.upload = UploadFolder(gui, flight, fly, self.show_verdict)
                 self._verdict = gui.add_markdown("")
@@ -187,10 +187,10 @@ def comparison(scenario: Scenario) -> str:
     lines += [
         f"| principal axes turned by | | | **{turned if turned > TURNED else 0.0:.3g}°** |",
         f"| mass [kg] | {true.mass:.5g} | {approximate.mass:.5g} | {_per_cent(error)} % |",
-        f"| COM of its own, off by | | {away:.3g} m | **{100.0 * away / size:.2g} % of the size** |",
+        f"| distance of its own COM | | {away:.3g} m | **{100.0 * away / size:.2g} % of the size** |",
     ]
     if np.linalg.norm(difference.center_of_mass) < 1e-9 * size < away:
-        lines += ["", "It is simulated with the COM of the solid."]
+        lines += ["", "The simulation uses the COM of the solid."]
     return "\n".join(lines)
 
 

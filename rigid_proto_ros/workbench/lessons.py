@@ -231,10 +231,10 @@ class LessonPanel:
             self._text = gui.add_markdown("")
             self._choices: list[Any] = [gui.add_button(letter, visible=False) for letter in "ABC"]
             self._numbers = gui.add_html("")
-            self._script = gui.add_button("Do it with exact forces", visible=False, hint="Runs the lesson's script")
-            self._again = gui.add_button("Begin again", visible=False, hint="The lesson from its start")
+            self._script = gui.add_button("Do it with exact forces", visible=False, hint="Run the lesson's script")
+            self._again = gui.add_button("Begin again", visible=False, hint="Restart the lesson")
             # Here, for class mode hides the other tabs.
-            self._class: Any = gui.add_checkbox("Class mode", False, hint="In large letters; F11 fills the screen")
+            self._class: Any = gui.add_checkbox("Class mode", False, hint="Large letters; F11 for full screen")
             gui.add_html(SPACE)
         self._choice = choice
 

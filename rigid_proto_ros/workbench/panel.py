@@ -140,7 +140,7 @@ class ForcesTab:
         self._tools = tools
         with tabs.add_tab("Forces"):
             with gui.add_folder("By hand"):
-                suits = "Of a poke by a click; times a force that suits the body's mass and size"
+                suits = "Force of a click, relative to a force that suits the body's mass and size"
                 force: Any = log_slider(gui, "Force ×", FORCE_DECADES, suits)
                 self._force = gui.add_html("")
             with gui.add_folder("Motion"):
@@ -183,11 +183,11 @@ class SessionTab:
         self._flight = flight
         with tabs.add_tab("Record"):
             with gui.add_folder("Rewind"):
-                hint = "Time stands while the past is shown"
+                hint = "Simulated time is paused while the past is shown"
                 self._back: Any = gui.add_slider("Seconds back", 0.0, 10.0, REWIND_STEP_S, 0.0, hint=hint)
-                self._go_on = gui.add_button("Go on from here", disabled=True, hint="With another future")
-            with gui.add_folder("Take, since the last reset"):
-                hint = "What was done by hand; reproduces the motion bit for bit (.zip)"
+                self._go_on = gui.add_button("Go on from here", disabled=True, hint="From the time that is shown")
+            with gui.add_folder("Recording since the last reset"):
+                hint = "The commands given on this page; they reproduce the motion bit for bit (.zip)"
                 save = gui.add_button("Save scene and script", hint=hint)
                 rate: Any = gui.add_dropdown("Frames a second", RATES, initial_value="30")
                 export = gui.add_button("Save as glTF", hint="For Blender and others (.glb)")
