@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A flight as an export takes it: what changed and the states, as told by a simulation or a session."""
+"""The input of an export: the changes and states of a simulation or of a recorded session."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def source_of_scene(scenario: Scenario, script: list[Command]) -> Source:
 
 
 def source_of_session(session: RecordedSession, given: Scenario | None = None) -> Source | None:
-    """The flight of a session; None for one that lacks what it would take to simulate it again."""
+    """The source of a session's motion; None if the session lacks the data needed to simulate it again."""
     if given is not None or session.missing:
         return None
 

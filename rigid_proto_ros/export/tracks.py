@@ -70,7 +70,7 @@ class Tracks(Backend):
         attitudes: np.ndarray | None = None,
         scale: np.ndarray | None = None,
     ) -> None:
-        """Keep where a mesh lies in its body, or the body's frames."""
+        """Keep the pose of a mesh relative to its body, or the body's frames."""
         if name in MESHES.values() and positions is not None and scale is not None:
             self._mesh_in_force[name] = positions[0], scale
         elif name in MESHES and positions is not None and attitudes is not None:

@@ -83,7 +83,7 @@ def _animate(prim: UsdGeom.Xform, codes: list[float], positions: np.ndarray, att
 
 
 def _place_mesh(prim: UsdGeom.Mesh, codes: list[float], track: Track) -> None:
-    """Where the mesh lies in its body: once, or at each frame where that changes in flight."""
+    """Pose of the mesh relative to its body: once, or at each frame if it changes during the simulation."""
     from pxr import Gf, UsdGeom
 
     place = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)

@@ -106,7 +106,7 @@ class SimulationLoop(ScenarioRun):
         super().check_change(scenario)
 
     def replace(self, scenario: Scenario) -> Setup:
-        """Put another scenario in force, its real time factor at once too."""
+        """Put another scenario in force; its real time factor takes effect at once, too."""
         setup = super().replace(scenario)
         if scenario.parameters.real_time_factor != self.pace.factor:
             self.pace.factor = scenario.parameters.real_time_factor

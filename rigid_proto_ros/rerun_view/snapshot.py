@@ -134,7 +134,7 @@ def _connected(address: str, process: ViewerProcess, log: Any) -> Any:
 
 
 def _ended(log: Any) -> InputError:
-    """Why the viewer has ended, by its own last words."""
+    """Why the viewer has ended, from the last line of its output."""
     log.seek(0)
     words = log.read().decode(errors="replace")
     # Without any adapter it says so; with one of OpenGL alone it has no render context at its first picture.

@@ -83,7 +83,7 @@ class Diagnostics:
         }
 
     def _report(self) -> None:
-        """Publish how it stands, and log that real time is given up."""
+        """Publish the diagnostics, and log when simulated time falls behind real time."""
         # Before the values are read: what was done before the stamp is in them.
         stamp = self._node.get_clock().now().to_msg()
         before, values = self._before, self._values()

@@ -64,7 +64,7 @@ def read_scene_file(path: str | Path, node_name: str = "rigid_body") -> SceneFil
 
 
 def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body") -> SceneFile:
-    """As ``read_scene_file``, from text; ``name`` stands in errors."""
+    """Like ``read_scene_file``, but from text; ``name`` is used in error messages."""
     scene = SceneFile()
     root = compose_yaml(text, name)
     if root is None:

@@ -209,7 +209,7 @@ def session_runs(path: Path, node: str = "") -> list[RecordedSession]:
 
 
 def _prefix(content: BagContent, path: str, node: str) -> str:
-    """What stands before the topics' names: the node's name with a slash before it."""
+    """The prefix of the topics' names: the node's name after a slash."""
     kinds: dict[str, set[str]] = {}
     for topic, message_type in content.types.items():
         before, slash, name = topic.rpartition("/")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Is a recording what it says? Its chain of events, and every state computed anew, to the bit; and where they part."""
+"""Verify a recording: check its chain of events, recompute every state bit for bit, and find the first difference."""
 
 from __future__ import annotations
 
