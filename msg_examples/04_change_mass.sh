@@ -6,6 +6,6 @@ set -e
 # A script: the same push before and after the density is multiplied by four.
 poke_client "$(dirname "$0")/heavier_in_flight.yaml" --reset
 
-# By hand: twice the density; then a ballast of 30 g at the tip, which ends the flips.
+# By parameters: twice the density, then a ballast of 30 g at the tip, which stops the flips.
 ros2 param set /rigid_body density 15700.0
 ros2 param set /rigid_body ballast.tip "[0.03, 0.0, 0.0, 0.07]"

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Simulations from Python, without ROS, on all cores: which gains stop the T-handle's tumbling soonest?"""
+"""Simulations from Python, without ROS, on all cores: which gains stop the T-handle's tumbling fastest?"""
 
 from itertools import product
 
@@ -15,7 +15,7 @@ SPINS = np.random.default_rng(1).normal(0.0, 4.0, (8, 3)).tolist()  # rad/s
 
 
 def cost(gains: tuple[float, float]) -> float:
-    """Mean of |attitude error|² + (|ω|/3)² over 2 s at 50 Hz and over the spins to begin with."""
+    """Mean of |attitude error|² + (|ω|/3)² over 2 s at 50 Hz and over the initial spins."""
     total = 0.0
     for spin in SPINS:
         flight = Flight(SCENE)

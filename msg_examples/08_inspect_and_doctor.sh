@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Is a mesh sound, and what is its inertia? Are the inertials in a robot's file right?
+# Check a mesh and compute its inertia; check and correct the inertials of a robot file.
 mkdir -p out
 
 rigid_proto inspect hammer --density 7850 --verify || exit   # against exact rational arithmetic

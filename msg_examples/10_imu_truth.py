@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Truth for an attitude filter: ~/imu has angular rate and specific force with errors, and the true attitude.
+"""Ground truth for an attitude filter: ~/imu has angular rate and specific force with errors, and the true attitude.
 
 A book swings on a string. Start the node first, with a biased gyroscope:
 rigid_body_node --ros-args --params-file config/plumb_line.yaml -p noise.imu:="[0.001, 0.0, 0.02, 0.0]"
@@ -15,7 +15,7 @@ alone, filtered, last_s, first_s, bias = None, None, None, None, np.zeros(3)
 
 
 def on_imu(imu: Imu) -> None:
-    """Follow the direction of up in body axes: by the gyroscope alone, and corrected by the accelerometer."""
+    """Track the vertical in body axes: with the gyroscope alone, and corrected by the accelerometer."""
     global alone, filtered, last_s, first_s, bias, error
     time_s = imu.header.stamp.sec + 1e-9 * imu.header.stamp.nanosec
     q, rate, force = imu.orientation, imu.angular_velocity, imu.linear_acceleration

@@ -3,9 +3,9 @@
 
     python tools/docs_tables.py [--check]
 
-A document holds a table between ``<!-- table: NAME -->`` and ``<!-- end -->``, or what a lesson says to try between ``<!-- lesson:
-SCENE -->`` and the same end; what stands there is replaced. With
-``--check`` nothing is written and the exit status is 1 when a document is behind.
+A document has a table between ``<!-- table: NAME -->`` and ``<!-- end -->``, or question and steps of a lesson between
+``<!-- lesson: SCENE -->`` and the same end mark. The text between the marks is replaced. With ``--check`` nothing is
+written, and the exit status is 1 if a document is out of date.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def integrators() -> str:
             order = evaluations = "-"
         cells = (_code(integrator.name), order, evaluations, "; ".join(lacks))
         rows.append((*cells, " ".join(integrator.limits.split()).rstrip(".").replace("``", "`")))
-    return _table(("name", "order", "evaluations a step", "doesn't support", "good for, and what breaks it"), rows)
+    return _table(("name", "order", "evaluations per step", "doesn't support", "uses and limits"), rows)
 
 
 def _measured_masses() -> dict[tuple[str, str, str], dict[str, str]]:
@@ -186,7 +186,7 @@ def figures() -> str:
     for tool in ("trimesh", "igl.moments"):
         rows.append((tool, _error(masses[tool, "ellipsoid 100k", "+1e6"]["inertia_error"]), "", "", ""))
     heads = (f"{title}, to {_attitude_error(default[problem]):.0e} rad" for problem, title in _MOTIONS.items())
-    return _table(("tool", "error of the inertia of a mesh 10⁶ m off", *heads), rows)
+    return _table(("tool", "inertia error of a mesh 10⁶ m from the origin", *heads), rows)
 
 
 _WEIGHS = {"MuJoCo": "MuJoCo compile, exact"}
@@ -332,7 +332,7 @@ def documents() -> list[Path]:
 def main(argv: list[str] | None = None) -> int:
     """Write the tables, or check them; returns the exit status."""
     parser = argparse.ArgumentParser(prog="python tools/docs_tables.py", description="Tables of the docs.")
-    parser.add_argument("--check", action="store_true", help="write nothing; exit 1 when a document is behind")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit 1 if a document is out of date")
     args = parser.parse_args(argv)
     behind = 0
     for path in documents():
@@ -342,7 +342,7 @@ def main(argv: list[str] | None = None) -> int:
             continue
         behind += 1
         if args.check:
-            print(f"{path}: behind the code; write it with: python tools/docs_tables.py", file=sys.stderr)
+            print(f"{path}: out of date; write it with: python tools/docs_tables.py", file=sys.stderr)
         else:
             path.write_text(new, encoding="utf-8")
     return 1 if args.check and behind else 0

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The node's topics and services, listed once for the docs; a test proves that the running node's graph
-is this list.
+"""The node's topics and services, listed once for the docs. A test checks the list against the graph of the running
+node.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ SUBSCRIBED, PUBLISHED, SERVED = "subscribed", "published", "served"
 
 @dataclass(frozen=True)
 class Interface:
-    """name: as ROS resolves it, ``~/`` standing for the node's own name. direction: SUBSCRIBED, PUBLISHED or SERVED.
-    type: ``package/msg/Type``. on_request: the parameter, or their group, that switches it on; empty when it is
-    always there.
+    """name: as in ROS, with ``~/`` for the node's own name. direction: SUBSCRIBED, PUBLISHED or SERVED.
+    type: ``package/msg/Type``. on_request: the parameter, or group of parameters, that switches it on; empty if it
+    always exists.
     """
 
     name: str
@@ -38,22 +38,22 @@ INTERFACES = (
         SUBSCRIBED,
         "~/wrench",
         "geometry_msgs/WrenchStamped",
-        "held wrench: each message replaces the one before of the same `;slot=<name>`, or without one; it ends "
-        "`wrench_timeout` after the last, or after its own `;duration=<s>`",
+        "held wrench: each message replaces the previous wrench of the same `;slot=<name>`, or the previous one "
+        "without a slot; it ends `wrench_timeout` after the last message, or after its own `;duration=<s>`",
     ),
     _topic(
         SUBSCRIBED,
         "~/thrusters",
         "std_msgs/Float64MultiArray",
-        "forces [N] of the thrusters, in the alphabetical order of their names; until the next message, or "
-        "`wrench_timeout` after the last",
+        "forces [N] of the thrusters, in the alphabetical order of their names; they act until the next message, or "
+        "until `wrench_timeout` after the last one",
         "thrusters",
     ),
     _topic(
         SUBSCRIBED,
         "~/poke",
         "geometry_msgs/WrenchStamped",
-        "pulse: each message adds one that lasts `poke_duration`, or what its frame says",
+        "pulse: each message adds one; it lasts `poke_duration`, or the `;duration=<s>` of its frame",
     ),
     _topic(
         SUBSCRIBED,
@@ -66,21 +66,21 @@ INTERFACES = (
         SUBSCRIBED,
         "~/string/attach",
         "geometry_msgs/PointStamped",
-        "where on the body the string is tied, moved to the nearest point of the surface; frames `world`, `body` "
+        "point of the body where the string is tied, moved to the nearest point of the surface; frames `world`, `body` "
         "(m from the COM), `<body_frame>/mesh`",
     ),
     _topic(
         SUBSCRIBED,
         "~/inertia/set",
         "geometry_msgs/InertiaStamped",
-        "mass, COM and tensor of the whole body; the model becomes `explicit` and the parameters follow",
+        "mass, COM and tensor of the whole body; the inertia model becomes `explicit`, and the parameters are updated",
     ),
     _topic(
         SUBSCRIBED,
         "~/schedule",
         "std_msgs/String",
-        "one entry of a poke script as YAML, or a list of entries, taken or refused as a whole; `t` in absolute "
-        "simulated seconds",
+        "one entry of a poke script as YAML, or a list of entries, which is accepted or refused as a whole; `t` is "
+        "absolute simulated time in seconds",
     ),
     _topic(PUBLISHED, "~/pose", "geometry_msgs/PoseStamped", "COM and attitude of the mesh's axes, in the world"),
     _topic(
@@ -89,7 +89,7 @@ INTERFACES = (
         "geometry_msgs/TwistStamped",
         "velocity of the COM and angular velocity, both in world axes",
     ),
-    _topic(PUBLISHED, "~/odom", "nav_msgs/Odometry", "both; its twist is in body axes"),
+    _topic(PUBLISHED, "~/odom", "nav_msgs/Odometry", "pose and twist; its twist is in body axes"),
     _topic(
         PUBLISHED,
         "~/imu",
@@ -107,14 +107,14 @@ INTERFACES = (
         PUBLISHED,
         "~/applied",
         "geometry_msgs/WrenchStamped",
-        "each wrench and poke as it takes effect: about the COM, in the body's frame at that time; the line of the "
+        "each wrench and poke when it takes effect, about the COM, in the body's frame at that time; the line with the "
         "same time on `~/events` has point, axes, slot and duration",
     ),
     _topic(
         PUBLISHED,
         "~/events",
         "std_msgs/String",
-        "one JSON line per command, change and service as applied, with a running SHA-256",
+        "one JSON line for each command, parameter change and service call when it is applied, with a running SHA-256",
     ),
     _topic(
         PUBLISHED,
@@ -126,10 +126,10 @@ INTERFACES = (
         PUBLISHED,
         "/diagnostics",
         "diagnostic_msgs/DiagnosticArray",
-        "once a second: counters, energies, |L| and its drift, what was refused and why",
+        "once a second: counters, energies, |L| and its drift, refused commands by reason",
     ),
     _topic(PUBLISHED, "/clock", "rosgraph_msgs/Clock", "simulated time", "publish_clock"),
-    _topic(PUBLISHED, "/tf", "tf2_msgs/TFMessage", "world to body, where tf2_msgs is installed", "publish_tf"),
+    _topic(PUBLISHED, "/tf", "tf2_msgs/TFMessage", "world to body, if tf2_msgs is installed", "publish_tf"),
     _service(
         "~/reset",
         "Trigger",
@@ -143,7 +143,7 @@ INTERFACES = (
     _service(
         "~/step",
         "Trigger",
-        "while paused: takes all commands that have arrived, advances one publication period and answers when "
+        "while paused: takes all commands that have arrived, advances one publication period and responds when "
         "its state is published",
     ),
     _service("~/clear_wrench", "Trigger", "ends the held wrench and the running pulses"),

@@ -51,7 +51,7 @@ class Parser(argparse.ArgumentParser):
     def _unknown(self, words: list[str]) -> str:
         options = [word for word in words if word.startswith("-")]
         if not options:
-            return f"{words[0]!r} is one argument too many"
+            return f"{words[0]!r} is an unexpected argument"
         name = options[0].partition("=")[0]
         known = (option for option in self._option_string_actions if option.startswith("--"))
         hint = self.instead_of(name) or did_you_mean(name, known)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto demo``: node, scripted pokes and a recording in one go; what ``make run`` runs.
+"""``rigid_proto demo``: node, scripted pokes and a recording in one command; ``make run`` runs it.
 
-Two real processes, rigid_body_node and poke_client, talk over ROS 2; this one starts them, waits, and ends them.
+Two processes, rigid_body_node and poke_client, communicate over ROS 2; this command starts them, waits, and ends them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..base.errors import InputError
 from ..base.interrupts import end_with_this_thread, with_this_package
 
 GRACE_S = 5.0
-"""A process that doesn't end within this time of SIGTERM is killed."""
+"""A process that doesn't end within this time after SIGTERM is killed."""
 
 CONFIRM_S = 2.0
 """How long the node goes on at least after the last command: the client waits for its confirmation."""
@@ -46,12 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number_from(3.0, 3600.0),
         default=10.0,
         metavar="S",
-        help="simulated seconds, or to 2 s after the last poke (default 10)",
+        help="simulated seconds, or until 2 s after the last poke if that is later (default 10)",
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fly, and say what happened."""
+    """Run node and client, and print a summary of the recording."""
     from ..base.bundled import example_path, scene_path
     from ..ros.domain import DOMAINS, hold_domain
     from ..scene.script import read_script
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"rigid_body_node with {scene}, poke_client with {script}: {until_s:g} s", flush=True)
     with contextlib.ExitStack() as processes:
         environment = with_this_package()
-        # Pokes of another demo, or for another node, are none of ours.
+        # A separate ROS domain keeps out the pokes of another demo, or for another node.
         held = None if os.environ.get("ROS_DOMAIN_ID") else hold_domain(DOMAINS)
         if held is not None:
             environment["ROS_DOMAIN_ID"] = str(held[0])
@@ -91,8 +91,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _start(command: list[str], environment: dict[str, str], processes: contextlib.ExitStack) -> subprocess.Popen:
-    """Start a process that ends when ``processes`` is left, also when this command is ended by a signal. It has a
-    session of its own: a Ctrl-C at the terminal reaches this command alone.
+    """Start a process that ends when ``processes`` is closed, also if a signal ends this command. The process has its
+    own session, so a Ctrl-C in the terminal reaches only this command.
     """
     process = subprocess.Popen(command, start_new_session=True, preexec_fn=end_with_this_thread(), env=environment)
     processes.callback(_end, process)
@@ -100,7 +100,7 @@ def _start(command: list[str], environment: dict[str, str], processes: contextli
 
 
 def _end(process: subprocess.Popen) -> None:
-    """SIGTERM, of which Python dies quietly where it has no handler yet, then after a while SIGKILL."""
+    """Send SIGTERM, which ends Python silently if it has no handler yet, and after a while SIGKILL."""
     process.terminate()
     try:
         process.wait(GRACE_S)
@@ -112,8 +112,8 @@ def _end(process: subprocess.Popen) -> None:
 def write_demo(mesh: str) -> tuple[Path, Path]:
     """Write demo_scene.yaml and demo_pokes.yaml; returns both paths.
 
-    The body spins about its middle principal axis, a little off; pokes act at the COM and at the vertex farthest from
-    it. Raises InputError for a mesh that can't fly.
+    The body spins about an axis close to its intermediate principal axis; pokes act at the COM and at the vertex
+    farthest from the COM. Raises InputError for a mesh that can't be simulated.
     """
     import numpy as np
 
@@ -152,7 +152,7 @@ def write_demo(mesh: str) -> tuple[Path, Path]:
 
 
 def _report(session: Path) -> int:
-    """What happened, read back from the recording itself."""
+    """Print a summary that is read from the recording."""
     from ..rerun_view.rrd_reading import read_session
 
     recorded = read_session(session)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The options of ``simulate`` and ``replay`` that write the motion for other tools, and what they do."""
+"""The options of ``simulate`` and ``replay`` that write the motion for other tools."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 
 EXPORTS = {
-    "csv": ((".csv",), "write the states as a table"),
-    "parquet": ((".parquet",), "write the states as a table"),
+    "csv": ((".csv",), "write the states as a CSV table"),
+    "parquet": ((".parquet",), "write the states as a Parquet table"),
     "gltf": ((".glb",), "write the motion for Blender, Unreal, three.js and others that read glTF"),
     "usd": ((".usda", ".usdc"), "write the motion, with mass properties, for Omniverse, Houdini and others"),
 }
-"""Options that take a file, how its name may end, and their help."""
+"""Options that write a file, the extensions of its name, and their help."""
 
 ANIMATIONS = ("gltf", "usd")
-"""Files that ``--fps`` is of."""
+"""Options to which ``--fps`` applies."""
 
 DEFAULT_FPS = 30.0
 
@@ -38,17 +38,17 @@ def add_exports(parser: argparse.ArgumentParser) -> None:
         "--fps",
         type=number_from(1e-3, 1e5),
         metavar="N",
-        help=f"with --gltf or --usd: frames a second (default {DEFAULT_FPS:g})",
+        help=f"with --gltf or --usd: frames per second (default {DEFAULT_FPS:g})",
     )
 
 
 def asked(args: argparse.Namespace) -> dict[str, str]:
-    """The files that are asked for, by option."""
+    """The requested files, by option."""
     return {name: file for name in EXPORTS if (file := getattr(args, name))}
 
 
 def check_exports(args: argparse.Namespace) -> None:
-    """Refuse what can't be written before any work is done; raises InputError."""
+    """Check before any work that the files can be written; raises InputError."""
     files = asked(args)
     for name, file in files.items():
         endings, _ = EXPORTS[name]
@@ -66,7 +66,7 @@ def check_exports(args: argparse.Namespace) -> None:
 def write_exports(
     args: argparse.Namespace, record: FlightRecord, source: Source | None, say: Callable[[str], None]
 ) -> None:
-    """Write what is asked for, and ``say`` a line of each file; raises InputError."""
+    """Write the requested files, and ``say`` one line for each; raises InputError."""
     files = asked(args)
     if "csv" in files or "parquet" in files:
         from ..export import table

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto identify``: mass properties from recorded motion, and first what of them it identifies."""
+"""``rigid_proto identify``: mass properties from recorded motion, and which of them the motion identifies."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..scene.scenario import Scenario
 
 EXAMPLES = (
-    ("rigid_proto identify out/flight.mcap", "what recorded motion identifies of the body, and what it doesn't"),
+    ("rigid_proto identify out/flight.mcap", "mass properties from a recording, and which of them it identifies"),
     ("rigid_proto identify throws/*.mcap --mass 1.2 --urdf", "several throws of a weighed body, as a URDF <inertial>"),
     (
         "rigid_proto identify rov.mcap --pose /odom --wrench /thrusters@base_link --fit mass,com,inertia,damping",
@@ -27,15 +27,15 @@ EXAMPLES = (
     ),
 )
 SENSORS = {"pose": "[@CHILD]", "imu": "", "wrench": "[@FRAME]"}
-"""Topics that a bag may have several of, and what may stand behind their names."""
+"""Topics of which a bag may have several, and what may follow their names."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
-        "sessions", nargs="+", metavar="SESSION", help="recordings made here (.rrd, .mcap), or any bags of ROS 2 or 1"
+        "sessions", nargs="+", metavar="SESSION", help="recordings of this package (.rrd, .mcap), or bags of ROS 2 or 1"
     )
-    parser.add_argument("--mass", type=float, metavar="M", help="the mass [kg], where it is known")
+    parser.add_argument("--mass", type=float, metavar="M", help="the mass [kg], if it is known")
     for sensor, frame in SENSORS.items():
         parser.add_argument(f"--{sensor}", metavar=f"TOPIC{frame}", help=f"the {sensor} topic of a bag")
     parser.add_argument(
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Read, estimate, and print it."""
+    """Read the recordings, estimate, and print the result."""
     try:
         from ..identify.identification import Known, as_json, as_text, as_urdf, identify
     except ImportError as error:
@@ -98,7 +98,7 @@ def _choice(args: argparse.Namespace) -> Choice:
 
 
 def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], list[Scenario]]:
-    """All flights of the sessions, and the scenarios of those that are ours."""
+    """All flights of the sessions, and the scenarios of those recorded by this package."""
     from ..identify.bag_reading import bag_flight
     from ..identify.session_reading import session_flight
     from ..rerun_view.session_files import is_bag, read_runs
@@ -124,7 +124,7 @@ def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], li
 
 
 def _has_scene(path: Path) -> bool:
-    """Whether a bag says what was flown, as ours do."""
+    """Whether a bag contains a scene, as those recorded by this package do."""
     from ..session.bag import read_bag
 
     if path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3"))):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto inspect``: mass properties of a mesh under every model, with a verdict before any number."""
+"""``rigid_proto inspect``: the verdict on a mesh, then its mass properties under every inertia model."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .inspect_report import print_inertial, print_report
 from .inspect_robot import add_robot_arguments, compare, lump
 
 DENSITY = 1000.0
-"""kg/m³, water's, when neither density nor mass is given."""
+"""kg/m³, that of water, if neither density nor mass is given."""
 VERIFIED = 1e-13
-"""Largest error against rational arithmetic with which ``--verify`` is content."""
+"""Largest error against rational arithmetic that ``--verify`` accepts."""
 
 
 EXAMPLES = (
-    ("rigid_proto inspect hammer --density 7850", "mass, COM, inertia and what is wrong with the mesh"),
+    ("rigid_proto inspect hammer --density 7850", "mass, COM, inertia and problems of the mesh"),
     (
         "rigid_proto inspect part.stl --scale 0.001 --mass 1.2 --urdf",
         "a part drawn in mm that weighs 1.2 kg, as a URDF <inertial>",
@@ -32,11 +32,11 @@ EXAMPLES = (
     ("rigid_proto inspect --compare robot.urdf", "the errors of a robot's inertials"),
     (
         "rigid_proto inspect --compare robot.urdf --fix fixed.urdf",
-        "the same file with right inertials",
+        "the same file with corrected inertials",
     ),
     (
         "rigid_proto inspect --lump robot.urdf --as-scene robot.yaml",
-        "the robot with its joints held, as a scene of one body",
+        "the robot with its joints fixed at 0, as a scene of one body",
     ),
 )
 
@@ -58,13 +58,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a point mass in kg at mesh coordinates; may be repeated",
     )  # fmt: skip
     parser.add_argument(
-        "--repair", action="store_true", help="weld edges, remove duplicate faces, orient faces, cap holes"
+        "--repair", action="store_true", help="weld gaps, remove duplicate faces, orient faces, cap holes"
     )
     parser.add_argument("--fallback", choices=FALLBACKS[1:], help="fallback shape for a mesh that encloses no volume")
     parser.add_argument(
         "--accept-open", type=float, default=0.0, metavar="B",
-        help="close holes with flat caps where whatever closes them changes volume and tensor by at most that part "
-        "of themselves (0.01: 1 %%); also of a robot's meshes",
+        help="close holes with flat caps if the relative change of volume and tensor by any way to close them is at "
+        "most B (0.01: 1 %%); also for a robot's meshes",
     )  # fmt: skip
     parser.add_argument(
         "--verify", action="store_true", help="compare with exact rational arithmetic (exit 1 above 1e-13)"
@@ -125,7 +125,7 @@ def _print(inspection: Inspection, report: dict, args: argparse.Namespace) -> No
 
 
 def _verify(inspection: Inspection, report: dict) -> int:
-    """Put the ``verification`` into the report, null where it is refused; returns the exit status."""
+    """Add ``verification`` to the report, null if it is refused; returns the exit status."""
     report["verification"] = None
     report["verification"] = verify_moments(inspection.body, inspection.scale)
     if max(report["verification"].values()) <= VERIFIED:

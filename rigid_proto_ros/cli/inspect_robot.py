@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto inspect`` of a whole robot: ``--compare`` judges its inertials, ``--fix`` rewrites them, ``--lump``
-takes it as one rigid body.
+"""``rigid_proto inspect`` for robots: ``--compare`` checks inertials, ``--fix`` corrects them, ``--lump`` computes a
+robot as one rigid body.
 """
 
 from __future__ import annotations
@@ -25,38 +25,36 @@ if TYPE_CHECKING:
 
 
 def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what concerns robots."""
+    """Declare the options for robots."""
     parser.add_argument(
         "--compare", nargs="+", metavar="ROBOT",
-        help="judge the inertials of URDF, SDF or MJCF files by their shapes, or that of one link by MESH; exit 1 "
-        "for wrong ones",
+        help="compare the inertials in URDF, SDF or MJCF files with the links' shapes, or that of one link with MESH; "
+        "exit 1 if one is wrong",
     )  # fmt: skip
     parser.add_argument(
         "--package-path", type=Path, action="append", metavar="DIR",
-        help="with --compare or --lump: a folder that holds packages or models that the file names; may be repeated",
+        help="with --compare or --lump: folder of the packages or models that the file refers to; may be repeated",
     )  # fmt: skip
     parser.add_argument(
         "--tolerance", type=float, metavar="T",
         help="with --compare: exit 1 also for an inertial that differs from a uniform solid's by more than T",
     )  # fmt: skip
-    parser.add_argument("--fix", metavar="OUT", help="with --compare: write the file to OUT, wrong inertials rewritten")
-    parser.add_argument("--all", action="store_true", help="with --fix: rewrite those that aren't uniform, too")
+    parser.add_argument("--fix", metavar="OUT", help="with --compare: write the file to OUT with corrected inertials")
+    parser.add_argument("--all", action="store_true", help="with --fix: correct those that aren't uniform, too")
     parser.add_argument("--lump", metavar="ROBOT", help="a URDF, SDF or MJCF with its joints at 0, as one rigid body")
-    parser.add_argument(
-        "--as-scene", metavar="FILE.yaml", help="with --lump: write a scene that simulates it, and its mesh"
-    )
+    parser.add_argument("--as-scene", metavar="FILE.yaml", help="with --lump: write a scene of this body, and its mesh")
 
 
 def _refuse(args: argparse.Namespace, use: str, *names: str) -> None:
-    """Refuse options that don't concern a use of robots."""
+    """Refuse options that have no meaning for robots."""
     for name in names:
         if getattr(args, name.replace("-", "_")):
             raise InputError(f"--{name}", f"can't be used with --{use}, which takes what the robot's file says")
 
 
 def compare(args: argparse.Namespace) -> int:
-    """``inspect [MESH] --compare ROBOT...``: 1 when a link's inertial is wrong, otherwise 0; with a mesh or a tolerance
-    also 1 for one that differs from the uniform solid, and when nothing could be compared.
+    """``inspect [MESH] --compare ROBOT...``: 1 if a link's inertial is wrong, otherwise 0; with a mesh or a tolerance
+    also 1 if an inertial differs from that of the uniform solid, or if nothing could be compared.
     """
     _refuse(args, "compare", "lump", "as-scene", "verify", "urdf", "sdf", "mjcf", "model", "ballast", "mass", "density")
     _refuse(args, "compare", "repair", "fallback")
@@ -81,7 +79,7 @@ def compare(args: argparse.Namespace) -> int:
             print(f"{robot}:")
         try:
             found.append(_judge(args, robot))
-        except InputError as error:  # the others are judged none the less
+        except InputError as error:  # the other robots are checked nevertheless
             print(f"rigid_proto inspect: {robot}: {' '.join(str(error).split())}", file=sys.stderr)
             found.append((2, {"compare": robot, "links": None, "refused": str(error)}))
     if args.json:
@@ -90,7 +88,7 @@ def compare(args: argparse.Namespace) -> int:
 
 
 def _judge(args: argparse.Namespace, robot: str) -> tuple[int, dict]:
-    """Exit status and JSON object of one robot, printed but for JSON."""
+    """Exit status and JSON object of one robot; prints the report unless JSON is asked for."""
     from ..robots.diagnosis import LIMIT, NOT_UNIFORM, UNKNOWN, WRONG, compare_robot
 
     diagnoses = compare_robot(
@@ -113,7 +111,7 @@ def _judge(args: argparse.Namespace, robot: str) -> tuple[int, dict]:
 
 
 def _print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
-    """A line for each link, its causes and what is expected instead, and a count."""
+    """Print a line for each link, the causes and the expected numbers, and the counts."""
     for d in diagnoses:
         name = f" ({d.mesh})" if d.mesh else ""
         note = f"; {d.note}" if d.note else ""
@@ -157,7 +155,7 @@ def _fix(args: argparse.Namespace) -> int:
 
 
 def lump(args: argparse.Namespace) -> int:
-    """``inspect --lump ROBOT``: the robot as one body, printed, and written as a scene where it is asked for."""
+    """``inspect --lump ROBOT``: print the robot as one body, and write it as a scene if asked for."""
     from ..robots.composite_inertia import lump_robot
 
     _refuse(args, "lump", "mesh", "compare", "fix", "all", "tolerance", "verify", "ballast", "mass", "density", "model")
@@ -202,7 +200,7 @@ def _print_lump(whole: Lump, written: tuple[str, ...]) -> None:
 
 
 def _write_scene(whole: Lump, name: str) -> tuple[str, ...]:
-    """Write the scene, and beside it the mesh, which carries the picture alone; returns what was written."""
+    """Write the scene, and in its folder the mesh, which is only drawn; returns the names of the files."""
     from ..robots.composite_inertia import obj_text
     from ..scene.scenario import scene_text
 

@@ -23,12 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration",
         type=number_from(0.1, 600.0),
         metavar="S",
-        help="simulated seconds (default 10, or 1 s past its script)",
+        help="simulated seconds (default 10, or until 1 s after the lesson's script)",
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fly the lesson's scene, with its script where it has one, and write the file."""
+    """Simulate the lesson's scene, with its script if it has one, and write the file."""
     try:
         from ..workbench.lesson_file import lesson_html
     except ImportError:

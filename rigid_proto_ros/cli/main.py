@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """``rigid_proto``: one console command; each of its commands is a module of this folder.
 
-Exit status: 0 done, 1 a check failed, 2 the input was refused (one line on stderr), 130 ended by Ctrl-C (143 by
+Exit status: 0 success, 1 a check failed, 2 the input was refused (one line on stderr), 130 ended by Ctrl-C (143 by
 SIGTERM).
 """
 
@@ -17,22 +17,22 @@ from ..base.command_line import Parser
 from ..base.errors import tell
 
 COMMANDS = {
-    "inspect": "mass properties of a mesh, and what is wrong with it",
+    "inspect": "mass properties of a mesh, and a check of the mesh",
     "simulate": "simulate a scene without ROS, as fast as possible",
-    "sweep": "simulate many variations of a scene into one table",
+    "sweep": "simulate many variations of a scene and write one table",
     "replay": "show, verify, convert, publish or branch a recorded session",
-    "identify": "mass properties from recorded motion, and which of them it identifies",
-    "snapshot": "a picture of a recorded session, without a display",
-    "lesson": "a lesson as one file that opens in a browser, without a server",
-    "demo": "start the node, send scripted pokes, record, and end",
+    "identify": "mass properties from recorded motion, and which of them the motion identifies",
+    "snapshot": "write a picture of a recorded session, without a display",
+    "lesson": "write a lesson as one file that opens in a browser, without a server",
+    "demo": "start the node, send scripted pokes, record, and exit",
     "up": "start the node with a live view, until Ctrl-C",
-    "workbench": "a body and its interactive page, until Ctrl-C; needs no ROS",
+    "workbench": "simulate a body and serve its interactive page, until Ctrl-C; needs no ROS",
 }
 
 EXAMPLES = (
     ("rigid_proto inspect hammer", "mass, COM and inertia of a bundled mesh"),
     ("rigid_proto simulate t_handle --record out/flight.rrd", "simulate a bundled scene, recorded for Rerun"),
-    ("rigid_proto replay out/flight.rrd --verify", "simulate it again, and compare every state bit for bit"),
+    ("rigid_proto replay out/flight.rrd --verify", "repeat the simulation, and compare every state bit for bit"),
 )
 
 
@@ -42,14 +42,14 @@ def main(argv: list[str] | None = None) -> int:
     argv = sys.argv[1:] if argv is None else argv
     parser = Parser(
         prog="rigid_proto",
-        description="Simulate a rigid body from its mesh, inspect it, record and replay it.",
+        description="Inspect a mesh, simulate it as a rigid body, record and replay the motion.",
         examples=EXAMPLES,
     )
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
     for name, summary in COMMANDS.items():
         command = subparsers.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
-        # Only the command that runs is imported, so that each starts as fast as it can.
+        # Only the command that runs is imported, so that each starts as fast as possible.
         if argv and argv[0] == name:
             module = importlib.import_module(f".{name}", __package__)
             module.add_arguments(command)
@@ -58,7 +58,7 @@ def main(argv: list[str] | None = None) -> int:
     args = parser.parse_args(argv)
     program = f"rigid_proto {args.command}"
     if own_process:
-        # All commands need it, and while it is imported there is nothing to close.
+        # All commands need this module, and during its import there is nothing to close yet.
         importlib.import_module("..base.compilation", __package__)
         return interrupts.run(lambda: _run(args), lambda error: tell(program, error))
     try:
@@ -70,11 +70,11 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
-    """Run the command, and say so where kernels are compiled first."""
+    """Run the command, with a message if kernels have to be compiled first."""
     from ..base.compilation import notify_when_compiling
 
     text = f"rigid_proto {args.command}: compiling kernels, at the first start only; a minute or two if all are missing"
     with notify_when_compiling(lambda: print(text, file=sys.stderr, flush=True)):
         status = args.run(args)
-    print(end="", flush=True)  # in here: what can't be written is told as any other file
+    print(end="", flush=True)  # inside _run, so that an output that can't be written is reported like any file
     return status

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto replay``: what a recorded session holds; check it, mend it, draw it, branch from it, send it again."""
+"""``rigid_proto replay``: show, verify, repair, convert, branch or publish a recorded session."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..session.recorded_session import RecordedSession
 
 EXAMPLES = (
-    ("rigid_proto replay out/flight.rrd --verify", "simulate it again, and compare every state bit for bit"),
+    ("rigid_proto replay out/flight.rrd --verify", "repeat the simulation, and compare every state bit for bit"),
     ("rigid_proto replay out/flight.mcap --record out/seen.rrd", "a bag as a Rerun recording"),
     (
         "rigid_proto replay out/flight.rrd --at 4 --as-scene out/branch.yaml",
@@ -40,22 +40,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--node",
         metavar="NAME",
         default="",
-        help="the node to send commands to, or the body in a bag with several",
+        help="the node that gets the commands, or the body in a bag with several bodies",
     )
     parser.add_argument(
-        "--verify", action="store_true", help="simulate it again and compare; exit 1 at the first difference"
+        "--verify", action="store_true", help="repeat the simulation and compare; exit 1 at the first difference"
     )
-    parser.add_argument("--record", metavar="FILE", help="convert it to another recording, .rrd (Rerun) or .mcap")
+    parser.add_argument("--record", metavar="FILE", help="convert the session to .rrd (Rerun) or .mcap")
     parser.add_argument(
-        "--repair", metavar="FILE", help="write a readable file with all that is complete in a damaged session"
+        "--repair", metavar="FILE", help="write a readable file with the complete part of a damaged session"
     )
     parser.add_argument("--at", type=number_from(0.0, 1e9), metavar="T", help="simulated time [s], for --as-scene")
     parser.add_argument(
         "--as-scene",
         metavar="FILE.yaml",
-        help="write the scene that begins at --at, and a script of what still acts then as FILE_script.yaml",
+        help="write a scene that starts at the time --at, and a script of the loads that act then as FILE_script.yaml",
     )
-    parser.add_argument("--publish", choices=("states", "commands"), help="publish it over ROS")
+    parser.add_argument("--publish", choices=("states", "commands"), help="publish the session over ROS")
     parser.add_argument(
         "--speed", type=number_from(1e-6, 1e6), metavar="X", help="speed factor of --publish states (default 1)"
     )
@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Say what the session holds, and do what is asked for with it."""
+    """Print a summary of the session, and carry out the options."""
     from ..rerun_view.session_files import read_runs, repair
 
     if (args.at is None) != (args.as_scene is None):
@@ -119,7 +119,7 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
             with Progress("verifying") as progress:
                 difference = verify(session, progress.fraction)
         except NotVerifiableError as error:
-            # What lies before the first reset can't be checked; what follows it can.
+            # The part before the first reset can't be checked; the parts after it can.
             if number == len(runs) and not verified:
                 raise
             print(f"  {which}not checked: {error.received}")
@@ -147,7 +147,7 @@ def _export(runs: list[RecordedSession], args: argparse.Namespace, given: Scenar
 
 
 def _print_difference(difference: Difference, session: RecordedSession) -> None:
-    """What led to a difference, as far as the recording says."""
+    """Print the last command before a difference, and how recording and present environment differ."""
     from ..session.check import made_with_table
 
     if difference.command:
@@ -161,8 +161,8 @@ def _print_difference(difference: Difference, session: RecordedSession) -> None:
 
 
 def _given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
-    """The scene of this file, which was given for a session that lacks its own; None without one. Raises InputError
-    for a session that has all it needs.
+    """The scene in this file, given for a session without a scene; None if no file is given. Raises InputError if the
+    session is complete without it.
     """
     if not path:
         return None

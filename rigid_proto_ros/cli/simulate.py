@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 DURATION_NS = 10_000_000_000
 AFTER_SCRIPT_NS = 1_000_000_000
-"""Without --duration the flight is so long, and goes on so long after a script's last command [ns]."""
+"""Duration without --duration, and the least time after a script's last command [ns]."""
 
 EXAMPLES = (
     ("rigid_proto simulate t_handle", "the bundled T-handle, 10 s"),
     (
         "rigid_proto simulate config/t_handle.yaml --script msg_examples/flip_and_poke.yaml --json",
-        "a scene with scripted pokes; one JSON object",
+        "a scene with scripted pokes; prints one JSON object",
     ),
     (
         'rigid_proto simulate hammer --set gravity="[0, 0, -9.81]" --duration 2 --record out/hammer.rrd',
@@ -45,7 +45,7 @@ def add_arguments(parser: Parser) -> None:
         "--duration",
         type=number_from(0.0, 1e9),
         metavar="S",
-        help="simulated seconds (default 10, or 1 past the script's last command where that is later)",
+        help="simulated seconds (default 10, or until 1 s after the script's last command if that is later)",
     )
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="change a parameter; may be repeated"
@@ -58,7 +58,7 @@ def add_arguments(parser: Parser) -> None:
 
 
 def _instead_of(option: str) -> str:
-    """A parameter isn't an option."""
+    """A hint for a parameter that was given as an option."""
     from ..scene.parameters import PARAMETERS
 
     name = option.removeprefix("--").replace("-", "_")
@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         _warn(f"{beyond} of the script's {len(script)} commands act at or after the end, {duration_ns / 1e9:.9g} s")
     files = [file for file in (args.record or scenario.parameters.record, args.bag) if file]
     if files:
-        # Whatever is refused is refused here, before a recording of an earlier run is overwritten.
+        # Check everything that can be refused now, before a recording of an earlier run is overwritten.
         OfflineRun(scenario, script)
         _check_places(files, args.bag)
     check_exports(args)
@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
             recorders[file] = _recorder(file, scenario.parameters)
             closing.callback(recorders[file].close)
         watching = [*recorders.values(), *filter(None, [record])]
-        # Only who records has a ghost.
+        # The ghost is simulated only if something is recorded.
         flight = OfflineRun(scenario, script, Observers(*watching) if watching else None)
         wall_time = run_with_progress(flight, duration_ns)
         result = summary(flight, wall_time)
@@ -120,7 +120,7 @@ def run(args: argparse.Namespace) -> int:
     if flight.simulation.failure:
         _warn(f"stopped in the last good state: {flight.simulation.failure}")
         return 1
-    # A recording that stopped has said so itself.
+    # A recording that stopped has already printed a message.
     return 0 if recorded == files else 2
 
 

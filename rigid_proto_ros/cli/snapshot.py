@@ -17,8 +17,8 @@ EXAMPLES = (("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "wh
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
-        "Write a .png of a recording as the viewer shows it at one simulated time. Needs no display, but a Vulkan "
-        "driver; mesa-vulkan-drivers has one that needs no GPU."
+        "Write a .png of a recording as the viewer shows it at one simulated time. This needs no display, but a Vulkan "
+        "driver; the package mesa-vulkan-drivers has one that needs no GPU."
     )
     parser.add_argument("session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of one body")
     parser.add_argument("--at", metavar="T", type=float, required=True, help="simulated time [s]")
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Take the picture; InputError says what was wrong with the request."""
+    """Write the picture; raises InputError for a request that is refused."""
     from ..rerun_view.session_files import is_bag
 
     # Pillow comes with Rerun.
@@ -52,7 +52,7 @@ def _draw(args: argparse.Namespace, recording: str | Path, size: tuple[int, int]
 
 
 def _drawn(args: argparse.Namespace, folder: Path) -> Path:
-    """The last run of a bag as a recording for the viewer."""
+    """The last run of a bag, converted to a recording for the viewer."""
     from ..rerun_view.session_files import read_runs, record
     from ..rerun_view.snapshot import check_picture, check_time
 

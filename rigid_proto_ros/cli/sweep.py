@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto sweep``: many variations of one scene into one table."""
+"""``rigid_proto sweep``: simulate many variations of one scene and write one table."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = (
     ("rigid_proto sweep box_tensor -o out/box_tensor.parquet", "a bundled study, on all cores"),
-    ("rigid_proto sweep box_tensor --row 7 --as-scene out/row.yaml", "one row of it, as a scene to simulate"),
+    ("rigid_proto sweep box_tensor --row 7 --as-scene out/row.yaml", "one row of this study, as a scene to simulate"),
 )
 
 
@@ -25,14 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("study", metavar="STUDY.yaml", help="a study file, or the name of a bundled study")
     parser.add_argument("-o", "--output", metavar="FILE.parquet", help="the table (default: the study's name.parquet)")
     parser.add_argument("--row", type=int, metavar="N", help="simulate one row only")
-    parser.add_argument(
-        "--as-scene", metavar="FILE.yaml", help="with --row: write it as a scene, and its script beside"
-    )
+    parser.add_argument("--as-scene", metavar="FILE.yaml", help="with --row: write the row as a scene, and its script")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fly the study, or one row of it."""
+    """Simulate the study, or one row of it."""
     from ..sweep.study import read_study
 
     if args.as_scene and args.row is None:

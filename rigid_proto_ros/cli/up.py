@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto up``: the node with a live view, until Ctrl-C; what ``make up`` runs."""
+"""``rigid_proto up``: the node with a live view, until Ctrl-C; ``make up`` runs it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import sys
 EXAMPLES = (
     ("rigid_proto up", "the T-handle, with a live view"),
     ("rigid_proto up hammer --viewer web", "another scene, shown in the browser"),
-    ("rigid_proto up hammer --viewer workbench", "with the interactive page beside the topics"),
+    ("rigid_proto up hammer --viewer workbench", "with the interactive page in addition to the topics"),
     ("rigid_proto up --mesh part.obj", "your own mesh"),
 )
 
@@ -23,13 +23,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--viewer",
         choices=("auto", "web", "native", "workbench", "none"),
         default="auto",
-        help="where it is shown: Rerun in the browser or in a window, the interactive page; auto: native where there "
-        "is a display, else web",
+        help="the live view: Rerun in the browser (web) or in a window (native), or the interactive page (workbench); "
+        "auto: native if there is a display, otherwise web",
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Become the node: signals reach it directly."""
+    """Run the node in this process, so that signals reach it directly."""
     from ..scene.scenario import read_scene
     from ..scene.scene_file import scene_file
     from .executables import own_executable, text_parameter

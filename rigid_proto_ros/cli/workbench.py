@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--port", type=int, metavar="PORT", help="port of the page (default 8080, or the next free one)"
     )
     parser.add_argument("--host", metavar="ADDRESS", help="address to serve the page on (default: this machine only)")
-    parser.add_argument("--no-browser", action="store_true", help="print the address, open no browser")
+    parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A flight as an export takes it: what changed and the states, as told by a simulation or a session."""
+"""The input of an export: the changes and states of a simulation or of a recorded session."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def frames(record: FlightRecord, source: Source | None, fps: float) -> tuple[Fli
     isn't the recorded one, as may be on another kind of processor.
     """
     if source is None:
-        return record, "the session can't be simulated again: its states are the frames"
+        return record, "the session can't be simulated again: the recorded states are used as frames"
     start_ns, end_ns = int(record.times_ns[0]), int(record.times_ns[-1])
     count = int((end_ns - start_ns) * 1e-9 * fps) + 1
     if count > FRAMES_MAX:
@@ -104,7 +104,7 @@ def frames(record: FlightRecord, source: Source | None, fps: float) -> tuple[Fli
             break
         row = run.simulation.state.row
         if time_ns in record.states and np.abs(row[:7] - record.states[time_ns][:7]).max() > AGREES:
-            return record, "simulated again here the motion isn't the recorded one: its states are the frames"
+            return record, "the motion isn't reproduced on this machine: the recorded states are used as frames"
         made.states[time_ns] = row.copy()
         if run.ghost is not None:
             run.ghost.advance(time_ns)
@@ -118,7 +118,7 @@ def source_of_scene(scenario: Scenario, script: list[Command]) -> Source:
 
 
 def source_of_session(session: RecordedSession, given: Scenario | None = None) -> Source | None:
-    """The flight of a session; None for one that lacks what it would take to simulate it again."""
+    """The source of a session's motion; None if the session lacks the data needed to simulate it again."""
     if given is not None or session.missing:
         return None
 

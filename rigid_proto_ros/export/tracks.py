@@ -61,7 +61,7 @@ class Tracks(Backend):
         """Keep the mesh; raises InputError for another one in flight."""
         if surface is not None and self._surfaces.setdefault(name, surface) is not surface:
             reason = f"the mesh changes at {self._times[0] / 1e9:.9g} s"
-            raise InputError("session", reason, "a flight of one mesh, for --gltf and --usd")
+            raise InputError("session", reason, "a simulation without a change of mesh, for --gltf and --usd")
 
     def place(
         self,
@@ -70,7 +70,7 @@ class Tracks(Backend):
         attitudes: np.ndarray | None = None,
         scale: np.ndarray | None = None,
     ) -> None:
-        """Keep where a mesh lies in its body, or the body's frames."""
+        """Keep the pose of a mesh relative to its body, or the body's frames."""
         if name in MESHES.values() and positions is not None and scale is not None:
             self._mesh_in_force[name] = positions[0], scale
         elif name in MESHES and positions is not None and attitudes is not None:

@@ -68,7 +68,7 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
         path.unlink()
         if not stage.GetRootLayer().Export(str(path)):
             raise InputError("--usd", file, "a file that can be written")
-    return ["mass or tensor change: the body's are those of the start"] if changed else []
+    return ["mass or tensor change: the file has the values at the start"] if changed else []
 
 
 def _animate(prim: UsdGeom.Xform, codes: list[float], positions: np.ndarray, attitudes: np.ndarray) -> None:
@@ -83,7 +83,7 @@ def _animate(prim: UsdGeom.Xform, codes: list[float], positions: np.ndarray, att
 
 
 def _place_mesh(prim: UsdGeom.Mesh, codes: list[float], track: Track) -> None:
-    """Where the mesh lies in its body: once, or at each frame where that changes in flight."""
+    """Pose of the mesh relative to its body: once, or at each frame if it changes during the simulation."""
     from pxr import Gf, UsdGeom
 
     place = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)

@@ -107,7 +107,7 @@ def _chosen_topics(path: Path, choice: Choice) -> dict[str, _Topic]:
     except InputError:
         raise
     except Exception as error:  # the library lets through whatever cut or damaged bytes lead to
-        accepted = f"a bag that rosbags can read ({error}); ros2 bag reindex mends one whose recorder was killed"
+        accepted = f"a bag that rosbags can read ({error}); ros2 bag reindex repairs a bag whose recorder was killed"
         raise InputError("session", str(path), accepted) from None
     return {kind: _topic(found[name], name, types[name], frame) for kind, (name, frame) in chosen.items()}
 
@@ -119,7 +119,7 @@ def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str
         topic, _, frame = text.partition("@")
         fitting = ", ".join(sorted(name for name, its_type in types.items() if its_type in KINDS[kind]))
         if types.get(topic) not in KINDS[kind]:
-            raise InputError(f"--{kind}", topic, f"a topic of the bag: {fitting or 'it has none of such a type'}")
+            raise InputError(f"--{kind}", topic, f"a topic of the bag: {fitting or 'it has no topic of such a type'}")
         found[kind] = (topic, frame)
     for kind, accepted in KINDS.items() if not given else ():
         topics = sorted(topic for topic, its_type in types.items() if its_type in accepted)
@@ -163,7 +163,7 @@ def _topic(messages: list[tuple[int, Any]], name: str, message_type: str, frame:
     if message_type in TRANSFORMS:
         messages, frame = _one_transform(messages, name, frame), ""
     elif frame and message_type not in KINDS["wrench"]:
-        raise InputError(name, f"{name}@{frame}", f"{name} alone, as a {message_type} has no choice of frames")
+        raise InputError(name, f"{name}@{frame}", f"{name} alone, since a {message_type} has no choice of frames")
     stamps = [m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec or logged for logged, m in messages]
     # Of messages with one stamp the first counts: a repeated one says nothing new.
     times, first = np.unique(np.array(stamps, np.int64), return_index=True)
@@ -213,7 +213,7 @@ def _check_clocks(chosen: dict[str, _Topic]) -> None:
         if topic.times_ns[0] > pose.times_ns[-1] or topic.times_ns[-1] + held < pose.times_ns[0]:
             apart = 1e-9 * (topic.times_ns[0] - pose.times_ns[0])
             accepted = "stamps of one clock, or of clocks that differ by at most 0.05 s (--fit offset)"
-            received = f"{topic.name} begins {apart:.6g} s after {pose.name}, with no time in common"
+            received = f"{topic.name} begins {apart:.6g} s after {pose.name}, so their times do not overlap"
             raise InputError("clocks", received, accepted)
 
 

@@ -25,7 +25,7 @@ GUESSED_RADIUS = 0.1
 """Of the ball that stands for a body of which nothing is known [m]."""
 FEWEST = 8
 """Poses of a flight."""
-MISFIT = "the residuals are larger than the noise, so the numbers may be farther off than their standard deviations say"
+MISFIT = "the residuals are larger than the noise, so the errors may be larger than the standard deviations"
 OTHER_UNITS = {"gravity": "m/s²", "offset": "s", "gyro_bias": "rad/s", "accel_bias": "m/s²", "imu_place": "m"}
 DAMPING_UNITS = ("N s/m", "N m s")
 TENSOR_NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -52,14 +52,14 @@ class Identification:
     @property
     def verdict(self) -> str:
         """What is identified, in a sentence, after the warning that the model doesn't fit, if it doesn't."""
-        text = "everything that was asked for is identified from this motion"
+        text = "all requested quantities are identified from this motion"
         if self.unidentified:
             words = {"mass": [self.mass], "centre of mass": self.center_of_mass, "tensor": self.inertia}
             found = [name for name, parts in words.items() if all(part.value is not None for part in parts)]
             if "tensor" not in found and all(part.value is not None for part in self.shape):
                 found.append("shape of the tensor")
             hidden = ", ".join(one.what for one in self.unidentified)
-            identified = ", ".join(found) or "nothing that was asked for"
+            identified = ", ".join(found) or "none of the requested quantities"
             text = f"identified from this motion: {identified}; not identified: {hidden}"
         return text if self.fits else f"{MISFIT}; {text}"
 
@@ -187,7 +187,7 @@ def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]
     if "damping" not in fit:
         lines.append(f"damping {first.linear_damping:g} N s/m, {first.angular_damping:g} N m s")
     if "imu_place" not in fit and any(s.kind == ACCELERATION for flight in flights for s in flight.series):
-        lines.append("the IMU stands at the tracked frame's origin, its axes those of the frame")
+        lines.append("the IMU is assumed to be at the tracked frame's origin, with the axes of that frame")
     for topic in dict.fromkeys(f.load_history.topic for f in flights if len(f.load_history.changes)):
         lines.append(f"{topic} was sampled: it changed between messages, and the errors count that")
     return lines

@@ -39,7 +39,7 @@ LOOK_S = 0.002
 """Between looks whether a step is made [s]."""
 
 SHORT_NS = 3_000_000
-"""Waits below this [ns] are a plain sleep, a third of the cost of one that a request can end."""
+"""Shorter waits [ns] are a plain sleep, which costs a third of a wait that a request can end."""
 
 
 class LiveSimulation:
@@ -115,7 +115,7 @@ class LiveSimulation:
             return future.result(timeout_s)
         except TimeoutError:
             if future.cancel():
-                text = f"the simulation was too busy to begin it within {timeout_s:g} s"
+                text = f"the simulation was too busy to start this request within {timeout_s:g} s"
                 raise InputError("request", text) from None
         # It has begun, so it will end.
         return future.result()
@@ -172,7 +172,7 @@ class LiveSimulation:
 
     @property
     def paused(self) -> bool:
-        """Whether simulated time stands."""
+        """Whether simulated time is paused."""
         return self.loop.paused
 
     # Commands
@@ -283,7 +283,7 @@ class LiveSimulation:
                 finished.close()
 
     def _warm_up_change(self, planned: Scenario) -> None:
-        """Compile what another integrator flies by."""
+        """Compile the kernels of another integrator."""
         if planned.setup.integrator is not self.scenario.setup.integrator:
             with suppress(CommandRefused):  # what acts when the change is made decides, and that is counted
                 warm_up(planned.setup)
@@ -299,7 +299,7 @@ class LiveSimulation:
         self.loop.simulation.introduce(observer)
 
     def add_observer(self, observer: Observer) -> None:
-        """Tell an observer what flies, and all that happens from now on; its methods run on the physics thread."""
+        """Notify an observer of the present body and of all further events; its methods run on the physics thread."""
 
         def add() -> None:
             self._observers = (*self._observers, observer)

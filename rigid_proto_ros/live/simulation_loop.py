@@ -101,12 +101,12 @@ class SimulationLoop(ScenarioRun):
         """Raises InputError where this scenario can't follow the present one."""
         if self.pace.followed and scenario.parameters.publish_clock:
             raise InputError(
-                "publish_clock", True, "false, while simulated time follows the /clock of another (use_sim_time)"
+                "publish_clock", True, "false, while simulated time follows the /clock of another node (use_sim_time)"
             )
         super().check_change(scenario)
 
     def replace(self, scenario: Scenario) -> Setup:
-        """Put another scenario in force, its real time factor at once too."""
+        """Put another scenario in force; its real time factor takes effect at once, too."""
         setup = super().replace(scenario)
         if scenario.parameters.real_time_factor != self.pace.factor:
             self.pace.factor = scenario.parameters.real_time_factor

@@ -88,7 +88,7 @@ def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray) -> 
     verdict.hole_effect = _hole_effect(topology, vertices)
     known = ""
     if verdict.hole_effect is not None and verdict.hole_effect < SMALL_HOLES:
-        known = f"; whatever closes it changes volume and tensor by at most {100.0 * verdict.hole_effect:.2g} %"
+        known = f"; any way to close it changes volume and tensor by at most {100.0 * verdict.hole_effect:.2g} %"
         known += f", which --accept-open {_rounded_up(verdict.hole_effect)} accepts"
     if topology.odd:
         rim = len(topology.boundary)
@@ -154,7 +154,7 @@ def _check_components(verdict: Verdict, topology: Topology, sums: Components, ve
             _check_overlap(verdict, nesting, whole, vertices, topology.corners)
         if nesting.within:
             message = f"the surface passes through itself ({counted(nesting.within, 'pair')} of triangles)"
-            verdict.add("self_crossing", WARNING, f"{message}; what it encloses twice counts twice")
+            verdict.add("self_crossing", WARNING, f"{message}; a volume that it encloses twice counts twice")
     if verdict.inward:
         verdict.add("inward", WARNING, "all faces were wound inward and have been turned outward")
 

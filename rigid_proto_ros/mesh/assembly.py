@@ -87,7 +87,7 @@ def add_collada(data: bytes, assembly: Assembly) -> float:
         raise MeshError(assembly.name, is_missing("pycollada", "meshes")) from None
     document = collada.Collada(io.BytesIO(_geometry_alone(data, assembly.name)))
     if document.scene is None:
-        raise MeshError(assembly.name, "the file has no scene that says which of its geometry is to be shown")
+        raise MeshError(assembly.name, "the file has no scene, which would define the geometry to be used")
     for bound in document.scene.objects("geometry"):
         for primitive in bound.original.primitives:
             if isinstance(primitive, collada.polylist.Polylist):

@@ -57,7 +57,7 @@ class _Document:
         """Entry ``number`` of the file's list ``kind``."""
         entries = self.json.get(kind, [])
         if not 0 <= number < len(entries):
-            raise MeshError(self.name, f"it names {kind} {number}, but has only {len(entries)}")
+            raise MeshError(self.name, f"it refers to {kind} {number}, but has only {len(entries)}")
         return entries[number]
 
     def view(self, number: int) -> bytes:
@@ -117,9 +117,9 @@ def _triangles(document: _Document, primitive: dict) -> tuple[np.ndarray, np.nda
     else:
         corners = np.arange(len(vertices))
     if mode != TRIANGLES:
-        raise MeshError(document.name, "it has strips or fans", "a file exported as triangles")
+        raise MeshError(document.name, "it has triangle strips or fans", "a file exported as triangles")
     if len(corners) % 3:
-        raise MeshError(document.name, f"{len(corners)} corners of triangles, which is no multiple of 3")
+        raise MeshError(document.name, f"{len(corners)} corners of triangles, which isn't a multiple of 3")
     return vertices, corners.reshape(-1, 3)
 
 

@@ -113,5 +113,5 @@ def _in_package(name: str, package: str, inside: str, search: Search) -> Path:
             missing = folder / inside
     if missing is not None:
         raise MeshError("mesh", f"there is no file {str(missing)!r} in the package of {name!r}")
-    where = f", and none above {str(search.near)!r}; --package-path DIR says where it is" if search.near else ""
+    where = f", and none above {str(search.near)!r}; give its folder by --package-path DIR" if search.near else ""
     raise MeshError("mesh", f"the package {package!r} of {name!r} was not found{where}")

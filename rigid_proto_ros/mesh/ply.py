@@ -102,7 +102,7 @@ def read_ply(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray
         {column for column, _, length in columns if not length} for label, _, columns in elements if label == "vertex"
     ]
     if len(places) != 1 or not {"x", "y", "z"} <= places[0]:
-        raise MeshError(name, "what its vertices are is not told", "one element vertex with properties x, y, z")
+        raise MeshError(name, "its header declares no vertices", "one element vertex with properties x, y, z")
     vertices, corners = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
     for element in elements:
         label, count, properties = element

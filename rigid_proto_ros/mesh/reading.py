@@ -103,7 +103,7 @@ def read_mesh(data: bytes, path: Path) -> Mesh:
     """The mesh that a file's bytes are, by the ending of its name; raises MeshError naming what is wrong with it."""
     suffix = path.suffix.lower().lstrip(".")
     if suffix not in FORMATS and suffix not in other_formats():
-        raise MeshError("mesh", path.name, f"a file named .{', .'.join(FORMATS)}, or as another that trimesh reads")
+        raise MeshError("mesh", path.name, f"a file named .{', .'.join(FORMATS)}, or another format that trimesh reads")
     if not data.strip():
         raise MeshError(path.name, "the file is empty")
     sha256, starts, unit = hashlib.sha256(data).hexdigest(), None, 1.0

@@ -48,7 +48,7 @@ def read_stl(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
     if is_ascii_stl(data):
         return _merge(_ascii_points(data.removeprefix(codecs.BOM_UTF8), name))
     if len(data) < 84:
-        raise MeshError(name, f"{len(data)} bytes are no STL file", "ASCII, or a binary header of 84 bytes and facets")
+        raise MeshError(name, f"{len(data)} bytes, no STL file", "ASCII, or a binary header of 84 bytes and facets")
     (count,) = struct.unpack_from("<I", data, 80)
     held, beyond = divmod(len(data) - 84, _FACET.itemsize)
     if count == 0 and beyond <= _SPARE:  # left for later by some that write facets as they come

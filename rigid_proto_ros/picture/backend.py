@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a picture is drawn with."""
+"""The interface through which a picture is drawn."""
 
 from __future__ import annotations
 

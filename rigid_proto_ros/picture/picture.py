@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is seen of a flight: from its states, and from what acts on the body, the parts that a backend draws."""
+"""The picture of a simulation: computes the parts that a backend draws from the states and the loads on the body."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The string from the hand to its knot: straight while it pulls, hanging through along gravity while it is slack."""
+"""The string from its free end to the knot: straight while it pulls, sagging along gravity while it is slack."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class StringRows:
 
     @property
     def held(self) -> np.ndarray:
-        """What the string holds at each of the n states (n,) [J]: nothing where none is tied."""
+        """Energy stored in the string at each of the n states (n,) [J]: 0 where no string is tied."""
         found = np.zeros(len(self.tied))
         found[self.tied] = self.energies
         return found

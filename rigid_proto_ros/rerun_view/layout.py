@@ -98,7 +98,7 @@ class Finished:
 
 
 def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
-    """The views of a flight that goes on, or of one that is finished: those that have something to show."""
+    """The views of a running or a finished simulation, without those that have nothing to show."""
     flight = _body_view(subject)
     if finished is None or finished.commanded:
         commands = rrb.TextLogView(

@@ -177,7 +177,7 @@ class RerunObserver(Observer):
     # What holds for a run
 
     def _next_run(self, stream: Stream) -> None:
-        """A reset: another run, in a recording of its own; the parameters in force, mesh and body stay."""
+        """Start a new run after a reset, in a new recording; the parameters in force, mesh and body are kept."""
         self._run += self._last_time_ns > 0
         name = self._name if self._run == 1 else f"{self._name}, run {self._run}"
         self._stream = self._backend.stream = self._open_next(stream, uuid.uuid4().hex, name)
@@ -191,7 +191,7 @@ class RerunObserver(Observer):
             forget_closed_recordings()
 
     def _send_scene(self, stream: Stream) -> None:
-        """What a run begins with: the scene as text."""
+        """The scene as text, with which a run begins."""
         stream.log_static(style.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         stream.log_static(style.POINSOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         if self._started is not None:

@@ -92,7 +92,7 @@ def repair(path: str | Path, repaired: str | Path) -> None:
     bag = path.exists() and is_bag(path)
     ending = ".mcap" if bag else ".rrd"
     if repaired.suffix != ending:
-        raise InputError("--repair", str(repaired), f"a file that ends in {ending}, as the session's kind does")
+        raise InputError("--repair", str(repaired), f"a file that ends in {ending}, like the session")
     if repaired.exists() and path.exists() and repaired.samefile(path):
         raise InputError("--repair", str(repaired), "another file than the one that is repaired")
     output_file("--repair", repaired)

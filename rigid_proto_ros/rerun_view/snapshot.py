@@ -134,14 +134,14 @@ def _connected(address: str, process: ViewerProcess, log: Any) -> Any:
 
 
 def _ended(log: Any) -> InputError:
-    """Why the viewer has ended, by its own last words."""
+    """Why the viewer has ended, from the last line of its output."""
     log.seek(0)
     words = log.read().decode(errors="replace")
     # Without any adapter it says so; with one of OpenGL alone it has no render context at its first picture.
     if "adapter" in words.lower() or "render context" in words:
         return InputError("snapshot", f"there is no graphics adapter that the viewer can draw with; install {DRIVERS}")
     last = (words.strip().splitlines() or ["no message"])[-1]
-    return InputError("snapshot", last, f"a viewer that starts; if it is the drivers: {DRIVERS}")
+    return InputError("snapshot", last, f"a viewer that starts; if drivers are missing: {DRIVERS}")
 
 
 def show(client: Any, recording: Path) -> None:

@@ -23,7 +23,7 @@ START_TIMEOUT_S = 30.0
 
 
 def viewer_program() -> str | None:
-    """Path of the ``rerun`` program: the one that came with the library, else the one on PATH."""
+    """Path of the ``rerun`` program: that installed with the library, otherwise the one on PATH."""
     found = importlib.util.find_spec("rerun_cli")
     for folder in (found.submodule_search_locations or []) if found else []:
         program = Path(folder) / ("rerun.exe" if sys.platform == "win32" else "rerun")

@@ -186,7 +186,7 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
     density = link.mass / sum(solid.mass for solid in parts.solids)
     note = f"density {density:.4g} kg/m³"
     if not 1.0 <= density <= 25000.0:
-        note += ", which no solid has: units of the mesh or of the mass?"
+        note += ", which no solid has; check the units of mesh and mass"
     return replace(
         plain,
         status=EXPLAINED if causes else NOT_UNIFORM if max(inertia_left, center_left) > tolerance else UNIFORM,

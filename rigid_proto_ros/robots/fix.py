@@ -50,11 +50,11 @@ def _indent(data: bytes, start: int) -> bytes:
 def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict, everything: bool) -> str:
     """Why a link that isn't uniform can't, or shan't, be written; "" when it can."""
     if diagnosis.status == NOT_UNIFORM and not everything:
-        return "a body of its shapes can have it; --all makes it uniform"
+        return "it is possible for its shapes; --all replaces it by that of the uniform solid"
     if link.problem or diagnosis.expected is None:
         return diagnosis.note or "its mass isn't a positive number"
     if link.element is None or id(link.element) not in places:
-        return "it stands in another file, or its body has no name"
+        return "it is in another file, or its body has no name"
     frame = link.element.find("pose")
     if frame is not None and frame.get("relative_to", "") not in ("", link.name):
         return f"its <pose> is relative to {frame.get('relative_to')!r}"

@@ -234,7 +234,7 @@ def _sized(shape: Shape, link: str, file: str, scale: str, text: Callable[[str],
         problem = shape.problem or ("" if file else "a mesh without a file")
         return replace(shape, file=file, scale=floats(f"scale of a mesh of link {link}", scale), problem=problem)
     if shape.kind not in SIZES:
-        return replace(shape, problem=f"a shape <{shape.kind}>, which isn't known here")
+        return replace(shape, problem=f"a shape <{shape.kind}>, which isn't supported")
     names, count = SIZES[shape.kind]
     words = " ".join(text(name) or "" for name in names.split())
     return replace(shape, size=tuple(floats(f"{names} of a {shape.kind} of link {link}", words, count).tolist()))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What the command line gives, read before rcl reads it: a slip ends in one line with a remedy and not in
-a stack of errors.
+"""The command line of the node, read before rcl reads it, so that a mistake gives one line with a remedy instead of a
+stack of errors.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ EXAMPLES = (
 
 
 def own_arguments(argv: list[str]) -> argparse.Namespace:
-    """``until``: seconds, or None. All else outside ``--ros-args ... [--]`` ends the process: --help with 0, what
-    isn't known with 2 and the nearest option. Raises InputError for options inside that rcl doesn't know or can't read;
-    ``given_arguments`` says better what is wrong with a parameter.
+    """``until``: seconds, or None. Any other argument outside ``--ros-args ... [--]`` ends the process: --help with
+    status 0, an unknown option with status 2 and the nearest known option. Raises InputError for options inside that
+    rcl doesn't know or can't read; ``given_arguments`` gives better messages about parameters.
     """
     parser = Parser(
         prog="rigid_body_node",
@@ -42,7 +42,7 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
     try:
         own = remove_ros_args(argv)[1:]
     except Exception as error:  # rclpy's own error types differ between versions
-        accepted = "--params-file FILE, -p NAME:=VALUE, -r FROM:=TO and what else ROS 2 takes there"
+        accepted = "--params-file FILE, -p NAME:=VALUE, -r FROM:=TO and other ROS 2 arguments"
         raise InputError("--ros-args", " ".join(str(error).split()), accepted) from None
     if "-h" in own or "--help" in own:
         parser.epilog = f"{_parameter_help()}\n\n{parser.epilog}"
@@ -67,9 +67,9 @@ def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]
     """The parameters that files and ``-p name:=value`` in ``argv`` give this node, later ones winning; raises
     InputError.
 
-    rcl reads the same; but where a later value has another type than an earlier one it keeps the earlier one. A name
-    that is no parameter is an error with the nearest known one; in a ``/**`` section, which other nodes share, a
-    warning.
+    rcl reads the same arguments, but if a later value has another type than an earlier one, rcl keeps the earlier one.
+    An unknown name is an error that gives the nearest known name; in a ``/**`` section, which other nodes share, it is
+    a warning.
     """
     given: dict[str, object] = {}
     for option, text in _ros_options(argv):
@@ -112,7 +112,7 @@ def _assignment(text: str, node_name: str) -> dict[str, object]:
 
 
 def remapped_node_name(argv: list[str], name: str = NODE_NAME) -> str:
-    """The node's name, after its namespace if it is given one, by ``-r __node:=name`` and ``-r __ns:=/namespace``."""
+    """The node's name, after its namespace if there is one, by ``-r __node:=name`` and ``-r __ns:=/namespace``."""
     namespace = ""
     for option, text in _ros_options(argv):
         left, _, right = text.partition(":=")

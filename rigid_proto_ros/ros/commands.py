@@ -226,4 +226,4 @@ class StepService:
 
 
 def _never_called(*_: object) -> None:
-    """What a subscription and a service must be given."""
+    """The callback that subscriptions and services require; it is never called."""

@@ -27,7 +27,7 @@ REFUSAL_REASONS = (
 
 WARNED_OF = {
     "refused_total": "{} refused",
-    "messages_lost": "{} lost on the way",
+    "messages_lost": "{} lost in transit",
     "queue_full": "messages may have been lost: a queue of commands was full",
     "overruns": "{} published late",
     "real_time_lost_s": "{:.2g} s behind real time",
@@ -83,14 +83,14 @@ class Diagnostics:
         }
 
     def _report(self) -> None:
-        """Publish how it stands, and log that real time is given up."""
+        """Publish the diagnostics, and log when simulated time falls behind real time."""
         # Before the values are read: what was done before the stamp is in them.
         stamp = self._node.get_clock().now().to_msg()
         before, values = self._before, self._values()
         self._before = values
         if (lost_s := values["real_time_lost_s"] - before["real_time_lost_s"]) > 0.0:
             self._node.get_logger().warning(
-                f"too much to do here: {lost_s:.2g} s of real time given up; simulated time is behind the wall clock",
+                f"machine too slow: {lost_s:.2g} s of real time given up; simulated time is behind the wall clock",
                 throttle_duration_sec=WARNING_S,
             )
         if self._publisher.get_subscription_count() == 0:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .node import RigidBodyNode
 
 LAST_START_S = 0.2
-"""How long a start that is nearly done is waited for at the end; one that compiles is left alone."""
+"""How long shutdown waits for a start that is nearly complete; a start that compiles isn't waited for."""
 
 
 def main(argv: list[str] | None = None, as_job: bool = False) -> int:

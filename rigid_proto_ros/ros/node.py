@@ -47,7 +47,7 @@ def offer_services(node: Node, live: LiveSimulation) -> None:
 
     offer(Trigger, "reset", lambda _: live.reset(), lambda _: "simulated time is 0")
     offer(Trigger, "clear_wrench", lambda _: live.clear_wrench(), lambda _: "no wrench acts; scheduled ones stay")
-    offer(Trigger, "string/release", lambda _: live.release_string(), lambda _: "the string is loose")
+    offer(Trigger, "string/release", lambda _: live.release_string(), lambda _: "the string is released")
     offer(SetBool, "pause", lambda request: live.pause(request.data), lambda r: "paused" if r.data else "running")
 
 

@@ -91,7 +91,7 @@ def converted(changes: list[RosParameter]) -> list[RosParameter]:
 
 
 def is_read_only(name: str) -> bool:
-    """Whether a parameter counts at start only, ours or one that every rclpy node has."""
+    """Whether a parameter takes effect at start only, for those of this node and those of every rclpy node."""
     return is_ros_parameter(name) or parameter_named(name).changes == READ_ONLY
 
 
@@ -118,7 +118,7 @@ class LiveParameters:
         self._behind.trigger()
 
     def set_together(self, parameters: list[RosParameter]) -> SetParametersResult:
-        """Convert, check together, and hand over to the physics thread; a refusal leaves all as it was."""
+        """Convert, check together, and pass to the physics thread; after a refusal nothing is changed."""
         try:
             parameters = converted(parameters)
         except InputError as error:

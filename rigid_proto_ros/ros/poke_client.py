@@ -5,8 +5,8 @@
     poke_client poke --at tip --push 5
     poke_client wrench --force 1 0 0 --for 2
 
-Exit status: 0 all sent, 1 something came late or was refused, 2 the input was refused or no node was found, 130 ended
-by Ctrl-C (143 by SIGTERM): commands already sent still act.
+Exit status: 0 all commands were sent, 1 a command was late or refused, 2 the input was refused or no node was found,
+130 ended by Ctrl-C (143 by SIGTERM): commands already sent still act.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _ONE_LINE_COMMANDS = ("poke", "wrench")
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Send what the arguments say; returns the exit status."""
+    """Send the commands that the arguments give; returns the exit status."""
     own_process = argv is None
     argv = sys.argv[1:] if argv is None else argv
     own = argv[: argv.index("--ros-args")] if "--ros-args" in argv else argv
@@ -35,12 +35,12 @@ def main(argv: list[str] | None = None) -> int:
         from ..scene.script import schedules
 
         args = _arguments(own)
-        # Read before a node is looked for: a mistake in it is told at once.
+        # Read the script before waiting for a node, so that an error in it is reported at once.
         script = _script(args)
         if args.dry_run:
             print("\n".join(text for _, _, text in schedules(script)), flush=True)  # in here: what fails is told
             return 0
-        # Half a second, in which there is nothing to close yet.
+        # This import takes half a second, during which there is nothing to close yet.
         importlib.import_module(".script_sender", __package__)
         if own_process:
             return interrupts.run(lambda: _send(script, args, argv), lambda error: tell("poke_client", error))
@@ -53,8 +53,8 @@ EXAMPLES = (
     ("poke_client poke --at tip --push 0.05", "0.05 N along the inward normal at the contact tip"),
     ("poke_client poke --at vertex/7 --impulse 0.001 0 0", "0.001 N s at a vertex, at once, world axes"),
     ("poke_client wrench --torque 0 0 -2e-4 --axes body --for 3", "a torque held for 3 s, body axes"),
-    ("poke_client msg_examples/flip_and_poke.yaml --reset", "a script, its times counted from the reset"),
-    ("poke_client msg_examples/flip_and_poke.yaml --dry-run", "what it would send"),
+    ("poke_client msg_examples/flip_and_poke.yaml --reset", "a script, with times counted from the reset"),
+    ("poke_client msg_examples/flip_and_poke.yaml --dry-run", "print the commands without sending them"),
 )
 
 
@@ -71,7 +71,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
         "what", metavar="SCRIPT.yaml | poke | wrench", help="a script file, or one command given by the options below"
     )
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
-    parser.add_argument("--reset", action="store_true", help="reset first, so that t is simulated time itself")
+    parser.add_argument("--reset", action="store_true", help="reset first, so that t is absolute simulated time")
     lead, timeout = number_from(0.0, 3600.0), number_from(0.0, MAX_TIME_S)
     parser.add_argument("--lead", type=lead, default=0.2, metavar="S", help="seconds added to every t (default 0.2)")
     parser.add_argument("--dry-run", action="store_true", help="print what would be sent, and send nothing")
@@ -80,9 +80,9 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
         type=timeout,
         default=10.0,
         metavar="S",
-        help="wait this long for the node (default 10; 0: no limit)",
+        help="maximum time to wait for the node (default 10; 0: no limit)",
     )
-    line = parser.add_argument_group("one command from the line")
+    line = parser.add_argument_group("one command from the command line")
     line.add_argument("--at", default="com", help="com, origin, a contact, vertex/<i>, point/<x>,<y>,<z>, ray/...")
     line.add_argument("--force", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N")
     line.add_argument("--push", type=float, metavar="N", help="N along the inward normal")
@@ -90,7 +90,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     line.add_argument("--torque", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N m")
     line.add_argument("--angular-impulse", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N m s (poke only)")
     line.add_argument("--axes", choices=("world", "body"), help="axes of force and torque (default world)")
-    line.add_argument("--slot", metavar="NAME", help="replace what acts in this slot, and nothing else")
+    line.add_argument("--slot", metavar="NAME", help="replace only the wrench or poke in this slot")
     line.add_argument("--for", dest="duration", type=float, metavar="S", help="duration in seconds")
     return parser.parse_args(argv)
 
@@ -113,7 +113,7 @@ def _script(args: argparse.Namespace) -> list[Command]:
 
 
 def _point(text: str) -> str | dict:
-    """A point as a frame writes it, as a script entry writes it."""
+    """Convert a point from the notation of a frame to that of a script entry."""
     try:
         match text.split("/"):
             case ["vertex", number]:
@@ -138,7 +138,7 @@ def _send(script: list[Command], args: argparse.Namespace, argv: list[str]) -> i
 
     from .script_sender import ScriptSender
 
-    # The middleware's own handler would end the context under the clean-up.
+    # The middleware's own signal handler would close the context during the clean-up.
     rclpy.init(args=[sys.argv[0], *argv], signal_handler_options=SignalHandlerOptions.NO)
     sender = None
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A recorded session over ROS once more: its states with their own stamps, or its commands to a node that flies."""
+"""Publish a recorded session over ROS: its states with their recorded stamps, or its commands to a running node."""
 
 from __future__ import annotations
 

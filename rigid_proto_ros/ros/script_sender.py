@@ -69,7 +69,7 @@ class Report:
         refused = f"{self.refused} refused{f' ({why})' if why else ''}"
         text = f"sent {parts}; {self.late} late, {refused}; the last acts at {self.last_ns / 1e9:.6g} s"
         if self.sent and self.reached_ns <= self.last_ns:
-            text += f", but simulated time stands still at {self.reached_ns / 1e9:.6g} s"
+            text += f", but simulated time has stopped at {self.reached_ns / 1e9:.6g} s"
         return text
 
 

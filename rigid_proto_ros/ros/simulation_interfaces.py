@@ -61,7 +61,7 @@ class SimulationInterfaces:
         ]
         response.features.spawn_formats = []
         response.features.custom_info = (
-            "One rigid body, set by parameters, which a reset keeps. A step is one publication period. "
+            "One rigid body, defined by parameters, which a reset keeps. A step is one publication period. "
             "Time and state are reset together: SCOPE_ALL."
         )
         return response

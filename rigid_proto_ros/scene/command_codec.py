@@ -51,14 +51,14 @@ _FIELDS: dict[str, dict[str, int | slice]] = {
 """Where the doubles of a message stand in the content of its event: ixx ixy ixz iyy iyz izz is the tensor."""
 
 Names = tuple[str, str]
-"""What the world's and the body's frame are called."""
+"""Names of the world frame and the body frame."""
 
 WORDS: Names = ("world", "body")
 """Names that every node reads."""
 
 
 def frame_names(parameters: Parameters, node_name: str) -> Names:
-    """What the node of this name calls the world's frame and the body's."""
+    """The names that the node of this name uses for the world frame and the body frame."""
     world, body = parameters.world_frame, parameters.body_frame
     return world, body or node_name.rpartition("/")[2] or "rigid_body"
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Every parameter, declared once: its type, ROS descriptors, the command line's help and the table in the
-docs come from here.
+"""Every parameter, declared once. Its type, the ROS descriptors, the command line's help and the table in the docs are
+derived from these declarations.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
 
-# What is declared of a parameter
+# Declaration of a parameter
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def _port(default: int, description: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class ExplicitInertia:
-    """The body by numbers, for ``inertia_model`` explicit."""
+    """Mass properties given as numbers, for ``inertia_model`` explicit."""
 
     mass: float = declare(1.0, "Mass of the explicit model.", "kg", lower=0.0, upper=HUGE, above=True)
     center_of_mass: Vector = declare(ZERO, "Centre of mass of the explicit model, in mesh coordinates.", "mesh units")
@@ -177,21 +177,21 @@ class ExplicitInertia:
 
 @dataclass(frozen=True, slots=True)
 class ThrusterRules:
-    """What holds for all thrusters."""
+    """Parameters of all thrusters."""
 
     bidirectional: bool = declare(
         False,
-        "Thrusters push both ways, up to their limit of either sign; else from 0 to their limit.",
+        "Whether thrusters push in both directions, up to their limit; otherwise only forwards, from 0 to their limit.",
         changes=READ_ONLY,
     )
     minimum_on_time: float = declare(
-        0.0, "Once on, a thruster pushes at least so long.", "s", lower=0.0, upper=1e9, changes=READ_ONLY
+        0.0, "Minimum time for which a thruster stays on.", "s", lower=0.0, upper=1e9, changes=READ_ONLY
     )
 
 
 @dataclass(frozen=True, slots=True)
 class InitialState:
-    """What the body does at time 0."""
+    """State of the body at time 0."""
 
     position: Vector = declare(ZERO, "Position of the centre of mass at time 0, world axes.", "m", changes=AT_RESET)
     orientation_xyzw: Four = declare(
@@ -203,8 +203,8 @@ class InitialState:
     angular_velocity: Vector = declare(ZERO, "Angular velocity at time 0, world axes.", "rad/s", changes=AT_RESET)
     string_mass: float = declare(
         0.0,
-        "Effective mass that stiffness and damping of a string tied at time 0 are taken from; 0 is that of the body as "
-        "it lies then.",
+        "Effective mass from which the stiffness and damping of a string tied at time 0 are computed; 0 means that of "
+        "the body in its initial state.",
         "kg",
         lower=0.0,
         upper=HUGE,
@@ -216,82 +216,84 @@ class InitialState:
 class StringParameters:
     """The string."""
 
-    attached: bool = declare(False, "The string is tied from the start, without a timeout.")
-    attach: Vector = declare(ZERO, "Where it is tied, in mesh coordinates.", "mesh units")
-    target: Vector = declare(ZERO, "Where its free end is while it is tied from the start, world axes.", "m")
+    attached: bool = declare(False, "Whether the string is tied from the start, without a timeout.")
+    attach: Vector = declare(ZERO, "Point of the body where the string is tied, in mesh coordinates.", "mesh units")
+    target: Vector = declare(ZERO, "Position of the free end of a string tied from the start, world axes.", "m")
     stiffness: float = declare(50.0, "Stiffness of the string.", "N/m", lower=0.0, upper=1e30)
     frequency: float = declare(
         0.0,
-        "Above 0 it takes precedence over stiffness: angular frequency of the effective mass on the string, so that "
-        "light and heavy bodies respond alike.",
+        "Angular frequency of the effective mass on the string, so that light and heavy bodies respond alike; above 0 "
+        "it takes precedence over stiffness.",
         "rad/s",
         lower=0.0,
         upper=1e15,
     )
-    damping_ratio: float = declare(0.1, "Damping of the string relative to critical.", lower=0.0, upper=1e6)
-    rest_length: float = declare(0.0, "Length up to which the string doesn't pull.", "m", lower=0.0, upper=1e30)
-    bilateral: bool = declare(False, "The string pushes too, as a spring does.")
+    damping_ratio: float = declare(0.1, "Damping of the string, relative to critical damping.", lower=0.0, upper=1e6)
+    rest_length: float = declare(
+        0.0, "Rest length of the string, up to which it doesn't pull.", "m", lower=0.0, upper=1e30
+    )
+    bilateral: bool = declare(False, "Whether the string also pushes, as a spring does.")
     timeout: float = declare(
-        1.0, "The string is released this long after the last target message; 0 never.", "s", lower=0.0, upper=1e9
+        1.0, "Time from the last target message to the string's release; 0 means never.", "s", lower=0.0, upper=1e9
     )
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseParameters:
-    """How ~/imu errs; the motion and all other topics stay exact."""
+    """Errors of ~/imu; the motion and all other topics stay exact."""
 
     imu: Four = declare(
         (0.0, 0.0, 0.0, 0.0),
-        "Errors in ~/imu: densities of white noise of angular velocity and specific force [per √Hz], then the standard "
+        "Errors of ~/imu: white noise densities of angular velocity and specific force [per √Hz], then the standard "
         "deviations of their biases.",
         "rad/s, m/s²",
         lower=0.0,
     )
     seed: int = declare(
-        0, "Seed of the noise: the same seed gives the same errors at the same stamps.", lower=0, upper=2**62
+        0, "Seed of the noise; the same seed gives the same errors at the same stamps.", lower=0, upper=2**62
     )
 
 
 @dataclass(frozen=True, slots=True)
 class GhostParameters:
-    """What differs of the ghost; it is shown where one is given."""
+    """How the ghost differs from the body; a ghost is shown when one of these is given."""
 
     inertia_model: str = declare(
         "",
-        "Show a ghost beside the body, from time 0 or the next reset on, that gets the same commands under this "
-        "inertia model.",
+        "Inertia model of a ghost that is shown beside the body, from time 0 or the next reset on, and gets the same "
+        "commands.",
         choices=("", *INERTIA_MODELS),
     )
     integrator: str = declare(
         "",
-        "Show a ghost, from time 0 or the next reset on, that gets the same commands under this integrator.",
+        "Integrator of a ghost that is shown, from time 0 or the next reset on, and gets the same commands.",
         choices=("", *INTEGRATOR_FILES),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """A value for every parameter. ``string.stiffness`` of files, ROS and command line is
+    """A value for every parameter. What files, ROS and command line call ``string.stiffness`` is
     ``parameters.string.stiffness`` here.
 
-    ``replaced`` makes one from values by name, with all checks; ``named`` gives those back. contacts: named points of
-    the body. ballast: point masses by name. thrusters: point, direction and limit by name. All in mesh
-    coordinates.
+    ``replaced`` returns a copy with values changed by name, with all checks; ``named`` returns all values by name.
+    contacts: named points of the body. ballast: point masses by name. thrusters: point, direction and limit by name.
+    All in mesh coordinates.
     """
 
     mesh: str = declare(
         "t_handle",
         "Mesh of the body: a path, a package:// URI or a bundled name; empty only with the explicit inertia model.",
     )
-    mesh_repair: bool = declare(False, "Orient, weld and cap a mesh that isn't closed, as with inspect --repair.")
+    mesh_repair: bool = declare(False, "Orient, weld and cap a mesh that isn't closed, as inspect --repair does.")
     mesh_fallback: str = declare(
         "",
-        "Fallback shape for a mesh that encloses no volume, as with inspect --fallback.",
+        "Substitute shape for a mesh that encloses no volume, as with inspect --fallback.",
         choices=("", "hull", "box"),
     )
     scale: tuple[float, ...] = declare(
         (1.0, 1.0, 1.0),
-        "Mesh coordinates times scale are metres; one number or one per axis, a negative one mirrors.",
+        "Factor from mesh coordinates to metres; one number or one per axis, a negative number mirrors.",
         "m per mesh unit",
         lower=-1e9,
         upper=1e9,
@@ -314,21 +316,21 @@ class Parameters:
     )
     inertia_model_com: str = declare(
         "model",
-        "Where the model's centre of mass lies: where the model has it, or where the true solid has it, so that what "
-        "the tensor does is seen alone; explicit numbers keep theirs.",
+        "Which centre of mass is used, that of the inertia model or that of the solid; with the latter, only the "
+        "tensors differ; the explicit model always keeps its own.",
         choices=MODEL_COMS,
     )
     explicit_inertia: ExplicitInertia = ExplicitInertia()
-    gyroscopic: bool = declare(True, "Keep the term ω × Iω; without it the motion isn't that of a rigid body.")
+    gyroscopic: bool = declare(True, "Include the term ω × Iω; without it the motion isn't that of a rigid body.")
     gravity: Vector = declare(ZERO, "Acceleration of gravity, world axes.", "m/s²")
     linear_damping: float = declare(
-        0.0, "Damping force at the centre of mass per velocity.", "N s/m", lower=0.0, upper=HUGE
+        0.0, "Damping force at the centre of mass, per velocity.", "N s/m", lower=0.0, upper=HUGE
     )
-    angular_damping: float = declare(0.0, "Damping torque per angular velocity.", "N m s", lower=0.0, upper=HUGE)
+    angular_damping: float = declare(0.0, "Damping torque, per angular velocity.", "N m s", lower=0.0, upper=HUGE)
     initial: InitialState = InitialState()
     integrator: str = declare(
         "auto",
-        "Integrator of the motion; auto picks the cheapest that meets accuracy.",
+        "Integrator of the motion; auto selects the cheapest one that meets accuracy.",
         choices=tuple(INTEGRATOR_FILES),
     )
     step: float = declare(
@@ -336,7 +338,7 @@ class Parameters:
     )
     accuracy: float = declare(
         1e-9,
-        "Local error a second that auto allows: angle, displacement per half diagonal, relative velocities.",
+        "Local error per second that auto allows: angle, displacement per half diagonal, relative velocities.",
         "1/s",
         lower=1e-16,
         upper=1.0,
@@ -348,35 +350,35 @@ class Parameters:
     )
     lockstep: bool = declare(
         False,
-        "While paused, each message taken from ~/wrench or ~/thrusters steps the simulation, as ~/step does; "
-        "without its round trip.",
+        "While paused, each message received on ~/wrench or ~/thrusters steps the simulation as ~/step does, but "
+        "without the round trip of a service call.",
     )
     start_paused: bool = declare(False, "Start paused.", changes=READ_ONLY)
     wrench_timeout: float = declare(
         1.5,
-        "A held wrench ends this long after its last message; 0 holds it until it is replaced.",
+        "Time from the last message of a held wrench to its end; 0 holds it until it is replaced.",
         "s",
         lower=0.0,
         upper=1e9,
     )
-    poke_duration: float = declare(0.05, "Duration of a poke that states none.", "s", lower=1e-9, upper=1e9)
+    poke_duration: float = declare(0.05, "Duration of a poke that doesn't give one.", "s", lower=1e-9, upper=1e9)
     schedule_horizon: float = declare(
-        3600.0, "How far ahead of simulated time a command's stamp may lie.", "s", lower=0.0, upper=1e9
+        3600.0, "Maximum time by which a command's stamp may lie ahead.", "s", lower=0.0, upper=1e9
     )
     string: StringParameters = StringParameters()
     publish_clock: bool = declare(False, "Publish simulated time on /clock.")
     publish_tf: bool = declare(False, "Publish the body's frame on /tf (where tf2_msgs is installed).")
-    imu_contact: str = declare("", "Contact at which ~/imu measures; empty means the centre of mass.")
+    imu_contact: str = declare("", "Contact where the IMU of ~/imu is; empty means the centre of mass.")
     noise: NoiseParameters = NoiseParameters()
     ghost: GhostParameters = GhostParameters()
     world_frame: str = declare("world", "Name of the world frame in published messages.", changes=READ_ONLY)
     body_frame: str = declare(
         "", "Name of the body's frame in published messages; empty means the node's name.", changes=READ_ONLY
     )
-    record: str = declare("", "Record the session to this .rrd (Rerun) or .mcap (bag) file; empty records nothing.")
+    record: str = declare("", "Record the session to this .rrd (Rerun) or .mcap (bag) file; empty means no recording.")
     viewer: str = declare(
         "none",
-        "Show the motion live: web in Rerun in the browser, native in Rerun's own window, workbench on the "
+        "Live view of the motion: web for Rerun in the browser, native for Rerun's own window, workbench for the "
         "interactive page.",
         choices=("none", "web", "native", "workbench"),
         changes=READ_ONLY,
@@ -390,9 +392,9 @@ class Parameters:
     thrusters: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def replaced(self, changes: Mapping[str, object]) -> Parameters:
-        """With these changed, by name, each converted and checked by its declaration; raises InputError.
+        """A copy with these values changed, by name, each converted and checked by its declaration; raises InputError.
 
-        A density that is set without a mass sets the mass, which would win, to 0.
+        A density that is set without a mass sets the mass to 0, since the mass takes precedence.
         """
         groups: dict[str, dict[str, Any]] = {}
         for name, value in convert_all(with_mass_of_density(changes)).items():
@@ -454,8 +456,8 @@ PATTERNS: dict[str, Parameter] = {
     ),
     "thrusters.": _pattern(
         "thrusters.<name>",
-        "A thruster on the body, commanded by ~/thrusters: x, y, z and the direction of its force in mesh coordinates; "
-        "behind them, where wanted, the largest force (0 for any).",
+        "A thruster on the body, commanded by ~/thrusters: x, y, z and the direction of its force in mesh coordinates, "
+        "optionally followed by its largest force (0 for no limit).",
         "mesh units, N",
         (6, 7),
         READ_ONLY,
@@ -481,7 +483,7 @@ def parameter_named(name: str) -> Parameter:
 
 
 ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
-"""Parameters that every rclpy node has, so a dump of one holds them; a name ending in a dot is a prefix."""
+"""Parameters that every rclpy node has, so that a parameter dump contains them; a name ending in a dot is a prefix."""
 
 
 def is_ros_parameter(name: str) -> bool:
@@ -495,5 +497,5 @@ def convert_all(values: Mapping[str, object]) -> dict[str, Value]:
 
 
 def with_mass_of_density(changes: Mapping[str, object]) -> Mapping[str, object]:
-    """The changes, with mass 0 where they set a density and no mass: the mass there was would win."""
+    """The changes, with mass 0 where they set a density and no mass, since a mass above 0 takes precedence."""
     return {**changes, "mass": 0.0} if "density" in changes and "mass" not in changes else changes

@@ -145,7 +145,7 @@ class ScenarioRun:
         self.ghost: Ghost | None = None
 
     def announce(self) -> None:
-        """Tell the observer what flies: the scene with its mesh, then the body."""
+        """Notify the observer of the scene with its mesh, then of the body."""
         notify_start(self.observer, self.scenario)
         self.simulation.announce()
 
@@ -198,7 +198,7 @@ class ScenarioRun:
 
 
 def notify_start(observer: Observer, scenario: Scenario) -> None:
-    """Tell an observer what flies."""
+    """Notify an observer of the scene and the body."""
     mesh = scenario.body_mesh
     if mesh is None:
         observer.on(Started(scenario.text, None, None, ""))

@@ -64,7 +64,7 @@ def read_scene_file(path: str | Path, node_name: str = "rigid_body") -> SceneFil
 
 
 def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body") -> SceneFile:
-    """As ``read_scene_file``, from text; ``name`` stands in errors."""
+    """Like ``read_scene_file``, but from text; ``name`` is used in error messages."""
     scene = SceneFile()
     root = compose_yaml(text, name)
     if root is None:
@@ -85,7 +85,7 @@ def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body
         value = scene.values.pop(parameter)
         # A recorded scene holds all parameters of its version: what had no effect is left out.
         if any(value) if isinstance(value, list) else value not in (0, "", GONE_DEFAULTS.get(parameter)):
-            raise InputError(f"{name}, {parameter}", "a parameter of an earlier version, which this one hasn't")
+            raise InputError(f"{name}, {parameter}", "a parameter of an earlier version that no longer exists")
     scene.wildcard = scene.values.keys() - named
     return scene
 
@@ -97,7 +97,7 @@ def scene_values(
     scene = read_scene_file(path, node_name)
     if scene.unused and not scene.has_section:
         there = ", ".join(scene.unused[:5])
-        warn(f"{path}: no section is for /{node_name.lstrip('/')} (it has {there}); /** is for every node")
+        warn(f"{path}: there is no section for /{node_name.lstrip('/')} (it has {there}); /** is for every node")
     values: dict[str, object] = {}
     for parameter, value in scene.values.items():
         if is_ros_parameter(parameter):

@@ -160,7 +160,7 @@ def _held_wrench(entry: Any, stamp: Stamp) -> list[Command]:
 
 def _thrusters(forces: Any, stamp: Stamp) -> list[Command]:
     if not isinstance(forces, list) or not forces:
-        raise InputError("", forces, "a list of forces [N], one a thruster in the order of their names")
+        raise InputError("", forces, "a list of forces [N], one per thruster in the order of their names")
     return [ThrusterCommand(tuple(_number(force, "") for force in forces), **stamp)]
 
 
@@ -192,7 +192,7 @@ def _set(changes: Any, stamp: Stamp) -> list[Command]:
     if not isinstance(changes, dict) or not changes:
         raise InputError("", changes, "{parameter: value, ...}")
     if "record" in changes:
-        accepted = "parameters of the motion; ros2 param set switches record"
+        accepted = "parameters of the motion; set record by ros2 param set"
         raise InputError("record", changes["record"], accepted)
     return [Change({str(name): value for name, value in changes.items()}, **stamp)]
 

@@ -29,7 +29,7 @@ _INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|\d+)\Z", re.ASCII)
 _DOUBLE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z", re.ASCII)
 _SPECIAL = re.compile(r"[+-]?\.?(inf|infinity|nan)\Z", re.IGNORECASE)
 _WORD = re.compile(r"(?!null\Z)[a-z_]{3,}\Z")
-"""Text that stands in YAML without quotes, unless it reads as true or false."""
+"""Text that needs no quotes in YAML, unless it means true or false."""
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """libyaml's, ten times as fast, where it is installed."""
@@ -45,7 +45,7 @@ def read_text(path: Path, kind: str) -> str:
 
 
 def compose_yaml(text: str, name: str) -> yaml.Node | None:
-    """The YAML tree of a text, with its lines; raises InputError, where ``name`` stands."""
+    """The YAML tree of a text, with line numbers; raises InputError, in which ``name`` is the name of the text."""
     try:
         depth = 0
         for event in yaml.parse(text, Loader=_LOADER):
@@ -144,7 +144,7 @@ def dump_yaml(value: object) -> str:
 
 
 def yaml_value(value: object) -> str:
-    """A parameter's value as it stands in a YAML file, with all its digits."""
+    """A parameter's value as written to a YAML file, with all digits."""
     # JSON is YAML; repr keeps all digits, and a double keeps its point so that it is read back as one.
     if isinstance(value, float):
         text = repr(value)

@@ -139,7 +139,7 @@ def _files(path: Path) -> list[Path]:
         return [path]
     files = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
     if not files:
-        accepted = "a folder with .mcap files; ros2 bag convert makes one of other or compressed files"
+        accepted = "a folder with .mcap files; ros2 bag convert rewrites other or compressed files"
         raise InputError("session", str(path), accepted)
     return files
 
@@ -163,7 +163,7 @@ def session_runs(path: Path, node: str = "") -> list[RecordedSession]:
     if MADE_WITH not in content.metadata and any(
         kind == "clock" and told.get("offset_ns") for _, kind, told in decoded
     ):
-        accepted = "what the node's own parameter record writes; a followed /clock stamps the topics by its own time"
+        accepted = "a recording by the parameter record; the stamps of these topics are those of a followed /clock"
         raise InputError("session", str(path), accepted)
     states = {name: _states(content, prefix, name) for name in PROJECTIONS}
     states = {name: found for name, found in states.items() if len(found[0])}
@@ -209,7 +209,7 @@ def session_runs(path: Path, node: str = "") -> list[RecordedSession]:
 
 
 def _prefix(content: BagContent, path: str, node: str) -> str:
-    """What stands before the topics' names: the node's name with a slash before it."""
+    """The prefix of the topics' names: the node's name after a slash."""
     kinds: dict[str, set[str]] = {}
     for topic, message_type in content.types.items():
         before, slash, name = topic.rpartition("/")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Is a recording what it says? Its chain of events, and every state computed anew, to the bit; and where they part."""
+"""Verify a recording: check its chain of events, recompute every state bit for bit, and find the first difference."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
     if (broken := broken_link(recorded)) is not None:
         if broken == 1 and first_ns > 0:
             raise began_later
-        what = f"command {broken} isn't what its hash says: {recorded[broken - 1]}"
+        what = f"command {broken} doesn't match its hash: {recorded[broken - 1]}"
         return Difference(times_ns[broken - 1], what, tampered=True)
     computed = _Lines()
     again = resimulation(session, computed)

@@ -71,7 +71,7 @@ class Mailbox:
         self._moved_at = time.monotonic()
 
     def wait(self, seconds: float) -> None:
-        """Return after ``seconds``, or at once when much waits, on ``wake`` and when the mailbox is closed."""
+        """Return after ``seconds``, or at once when the mailbox is filling up, is closed, or on ``wake``."""
         self._wake.wait(seconds)
         self._wake.clear()
 

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from mcap.writer import Writer
 
 FLUSH_PERIOD_S = 0.4
-"""What a kill -9 loses at most."""
+"""Longest part [s] of a recording that kill -9 loses."""
 
 CHUNK_NS = 500_000_000
 """Simulated time that a chunk holds at most: what a cut inside it loses, also in a run faster than the clock."""

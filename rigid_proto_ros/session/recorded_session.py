@@ -123,7 +123,7 @@ def find_mesh(
                 path.write_bytes(data)
                 return load_mesh(str(path))
     raise MeshError(
-        "mesh", name, f"the file with SHA-256 {sha256}, there or beside the session; the recording doesn't hold it"
+        "mesh", name, f"the file with SHA-256 {sha256}, there or in the session's folder; the recording lacks it"
     )
 
 

@@ -84,7 +84,7 @@ class Flight:
             raise InputError("step", simulation.failure)
         if simulation.refused.total() > refused:
             counts = ", ".join(f"{count} {reason}" for reason, count in simulation.refused.items())
-            raise CommandRefused("schedule", "command", f"refused when it came to act ({counts})")
+            raise CommandRefused("schedule", "command", f"refused when it was due to act ({counts})")
         return simulation.state
 
     def sample(self) -> State:

@@ -228,7 +228,7 @@ def make_study(spec: Any, name: str = "study", folder: Path = Path()) -> Study:
     vary = _vary(spec["vary"], name, base.parameters, script)
     reference = _reference(spec.get("reference"), f"{name}, reference")
     if measures.needs_reference and reference is None:
-        raise InputError(f"{name}, reference", None, "parameters of a reference, as a difference is measured")
+        raise InputError(f"{name}, reference", None, "parameters of a reference, since a difference is measured")
     samples = _samples(spec.get("samples"), f"{name}, samples", vary)
     study = Study(name, base.parameters, script, nanoseconds(duration_s), seed, samples, vary, reference, measures)
     if study.rows > MAX_ROWS:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The body's tab: size, mass and tensor, the true one next to an approximate one, and its mesh.
+"""The body's tab: size, mass and tensor, the true tensor next to an approximate one, and its mesh.
 
-Meshes that come from a browser are judged as ``inspect`` judges files, asked for unit and up axis, and flown. A body
-reads its mesh by path, so the file lies in a folder made here, for as long as it flies; a saved take carries it.
+Uploaded meshes are checked as by ``inspect``; the user gives the unit, then they are simulated. A body reads its mesh
+by path, so the file is kept in a temporary folder for as long as the body is simulated; a saved recording contains it.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ OWN_FILE = "(a file)"
 
 
 class BodyTab:
-    """Everything about mass and shape. ``changed`` is called whenever the parameters have. fly(values) begins a scene
-    of these parameters, and says whether it was taken.
+    """Everything about mass and shape. ``changed`` is called whenever the parameters have changed. fly(values) starts a
+    scene with these parameters, and returns whether it was accepted.
     """
 
     def __init__(
@@ -53,8 +53,8 @@ class BodyTab:
         self._base_scale = self._base_mass = 1.0
         with tabs.add_tab("Body"):
             with gui.add_folder("Size and mass"):
-                controls.factor("Size ×", "All three scales together (scale)", 1.0, self._size_factor, self._set_size)
-                hint = "Times the original mass, without ballast (mass)"
+                controls.factor("Size ×", "Factor on all three scales (scale)", 1.0, self._size_factor, self._set_size)
+                hint = "Factor on the original mass, without ballast (mass)"
                 controls.factor("Mass ×", hint, 2.0, self._mass_factor, self._set_mass)
                 controls.numbers("density", "Density [kg/m³]")
             with gui.add_folder("Inertia"):
@@ -64,7 +64,7 @@ class BodyTab:
                 tensor = gui.add_text("Tensor", "", hint=hint)
             with gui.add_folder("Mesh"):
                 mesh = gui.add_dropdown(
-                    "Body", (OWN_FILE, *body_names()), initial_value=OWN_FILE, hint="Bundled (mesh)"
+                    "Body", (OWN_FILE, *body_names()), initial_value=OWN_FILE, hint="A bundled mesh (mesh)"
                 )
                 self.upload = UploadFolder(gui, flight, fly, self.show_verdict)
                 self._verdict = gui.add_markdown("")
@@ -78,18 +78,18 @@ class BodyTab:
 
     @property
     def table(self) -> str:
-        """The true tensor beside another, as it is shown."""
+        """The table that compares the true tensor with another one, as shown."""
         return str(self._table.content)
 
     def changed(self, scenario: Scenario, another: bool) -> None:
-        """Show what follows from the parameters in force; ``another`` body is the measure of "times" from now on."""
+        """Show the results of the parameters in force; with ``another``, this body is the new reference of factors."""
         if another:
             self._base_scale = float(np.prod(np.abs(scenario.setup.body.scale))) ** (1.0 / 3.0)
             self._base_mass = _own_mass(scenario)
         self._table.content = comparison(scenario)
 
     def show_verdict(self, lines: Sequence[str]) -> None:
-        """What is to be said of a mesh, one line each."""
+        """Show these remarks on a mesh, one per line."""
         self._verdict.content = "\n".join(f"- {line}" for line in lines)
 
     def _size_factor(self, values: Mapping[str, Any]) -> float:
@@ -99,7 +99,7 @@ class BodyTab:
     def _set_size(self, factor: float) -> dict[str, object]:
         scale = self._flight.scenario.setup.body.scale
         present = float(np.prod(np.abs(scale))) ** (1.0 / 3.0)
-        # The root's rounding would stand in what is shown and refused: 999999999999.9991 for 1e12.
+        # Otherwise the rounding of the root would be visible in values and messages: 999999999999.9991 for 1e12.
         return {"scale": [float(f"{x:.14g}") for x in scale * (factor * self._base_scale / present)]}
 
     def _mass_factor(self, _: Mapping[str, Any]) -> float:
@@ -132,7 +132,7 @@ class BodyTab:
 
 
 def _own_mass(scenario: Scenario) -> float:
-    """Mass [kg] without ballast: as its parameter says, or what the density gives."""
+    """Mass [kg] without ballast: that of its parameter, or that computed from the density."""
     parameters = scenario.parameters
     explicit = parameters.inertia_model == "explicit"
     given = parameters.explicit_inertia.mass if explicit else parameters.mass
@@ -140,17 +140,17 @@ def _own_mass(scenario: Scenario) -> float:
     return given if given > 0.0 else scenario.setup.body.mass - weights
 
 
-# The true tensor beside an approximate one
+# Comparison of the true tensor with an approximate one
 
 TURNED = 1e-6
-"""[°] The same of an angle between axes, whose moments may be close to each other."""
+"""[°] Smaller angles between axes are shown as 0: they are rounding, since moments may be close to each other."""
 
 TITLES = {"solid": "solid (true)", "shell": "shell", "points": "points", "bounding_box": "bounding box"}
 
 
 def model_properties(scenario: Scenario, model: str, com: str = "") -> MassProperties:
-    """Mass properties of the scenario's body under a model; raises InputError where that can't be had. com: one of
-    MODEL_COMS, as the scenario has it where it is empty.
+    """Mass properties of the scenario's body under a model; raises InputError if they don't exist. com: one of
+    MODEL_COMS; empty means that of the scenario.
     """
     changes = {"inertia_model": model, "inertia_model_com": com or scenario.parameters.inertia_model_com}
     body = scenario.with_changes(changes).setup.body
@@ -158,7 +158,7 @@ def model_properties(scenario: Scenario, model: str, com: str = "") -> MassPrope
 
 
 def comparison(scenario: Scenario) -> str:
-    """The true tensor and the one in force, or the bounding box's where that is the true one, as a table.
+    """Table of the true tensor and the tensor in force, or that of the bounding box if the true one is in force.
 
     Errors are relative to each moment.
     """
@@ -187,10 +187,10 @@ def comparison(scenario: Scenario) -> str:
     lines += [
         f"| principal axes turned by | | | **{turned if turned > TURNED else 0.0:.3g}°** |",
         f"| mass [kg] | {true.mass:.5g} | {approximate.mass:.5g} | {_per_cent(error)} % |",
-        f"| COM of its own, off by | | {away:.3g} m | **{100.0 * away / size:.2g} % of the size** |",
+        f"| distance of its own COM | | {away:.3g} m | **{100.0 * away / size:.2g} % of the size** |",
     ]
     if np.linalg.norm(difference.center_of_mass) < 1e-9 * size < away:
-        lines += ["", "It is simulated with the COM of the solid."]
+        lines += ["", "The simulation uses the COM of the solid."]
     return "\n".join(lines)
 
 
@@ -199,29 +199,29 @@ def _per_cent(error: float) -> str:
     return f"{100.0 * seen:+.3g}" if seen else "0"
 
 
-# Meshes that come from a browser
+# Uploaded meshes
 
 MAX_BYTES = 256_000_000
-"""Of one upload: it comes over the page's socket and stands in memory whole. Larger files are named by path."""
+"""Largest upload: it is sent over the page's socket and held completely in memory. Give larger files by path."""
 
 ACCEPTED = (*OWN_FORMATS, "glb")
-"""Endings of files that hold all of the mesh: .gltf and .dae may name other files, .3mf is a zip."""
+"""Extensions of files that contain the whole mesh: .gltf and .dae may refer to other files, .3mf is a zip."""
 
 Y_UP = ("glb", "obj")
-"""glTF says so, and most tools write .obj like that; what it says itself, in a comment ``# z up``, comes first."""
+"""glTF requires y up, and most tools write .obj like that; a comment ``# z up`` in an .obj takes precedence."""
 
 Z_UP_COMMENT = re.compile(rb"^#.*\bz[ -]?(?:axis )?(?:is )?up\b", re.IGNORECASE | re.MULTILINE)
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-"""Metres, by the name of what a file's numbers may be in."""
+"""Length in metres of each unit that a file may use."""
 
 HALF = math.sqrt(0.5)
 UPRIGHT = {"z": [0.0, 0.0, 0.0, 1.0], "y": [HALF, 0.0, 0.0, HALF]}
 """Attitudes xyzw that turn a file's up axis to the world's z."""
 
 ROOM_SIZE = 20.0
-"""A file whose longest side is more than this isn't in metres: meshes are of things, and most of these
-are in millimetres.
+"""A file whose longest side is larger than this is assumed not to be in metres, but in millimetres, as most meshes of
+objects are.
 """
 
 SENSIBLE_DENSITY = 1000.0
@@ -230,8 +230,8 @@ SENSIBLE_DENSITY = 1000.0
 
 @dataclass(frozen=True)
 class Upload:
-    """name: as shown. path: for the parameter ``mesh``. up: which of its axes points up, as far as is known.
-    inspection: what is known of it.
+    """name: as shown. path: for the parameter ``mesh``. up: the axis that points up, as far as known. inspection: the
+    result of the check.
     """
 
     name: str
@@ -247,21 +247,21 @@ class Upload:
 
     @property
     def likely_unit(self) -> str:
-        """Which of UNITS it is most likely in."""
+        """The most likely one of UNITS."""
         return "m" if self.name.endswith(".glb") or float(self.sides.max()) <= ROOM_SIZE else "mm"
 
     @property
     def refusal(self) -> str:
-        """Why it can't fly as a solid as it is, or empty."""
+        """Why it can't be simulated as a solid without changes, or empty."""
         return "" if self.inspection.refusal is None else str(self.inspection.refusal)
 
     @property
     def verdict(self) -> list[str]:
-        """One line a remark, the severity first."""
+        """One line per remark, beginning with the severity."""
         return [f"{finding.severity}: {finding.message}" for finding in self.inspection.findings]
 
     def size_and_mass(self, unit: str) -> str:
-        """Its size and mass in one line, its numbers being in this unit and its density SENSIBLE_DENSITY."""
+        """Size and mass in one line, for coordinates in this unit and SENSIBLE_DENSITY."""
         metres = UNITS[unit]
         sides = " × ".join(f"{side * metres:.3g}" for side in self.sides)
         volume = self.inspection.volume
@@ -270,7 +270,7 @@ class Upload:
         return f"{sides} m, {SENSIBLE_DENSITY * volume * metres**3:.3g} kg at {SENSIBLE_DENSITY:g} kg/m³"
 
     def scene(self, unit: str, stand_in: dict[str, object]) -> dict[str, object]:
-        """Parameters of a scene of this body alone, at rest; stand_in: how one that isn't closed flies."""
+        """Parameters of a scene with only this body, at rest; stand_in: parameters that replace an open mesh."""
         return {
             "mesh": self.path,
             "scale": [UNITS[unit]] * 3,
@@ -281,10 +281,10 @@ class Upload:
 
 
 def take_upload(file_name: str, data: bytes) -> Upload:
-    """Judge a file and keep it in a folder of its own; a body that is told the same path again sees no change.
+    """Check a file and keep it in a new folder, since a body that is given the same path again sees no change.
 
-    A readable mesh that bounds no solid is kept too; its ``refusal`` says why. Raises MeshError for what is no mesh,
-    and keeps nothing of it.
+    A readable mesh that bounds no solid is kept, too; its ``refusal`` has the reason. Raises MeshError for a file that
+    isn't a mesh, which isn't kept.
     """
     name, suffix = shown_name(file_name)
     if suffix not in ACCEPTED:
@@ -304,7 +304,7 @@ def take_upload(file_name: str, data: bytes) -> Upload:
 
 
 def shown_name(file_name: str) -> tuple[str, str]:
-    """What is left of a file's name, plain letters, at most 40 before the ending; and the ending itself."""
+    """A file's name reduced to plain characters, at most 40 before the extension; and the extension."""
     stem, _, suffix = re.split(r"[/\\]", file_name)[-1].rpartition(".")
     stem = re.sub(r"[^A-Za-z0-9_-]+", "_", stem).strip("_")[:40] or "mesh"
     suffix = re.sub(r"[^a-z0-9]+", "", suffix.lower())[:8]
@@ -312,9 +312,9 @@ def shown_name(file_name: str) -> tuple[str, str]:
 
 
 class UploadFolder:
-    """viser's upload button, and what is asked before a file flies. fly(values) begins a scene of these parameters;
-    show_verdict(lines) says what is found of a file. Files lie on the disk for as long as they may fly; ``close``
-    removes all.
+    """viser's upload button, and the inputs that are needed before a file is simulated. fly(values) starts a scene with
+    these parameters; show_verdict(lines) shows the remarks on a file. Files stay on the disk for as long as they may be
+    simulated; ``close`` removes all of them.
     """
 
     def __init__(
@@ -361,14 +361,14 @@ class UploadFolder:
             await self._fly({"mesh_repair": True} if repaired else {"mesh_fallback": "hull"})
 
     def close(self, kept: str = "") -> None:
-        """Remove all files but this one."""
+        """Remove all files except this one."""
         for path in self._taken:
             if path != kept:
                 shutil.rmtree(Path(path).parent, ignore_errors=True)
         self._taken = [path for path in self._taken if path == kept]
 
     async def take(self, name: str, content: bytes) -> None:
-        """Judge a file, and say what is found of it."""
+        """Check a file and show the remarks."""
         self.close(self._flight.scenario.parameters.mesh)
         try:
             upload = await asyncio.to_thread(take_upload, name, content)
@@ -380,7 +380,7 @@ class UploadFolder:
         self._show([f"{upload.name}:", *lines] if lines else [f"{upload.name}: no problems found"], upload)
 
     def _show(self, lines: list[str], upload: Upload | None) -> None:
-        """The verdict, and what is asked before this upload flies; None: nothing is asked."""
+        """Show the verdict, and the inputs that are needed before this upload is simulated; None: no inputs."""
         self.present = upload
         self._show_verdict(lines)
         if upload is not None:

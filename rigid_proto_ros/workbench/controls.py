@@ -99,8 +99,8 @@ class Controls:
 
     def any_parameter(self) -> None:
         """One that is chosen by name, as text."""
-        chosen: Any = self._gui.add_dropdown("Parameter", ("mass",), hint="Those that can be changed live")
-        text: Any = self._gui.add_text("Value", "", hint="Numbers with blanks between them; true or false; a name")
+        chosen: Any = self._gui.add_dropdown("Parameter", ("mass",), hint="Those that can change at any time")
+        text: Any = self._gui.add_text("Value", "", hint="Numbers separated by blanks; true or false; a name")
 
         def shown(values: Values) -> object:
             options = tuple(name for name in (*values, NEW_WEIGHT) if parameter_named(name).changes != "read-only")

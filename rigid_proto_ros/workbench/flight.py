@@ -99,7 +99,7 @@ class RunMemory(Observer):
         """The run so far. Raises InputError when more has happened in it than is kept."""
         with self._lock:
             if not self._whole:
-                accepted = f"at most {MAX_EVENTS} commands since the last reset; reset, then go on"
+                accepted = f"at most {MAX_EVENTS} commands since the last reset; reset, then continue"
                 raise InputError("session", "more commands than are kept", accepted)
             states = list(self._states)
             return RecordedSession(

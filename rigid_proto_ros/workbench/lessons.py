@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Lessons on the page: a question first, then what to try and to see, with the numbers that the lesson speaks of. What
-each of them needs of the page, and which of its steps have been carried out.
+"""Lessons on the page: a question, then steps to try, with the quantities that the lesson is about. What each lesson
+needs from the page, and which of its steps have been completed.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ ALONE = "watch 1"
 
 @dataclass(frozen=True)
 class Course:
-    """steps: one for each of the lesson's sentences, a tuple of what it takes: ``poke``, ``poke com``, ``poke away``,
-    ``drag`` and ``reset``, ``set NAME`` of a parameter, ``show NAME`` of a switch, in any order and as often as it is
-    listed, then ``watch SECONDS`` of simulated time.
+    """steps: one for each of the lesson's sentences, a tuple of the actions that complete it: ``poke``, ``poke com``,
+    ``poke away``, ``drag`` and ``reset``, ``set NAME`` for a parameter, ``show NAME`` for a switch, in any order and as
+    often as listed, then ``watch SECONDS`` of simulated time.
 
-    numbers: the readouts that the lesson speaks of. shows: switches that are on, or parts. labels: the parts and
-    contacts that are named in the picture, at most three; an arrow that isn't named isn't drawn. speed: simulated
-    seconds per second. reveals: switches that are on once the question is answered.
+    numbers: the readouts shown with the lesson. shows: switches, or parts, that are on. labels: the parts and contacts
+    with a label in the picture, at most three; an arrow without a label isn't drawn. speed: simulated seconds per
+    second. reveals: switches that are turned on when the question is answered.
     """
 
     steps: tuple[tuple[str, ...], ...]
@@ -142,11 +142,11 @@ COURSES = {
 NO_LESSON = Course(())
 
 LONGEST_NS = 500_000_000
-"""[ns] Between two states that were watched: time that goes on by more, or back, is another beginning."""
+"""[ns] Longest time between two watched states; a longer one, or a step back, starts the watching again."""
 
 
 class LessonProgress:
-    """done: how many steps of the present lesson have been carried out, one after the other."""
+    """done: how many steps of the present lesson have been completed, one after the other."""
 
     def __init__(self) -> None:
         self.done = 0
@@ -156,7 +156,7 @@ class LessonProgress:
         self._last_ns: int | None = None
 
     def begin(self, lesson: str) -> None:
-        """Another lesson, or the same from its beginning; empty for none."""
+        """Start another lesson, or restart the same one; empty for none."""
         self._steps = COURSES.get(lesson, NO_LESSON).steps
         self._go_to(0)
 
@@ -170,14 +170,14 @@ class LessonProgress:
                 self._open.append(what)
 
     def did(self, what: str) -> bool:
-        """Something was done; returns whether that completes a step."""
+        """Note an action; returns whether it completes a step."""
         if what not in self._open:
             return False
         self._open.remove(what)
         return self._completed()
 
     def watched(self, time_ns: int) -> bool:
-        """The body was seen at this simulated time; returns whether that completes a step."""
+        """Note that the body was shown at this simulated time; returns whether that completes a step."""
         before, self._last_ns = self._last_ns, time_ns
         if before is None or self._open or self._watch_ns <= 0.0 or not 0 < time_ns - before <= LONGEST_NS:
             return False
@@ -196,15 +196,15 @@ class LessonProgress:
 FREE = "– (no lesson)"
 
 NUMBERS_S = 0.2
-"""[s] How often the numbers are written anew."""
+"""[s] Interval at which the numbers are updated."""
 
 SPACE = f'<div class="{ANSWERS}"></div>'
-"""Room for answers, on paper."""
+"""Empty space for answers on a printed page."""
 
 
 class LessonPanel:
-    """on_lesson(course) is called when one begins, or none; reveal(names) with the switches that its answer turns on;
-    for_class(on) when class mode, with nothing but picture, lesson and three buttons, begins or ends.
+    """on_lesson(course) is called when a lesson begins or ends; reveal(names) with the switches that its answer turns
+    on; for_class(on) when class mode, which shows only picture, lesson and three buttons, begins or ends.
     """
 
     def __init__(
@@ -231,10 +231,10 @@ class LessonPanel:
             self._text = gui.add_markdown("")
             self._choices: list[Any] = [gui.add_button(letter, visible=False) for letter in "ABC"]
             self._numbers = gui.add_html("")
-            self._script = gui.add_button("Do it with exact forces", visible=False, hint="Runs the lesson's script")
-            self._again = gui.add_button("Begin again", visible=False, hint="The lesson from its start")
-            # Here, for class mode hides the other tabs.
-            self._class: Any = gui.add_checkbox("Class mode", False, hint="In large letters; F11 fills the screen")
+            self._script = gui.add_button("Do it with exact forces", visible=False, hint="Run the lesson's script")
+            self._again = gui.add_button("Begin again", visible=False, hint="Restart the lesson")
+            # In this tab, since class mode hides the others.
+            self._class: Any = gui.add_checkbox("Class mode", False, hint="Large letters; F11 for full screen")
             gui.add_html(SPACE)
         self._choice = choice
 
@@ -266,12 +266,12 @@ class LessonPanel:
 
     @property
     def lesson(self) -> Lesson | None:
-        """The one that is shown, or None."""
+        """The lesson that is shown, or None."""
         return self._lessons.get(str(self._choice.value))
 
     @property
     def course(self) -> Course:
-        """What it needs."""
+        """What the lesson that is shown needs from the page."""
         lesson = self.lesson
         return NO_LESSON if lesson is None else COURSES.get(lesson.name, NO_LESSON)
 
@@ -280,12 +280,12 @@ class LessonPanel:
         self._choice.value = next(title for title, lesson in self._lessons.items() if lesson.name == name)
 
     def leave(self) -> None:
-        """Another body flies: no lesson."""
+        """Leave the lesson, since another body is simulated."""
         self._choice.value = FREE
         self.show()
 
     def show(self) -> None:
-        """Show the chosen lesson, whose scene flies already, from its question on."""
+        """Show the chosen lesson, whose scene is already simulated, beginning with its question."""
         lesson = self.lesson
         self._guess, self._asked = None, lesson is not None
         self._show_buttons()
@@ -315,7 +315,7 @@ class LessonPanel:
                 self.answer(None)
 
     def answer(self, choice: int | None) -> None:
-        """A guess, or none: the motion shows what is right."""
+        """Note the guess, or None, and let the motion show the answer."""
         if self._asked:
             self._guess, self._asked = choice, False
             self._reveal(self.course.reveals)
@@ -331,7 +331,7 @@ class LessonPanel:
         self._text.content = "" if lesson is None else self.text(lesson)
 
     def text(self, lesson: Lesson) -> str:
-        """The question, or what to try, with marks at what is done."""
+        """The question, or the steps to try, with a mark at each completed step."""
         if self._asked:
             return f"**What do you think?**\n\n{lesson.question}"
         lines = []
@@ -347,10 +347,10 @@ class LessonPanel:
             lines += ["", f"{'**You were right.**' if right else correct} {lesson.reason}"]
         return "\n".join(lines)
 
-    # What the steps ask for
+    # Actions that the steps require
 
     def did(self, what: str) -> None:
-        """Something that a step may ask for, as Course.steps names it, was done on the page."""
+        """Note an action on the page, by its name in Course.steps."""
         if self._progress.did(what):
             self._show_text()
 
@@ -364,13 +364,13 @@ class LessonPanel:
     def watched(self, times_ns: Sequence[int]) -> None:
         """The body was seen at these simulated times."""
         if self._asked and not self._flight.paused:
-            self.answer(None)  # somebody would rather see it
+            self.answer(None)  # the user resumed without an answer
         for time_ns in times_ns:
             if self._progress.watched(time_ns):
                 self._show_text()
 
     def draw(self, now_s: float) -> None:
-        """Write the lesson's numbers where that is due."""
+        """Update the lesson's numbers if that is due."""
         if now_s >= self._due_s:
             self._due_s = now_s + NUMBERS_S
             values = self._readings.values

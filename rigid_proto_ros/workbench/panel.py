@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The bar that stays in sight, and the tabs of forces, of the run since the last reset, and of what is shown."""
+"""The time bar, which is always visible, and the tabs for forces, for the run since the last reset, and for display."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1"
 PAUSE, PLAY, STEP, RESET = "Pause", "Play", "Step", "Reset"
 
 REWIND_STEP_S = 0.05
-"""[s] Of the rewind slider."""
+"""[s] Step of the rewind slider."""
 
 RATES = ("24", "25", "30", "60")
 
 GRAVITIES = {"off": [0.0, 0.0, 0.0], "Earth's": [0.0, 0.0, -9.81], "Moon's": [0.0, 0.0, -1.62]}
 
 FORCE_DECADES = 2.0
-"""Of the force's slider, up and down from the force that suits the body."""
+"""Range of the force's slider in decades, up and down from the force that suits the body."""
 
 SEE_INTO, CENTRE_OF_MASS, PATHS = "See into the body", "Centre of mass", "Paths of the COM and of a point"
 
@@ -54,7 +54,7 @@ PARTS: dict[str, tuple[str, ...]] = {
 """Parts of the picture by the name of their switch."""
 
 ALWAYS = (style.STRING, style.HAND, style.LOADS, style.GHOST_MESH)
-"""Parts that are seen wherever they are."""
+"""Parts that are always shown."""
 
 
 class TimeBar:
@@ -94,7 +94,7 @@ class TimeBar:
             await self.play_or_pause()
 
     async def play_or_pause(self) -> None:
-        """Pause or go on; from the past that is looked at, go on from there."""
+        """Pause or resume; if the past is shown, continue from there."""
         if self._flight.moment_ns is not None:
             await self._flight.go_on_from_here()
         else:
@@ -112,7 +112,7 @@ class TimeBar:
 
 
 def motion_words(scenario: Scenario, loads: int, tied: bool, at_rest: bool, paused: bool) -> str:
-    """What the body does. loads: how many act; tied: to a string."""
+    """State of the motion in words. loads: how many loads act; tied: whether a string is tied."""
     setup = scenario.setup
     if paused:
         return "paused"
@@ -132,7 +132,7 @@ def motion_words(scenario: Scenario, loads: int, tied: bool, at_rest: bool, paus
 
 
 class ForcesTab:
-    """What acts on the body: the hand's force and string, the start, gravity, and any parameter by its name."""
+    """Loads on the body: the force of a click, initial spin, gravity, and any parameter by its name."""
 
     def __init__(
         self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle, controls: Controls, tools: Tools, flight: Flight
@@ -140,7 +140,7 @@ class ForcesTab:
         self._tools = tools
         with tabs.add_tab("Forces"):
             with gui.add_folder("By hand"):
-                suits = "Of a poke by a click; times a force that suits the body's mass and size"
+                suits = "Force of a click, relative to a force that suits the body's mass and size"
                 force: Any = log_slider(gui, "Force ×", FORCE_DECADES, suits)
                 self._force = gui.add_html("")
             with gui.add_folder("Motion"):
@@ -172,7 +172,7 @@ class ForcesTab:
 
 
 class SessionTab:
-    """The tab of what is kept of the run since the last reset."""
+    """The tab for the recording of the run since the last reset."""
 
     def __init__(
         self,
@@ -183,11 +183,11 @@ class SessionTab:
         self._flight = flight
         with tabs.add_tab("Record"):
             with gui.add_folder("Rewind"):
-                hint = "Time stands while the past is shown"
+                hint = "Simulated time is paused while the past is shown"
                 self._back: Any = gui.add_slider("Seconds back", 0.0, 10.0, REWIND_STEP_S, 0.0, hint=hint)
-                self._go_on = gui.add_button("Go on from here", disabled=True, hint="With another future")
-            with gui.add_folder("Take, since the last reset"):
-                hint = "What was done by hand; reproduces the motion bit for bit (.zip)"
+                self._go_on = gui.add_button("Go on from here", disabled=True, hint="From the time that is shown")
+            with gui.add_folder("Recording since the last reset"):
+                hint = "The commands given on this page; they reproduce the motion bit for bit (.zip)"
                 save = gui.add_button("Save scene and script", hint=hint)
                 rate: Any = gui.add_dropdown("Frames a second", RATES, initial_value="30")
                 export = gui.add_button("Save as glTF", hint="For Blender and others (.glb)")
@@ -217,7 +217,7 @@ class SessionTab:
                 await self._saving(event.client, "take.glb", lambda: self._motion(float(rate.value)))
 
     def draw(self) -> None:
-        """How far back one can go grows while the body flies."""
+        """Update the range of the rewind slider, which grows with the run."""
         flight = self._flight
         first_s, last_s = flight.reach_s
         looking = flight.moment_ns is not None
@@ -226,7 +226,7 @@ class SessionTab:
             if self._back.max != available:
                 self._back.max = available
         back_s = last_s - (flight.moment_ns or 0) * 1e-9 if looking else 0.0
-        # What a hand has just set may be more than there is; only what differs by a step is written over it.
+        # The user may have set more than is available; the value is overwritten only if it differs by a step.
         if abs(self._back.value - back_s) > 0.5 * REWIND_STEP_S:
             self._back.value = min(back_s, self._back.max)
         self._go_on.disabled = not looking
@@ -246,7 +246,7 @@ class SessionTab:
         mesh = self._flight.scenario.body_mesh
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
             if mesh is not None and mesh.mesh.path == self._flight.scenario.parameters.mesh:
-                # Beside the scene, which names it: the file itself may be gone by then.
+                # In the folder of the scene, which refers to it: the original file may no longer exist later.
                 name = Path(mesh.mesh.path).name
                 archive.writestr(name, Path(mesh.mesh.path).read_bytes())
                 scene = scene.replace(mesh.mesh.path, name)
@@ -267,8 +267,8 @@ class SessionTab:
 
 
 class ShowTab:
-    """switch(part, shown) shows a part; see_into(on) and dark(on) do what they say. on_shown(name) is told of what is
-    switched on.
+    """switch(part, shown) shows or hides a part; see_into(on) makes the body transparent, dark(on) selects the dark
+    theme. on_shown(name) is called when something is switched on.
     """
 
     def __init__(
@@ -307,7 +307,7 @@ class ShowTab:
             self._switch(part, shown)
 
     def show_for(self, names: Iterable[str]) -> None:
-        """Switch on what a scene needs, by names of switches or of parts, and off the rest."""
+        """Switch on what a scene needs, by names of switches or of parts, and the rest off."""
         wanted = set(names)
         for name, box in self._switches.items():
             box.value = not wanted.isdisjoint((name, *PARTS.get(name, ())))

@@ -169,7 +169,7 @@ def test_a_script_with_a_mistake_is_refused(name, tmp_path, capfd):
         (["simulate", "t_handle", "--recrod", "x.rrd"], "did you mean --record?"),
         (["simulate", "t_handle", "--bag", "/not/there/x.mcap"], "a folder that exists"),
         (["replay", "x.rrd", "--publish", "state"], "did you mean states?"),
-        (["replay", "book.rrd", "hammer.rrd"], "one argument too many"),
+        (["replay", "book.rrd", "hammer.rrd"], "an unexpected argument"),
         (["demo", "--duration", "1"], "--duration"),
         (["sweep", "box_tensor", "-o", "table.csv"], ".parquet"),
     ],

@@ -259,7 +259,7 @@ def test_usdchecker_finds_what_breaks_its_rules_and_nothing_in_a_flight(flight, 
     (tmp_path / "change.yaml").write_text("- {t: 0.05, set: {density: 500.0}}")
     words = ["--script", str(tmp_path / "change.yaml"), "--usd", str(tmp_path / "a.usda"), "--duration", "0.1"]
     assert main(["simulate", "hammer", *words]) == 0
-    assert "mass or tensor change: the body's are those of the start" in capsys.readouterr().out
+    assert "mass or tensor change: the file has the values at the start" in capsys.readouterr().out
 
 
 def test_a_physics_engine_that_begins_with_the_stages_numbers_flies_as_the_samples_do(tmp_path):

@@ -179,8 +179,8 @@ LATE = [(t, fb.imu(t, (0, 0, 0), (0, 0, 0))) for t in range(100 * 10**9, 101 * 1
     ("others", "topics", "message"),
     [
         (THRUST, {"pose": "/nothing"}, "a topic of the bag: /pose"),
-        (THRUST, {"pose": "/pose", "imu": "/pose"}, "it has none of such a type"),
-        (THRUST, {"pose": "/pose@drone"}, f"/pose alone, as a {POSE} has no choice of frames"),
+        (THRUST, {"pose": "/pose", "imu": "/pose"}, "it has no topic of such a type"),
+        (THRUST, {"pose": "/pose@drone"}, f"/pose alone, since a {POSE} has no choice of frames"),
         (THRUST, {"pose": "/pose", "wrench": "/w"}, "in frame 'thruster_7'"),
         ({"/late": (IMU, LATE)}, {}, "clocks: got '/late begins 100 s after /pose"),
         ({"/pose": (POSE, NAN)}, {}, r"/pose: the message 0\.1 s after the first"),

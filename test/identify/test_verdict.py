@@ -48,7 +48,7 @@ def test_a_free_tumble_tells_the_shape_of_the_tensor_and_not_its_size(noise) -> 
 def test_a_flight_without_spin_tells_nothing_of_the_body() -> None:
     found = _identified((0.0, 0.0, 0.0))
     assert len(found.unidentified) == 10
-    assert found.verdict.startswith("identified from this motion: nothing")
+    assert found.verdict.startswith("identified from this motion: none of the requested")
     assert not any("±" in line for line in as_text(found))
 
 

@@ -50,7 +50,7 @@ def all_known_or_told(rig, before: dict[str, int], sent: int, publishers: int, t
     assert known() == sent or (told and known() < sent and gained["queue_full"] > 0), gained
     # A report that finds more lost, or a queue that was full, is a warning that says so.
     for earlier, later in itertools.pairwise(rig.all_diagnostics()):
-        for key, words in (("messages_lost", "lost on the way"), ("queue_full", "may have been lost")):
+        for key, words in (("messages_lost", "lost in transit"), ("queue_full", "may have been lost")):
             assert later[key] == earlier[key] or (later["level"] == 1 and words in later["message"])
     rig.sent += gained["wrench_received"] + gained["poke_received"]
     return gained

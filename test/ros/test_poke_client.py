@@ -148,7 +148,7 @@ def test_without_reset_every_time_counts_from_now_and_the_lead_and_single_comman
     ):
         status, said = client(*words, "--lead", 1)
         # Its time doesn't move: the client says so, and waits no longer for the last command to act.
-        assert status == 0 and "but simulated time stands still at 0 s" in said
+        assert status == 0 and "but simulated time has stopped at 0 s" in said
     rig.sent += 2 + 1 + 1
     rig.until_received(rig.sent)
     rig.pause(False)
@@ -227,7 +227,7 @@ def test_never_more_than_500_commands_are_ahead_of_what_the_node_has_confirmed(
     path.write_text("- {t: 1.0, impulse: [1.0e-6, 0, 0], repeat: 1600, every: 0.001}\n")
     with SlowNode(ros_environment, 1600) as slow:
         assert poke_client([str(path), "--node", "tester", "--reset", "--timeout", "0"]) == 0
-        assert "the last acts at 2.599 s, but simulated time stands still at 0 s" in capsys.readouterr().out
+        assert "the last acts at 2.599 s, but simulated time has stopped at 0 s" in capsys.readouterr().out
         assert slow.most_ahead == 500
         assert slow.received == 1600
         assert slow.calls == ["pauseTrue", "reset", "pauseFalse"]

@@ -97,7 +97,7 @@ def test_a_file_without_a_section_for_the_node_is_warned_of(tmp_path):
     told: list[str] = []
     given = given_arguments(["node", "--ros-args", "--params-file", str(path)], "lab/drone", told.append)
     assert given == {}
-    assert told == [f"{path}: no section is for /lab/drone (it has /rigid_body); /** is for every node"]
+    assert told == [f"{path}: there is no section for /lab/drone (it has /rigid_body); /** is for every node"]
     assert given_arguments(["node", "--ros-args", "--params-file", str(path)], "rigid_body", told.append)
     path.write_text("drone: {ros__parameters: {mass: 1.0}}\n")
     assert scene_values(path, told.append) == {}

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: MIT
 """auto: for each segment the cheapest method that meets ``accuracy``.
 
-| what the segment holds | method |
+| the segment has | method |
 |---|---|
-| nothing moves, nothing pulls | none: the body sleeps |
+| no motion and no load | none: the body sleeps |
 | no spin, no torque | closed form |
-| spin, no torque, no force that turns along | one exact step, however long |
-| a body-axes wrench, damping | Taylor series of the spin and what it carries along |
+| spin, no torque, no body-fixed force | one exact step of any length |
+| a body-fixed wrench, damping | Taylor series of the spin and of the quantities that follow from it |
 | loads that depend on the attitude, a string | Taylor series of the whole motion |
 
-Taylor steps are as long as the accuracy allows, read off their coefficients. The choice is a function of the segment's
-problem and start; steps are functions of what they start from. Strings and damping faster than FASTEST are refused
-(simulation/checks.py): steps of about 1.5/FASTEST would be slower than the clock.
+Taylor steps are as long as the accuracy allows, which follows from their coefficients. The choice depends only on the
+segment's problem and initial state, and each step only on the state at its start. Strings and damping faster than
+FASTEST are refused (simulation/checks.py): with steps of about 1.5/FASTEST the simulation would be slower than real
+time.
 """
 
 from __future__ import annotations
@@ -41,14 +42,14 @@ from .series import SPIN_COLUMNS
 from .series_steps import series_steps, series_workspace
 
 FASTEST = 5e5
-"""rad/s of a string's swing, and 1/s of damping, that a core can follow in real time: 3.3e5 steps a second, each 2 to 3
-µs.
+"""Highest frequency of a string [rad/s] and rate of damping [1/s] that one core can simulate in real time: 3.3e5 steps
+per second, each of 2 to 3 µs.
 """
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def steady_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
-    """Closed form for a body that doesn't spin, or whose spin nothing changes for want of the gyroscopic term."""
+    """Closed form for a body without spin, or with a constant spin because the gyroscopic term is left out."""
     for done in range(n):
         own, c = p.acceleration_body, p.damping_linear
         push = rotate(y[0], y[1], y[2], y[3], own[0], own[1], own[2])
@@ -139,7 +140,7 @@ AUTO = Integrator(
     order=None,
     evaluations=0,
     source="integrators/auto.py",
-    limits="Chooses per segment; steps follow from ``accuracy`` and not from ``step``.",
+    limits="Selects a method for each segment; steps follow from ``accuracy``, not ``step``.",
     stability_limit=math.inf,
     supports=LOADS | {ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM},
     kernel=None,
