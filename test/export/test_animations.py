@@ -151,7 +151,7 @@ def test_frames_come_evenly_and_are_the_simulated_states_to_the_bit(fps):
 def test_a_motion_that_cannot_be_simulated_again_is_drawn_as_recorded():
     record, _ = record_of("hammer", THROWN, 0.3)
     _, other = record_of("hammer", {**THROWN, "gravity": [0.0, 0.0, -9.0]}, 0.3)
-    for source, reason in ((None, "can't be simulated again"), (other, "isn't the recorded one")):
+    for source, reason in ((None, "can't be simulated again"), (other, "isn't reproduced")):
         made, said = frames(record, source, 30.0)
         assert made is record and reason in said
 
