@@ -39,7 +39,9 @@ def test_the_lesson_states_the_size_of_the_book() -> None:
     page = Path(__file__).parents[2] / "docs" / "lessons" / "book.md"
     if not page.is_file():
         pytest.skip("not run from a source tree")
-    stated = re.search(r"([0-9.]+) cm\s+wide,\s+([0-9.]+) cm\s+high\s+and\s+([0-9.]+) cm\s+thick", page.read_text("utf-8"))
+    stated = re.search(
+        r"([0-9.]+) cm\s+wide,\s+([0-9.]+) cm\s+high\s+and\s+([0-9.]+) cm\s+thick", page.read_text("utf-8")
+    )
     assert 100.0 * np.ptp(load_mesh("book").vertices, axis=0) == pytest.approx([float(x) for x in stated.groups()])
 
 
