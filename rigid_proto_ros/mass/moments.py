@@ -489,8 +489,7 @@ def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     """The bounding box of the referenced vertices as a solid cuboid (the 2019 paper's eq. 8, centred on the box)."""
     vertices, triangles = _surface(vertices, triangles)
     lower, upper, finite = _bounds(referenced_vertices(vertices, triangles))
-    if not finite:
-        raise MeshError("mesh", "a vertex coordinate is not finite")
+    _refuse(0 if finite else _NOT_FINITE, vertices.shape[0])
     low, high = np.array(lower), np.array(upper)
     side = high - low
     volume = float(side[0] * side[1] * side[2])

@@ -27,7 +27,7 @@ from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, arm, fill_b
 from ..motion.integrators.auto import FASTEST
 from ..motion.integrators.integrator import provide_kernel
 from ..motion.loads import is_within_magnitude
-from ..motion.problem import ENVIRONMENT_FIELDS, KNOT, ORIGIN, PROBLEM, PUSHES, REST, TARGET, C, K, begin_body
+from ..motion.problem import ENVIRONMENT_FIELDS, KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_body
 from ..motion.state import fill_initial_row
 from ..motion.string import effective_mass, energy_of, most_yielding, span_of, spring_of
 from . import flight as fl
@@ -265,18 +265,6 @@ def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.
         return False
     copy_numbers(flight.row, flight.start)
     return not own.string_attached or _tie(own, flight)
-
-
-def begins_otherwise(row: NDArray[np.void], ballast: NDArray[np.float64], setup: Setup) -> bool:
-    """Whether a row (1,) would begin otherwise than its setup: a parameter that ROW doesn't have decides there too.
-    False where the simulation must begin it.
-    """
-    flight, none, problem = setup.flight_start.flight[0].copy(), np.zeros(0, fl.LOAD_ROW), setup.problem
-    if not _begin(row[0], ballast, flight, none, none):
-        return False
-    pairs = [(flight["body"], setup.body_row), (flight["start"], setup.initial)]
-    pairs += [(flight["common"][name], problem[name]) for name in PROBLEM.names or ()]
-    return not all(np.array_equal(begun, own) for begun, own in pairs)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -100,8 +100,6 @@ class BatchMaker:
             raise NotBatchable
         self._row = batch_row(parameters, body_mesh)
         self._ballast = np.array([m for m in parameters.point_masses if m[0] > 0.0], dtype=float).reshape(-1, 4)
-        if batch.begins_otherwise(self._row, self._ballast, setup):
-            raise NotBatchable
         self._table, entries = _commands_of(typical.script, setup)
         self._written = [_place_of(v, typical.script, entries) if v.target.entry else None for v in study.vary]
         if any(self._written) and not setup.integrator.supports_loads:
