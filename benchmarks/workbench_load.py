@@ -2,7 +2,9 @@
 """What a page costs the body that flies in its process: overruns and share of a core at 1 kHz, with a page and without, by
 turns; from a move of the hand to the string as it is sent to be drawn; memory, while somebody pokes and pulls.
 
-The page is a process of its own that reads what a browser would be sent. ``--minutes`` is for the memory.
+The page is a process of its own that reads what a browser would be sent. For comparison, two processes that have nothing
+to do with the simulation compute as much, as often, as the page's thread and the reader do. ``--minutes`` is for the
+memory.
 """
 
 from __future__ import annotations
@@ -24,8 +26,11 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parent), str(FOLDER.parent / "test")]
 
 from result_table import ResultTable
 
-ROUNDS, ROUND_S = 5, 6.0
+ROUNDS, ROUND_S = 9, 6.0
 """Of each, by turns."""
+
+OTHERS_MS = (2.5, 1.5)
+"""Of computing by other processes, every 20 ms, as long as the page's thread and the reader take for a frame."""
 MOVES = 100
 
 
@@ -49,6 +54,28 @@ def opened(port: int):
     finally:
         page.kill()
         page.wait()
+
+
+@contextmanager
+def others():
+    """Other processes that compute as much."""
+    processes = [subprocess.Popen([sys.executable, __file__, "--compute", str(ms)]) for ms in OTHERS_MS]
+    time.sleep(1.0)
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def compute(ms: float) -> None:
+    """One of these processes."""
+    while True:
+        began = time.monotonic()
+        while time.monotonic() < began + 1e-3 * ms:
+            pass
+        time.sleep(0.02 - 1e-3 * ms)
 
 
 def load(flown) -> tuple[float, float]:
@@ -102,9 +129,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--read", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--compute", type=float, help=argparse.SUPPRESS)
     args = parser.parse_args()
-    if args.read:
-        read(args.read)
+    if args.read or args.compute:
+        read(args.read) if args.read else compute(args.compute)
         return
     from workbench_page import Flown
 
@@ -129,10 +157,14 @@ def main() -> None:
         for _ in range(ROUNDS):
             time.sleep(3.0)  # the page before is forgotten
             alone = load(flown)
+            with others():
+                beside = load(flown)
             with opened(port):
-                rounds.append((alone, load(flown)))
+                rounds.append((alone, load(flown), beside))
         for k, what in enumerate(("overruns a second", "share of a core")):
-            tell(what, *(statistics.median(pair[side][k] for pair in rounds) for side in (0, 1)))
+            without, with_page, beside = (statistics.median(found[side][k] for found in rounds) for side in range(3))
+            tell(what, without, with_page)
+            tell(f"{what}, other processes instead of the page", without, beside)
         with opened(port):
             found = drawn_string_ms(flown)
             tell("move of the hand to drawn string [ms], median", float("nan"), statistics.median(found))

@@ -32,6 +32,8 @@ try:
     import numba
     from numba import config
     from numba.core import event
+    from numba.core.caching import CompileResultCacheImpl, FunctionCache
+    from numba.core.runtime.nrt import rtsys
     from numba.core.typing import cffi_utils  # noqa: F401  # looks for cffi, at the first kernel if not here
     from numba.extending import intrinsic as numba_intrinsic
     from numba.np import arraymath  # looks for scipy's linear algebra, at the first kernel if not here
@@ -143,30 +145,52 @@ class KernelLocator:
         return str(self._lineno)
 
 
-_USUAL = "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator,IPythonCacheLocator,ZipCacheLocator"
-"""numba's own list."""
+class _KernelFiles(CompileResultCacheImpl):
+    """Which of numba's locators are asked."""
+
+    _locator_classes = [KernelLocator, *CompileResultCacheImpl._locator_classes]  # noqa: SLF001
+
+
+class KernelCache(FunctionCache):
+    """The kernels of one function on disk. Its files are looked for when they are wanted: most functions are compiled
+    into others only.
+    """
+
+    _impl_class = _KernelFiles
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """The kernel for a signature, or None.
+
+        numba imports its whole compiler first, which takes longer than the rest of a short command; the compiler
+        itself does that, too, once something is to be compiled (tried with 0.68).
+        """
+        if not hasattr(self, "_impl"):
+            super().__init__(self._function)
+        rtsys.initialize(target)
+        return self._load_overload(signature, target)
+
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def njit(*signature: Any, allocates: bool = True, **options: Any) -> Callable[[_Function], _Function]:
-    """numba's, with kernels kept by ``KernelLocator``. To a type checker what it makes is the Python function.
+def njit(*, allocates: bool = True, cache: bool = False, **options: Any) -> Callable[[_Function], _Function]:
+    """numba's, with kernels kept by ``KernelCache``. To a type checker what it makes is the Python function.
 
     allocates: False where the function makes no arrays but slices of given ones, whose references nobody counts then:
     each slice costs two atomic operations otherwise. numba refuses to compile such a function if it does allocate.
     """
 
     def decorated(function: _Function) -> _Function:
-        # NUMBA_CACHE_LOCATOR_CLASSES, which numba reads when it is handed the function (tried with 0.68).
-        before = _CONFIG.CACHE_LOCATOR_CLASSES
-        _CONFIG.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__},{before or _USUAL}"
-        try:
-            # numba's own name (tried with 0.68); where it isn't given the caller's would count.
-            options["_nrt"] = allocates
-            compiled: _Function = numba.njit(*signature, **options)(function)
-            return compiled
-        finally:
-            _CONFIG.CACHE_LOCATOR_CLASSES = before
+        # numba's own name (tried with 0.68); where it isn't given the caller's would count.
+        options["_nrt"] = allocates
+        compiled: Any = numba.njit(**options)(function)
+        if cache and not INTERPRETED:
+            compiled._cache = KernelCache(function)  # noqa: SLF001
+        kernel: _Function = compiled
+        return kernel
 
     return decorated
 

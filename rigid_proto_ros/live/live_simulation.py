@@ -32,7 +32,7 @@ from ..simulation.observer import Observer, Observers, SceneChanged
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
 from .command_receiver import COUNTED_BY, CommandReceiver
-from .pacing import Stamps
+from .pacing import Stamps, ask_for_short_slices
 from .simulation_loop import Endpoints, SimulationLoop
 
 LOOK_S = 0.002
@@ -122,6 +122,7 @@ class LiveSimulation:
 
     def _run(self, on_crash: Callable[[], None]) -> None:
         loop = self.loop
+        ask_for_short_slices()
         try:
             loop.start()
             wake_ns = loop.next_wake_ns()

@@ -190,9 +190,11 @@ class ViserBackend(Backend):
         if node is None:
             return
         if positions is not None:
-            node.position = self.drawn(name, positions[-1])
+            move(node, self.drawn(name, positions[-1]))
         if attitudes is not None:
-            node.wxyz = wxyz(attitudes[-1])
+            turned = wxyz(attitudes[-1])
+            if tuple(node.wxyz) != turned:
+                node.wxyz = turned
         if scale is not None:
             node.scale = tuple((scale / self.unit).tolist())
 
@@ -255,7 +257,7 @@ class ViserBackend(Backend):
                 look = style.STYLES[name]
                 node = self._scene.add_icosphere(f"/{name}", look.width, look.colours[0], cast_shadow=False)
                 self._nodes[name] = node
-            node.position = self.drawn(name, positions[-1])
+            move(node, self.drawn(name, positions[-1]))
         if name in self._nodes:
             self._set_there(name, there)
 
@@ -278,7 +280,7 @@ class ViserBackend(Backend):
                 strip = (np.array(path[::-every][::-1]) - path[-1]) / self.unit
                 self._segments(name, np.stack([strip[:-1], strip[1:]], axis=1), style.STYLES[name].colours[0])
             if name in self._nodes:
-                self._nodes[name].position = self.drawn(name, self._path_base[name])
+                move(self._nodes[name], self.drawn(name, self._path_base[name]))
                 self._set_there(name, len(path) > 1)
         written = [
             label
@@ -298,7 +300,7 @@ class ViserBackend(Backend):
                 name, position, text = labels[k]
                 if node.text != text:
                     node.text = text
-                node.position = self._in_the_picture(name, position)
+                move(node, self._in_the_picture(name, position))
             if node.visible != (k < len(labels)):
                 node.visible = k < len(labels)
 
@@ -312,6 +314,12 @@ class ViserBackend(Backend):
         vector = np.array([x, y, z])
         turned = point + 2.0 * np.cross(vector, np.cross(vector, point) + w * point)
         return np.asarray(self._nodes[frame].position) + turned
+
+
+def move(node: Any, position: np.ndarray) -> None:
+    """Set the position (3,) of a node that isn't there already; viser 1.1 compares, too, but takes much longer."""
+    if not np.array_equal(node.position, position):
+        node.position = position
 
 
 def _colours(colours: tuple[style.Colour, ...], count: int) -> np.ndarray:

@@ -255,7 +255,7 @@ class Page:
         self.readout_tab.draw(now_s)
         failure = self.live.loop.simulation.failure
         words = "the past" if looking else f"⚠ {failure}" if failure else self._words()
-        self.bar.show(self.state.time_ns * 1e-9, self.flight.waited_for or words)
+        self.bar.show(now_s, self.state.time_ns * 1e-9, self.flight.waited_for or words)
         self.session_tab.draw()
 
     def _words(self) -> str:
@@ -396,7 +396,10 @@ class Page:
 
     def _string_energies(self, times: np.ndarray, rows: np.ndarray) -> list[float]:
         """Of the string at each of the times (n,), of states (n, 13) [J]."""
-        return self.picture.string.rows(times, rows, matrix_from_quaternion(rows[:, 3:7])).held.tolist()
+        string = self.picture.string
+        if not string.was_tied:
+            return [0.0] * len(times)
+        return string.rows(times, rows, matrix_from_quaternion(rows[:, 3:7])).held.tolist()
 
     def _draw_past(self) -> None:
         moment_ns = self.flight.moment_ns

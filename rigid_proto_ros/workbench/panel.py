@@ -31,6 +31,9 @@ SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1"
 
 PAUSE, PLAY, STEP, RESET = "Pause", "Play", "Step", "Reset"
 
+TIME_S = 0.1
+"""Between two times that are shown while the body moves."""
+
 REWIND_STEP_S = 0.05
 """[s] Step of the rewind slider."""
 
@@ -62,6 +65,7 @@ class TimeBar:
 
     def __init__(self, gui: viser.GuiApi, controls: Controls, flight: Flight) -> None:
         self._flight = flight
+        self._words, self._due_s = "", 0.0
         with gui.add_folder("Time"):
             self._line = gui.add_html("")
             play = gui.add_button_group("Simulation", (PAUSE, STEP, RESET))
@@ -100,12 +104,15 @@ class TimeBar:
         else:
             self._flight.pause(not self._flight.paused)
 
-    def show(self, time_s: float, words: str) -> None:
-        """The time that is shown, and what the body is doing."""
+    def show(self, now_s: float, time_s: float, words: str) -> None:
+        """The time that is shown, which nobody reads faster than it is drawn, and what the body is doing."""
         flight = self._flight
         label = PLAY if flight.paused or flight.moment_ns is not None else PAUSE
         if self._play.options[0] != label:
             self._play.options = (label, STEP, RESET)
+        if words == self._words and now_s < self._due_s:
+            return
+        self._words, self._due_s = words, now_s + TIME_S
         content = f'<div class="{MARK}"><b>{time_s:.2f} s</b> <span>{words}</span></div>'
         if self._line.content != content:
             self._line.content = content

@@ -167,10 +167,10 @@ class LivePlot:
 
 
 class Readings:
-    """What can be read off a flight. ``restart`` at every reset; values: as text, by name."""
+    """What can be read off a flight. ``restart`` at every reset."""
 
     def __init__(self) -> None:
-        self.values: dict[str, str] = {}
+        self._last: tuple[Scenario, State, float, np.ndarray | None] | None = None
         self._samples: deque[tuple[float, ...]] = deque()
         self._start: np.ndarray | None = None
 
@@ -192,42 +192,61 @@ class Readings:
 
     def take(self, scenario: Scenario, state: State, string_energy: float, ghost: np.ndarray | None) -> None:
         """A state, what the string holds [J], and the ghost's state (13,)."""
-        body = scenario.setup.body
-        momentum = state.angular_momentum(body.inertia)
-        length = float(np.linalg.norm(momentum))
-        if self._start is None and length > 0.0:
-            self._start = momentum
-        angle = 0.0 if self._start is None else float(np.degrees(angle_to(self._start, momentum[np.newaxis])[0]))
-        w = principal_axes(body.inertia)[1].T @ state.angular_velocity_body
-        kinetic = state.kinetic_energy(body.mass, body.inertia)
-        translational = 0.5 * body.mass * float(state.linear_velocity @ state.linear_velocity)
-        rotational = kinetic - translational
-        gravity = -body.mass * float(scenario.setup.gravity @ state.position)
-        total = kinetic + gravity + string_energy
+        self._last = (scenario, state, string_energy, ghost)
         time_s = state.time_ns * 1e-9
         if self._samples and time_s < self._samples[-1][0]:
             self._samples.clear()
         if self.is_due(state.time_ns):
-            energies = (translational, rotational, gravity, total, string_energy)
-            self._samples.append((time_s, *energies, *w.tolist(), angle))
+            body = scenario.setup.body
+            momentum = state.angular_momentum(body.inertia)
+            if self._start is None and momentum.any():
+                self._start = momentum
+            energies = _energies(scenario, state, string_energy)
+            spins = principal_axes(body.inertia)[1].T @ state.angular_velocity_body
+            self._samples.append((time_s, *energies, *spins.tolist(), self._turned(momentum)))
         while self._samples[0][0] < time_s - PLOTTED_S:
             self._samples.popleft()
-        spin = float(np.linalg.norm(state.angular_velocity_body))
+
+    def _turned(self, momentum: np.ndarray) -> float:
+        """The angle [°] that L (3,) has turned by."""
+        return 0.0 if self._start is None else float(np.degrees(angle_to(self._start, momentum[np.newaxis])[0]))
+
+    @property
+    def values(self) -> dict[str, str]:
+        """The last state in words, by name."""
+        if self._last is None:
+            return {}
+        scenario, state, string_energy, ghost = self._last
+        body = scenario.setup.body
+        momentum = state.angular_momentum(body.inertia)
+        w = principal_axes(body.inertia)[1].T @ state.angular_velocity_body
+        spin = float(np.linalg.norm(w))
         spins = " ".join(f"{style.without_rounding(x, spin):.3g}" for x in w)
-        self.values = {
+        translational, rotational, _, total, _ = _energies(scenario, state, string_energy)
+        values = {
             SPEED: f"{style.without_rounding(float(np.linalg.norm(state.linear_velocity))):.4g} m/s",
             SPIN: f"{style.without_rounding(spin):.4g} {style.OMEGA_UNIT}",
             SPINS: f"{spins} {style.OMEGA_UNIT}",
             ENERGY: f"{total:.5g} {style.ENERGY_UNIT}",
             TRANSLATIONAL: f"{style.without_rounding(translational):.4g} {style.ENERGY_UNIT}",
             ROTATIONAL: f"{style.without_rounding(rotational):.4g} {style.ENERGY_UNIT}",
-            MOMENTUM: f"{length:.5g} {style.MOMENTUM_UNIT}",
-            DRIFT: f"{style.without_rounding(angle):.3g}{style.ANGLE_UNIT}",
+            MOMENTUM: f"{float(np.linalg.norm(momentum)):.5g} {style.MOMENTUM_UNIT}",
+            DRIFT: f"{style.without_rounding(self._turned(momentum)):.3g}{style.ANGLE_UNIT}",
             COM_PLACE: " ".join(f"{style.without_rounding(x):.4g}" for x in state.position) + " m",
         }
         if ghost is not None:
             apart = float(np.degrees(attitude_angle(np.array(state.orientation_xyzw), ghost[3:7])))
-            self.values[GHOST_ANGLE] = f"{apart:.0f}{style.ANGLE_UNIT}"
+            values[GHOST_ANGLE] = f"{apart:.0f}{style.ANGLE_UNIT}"
+        return values
+
+
+def _energies(scenario: Scenario, state: State, string_energy: float) -> tuple[float, ...]:
+    """Energies [J]: translational, rotational, of gravity, total, of the string."""
+    body = scenario.setup.body
+    kinetic = state.kinetic_energy(body.mass, body.inertia)
+    translational = 0.5 * body.mass * float(state.linear_velocity @ state.linear_velocity)
+    gravity = -body.mass * float(scenario.setup.gravity @ state.position)
+    return translational, kinetic - translational, gravity, kinetic + gravity + string_energy, string_energy
 
 
 class ReadoutTab:

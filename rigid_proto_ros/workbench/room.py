@@ -13,6 +13,7 @@ import numpy as np
 import viser
 
 from ..picture.surface import BOX_CORNERS
+from .drawing import move
 from .readouts import nice_step
 
 Colour = tuple[int, int, int]
@@ -137,6 +138,8 @@ class Room:
     def place(self, origin: np.ndarray, unit: float) -> None:
         """The picture's middle is at the world point ``origin`` (3,) [m], one of its units is ``unit`` [m]."""
         x, y, z = (-np.asarray(origin) / unit) % (5.0 * self.cell)
-        self._floor.position = (x, y, self._floor_height)
+        move(self._floor, np.array([x, y, self._floor_height]))
+        if not self._wall.visible:
+            return
         behind = self._middle[1] + 1.5 + float(np.linalg.norm(self._reach))
-        self._wall.position = (x, behind, z)
+        move(self._wall, np.array([x, behind, z]))

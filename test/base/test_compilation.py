@@ -13,9 +13,7 @@ from rigid_proto_ros.base import compilation
 PACKAGE = Path(rigid_proto_ros.__file__).parent
 INNER = "from .compilation import njit\n\n\n@njit(cache=True)\ndef inner(x):\n    return x + {}\n"
 OUTER = "from .compilation import njit\nfrom .between import (\n    inner,\n)\n\n\n@njit(cache=True)\ndef outer(x):\n    return inner(x)\n"
-BROKEN = (
-    "numba no longer asks the locators that NUMBA_CACHE_LOCATOR_CLASSES names: base/compilation.py needs another way"
-)
+BROKEN = "numba no longer keeps kernels by Dispatcher._cache: base/compilation.py needs another way"
 CALL = "from package.base.outer import outer; print(outer(1), sum(outer.stats.cache_hits.values()))"
 
 

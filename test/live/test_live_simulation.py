@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import ctypes
+import platform
+import struct
 import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
@@ -12,6 +16,7 @@ import pytest
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
+from rigid_proto_ros.live.pacing import SLICE_NS
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.parameters import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario
@@ -165,3 +170,21 @@ def test_a_floor_of_the_accuracy_that_arises_in_the_last_moments_is_in_the_recor
         live.set_parameters({"record": str(tmp_path / "next.mcap")})
     live.stop()
     assert read_runs(path)[0].accuracy_floor == floor
+
+
+def slice_of(thread: int) -> int:
+    """Of this thread, by its number in the system [ns]."""
+    attributes = ctypes.create_string_buffer(48)
+    number = {"x86_64": 315, "aarch64": 275}[platform.machine()]
+    assert ctypes.CDLL(None).syscall(number, thread, attributes, 48, 0) == 0  # sched_getattr
+    return struct.unpack("IIQiIQQQ", attributes.raw)[5]
+
+
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux") or tuple(map(int, platform.release().split(".")[:2])) < (6, 12),
+    reason="time slices can be chosen on Linux 6.12 and later",
+)
+def test_the_physics_thread_asks_for_short_time_slices(live):
+    (thread,) = (thread for thread in threading.enumerate() if thread.name == "physics")
+    live.call(lambda: None)
+    assert slice_of(thread.native_id) == SLICE_NS < slice_of(threading.get_native_id())
