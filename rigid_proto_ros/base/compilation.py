@@ -148,7 +148,7 @@ class KernelLocator:
 class _KernelFiles(CompileResultCacheImpl):
     """Which of numba's locators are asked."""
 
-    _locator_classes = [KernelLocator, *CompileResultCacheImpl._locator_classes]  # noqa: SLF001
+    _locator_classes = [KernelLocator, *CompileResultCacheImpl._locator_classes]  # noqa: SLF001 (numba's place for it)
 
 
 class KernelCache(FunctionCache):
@@ -188,7 +188,7 @@ def njit(*, allocates: bool = True, cache: bool = False, **options: Any) -> Call
         options["_nrt"] = allocates
         compiled: Any = numba.njit(**options)(function)
         if cache and not INTERPRETED:
-            compiled._cache = KernelCache(function)  # noqa: SLF001
+            compiled._cache = KernelCache(function)  # noqa: SLF001 (where enable_caching puts it)
         kernel: _Function = compiled
         return kernel
 

@@ -12,7 +12,7 @@ from functools import cache, cached_property
 import numpy as np
 from numba import from_dtype, int64, types
 
-from ..base.compilation import copy_numbers, njit
+from ..base.compilation import copy_numbers, entry_of, njit
 from ..base.rotation import rotate_inverse
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import BODY, fill_body
@@ -131,7 +131,7 @@ def _compiled() -> tuple[Callable[..., int], np.ndarray, int]:
     signature = int64(flat, types.int64[::1], table, flat, int64, tables, cube, types.int64[::1])
     degree = degree_for(ACCURACY)
     methods = method_table(AUTO, degree)
-    return njit(signature, cache=True, nogil=True, error_model="numpy")(_fly_all), methods, degree
+    return entry_of(njit(cache=True, nogil=True, error_model="numpy")(_fly_all), signature), methods, degree
 
 
 def fly_rows(flown: np.ndarray, times_ns: np.ndarray, wrenches: Wrenches) -> tuple[np.ndarray, np.ndarray]:
