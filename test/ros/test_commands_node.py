@@ -202,25 +202,38 @@ def test_events_tell_every_command_change_and_service_in_one_unbroken_chain_sinc
     chain_is_whole(rig.events()[-1:])
 
 
-@pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.stress)])
-@pytest.mark.parametrize("by_wrench", [False, True], ids=["by step", "by wrench"])
-def test_in_lockstep_every_command_acts_at_the_time_that_it_was_sent_for_and_one_step_follows(rig, count, by_wrench):
-    rig.set(publish_rate=1000.0, lockstep=by_wrench)
-    rig.start_over(paused=True)
-    rig.until(lambda: rig.newest_ns("twist") == 0, "a twist of time 0")
-    for k in range(count):
-        if by_wrench:
-            rig.publish("wrench", wrench_message(0, "", ((1e-3, 0.0, -2e-3)[k % 3], 0.0, 0.0)))
-        else:
-            rig.publish("poke", wrench_message(0, "world;impulse", (1e-6, 0.0, 0.0)))
-            answer = rig.call("step", Trigger, pause_s=0.0005).message
-            # It says what was taken before.
-            assert int(answer.split("; ")[1].split()[0]) == rig.sent
-        # The state of a step's end; while paused the present one comes again ten times a second.
-        rig.until(lambda k=k: rig.newest_ns("twist") > k * MS, "a later twist", pause_s=0.0005)
-        assert rig.newest_ns("twist") == (k + 1) * MS
-    events = rig.wait_event("wrench" if by_wrench else "poke", count)
-    assert [event["time_ns"] for event in events] == [k * MS for k in range(count)]
+CONTROLLERS = {
+    "poke": lambda k: ("poke", wrench_message(0, "world;impulse", (1e-6, 0.0, 0.0))),
+    "string": lambda k: ("string/target", point_message(0, "", (0.0, 1e-3 * (k % 3), 0.3))),
+    "schedule": lambda k: ("schedule", {"data": json.dumps({"t": k * 1e-3, "angular_impulse": [1e-6, 0.0, 0.0]})}),
+    "wrench": lambda k: ("wrench", wrench_message(0, "", ((1e-3, 0.0, -2e-3)[k % 3], 0.0, 0.0))),
+    "thrusters": lambda k: ("thrusters", {"data": [0.1 * (k % 2)]}),
+}
+"""What each commands at its k-th step, by topic; the last two are followed by a step without a call of the service."""
+
+
+@pytest.mark.parametrize(("runs", "count"), [(1, 100), pytest.param(20, 1000, marks=pytest.mark.stress)])
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_in_lockstep_every_command_acts_at_the_time_that_it_was_sent_for_and_one_step_follows(
+    rig, controller, runs, count
+):
+    by_command = controller in ("wrench", "thrusters")
+    kind = {"string": "string_target", "schedule": "poke"}.get(controller, controller)
+    rig.set(publish_rate=1000.0, lockstep=by_command)
+    for _ in range(runs):
+        rig.start_over(paused=True)
+        rig.until(lambda: rig.newest_ns("twist") == 0, "a twist of time 0")
+        for k in range(count):
+            rig.publish(*CONTROLLERS[controller](k))
+            if not by_command:
+                answer = rig.call("step", Trigger, pause_s=0.0005).message
+                # It says what was taken before.
+                assert int(answer.split("; ")[1].split()[0]) == rig.sent
+            # The state of a step's end; while paused the present one comes again ten times a second.
+            rig.until(lambda k=k: rig.newest_ns("twist") > k * MS, "a later twist", pause_s=0.0005)
+            assert rig.newest_ns("twist") == (k + 1) * MS
+        events = rig.wait_event(kind, count)
+        assert [event["time_ns"] for event in events] == [k * MS for k in range(count)]
 
 
 def test_inertia_is_latched_and_comes_again_at_every_change_with_its_time(rig):
