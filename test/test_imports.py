@@ -37,7 +37,7 @@ ROS = ("rclpy", "rcl_interfaces", "builtin_interfaces")
 ALLOWED = {
     "numpy": ORDER,
     "numba": ("base", "mesh", "mass", "motion", "simulation", "sweep", "identify.trajectories"),
-    "llvmlite": ("base.simd", "base.elementary", "base.provenance"),  # comes with numba
+    "llvmlite": ("base.simd", "base.arithmetic", "base.provenance"),  # comes with numba
     "yaml": ("scene", "session", "sweep", "ros", "cli"),
     "trimesh": ("mesh.assembly", "robots.link_shapes"),
     "collada": ("mesh.assembly",),

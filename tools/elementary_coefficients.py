@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes the constants of base/elementary.py: minimax polynomials by Remez's exchange, and π, log 2 and atan in parts.
+"""Writes the constants of base/arithmetic.py: minimax polynomials by Remez's exchange, and π, log 2 and atan in parts.
 
 ``python tools/elementary_coefficients.py`` prints them; mpmath computes with 60 digits. A polynomial's error is measured
 relative to the whole function that it completes, after its coefficients have been rounded to doubles.

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
+from .arithmetic import sine_cosine
 from .compilation import njit
-from .elementary import sine_cosine
 from .vectors import Numbers
 
 

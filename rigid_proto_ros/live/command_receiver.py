@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 from ..base.errors import CommandRefused, InputError
 from ..scene.scenario import check_inertia, nanoseconds
 from ..scene.script import expand_schedule, read_schedule, with_contacts
-from ..simulation.checks import check_command
 from ..simulation.commands import Change, Command, Listed
-from ..simulation.setup import Setup
+from ..simulation.setup import Setup, check_command
 
 if TYPE_CHECKING:
     from .simulation_loop import SimulationLoop

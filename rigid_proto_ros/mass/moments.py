@@ -24,9 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.arithmetic import pair_add, pair_divide, pair_multiply, two_sum
 from ..base.compilation import njit
 from ..base.errors import MeshError
-from ..base.exact_arithmetic import pair_add, pair_divide, pair_multiply, two_sum
 from ..base.simd import Packed, filled, load, number, store
 
 SMALL_MESH = 16

@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base.arithmetic import inverse_tangent_of
 from ..base.compilation import njit
-from ..base.elementary import inverse_tangent_of
 from ..base.rotation import length, norm
 from ..base.vectors import Numbers
 

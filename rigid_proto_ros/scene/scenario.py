@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arithmetic import exact_quotient
 from ..base.errors import CommandRefused, InputError, MeshError
-from ..base.exact_arithmetic import exact_quotient
 from ..mass.from_mesh import mesh_body
 from ..mass.properties import MassProperties, MeshMoments, explicit_mass_properties, scale_vector
 from ..mass.tensor import check_tensor
@@ -25,9 +25,8 @@ from ..motion.problem import ENVIRONMENT_FIELDS
 from ..motion.state import fill_initial_row
 from ..motion.string import StringSettings
 from ..motion.surface import Surface
-from ..simulation.checks import check_start
 from ..simulation.commands import nanoseconds
-from ..simulation.setup import Setup
+from ..simulation.setup import Setup, check_start
 from ..simulation.thrusters import make_thruster
 from .parameters import READ_ONLY, Parameters, Value, convert_all, parameter_named, with_mass_of_density
 from .scene_file import scene_file, scene_values

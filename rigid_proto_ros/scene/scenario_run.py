@@ -17,7 +17,6 @@ import numpy as np
 from ..base.command_line import Progress
 from ..base.errors import CommandRefused, InputError
 from ..mesh.reading import Mesh
-from ..simulation.checks import check_command
 from ..simulation.commands import Change, Command, Listed
 from ..simulation.observer import (
     Event,
@@ -29,7 +28,7 @@ from ..simulation.observer import (
     SceneChanged,
     Started,
 )
-from ..simulation.setup import Setup
+from ..simulation.setup import Setup, check_command
 from ..simulation.simulation import Simulation
 from .scenario import BodyMesh, Scenario, check_inertia, publication_ns
 from .script import with_contacts

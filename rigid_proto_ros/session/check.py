@@ -11,8 +11,7 @@ import numpy as np
 
 from ..base.errors import CommandRefused, InputError
 from ..base.provenance import cpu, versions
-from ..simulation.event_log import EventLog
-from ..simulation.observer import Event, Logged, Observer
+from ..simulation.observer import Event, EventLog, Logged, Observer
 from .messages import FIELDS, PROJECTIONS
 from .recorded_session import RecordedSession, Resimulation, decode_event, resimulation
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arithmetic import exact_quotient
 from ..base.compilation import copy_numbers, njit, record_type
-from ..base.exact_arithmetic import exact_quotient
 from ..base.simd import aligned
 from ..base.vectors import Vector
 from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass

@@ -18,7 +18,6 @@ from ..base.compilation import copy_numbers, njit, record_type
 from ..base.rotation import norm
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
-from ..motion.integrators.equations import accelerations, parts_of, tension_margin
 from ..motion.integrators.integrator import ADAPTIVE, CONTROL, NOTHING, ONE_STEP, commit, is_provided, reach
 from ..motion.integrators.series_steps import FLOOR, begin_control
 from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
@@ -29,8 +28,11 @@ from ..motion.problem import (
     PROBLEM,
     STRING,
     VARIABLES,
+    accelerations,
     begin_problem,
     begin_string,
+    parts_of,
+    tension_margin,
     to_good_row,
     to_variables,
 )

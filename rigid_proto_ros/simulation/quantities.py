@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
+from ..base.arithmetic import inverse_tangent_of
 from ..base.compilation import copy_numbers, njit
-from ..base.elementary import inverse_tangent_of
 from ..base.rotation import norm, rotate
 from ..motion.state import angular_momentum, kinetic_energy
 

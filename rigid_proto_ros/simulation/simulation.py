@@ -25,7 +25,6 @@ from ..motion.problem import MAX_SPEED, PROBLEM, VARIABLES
 from ..motion.state import State, angular_momentum, shift_com
 from ..motion.string import StringState
 from . import flight as fl
-from .checks import check_command, check_load_supported, check_rates, check_start, check_thrust, load_row, needs_of
 from .commands import (
     HELD_WRENCH,
     IMPULSE,
@@ -45,12 +44,12 @@ from .commands import (
     order_of,
     slot_name,
 )
-from .event_log import EventLog
 from .flight_arrays import APPLY, CUT, END_ALL, END_DUE, FINISH, TIMEOUTS, ActingLoad, FlightArrays
 from .observer import (
     AccuracyFloor,
     Applied,
     BodyChanged,
+    EventLog,
     LoadBegan,
     LoadEnded,
     Logged,
@@ -61,7 +60,16 @@ from .observer import (
     StringChanged,
     shown_load,
 )
-from .setup import Setup
+from .setup import (
+    Setup,
+    check_command,
+    check_load_supported,
+    check_rates,
+    check_start,
+    check_thrust,
+    load_row,
+    needs_of,
+)
 from .string_control import StringControl
 from .thrusters import ThrusterControl
 

@@ -14,9 +14,8 @@ from ..motion.body import Body
 from ..motion.loads import MAX_ACCELERATION
 from ..motion.state import State
 from ..motion.string import StringState, tie
-from .checks import check_rates
 from .commands import MoveString, TieString
-from .setup import Setup
+from .setup import Setup, check_rates
 
 
 class StringControl:

@@ -30,10 +30,9 @@ from ..scene.script import MAX_TIME_S, expand_script
 from ..scene.yaml_text import dump_yaml
 from ..simulation import batch
 from ..simulation import flight as fl
-from ..simulation.checks import check_command, check_start
 from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand
 from ..simulation.quantities import CONTEXT, STATE, begin, measure_flight
-from ..simulation.setup import Setup
+from ..simulation.setup import Setup, check_command, check_start
 from ..simulation.simulation import Simulation
 from .sampling import Draw, as_text
 from .study import Study, Variation, Vary, body_mesh_of, plain, vertex_number

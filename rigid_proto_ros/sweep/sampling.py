@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arithmetic import exponential_of, logarithm, sine_cosine
 from ..base.compilation import njit
-from ..base.elementary import exponential_of, logarithm, sine_cosine
 from ..base.errors import InputError
 from .fields import mapping, number, whole
 

@@ -10,7 +10,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from rigid_proto_ros.base import elementary as el
+from rigid_proto_ros.base import arithmetic as el
 
 mpmath.mp.prec = 160
 TINY, HUGE = -300.0, 300.0

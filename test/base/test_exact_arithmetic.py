@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from rigid_proto_ros.base.exact_arithmetic import two_product, two_sum
+from rigid_proto_ros.base.arithmetic import two_product, two_sum
 
 NUMBERS = [0.0, 1.0, -1.0, 3.0, 0.1, 2.0**-30, 1.0 + 2.0**-52, 134217729.0, -1e150, 1e-140]
 

@@ -6,7 +6,7 @@ import json
 from flights import SECOND, flight, wrench
 
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.simulation import event_log
+from rigid_proto_ros.simulation import observer
 from rigid_proto_ros.simulation.observer import Logged, Observer, Observers
 
 BODY = make_body(2.0, (0.0, 0.0, 0.0), ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9)))
@@ -37,7 +37,7 @@ def commanded(count: int):
 
 
 def test_events_chained_later_give_the_hash_of_those_chained_at_once(monkeypatch):
-    monkeypatch.setattr(event_log, "MOST_NOTED", 7)
+    monkeypatch.setattr(observer, "MOST_NOTED", 7)
     read, unread, now_and_then = commanded(50), commanded(50), commanded(50)
     reader, fickle = Reader(), Reader()
     read.watch(Observers(Observer(), reader))

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from sweep_studies import PULLED, study
 
-from rigid_proto_ros.base import elementary as el
+from rigid_proto_ros.base import arithmetic as el
 from rigid_proto_ros.base.bundled import body_names, scene_names
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.provenance import MOTION

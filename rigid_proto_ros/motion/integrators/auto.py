@@ -11,7 +11,7 @@
 
 Taylor steps are as long as the accuracy allows, which follows from their coefficients. The choice depends only on the
 segment's problem and initial state, and each step only on the state at its start. Strings and damping faster than
-FASTEST are refused (simulation/checks.py): with steps of about 1.5/FASTEST the simulation would be slower than real
+FASTEST are refused (simulation/setup.py): with steps of about 1.5/FASTEST the simulation would be slower than real
 time.
 """
 
@@ -24,8 +24,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
-from ..problem import damping_functions, is_good
-from .equations import stretch
+from ..problem import damping_functions, is_good, stretch
 from .free_body import free_body_steps
 from .integrator import (
     ADAPTIVE,

@@ -36,13 +36,11 @@ import math
 
 import numpy as np
 
+from ...base.arithmetic import inverse_tangent, pair_add, pair_multiply, sine_cosine, two_product, two_sum
 from ...base.compilation import njit
-from ...base.elementary import inverse_tangent, sine_cosine
-from ...base.exact_arithmetic import pair_add, pair_multiply, two_product, two_sum
 from ...base.rotation import multiply, norm, normalize, rotate
 from ...base.vectors import Quaternion, Vector
-from ..problem import MAX_SPEED, damping_functions, is_good, undamped_torque
-from .equations import parts_of
+from ..problem import MAX_SPEED, damping_functions, is_good, parts_of, undamped_torque
 from .integrator import ANGULAR_DAMPING, LOADS, ONE_STEP, Integrator, Method
 
 ON_SEPARATRIX = 1e-290

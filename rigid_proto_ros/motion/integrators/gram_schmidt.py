@@ -16,8 +16,7 @@ import numpy as np
 from ...base.compilation import copy_numbers, njit
 from ...base.rotation import matrix_elements, norm
 from ...base.vectors import Quaternion, Vector
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY
-from .equations import accelerations, parts_of
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, accelerations, parts_of
 from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
 from .runge_kutta import ONE_STAGE, repeated
 

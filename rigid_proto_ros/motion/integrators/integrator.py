@@ -37,7 +37,7 @@ NO_GYROSCOPIC_TERM = "gyroscopic: false"
 LOADS = frozenset({BODY_TORQUE, WORLD_TORQUE, BODY_FORCE})
 """What wrenches and pokes can ask for. Gravity, world forces at the COM and linear damping are closed form for all."""
 EVALUATED = LOADS | {STRING, *ENVIRONMENT_NEEDS.values()}
-"""What an integrator supports that takes all rates from ``accelerations`` (integrators/equations.py)."""
+"""What an integrator supports that takes all rates from ``accelerations`` (motion/problem.py)."""
 
 
 def needs_of_load(load: Load) -> frozenset[str]:

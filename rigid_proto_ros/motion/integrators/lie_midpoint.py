@@ -25,8 +25,7 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize, rotate
 from ...base.vectors import Quaternion, Vector
-from ..problem import is_good, torque
-from .equations import parts_of
+from ..problem import is_good, parts_of, torque
 from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 
 _MAX_ITERATIONS = 60

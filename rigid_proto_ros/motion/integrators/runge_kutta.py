@@ -20,8 +20,18 @@ import numpy as np
 from ...base.compilation import copy_numbers, njit
 from ...base.rotation import exponential, multiply, normalize
 from ...base.simd import Packed, filled, four, joined, load, number, store
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good
-from .equations import accelerations, parts_of, stretch, tension_margin
+from ..problem import (
+    DISPLACEMENT,
+    HAND_WORK,
+    HEAT,
+    SPIN,
+    VELOCITY,
+    accelerations,
+    is_good,
+    parts_of,
+    stretch,
+    tension_margin,
+)
 from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
 from .string_law import is_one_sided, shortening_heat
 

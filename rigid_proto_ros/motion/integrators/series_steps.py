@@ -24,8 +24,8 @@ import math
 
 import numpy as np
 
+from ...base.arithmetic import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of, logarithm
 from ...base.compilation import copy_numbers, njit
-from ...base.elementary import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of, logarithm
 from ...base.rotation import norm
 from ...base.simd import Packed, aligned, filled, four, joined, largest, load
 from ..problem import ATTITUDE, HEAT, VARIABLES, damping_functions, is_good

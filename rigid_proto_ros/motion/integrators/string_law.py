@@ -22,8 +22,8 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import norm
+from ..problem import knot_of, stretch
 from ..string import NO_DIRECTION
-from .equations import knot_of, stretch
 from .series import A_KNOT, DISTANCE, STRETCH, TENSION, Knot, distance_series, stretch_at
 
 SLACK, PULLS, SHORTENS = 0.0, 1.0, 2.0
