@@ -159,8 +159,8 @@ def test_a_launch_file_needs_no_numba() -> None:
 
 @pytest.mark.parametrize("module", ["simulation.simulation", "scene.scenario", "session.recorded_session"])
 def test_simulating_loads_no_viewer_mesh_reader_or_ros(module: str) -> None:
-    # scipy is not among them: numba loads it where it is installed, for linear algebra that we don't use.
-    heavy = ("trimesh", "rerun", "rclpy", "pyarrow", "manifold3d", "mcap", "zstandard")
+    # numba would load the last three, wherever they are installed, for what no kernel here uses.
+    heavy = ("trimesh", "rerun", "rclpy", "pyarrow", "manifold3d", "mcap", "zstandard", "scipy", "cffi", "coverage")
     code = f"import sys, {PACKAGE}.{module}; print(*[name for name in {heavy!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -15,10 +15,13 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import types
 
 from .compilation import INTERPRETED, Emitted, intrinsic, njit
 from .simd import fused_multiply_add
+
+# isort: split
+# After compilation.py, which keeps numba from importing what isn't needed.
+from numba import types
 
 # Pairs of doubles
 #
