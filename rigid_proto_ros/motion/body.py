@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The rigid body: mass properties, principal axes, and where mesh points lie on it.
+"""The rigid body: mass properties, principal axes, and conversion of mesh coordinates to body axes.
 
 Compiled kernels read a body as a row of BODY doubles.
 """
@@ -18,7 +18,7 @@ from ..base.vectors import Numbers
 from ..mass.closed_form import Principal
 from ..mass.tensor import principal_axes_kernel
 
-# Where the numbers of a body stand in its row.
+# Layout of a body's row.
 MASS = 0
 COM = 1  # (3,) [m, mesh axes after scaling]
 INERTIA = 4  # (9,) row by row
@@ -26,12 +26,12 @@ MOMENTS = 13  # (3,) ascending
 AXES = 16  # (9,) principal axes row by row
 QUATERNION = 25  # (4,) principal to body
 BODY_SCALE = 29  # (3,)
-LENGTH = 32  # ℓ, what displacement errors are measured by [m]; 1 where no mesh gives it a size
+LENGTH = 32  # ℓ, reference length of displacement errors [m]; 1 without a mesh
 BODY = 33
 
 MAX_ACCELERATION = 1e15
-"""m/s² and rad/s²; m/s and rad/s for impulses. A command beyond it is a slip of the keyboard, and it
-would leave no digits.
+"""Limit in m/s² and rad/s²; in m/s and rad/s for impulses. A larger command is most likely a typing error, and would
+leave no significant digits of the motion.
 """
 
 
@@ -68,8 +68,8 @@ def normal(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float
 def fill_body(
     mass: float, com: np.ndarray, inertia: np.ndarray, principal: Principal, scale: np.ndarray, body: np.ndarray
 ) -> None:
-    """The row of a body (BODY,) without a size from com (3,), inertia (3, 3), its principal moments and axes and
-    scale (3,).
+    """Fill the row of a body (BODY,), with length ℓ = 1, from mass, com (3,), inertia (3, 3), its principal moments and
+    axes, and scale (3,).
     """
     moments, axes = principal
     quaternion_of_axes(axes, body[QUATERNION : QUATERNION + 4])
@@ -85,7 +85,7 @@ def fill_body(
 
 @dataclass(frozen=True)
 class Body:
-    """row (BODY,): the body as compiled kernels read it; none of its numbers is changed."""
+    """A rigid body. row (BODY,): the body as compiled kernels read it; it is never modified."""
 
     row: np.ndarray
 
@@ -106,7 +106,7 @@ class Body:
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """(3,): mesh coordinates times it are metres from the mesh origin."""
+        """(3,): factors from mesh coordinates to metres from the mesh origin."""
         return self.row[BODY_SCALE : BODY_SCALE + 3]
 
     @cached_property
@@ -116,18 +116,18 @@ class Body:
 
     @cached_property
     def principal_axes(self) -> np.ndarray:
-        """(3, 3): columns, body axes."""
+        """(3, 3): principal axes as columns, in body axes."""
         return self.row[AXES : AXES + 9].reshape(3, 3)
 
     @cached_property
     def principal_quaternion(self) -> np.ndarray:
-        """(4,) xyzw, takes principal to body axes."""
+        """(4,) xyzw, rotation from principal to body axes."""
         return self.row[QUATERNION : QUATERNION + 4]
 
     @cached_property
     def light(self) -> float:
-        """A load stays far below MAX_ACCELERATION while (Σ|F| + Σ|τ|)(1 + Σ|point|) is no more, point in mesh
-        coordinates.
+        """Bound of (Σ|F| + Σ|τ|)(1 + Σ|point|), with point in mesh coordinates, up to which a load stays far below
+        MAX_ACCELERATION.
         """
         largest: float = max(*map(abs, self.scale.tolist()), *map(abs, self.center_of_mass.tolist()))
         return 0.1 * MAX_ACCELERATION * min(self.mass, float(self.principal_moments[0]) / (1.0 + 3.0 * largest))

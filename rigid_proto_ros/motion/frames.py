@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The frame of a wrench: which axes its numbers are in, and which point of the body it attacks.
+"""The frame of a wrench: the axes of its components, and its point of application on the body.
 
 A frame is written ``axes@point[;duration=<s>|;impulse][;slot=<name>]``; README and docs list the forms. This module
-only reads the text; where the point lies on the body is resolved by motion/loads.py.
+only parses the text; motion/loads.py resolves the point on the body.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ CONTACT_NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
 RESERVED_WORDS = frozenset({*AXES, *FIXED_POINTS, "vertex", "point", "ray", "mesh", "duration", "impulse"})
 
 MAX_FRAME_LENGTH = 1024
-"""Characters; the longest sensible frame, a ray with 17 digits a number, has about 170."""
+"""Characters; the longest sensible frame, a ray with 17 digits per number, has about 170."""
 
 MAX_DURATION_S = 1e9
-"""A pulse's end must stay well inside the 292 years that int64 nanoseconds hold."""
+"""The end of a pulse must stay well within the 292 years that int64 nanoseconds can represent."""
 
 SLOT_NAME = re.compile(r"[a-z][a-z0-9_]{0,11}\Z")
-"""Twelve characters fit into one integer, by which compiled flights know a slot."""
+"""Twelve characters fit into the integer that identifies a slot in compiled flights."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
 
 
 class Frame(NamedTuple):
-    """axes: ``world``, ``body`` or ``normal``; point: a form of POINT_FORMS as a tuple, its word first. slot: which of
-    several held wrenches it replaces, empty for the unnamed one.
+    """axes: ``world``, ``body`` or ``normal``; point: a form of POINT_FORMS as a tuple, its keyword first. slot: name
+    of the slot whose held wrench it replaces, empty for the unnamed one.
     """
 
     axes: str
@@ -47,7 +47,7 @@ class Frame(NamedTuple):
 
     @property
     def options(self) -> str:
-        """What stands behind the point."""
+        """The options after the point."""
         slot = f";slot={self.slot}" if self.slot else ""
         if self.duration_s is not None:
             return f";duration={self.duration_s!r}{slot}"
@@ -55,12 +55,12 @@ class Frame(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The frame written out, with both axes and point."""
+        """The frame as text, with both axes and point."""
         return f"{self.axes}@{point_text(self.point)}{self.options}"
 
 
 def point_text(point: tuple[Any, ...]) -> str:
-    """A point as it stands in a frame; numbers keep all their digits."""
+    """Text of a point in a frame; numbers keep all their digits."""
     word, *values = point
     if word in FIXED_POINTS:
         return str(word)
@@ -71,12 +71,12 @@ def point_text(point: tuple[Any, ...]) -> str:
     return "/".join([word, *(",".join(repr(float(x)) for x in triple) for triple in values)])
 
 
-@functools.lru_cache(maxsize=1024)  # frames come again and again
+@functools.lru_cache(maxsize=1024)  # the same frames recur
 def parse_frame(text: str, world: str = "world", body: str = "body") -> Frame:
-    """Read a ``frame_id``. What can be the name of a contact is one: the body that a command comes to has it, or not.
+    """Parse a ``frame_id``. A word that can name a contact is taken as one; whether the body has it is checked later.
 
-    world, body: names of this node's world and body frame, accepted beside the words. Raises CommandRefused with
-    reason ``frame``.
+    world, body: names of this node's world and body frames, accepted besides the keywords. Raises CommandRefused with
+    reason ``frame``, or ``nonfinite`` for numbers that overflow.
     """
     if len(text) > MAX_FRAME_LENGTH:
         raise CommandRefused("frame", "frame_id", text[:40] + "...", f"at most {MAX_FRAME_LENGTH} characters")
@@ -118,7 +118,7 @@ def _parse_point(part: str, text: str, axes_words: Iterable[str] = ()) -> tuple[
 
 
 def contact_point(name: str, contacts: Mapping[str, Vector]) -> Vector:
-    """Where a contact of the body is, in mesh coordinates; raises CommandRefused (``frame``) naming those it has."""
+    """Position of a contact of the body in mesh coordinates; raises CommandRefused (``frame``) listing its contacts."""
     if name not in contacts:
         known = f"a contact of the body ({_names(contacts)})" if contacts else "the body has no contacts"
         accepted = "; ".join(filter(None, [f"{known}, or {POINT_FORMS}", did_you_mean(name, [*contacts, *AXES])]))
@@ -158,7 +158,7 @@ def _parse_options(options: list[str], text: str) -> tuple[float | None, bool, s
 
 
 def check_contact_name(name: str) -> None:
-    """Raises CommandRefused unless ``name`` can stand for a point in a frame."""
+    """Raises CommandRefused unless ``name`` can be used as a point in a frame."""
     if not CONTACT_NAME.match(name) or name in RESERVED_WORDS:
         raise CommandRefused(
             "frame", f"contacts.{name}", name, f"[a-z][a-z0-9_]*, and none of {_names(RESERVED_WORDS)}"

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Forces and torques on the body, and their sum as an integrator takes it.
+"""Forces and torques on the body, and their sums, which integrators use.
 
-Three kinds of load differ on a turning body: a torque fixed in the world, a world force at a point of the body, and a
-force that turns with the body. Any number of each sums to the same few vectors, because the torque of world forces Fᵢ
+On a rotating body three kinds of load differ: a torque fixed in the world, a world force at a point of the body, and a
+force that rotates with the body. Any number of each reduces to the same few sums, because the torque of world forces Fᵢ
 at body points rᵢ is linear in M = Σ rᵢ Fᵢᵀ: Σ rᵢ × RᵀFᵢ is the axial vector of M R.
 
-What a load does is compiled, once: live flights, offline ones and sweeps call the functions here on a load's row.
+The effect of a load is compiled once: live simulations, offline runs and sweeps call the functions here on its row.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .frames import Frame, contact_point, point_text
 from .state import State
 from .surface import Surface
 
-# Where the sums of loads stand in one row of LOADS_SIZE doubles.
+# Layout of the sums of loads, a row of LOADS_SIZE doubles.
 FORCE_WORLD = 0  # (3,) [N]
 FORCE_BODY = 3  # (3,) [N]
 TORQUE_WORLD = 6  # (3,) [N m]
@@ -35,14 +35,14 @@ TORQUE_BODY = 9  # (3,) [N m]
 MOMENT = 12  # (9,) M row by row [N m]
 LOADS_SIZE = 21
 
-# Where the numbers of one load stand in its row of LOAD doubles.
+# Layout of one load, a row of LOAD doubles.
 LOAD_AXES = 0
 WORLD_AXES, BODY_AXES, NORMAL_AXES = 0.0, 1.0, 2.0
 HAS_POINT = 1
 POINT = 2  # (3,) [mesh coordinates]
 FORCE = 5  # (3,) [N, or N s]
 TORQUE = 8  # (3,) [N m, or N m s]
-NORMAL = 11  # (3,) inward, of the unscaled mesh
+NORMAL = 11  # (3,) inward normal of the unscaled mesh
 LOAD = 14
 
 _AXES = ("world", "body", "normal")
@@ -53,7 +53,7 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def arm_of(load: np.ndarray, body: np.ndarray) -> Vector:
-    """From the COM to the point of attack [m, body axes]: three numbers."""
+    """Vector from the COM to the point of application [m, body axes]: three numbers."""
     if load[HAS_POINT] == 0.0:
         return 0.0, 0.0, 0.0
     return of_body.arm(body, load[POINT], load[POINT + 1], load[POINT + 2])
@@ -61,7 +61,7 @@ def arm_of(load: np.ndarray, body: np.ndarray) -> Vector:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def own_force(load: np.ndarray, body: np.ndarray) -> Vector:
-    """The force in body axes, of a load whose axes turn with the body: three numbers."""
+    """The force, in body axes, of a load whose axes rotate with the body: three numbers."""
     f = load[FORCE]
     if load[LOAD_AXES] == NORMAL_AXES:
         x, y, z = of_body.normal(body, load[NORMAL], load[NORMAL + 1], load[NORMAL + 2])
@@ -71,14 +71,14 @@ def own_force(load: np.ndarray, body: np.ndarray) -> Vector:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _bound(x: float, y: float, z: float) -> float:
-    """√3 times the largest component: not below the length, and without its overflow."""
+    """√3 times the largest component: an upper bound of the length without overflow of squares."""
     return 1.7320508075688772 * max(abs(x), abs(y), abs(z))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def magnitudes(load: np.ndarray, body: np.ndarray) -> tuple[float, float]:
-    """Bounds of the linear [m/s²] and angular [rad/s²] acceleration over all attitudes: by |r||F| and the
-    smallest moment.
+    """Upper bounds of the linear [m/s²] and angular [rad/s²] acceleration over all attitudes, computed from |r||F| and
+    the smallest principal moment.
     """
     force = _bound(load[FORCE], load[FORCE + 1], load[FORCE + 2])
     torque = _bound(load[TORQUE], load[TORQUE + 1], load[TORQUE + 2])
@@ -90,20 +90,20 @@ def magnitudes(load: np.ndarray, body: np.ndarray) -> tuple[float, float]:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def is_within_magnitude(load: np.ndarray, body: np.ndarray) -> bool:
-    """Whether both stay within MAX_ACCELERATION; an overflow to NaN doesn't."""
+    """Whether both accelerations are within MAX_ACCELERATION; False if they overflow to NaN."""
     linear, angular = magnitudes(load, body)
     return linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def is_zero(load: np.ndarray) -> bool:
-    """Whether there is neither force nor torque."""
+    """Whether the load has neither force nor torque."""
     return not load[FORCE : FORCE + 6].any()
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def accumulate_load(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> None:
-    """What the load adds to the sums, into share (LOADS_SIZE,): forces and torques by axes, the moment r
+    """Write the load's contribution to the sums into share (LOADS_SIZE,): forces and torques by axes, and the moment r
     Fᵀ of a world force.
     """
     share[:] = 0.0
@@ -126,7 +126,7 @@ def accumulate_load(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> No
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def apply_impulse(load: np.ndarray, body: np.ndarray, row: np.ndarray) -> None:
-    """What an impulse does to a state row: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
+    """Apply impulse J and angular impulse H to a state row: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
     a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])
     hx, hy, hz = load[TORQUE], load[TORQUE + 1], load[TORQUE + 2]
     if load[LOAD_AXES] == WORLD_AXES:
@@ -151,7 +151,7 @@ def apply_impulse(load: np.ndarray, body: np.ndarray, row: np.ndarray) -> None:
 
 
 class Load(NamedTuple):
-    """One command's wrench, its point resolved on the body.
+    """The wrench of one command, with its point resolved on the body.
 
     axes: ``world``, ``body`` or ``normal``. mesh_point (3,) in mesh coordinates, or None for the COM. mesh_normal (3,):
     the inward normal there, for ``normal``. force [N, or N s for an impulse], torque about the point [N m, or N m s].
@@ -165,7 +165,7 @@ class Load(NamedTuple):
 
     @property
     def is_zero(self) -> bool:
-        """Whether there is neither force nor torque."""
+        """Whether the load has neither force nor torque."""
         return not (any(self.force) or any(self.torque))
 
     @property
@@ -189,11 +189,11 @@ class Load(NamedTuple):
         return f"{axes}@{point_text(point)}"
 
     def arm(self, body: Body) -> np.ndarray:
-        """From the COM to the point of attack (3,) [m, body axes]."""
+        """Vector from the COM to the point of application (3,) [m, body axes]."""
         return np.array(arm_of(self.row, body.row))
 
     def own_force(self, body: Body) -> np.ndarray:
-        """The force (3,) in body axes, of a load whose axes turn with the body."""
+        """The force (3,), in body axes, of a load whose axes rotate with the body."""
         return np.array(own_force(self.row, body.row))
 
     def check_magnitude(self, body: Body) -> None:
@@ -210,12 +210,12 @@ class Load(NamedTuple):
 
 
 def load_of_row(row: np.ndarray) -> Load:
-    """The load whose row (LOAD,) this is."""
+    """The load with this row (LOAD,)."""
     return load_of_bytes(row.tobytes())
 
 
 def load_of_bytes(row: bytes) -> Load:
-    """The load whose row these are."""
+    """The load whose row has these bytes."""
     axes, has_point, *numbers = _ROW.unpack(row)
     point, force, torque, normal = (vector(numbers[k : k + 3]) for k in range(0, 12, 3))
     named = _AXES[int(axes)]
@@ -223,8 +223,8 @@ def load_of_bytes(row: bytes) -> Load:
 
 
 def light_row(frame: Frame, force: Numbers, torque: Numbers, body: Body) -> bytes:
-    """The row of a load that is nothing but its numbers, as most are: on a point given as such, in world or body axes,
-    and far from too strong. Empty for any other: ``resolve_load`` says what it is, or what is wrong with it.
+    """Fast path for most loads: the row of a load in world or body axes, at the COM or at a given point, that is far
+    below the magnitude limit. Empty for any other load, which ``resolve_load`` resolves or refuses.
     """
     word, axes = frame.point[0], frame.axes
     if axes == "normal" or word not in ("com", "point"):
@@ -233,7 +233,7 @@ def light_row(frame: Frame, force: Numbers, torque: Numbers, body: Body) -> byte
     tx, ty, tz = torque
     x, y, z = frame.point[1] if word == "point" else _ORIGIN
     amount = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz)
-    # Of what isn't finite this doesn't hold.
+    # False for numbers that aren't finite.
     if amount * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light:
         return _ROW.pack(_AXES_NUMBERS[axes], word == "point", x, y, z, fx, fy, fz, tx, ty, tz, 0.0, 0.0, 0.0)
     return b""
@@ -248,12 +248,12 @@ def resolve_load(
     contacts: Mapping[str, Vector],
     state: State | None,
 ) -> Load:
-    """Resolve a frame's point on the body as it is now; raises CommandRefused (``frame``, ``ray_miss``, ``nonfinite``).
+    """Resolve a frame's point on the body in its state; raises CommandRefused (``frame``, ``ray_miss``, ``nonfinite``).
 
-    without a body and a state a ray stays unresolved: it is checked again when it takes effect.
+    Without a body and a state a ray stays unresolved: it is checked again when it takes effect.
     """
     force, torque = vector(force), vector(torque)
-    # Of finite numbers a sum that isn't finite overflowed; only then each is looked at.
+    # The sum of finite numbers may overflow: if it isn't finite, each number is checked.
     if not math.isfinite(sum(force) + sum(torque)) and not all(map(math.isfinite, (*force, *torque))):
         raise CommandRefused("nonfinite", "wrench", [*force, *torque], "finite numbers")
     if frame.axes != "normal":

@@ -16,7 +16,7 @@ from ..base.vectors import Numbers
 
 @dataclass(slots=True)
 class State:
-    """State at one instant of simulated time; a new one is made for every instant, and none is changed.
+    """State at one instant of simulated time; every instant has its own object, which is never modified.
 
     time_ns: simulated time [ns]. row (13,) float64: COM position x [m, world], attitude q xyzw (body to world), COM
     velocity v [m/s, world], angular velocity ω [rad/s, body axes].
@@ -56,8 +56,8 @@ class State:
         return times(self.rotation, self.angular_velocity_body)
 
     def moved(self, values: Mapping[str, Numbers]) -> State:
-        """With another position, orientation_xyzw, linear_velocity or angular_velocity, all in world axes; the others
-        stay, ω in the world, too.
+        """A copy with another position, orientation_xyzw, linear_velocity or angular_velocity, all in world axes; the
+        others, including ω in world axes, stay unchanged.
         """
         row = np.empty(13)
         attitude = values.get("orientation_xyzw", self.orientation_xyzw)
@@ -91,8 +91,8 @@ class State:
 def fill_initial_row(
     position: np.ndarray, orientation: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray, row: np.ndarray
 ) -> bool:
-    """A state row (13,) of an orientation (4,) of any length and of ω (3,) in world axes; False when the orientation
-    has no length.
+    """Fill a state row (13,), given an orientation (4,) of any length and ω (3,) in world axes; returns False when the
+    orientation has length zero.
     """
     x, y, z, w = to_unit(orientation[0], orientation[1], orientation[2], orientation[3])
     row[3], row[4], row[5], row[6] = x, y, z, w
@@ -109,8 +109,8 @@ def fill_initial_row(
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def shift_com(row: np.ndarray, x: float, y: float, z: float) -> None:
-    """Let a state row (13,) be that of another point of the same moving body, x, y, z [m, body axes] from the COM that
-    it was of: the place R d further, with the velocity v + ω × R d.
+    """Change the reference point of a state row (13,) to the one at d = (x, y, z) [m, body axes] from the COM on the
+    same moving body: the position changes by R d, the velocity by ω × R d.
     """
     R = matrix_elements(row[3], row[4], row[5], row[6])
     x, y, z = R[0] * x + R[1] * y + R[2] * z, R[3] * x + R[4] * y + R[5] * z, R[6] * x + R[7] * y + R[8] * z
@@ -134,7 +134,7 @@ def kinetic_energy(row: np.ndarray, mass: float, inertia: np.ndarray) -> float:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def angular_momentum(row: np.ndarray, inertia: np.ndarray) -> tuple[float, float, float]:
-    """L = R I ω about the COM, world axes [N m s], likewise."""
+    """L = R I ω about the COM, world axes [N m s], of a state row (≥ 13,); inertia (9,) row by row."""
     x, y, z = row[10], row[11], row[12]
     return rotate(
         row[3],

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""The string: a massless spring with a damper from a knot on the body to a free end that a hand moves.
+"""The string: a massless spring with a damper between a knot on the body and a free end that a hand moves.
 
-With l the distance from free end to knot and x = l − rest length, it pulls the knot towards the free end with
+With the distance l from free end to knot and x = l − rest length, its tension pulls the knot towards the free end with
 
     T = max(0, k x + c l') while x > 0, else 0;        bilateral: T = k x + c l' always.
 
-Rest length 0: F = −k a − c a' with a the vector from free end to knot, regular at distance 0. Otherwise there is no
-pull within 1e-12 rest lengths of the free end, where it has no direction. k and c come from the effective mass that the
-knot shows along the string, 1/m_eff = 1/m + (r × n)ᵀ I⁻¹ (r × n), taken when the string is tied and when the body or
-the string changes, then held: c = 2ζ√(k m_eff), and k = m_eff ω² when a frequency is asked for.
+Rest length 0: F = −k a − c a' with a the vector from free end to knot, regular at distance 0. Otherwise the force is
+zero within 1e-12 rest lengths of the free end, where its direction is undefined. k and c follow from the effective mass
+of the knot along the string, 1/m_eff = 1/m + (r × n)ᵀ I⁻¹ (r × n), computed when the string is tied and when the body
+or the string changes, and constant in between: c = 2ζ√(k m_eff), and k = m_eff ω² if a frequency is given.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from .body import MASS, Body, angular_acceleration
 from .state import State
 
 RAMP_NS = 100_000_000
-"""The free end takes at most this long to a new target: targets come at 10 Hz and more from a hand that
-moves evenly.
+"""Longest time [ns] in which the free end moves to a new target: a hand in steady motion sends targets at 10 Hz or
+more.
 """
 
 NO_DIRECTION = 1e-12
-"""Rest lengths from the free end within which the string doesn't pull."""
+"""Distance from the free end, in rest lengths, within which the string exerts no force."""
 
 ROUNDINGS = 4.0
-"""Of position and arm, that a span of zero may come to when it is computed."""
+"""Largest computed length of a span of zero, in units of ε (|position| + |arm|)."""
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def most_yielding(mass: float, i1: float, i2: float, i3: float, x: float, y: float, z: float) -> float:
-    """A bound of 1/m_eff [1/kg] over all directions for the knot at x, y, z [m] from the COM, in principal axes with
-    moments i1 ≤ i2 ≤ i3: 1/m and the largest eigenvalue of [r]×ᵀ I⁻¹ [r]×, by its trace or by |r|²/i1.
+    """Upper bound of 1/m_eff [1/kg] over all directions for a knot at x, y, z [m] from the COM, in principal axes with
+    moments i1 ≤ i2 ≤ i3: 1/m and the largest eigenvalue of [r]×ᵀ I⁻¹ [r]×, bounded by its trace or by |r|²/i1.
     """
     xx, yy, zz = x * x, y * y, z * z
     trace = (yy + zz) / i1 + (zz + xx) / i2 + (xx + yy) / i3
@@ -48,7 +48,7 @@ def most_yielding(mass: float, i1: float, i2: float, i3: float, x: float, y: flo
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def length_of(x: float, y: float, z: float) -> float:
-    """|v| of a vector of any size."""
+    """|v| without overflow or underflow of squares."""
     largest = max(abs(x), abs(y), abs(z))
     if largest == 0.0:
         return 0.0
@@ -59,8 +59,8 @@ def length_of(x: float, y: float, z: float) -> float:
 def free_end_at(
     now_ns: int, origin: np.ndarray, target: np.ndarray, begin_ns: int, end_ns: int
 ) -> tuple[Vector, Vector]:
-    """Where the free end is [m, world], and its velocity [m/s, world] from then on: it goes evenly from origin (3,) at
-    begin_ns to target (3,) at end_ns and stays there.
+    """The free end's position [m, world] and, from then on, its velocity [m/s, world], for uniform motion from origin
+    (3,) at begin_ns to target (3,) at end_ns, where it stays.
     """
     if now_ns >= end_ns:
         return (target[0], target[1], target[2]), (0.0, 0.0, 0.0)
@@ -71,8 +71,8 @@ def free_end_at(
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def span_of(rx: float, ry: float, rz: float, row: np.ndarray, ex: float, ey: float, ez: float) -> Vector:
-    """From the free end at e [m, world] to the knot at r [m from the COM, body axes] at a state row (13,): three
-    numbers [m, world].
+    """Vector from the free end at e [m, world] to the knot at r [m from the COM, body axes] for a state row (13,):
+    three numbers [m, world].
     """
     a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])
     return (
@@ -94,9 +94,9 @@ def _turning(body: np.ndarray, rx: float, ry: float, rz: float, x: float, y: flo
 def effective_mass(
     body: np.ndarray, rx: float, ry: float, rz: float, row: np.ndarray, span: Vector, rest_length: float
 ) -> float:
-    """m_eff [kg] of the point r [m, body axes] of a body (BODY,) along ``span`` [world]; over all directions when the
-    span is none: shorter than NO_DIRECTION rest lengths or what rounding of the places that it lies between makes of
-    zero.
+    """m_eff [kg] of the point r [m, body axes] of a body (BODY,) along ``span`` [world]. The mean of 1/m_eff over all
+    directions is used if the span has no direction: shorter than NO_DIRECTION rest lengths, or than the rounding error
+    of the positions that it connects.
     """
     x, y, z = span
     length = length_of(x, y, z)
@@ -115,14 +115,14 @@ def effective_mass(
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def spring_of(mass: float, stiffness: float, frequency: float, damping_ratio: float) -> tuple[float, float]:
-    """k [N/m] and c [N s/m] for this effective mass; a frequency [rad/s] > 0 wins over the stiffness."""
+    """k [N/m] and c [N s/m] for this effective mass; a frequency [rad/s] > 0 overrides the stiffness."""
     k = mass * (frequency * frequency) if frequency > 0.0 else stiffness
     return k, 2.0 * damping_ratio * math.sqrt(k * mass)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def energy_of(span: Vector, stiffness: float, rest_length: float, bilateral: bool) -> float:
-    """½ k x² while it pulls [J]."""
+    """½ k x² [J]; 0 while a pull-only string is slack."""
     stretch = length_of(*span) - rest_length
     if stretch < 0.0 and not bilateral:
         return 0.0
@@ -131,10 +131,10 @@ def energy_of(span: Vector, stiffness: float, rest_length: float, bilateral: boo
 
 @dataclass(frozen=True)
 class StringSettings:
-    """What parameters say of the string.
+    """Parameters of the string.
 
     attached: tied from the start, at ``attach`` (mesh coordinates) to ``target`` [m, world], without timeout. stiffness
-    [N/m]; frequency [rad/s], > 0 wins over stiffness; rest_length [m]; timeout_ns after the last target, 0 never.
+    [N/m]; frequency [rad/s], overrides it if > 0; rest_length [m]; timeout_ns after the last target, 0 never.
     """
 
     attached: bool = False
@@ -150,9 +150,9 @@ class StringSettings:
 
 @dataclass(frozen=True)
 class StringState:
-    """A tied string. attach: the knot in mesh coordinates. The free end goes evenly from ``origin`` at begin_ns to
-    ``target`` at end_ns [m, world] and stays there. last_target_ns: time of the last target; release_ns: when it lets
-    go, or None. effective_mass [kg], stiffness [N/m], damping [N s/m], frequency ω_s = √(k/m_eff) [rad/s] as computed.
+    """A tied string. attach: the knot in mesh coordinates. The free end moves at constant velocity from ``origin`` at
+    begin_ns to ``target`` at end_ns [m, world] and stays there. last_target_ns: time of the last target; release_ns:
+    time of release, or None. effective_mass [kg], stiffness [N/m], damping [N s/m], frequency ω_s = √(k/m_eff) [rad/s].
     """
 
     attach: tuple[float, float, float]
@@ -176,15 +176,15 @@ class StringState:
         return np.array([*self.attach, *self.origin, *self.target, *numbers])
 
     def arm(self, body: Body) -> np.ndarray:
-        """From the COM to the knot (3,) [m, body axes]."""
+        """Vector from the COM to the knot (3,) [m, body axes]."""
         return body.point(self.attach)
 
     def free_end(self, time_ns: int) -> np.ndarray:
-        """Where the free end is (3,) [m, world]."""
+        """Position of the free end (3,) [m, world]."""
         return np.array(free_end_at(time_ns, self.origin, self.target, self.begin_ns, self.end_ns)[0])
 
     def span(self, body: Body, state: State) -> np.ndarray:
-        """From the free end to the knot (3,) [m, world]."""
+        """Vector from the free end to the knot (3,) [m, world]."""
         return np.array(self._span(body, state))
 
     def _span(self, body: Body, state: State) -> Vector:
@@ -193,11 +193,11 @@ class StringState:
         return span_of(rx, ry, rz, state.row, ex, ey, ez)
 
     def potential_energy(self, body: Body, state: State) -> float:
-        """½ k x² while it pulls [J]."""
+        """½ k x² [J]; 0 while a pull-only string is slack."""
         return energy_of(self._span(body, state), self.stiffness, self.rest_length, self.bilateral)
 
     def moved(self, target: Numbers, time_ns: int, timeout_ns: int) -> StringState:
-        """The hand goes to a new target: over the time since the last one, at most RAMP_NS."""
+        """Move the free end to a new target, in the time since the last target but at most RAMP_NS."""
         ramp_ns = min(time_ns - self.last_target_ns, RAMP_NS)
         return replace(
             self,
@@ -210,8 +210,8 @@ class StringState:
         )
 
     def with_spring(self, settings: StringSettings, body: Body, state: State, mass: float = 0.0) -> StringState:
-        """With stiffness and damping taken anew from the settings and ``mass`` [kg], or where that is 0 from the
-        effective mass of the body as it is.
+        """A copy with stiffness and damping computed from the settings and ``mass`` [kg] or, if that is 0, from the
+        current effective mass of the body.
         """
         if not mass:
             rx, ry, rz = self.arm(body)
@@ -241,7 +241,7 @@ def tie(
 ) -> StringState:
     """Tie the string at ``attach`` (mesh coordinates) with its free end at ``target`` [m, world] at once.
 
-    timeout_ns 0 never lets go. mass: as ``with_spring`` takes it.
+    timeout_ns: 0 for no release. mass: see ``with_spring``.
     """
     now_ns = state.time_ns
     point = np.asarray(target, dtype=float)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The body's surface as commands need it: where a ray meets it, and which way is inward at a point.
+"""Queries of commands on the body's surface: ray intersection, nearest point, and inward normal at a point.
 
-Everything here is in mesh coordinates (the file's numbers). One pass over all triangles per query: a poke is rare, and
-a million triangles take some milliseconds.
+Everything is in mesh coordinates (the file's numbers). Each query visits all triangles: pokes are rare, and a million
+triangles take some milliseconds.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class Surface:
     def inward_normal(self, point: Numbers) -> np.ndarray:
         """Unit inward normal (3,) of the surface where it is nearest to ``point`` (3,).
 
-        On an edge or at a vertex it is the angle-weighted mean of the faces that meet there (Baerentzen & Aanaes 2005),
-        which doesn't depend on how the faces are triangulated. Zero where they cancel.
+        On an edge or at a vertex it is the angle-weighted mean of the normals of adjacent faces (Baerentzen & Aanaes
+        2005), which doesn't depend on how the faces are triangulated. Zero where they cancel.
         """
         point = np.asarray(point, dtype=float)
         outward = np.array(_pseudo_normal(self.vertices, self.triangles, point, 1e-9 * length(self.extent)))
@@ -104,8 +104,8 @@ def _first_hit(
 
 @njit(cache=True)
 def _nearest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Nearest point of a triangle, squared distance, and the angle that the triangle spans there: its corner's, π on an
-    edge, 2π inside. After Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+    """Nearest point of a triangle, squared distance, and the angle of the triangle at that point: the corner's angle, π
+    on an edge, 2π inside. After Ericson, Real-Time Collision Detection (2005), section 5.1.5.
     """
     ab = b - a
     ac = c - a

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Rows of one scene in one compiled call without the interpreter's lock: bodies, flights and their measures.
+"""Simulation of many rows of one scene in one compiled call that releases the GIL: bodies, flights and measures.
 
-A row begins with the record of a setup's flight, filled with the numbers in which it differs, and is flown by the
-functions of simulation/flight.py. Every operation stands in the order in which a scene's setup and a simulation's
-commands do it, so the bits are theirs. Whatever is out of the ordinary (a bound, a doubtful tensor, a string that is
-too fast) gives no result: the caller then asks the simulation, which knows what to say.
+A row starts from the record of a setup's flight, filled with the numbers in which it differs, and is advanced by the
+functions of simulation/flight.py. All operations have the same order as in a scene's setup and a simulation's commands,
+so results agree bit for bit. Unusual cases (a limit, a doubtful tensor, a string that is too fast) give no result: the
+caller then runs the simulation, which handles them or reports the error.
 """
 
 from __future__ import annotations
@@ -37,50 +37,50 @@ from .setup import Setup
 
 _NUMBERS: list[tuple[Any, ...]] = [
     ("scale", np.float64, 3),
-    ("mass", np.float64),  # [kg], 0: the density decides
+    ("mass", np.float64),  # [kg]; 0: computed from the density
     ("density", np.float64),  # [kg/m³]
     ("explicit_inertia_mass", np.float64),  # [kg]
     ("explicit_inertia_center_of_mass", np.float64, 3),  # [mesh coordinates]
     ("explicit_inertia_tensor", np.float64, 6),  # ixx ixy ixz iyy iyz izz [kg m²]
     *ENVIRONMENT_FIELDS,
     ("initial_position", np.float64, 3),  # [m, world]
-    ("initial_orientation_xyzw", np.float64, 4),  # of any length
+    ("initial_orientation_xyzw", np.float64, 4),  # needn't be normalized
     ("initial_linear_velocity", np.float64, 3),  # [m/s, world]
     ("initial_angular_velocity", np.float64, 3),  # [rad/s, world]
     ("string_attach", np.float64, 3),  # [mesh coordinates]
     ("string_target", np.float64, 3),  # [m, world]
     ("string_stiffness", np.float64),  # [N/m]
-    ("string_frequency", np.float64),  # [rad/s], > 0 wins over the stiffness
+    ("string_frequency", np.float64),  # [rad/s], overrides the stiffness if > 0
     ("string_damping_ratio", np.float64),
     ("string_rest_length", np.float64),  # [m]
 ]
 ROW = record_type(
     [
-        # Parameters by name, dots as underscores: in these numbers rows of one batch may differ.
+        # Parameters by name, with dots as underscores: numbers in which the rows of a batch may differ.
         *_NUMBERS,
-        # The same in all rows of a batch: strings, then what of mesh and model doesn't change with the numbers above.
+        # The same in all rows of a batch: flags of the string, then properties of mesh and model.
         ("string_attached", np.bool_),  # at time 0
         ("string_bilateral", np.bool_),
         ("model", np.int64),  # EXPLICIT, ORDINARY or STRETCHED
-        ("solid_measure", np.float64),  # volume at unit scale; NaN when the surface bounds none
+        ("solid_measure", np.float64),  # volume at unit scale; NaN when the surface bounds no volume
         ("measure", np.float64),  # of the model: volume, area or number of points
         ("reference", np.float64, 3),
         ("center", np.float64, 3),
         ("center_low", np.float64, 3),
         ("second", np.float64, 6),
         ("has_surface", np.bool_),
-        ("extent", np.float64, 3),  # of the bounding box
+        ("extent", np.float64, 3),  # sides of the bounding box
     ]
 )
 NUMBERS = tuple(name for name, *_ in _NUMBERS)
 """Fields in which rows of one batch may differ."""
 PARAMETERS = (*NUMBERS, "string_attached", "string_bilateral")
-"""Fields that parameters give."""
+"""Fields that are set by parameters."""
 
 EXPLICIT, ORDINARY, STRETCHED = range(3)
 
 CERTAIN = 0.999
-"""Of a limit: nearer to it the simulation decides."""
+"""Fraction of a limit up to which a row is accepted here; closer to the limit the simulation decides."""
 
 
 _Side = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -89,8 +89,8 @@ _Side = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 @dataclass
 class Batch:
-    """rows (n,) ROW. ballast (k, 4): masses [kg] above 0, and where they are [mesh coordinates]. setup: of the scene.
-    commands (n or 1, c) LOAD_ROW: loads, in the order in which they act.
+    """A batch of rows. rows (n,) ROW. ballast (k, 4): masses [kg], above 0, and their positions [mesh coordinates].
+    setup: the scene's. commands (n or 1, c) LOAD_ROW: loads, in the order in which they act.
     """
 
     rows: NDArray[np.void]
@@ -100,12 +100,12 @@ class Batch:
 
     @property
     def notes_floors(self) -> bool:
-        """Whether the integrator is held to an accuracy."""
+        """Whether the integrator has an accuracy, so that error floors are recorded."""
         return self.setup.integrator.chooses or self.setup.integrator.name == "free_body"
 
     @property
     def arrays(self) -> _Side:
-        """What the compiled call takes of it."""
+        """Arguments of the compiled call."""
         start = self.setup.flight_start
         integrator = self.setup.integrator
         strings = bool(self.rows["string_attached"].any())
@@ -117,8 +117,8 @@ class Batch:
 
 @dataclass
 class Results:
-    """status (n,): 1 done, 0 the simulation must do it. measured (n, k). floors (n, FLOOR_KINDS): what has held the
-    motion to less than its accuracy (simulation/flight.py).
+    """Results of a batch. status (n,): 1 done, 0 the simulation must run the row. measured (n, k). floors (n,
+    FLOOR_KINDS): error floors due to rounding (simulation/flight.py).
     """
 
     status: NDArray[np.int64]
@@ -127,7 +127,7 @@ class Results:
 
 
 def new_results(rows: int, measures: int) -> Results:
-    """Empty ones, as failed rows have them."""
+    """Results with the values of rows without a result: status 0, NaN, no error floors."""
     unknown, floors = np.full((rows, measures), np.nan), np.zeros((rows, fl.FLOOR_KINDS))
     return Results(np.zeros(rows, np.int64), unknown, floors)
 
@@ -139,7 +139,7 @@ _Made = tuple[float, np.ndarray, np.ndarray, Principal, bool]
 
 @njit(cache=True, error_model="numpy")
 def _explicit(own: np.record, ballast: np.ndarray) -> _Made:
-    """Mass, COM (3,), inertia (3, 3), its principal moments and axes, and whether the numbers are plainly good."""
+    """Mass, COM (3,), inertia (3, 3), its principal moments and axes, and whether the numbers are certainly valid."""
     given = own.explicit_inertia_tensor
     inertia = np.empty((3, 3))
     inertia[0, 0], inertia[1, 1], inertia[2, 2] = given[0], given[3], given[5]
@@ -148,7 +148,7 @@ def _explicit(own: np.record, ballast: np.ndarray) -> _Made:
     inertia[1, 2] = inertia[2, 1] = given[4]
     mass = own.explicit_inertia_mass
     good = 0.0 < mass < math.inf
-    # Without ballast the tensor that comes out is the one given.
+    # Without ballast the resulting tensor, checked below, is the given one.
     if ballast.shape[0] > 0:
         good = good and is_plainly_good(principal_axes_kernel(inertia)[0])
     center = own.explicit_inertia_center_of_mass
@@ -158,7 +158,7 @@ def _explicit(own: np.record, ballast: np.ndarray) -> _Made:
 
 @njit(cache=True, error_model="numpy")
 def _spread(own: np.record, ballast: np.ndarray) -> _Made:
-    """The same for a model whose mass is spread over a mesh."""
+    """The same for a model whose mass is distributed over a mesh."""
     s, mass = own.scale, own.mass
     if not mass > 0.0:
         mass = own.density * own.solid_measure * abs(s[0] * s[1] * s[2])
@@ -176,7 +176,7 @@ def _spread(own: np.record, ballast: np.ndarray) -> _Made:
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _make_body(own: np.record, ballast: np.ndarray, body: np.ndarray) -> bool:
-    """Fill ``body`` (BODY,) from a row and ballast (k, 4); False when the simulation has to check it."""
+    """Fill ``body`` (BODY,) from a row and ballast (k, 4); returns False when the simulation must check it."""
     s = own.scale
     for k in range(3):
         if not SCALE_LIMITS[0] <= abs(s[k]) <= SCALE_LIMITS[1]:
@@ -200,7 +200,7 @@ def _make_body(own: np.record, ballast: np.ndarray, body: np.ndarray) -> bool:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _span(flight: np.record) -> Vector:
-    """From the string's free end, which stays where it is, to the knot: three numbers [m, world]."""
+    """Vector from the string's free end, which is at rest at its target, to the knot: three numbers [m, world]."""
     string = flight.string
     rx, ry, rz = arm(flight.body, string[KNOT], string[KNOT + 1], string[KNOT + 2])
     return span_of(rx, ry, rz, flight.row, string[TARGET], string[TARGET + 1], string[TARGET + 2])
@@ -208,7 +208,7 @@ def _span(flight: np.record) -> Vector:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _string_energy(flight: np.record) -> float:
-    """Of the string now [J]; 0 where none is tied."""
+    """Current energy of the string [J]; 0 without a string."""
     if not flight.tied:
         return 0.0
     string = flight.string
@@ -217,7 +217,7 @@ def _string_energy(flight: np.record) -> float:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _tie(own: np.record, flight: np.record) -> bool:
-    """Tie the string of a row; False when its rates may be beyond what the integrator follows."""
+    """Tie the string of a row; returns False when its rates may exceed the integrator's limit."""
     string, body = flight.string, flight.body
     for k in range(3):
         string[KNOT + k] = own.string_attach[k]
@@ -233,7 +233,7 @@ def _tie(own: np.record, flight: np.record) -> bool:
         b = body[P + 1] * rx + body[P + 4] * ry + body[P + 7] * rz
         c = body[P + 2] * rx + body[P + 5] * ry + body[P + 8] * rz
         yields = most_yielding(body[MASS], body[M], body[M + 1], body[M + 2], a, b, c)
-        # No point shows more than the whole mass.
+        # The effective mass of a point is at most the body's mass.
         largest, damping = spring_of(body[MASS], stiffness, frequency, ratio)
         if math.sqrt(largest * yields) > CERTAIN * FASTEST or damping * yields > CERTAIN * FASTEST:
             return False
@@ -248,7 +248,7 @@ def _tie(own: np.record, flight: np.record) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.ndarray, loads: np.ndarray) -> bool:
-    """Time 0 of a row, in a copy of its setup's flight; fills loads. False: the simulation must do it."""
+    """Initialize a row's flight, a copy of its setup's, and loads; returns False when the simulation must run it."""
     body = flight.body
     if not _make_body(own, ballast, body):
         return False
@@ -281,9 +281,9 @@ def _fly_row(
     tables: tuple[Any, ...],
     states: np.ndarray,
 ) -> bool:
-    """Row i's flight: fills states (m, STATE) at sample_ns (m,) ascending, each before what acts at that very time.
+    """Simulate row i: fills states (m, STATE) at the ascending times sample_ns (m,), before events at those same times.
 
-    context: simulation/quantities.py, filled here. False: the simulation must do it.
+    context: see simulation/quantities.py; it is filled here. Returns False when the simulation must run the row.
     """
     due = commands[i if commands.shape[0] > 1 else 0]
     flights[0] = start[0]
@@ -316,10 +316,10 @@ def _fly_rows(
     results: tuple[Any, ...],
     room: tuple[Any, ...],
 ) -> None:
-    """All rows of a batch, each beside that of the references if there are any."""
+    """Simulate all rows of a batch, each together with the same row of the references if there are any."""
     status, measured, floors = results
     context, flights, tables, states, others = room
-    # One place that flies, whichever it is: a second one would be compiled a second time.
+    # A single call for both, since a second one would be compiled a second time.
     sides, kept = (references, own), (others, states)
     for i in range(status.shape[0]):
         came = False
@@ -342,15 +342,15 @@ def fly_rows(
     sample_ns: NDArray[np.int64],
     measures: NDArray[np.float64],
 ) -> Results:
-    """Fly all rows, each beside its reference if there are any; those that it can't check have status 0.
+    """Simulate all rows, each with its reference if there are any; rows that can't be checked here have status 0.
 
-    sample_ns (m,) ascending, measures (j, MEASURE): simulation/quantities.py.
+    sample_ns (m,) ascending, measures (j, MEASURE): see simulation/quantities.py.
     """
     sides = (batch,) if references is None else (batch, references)
     results = new_results(len(batch.rows), len(measures))
     filled = results.status, results.measured, results.floors
     loads = max(side.commands.shape[1] for side in sides) + 1
-    # The workspace begins a line of the processor's cache.
+    # The workspace is aligned to a cache line.
     work = aligned((1, max(1, *(side.setup.flight_start.room for side in sides))))[0]
     tables = np.zeros(loads, fl.LOAD_ROW), np.zeros(4 * loads + 4, fl.EVENT), work
     states, others = (np.zeros((len(sample_ns), STATE)) for _ in range(2))

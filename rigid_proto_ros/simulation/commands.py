@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The commands: one union, as scripts, messages and event lines say them and as the simulation takes them; without
-numba, which who only sends commands has no use for.
+"""The commands: one union type for scripts, messages, event lines and the simulation. Importing it doesn't load numba,
+which a program that only sends commands doesn't need.
 
-``order_of`` says in which order those of equal times act.
+``order_of`` defines the order of commands with equal times.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
 NO_SLOT, UNNAMED_SLOT = 0, 1
 HELD_WRENCH, PULSE, IMPULSE, CLEAR = range(4)
-"""What a command is to a flight, as its tables hold it."""
+"""Kinds of commands in the tables of a flight."""
 
 FARTHEST = 1e100
-"""Metres: a place beyond it has no squared distance in a double."""
+"""Largest coordinate of a point [m]; the squared distance of such a point still fits a double."""
 
 
 def nanoseconds(seconds: float) -> int:
-    """Seconds to whole nanoseconds, to the nearest."""
+    """Seconds, rounded to whole nanoseconds."""
     return round(seconds * 1e9)
 
 
 class Rank(IntEnum):
-    """Order of single messages at one instant."""
+    """Order of single messages with equal times."""
 
     CHANGE = 0  # parameter changes and services
     INERTIA = 1
@@ -47,9 +47,9 @@ class Rank(IntEnum):
 
 @dataclass(slots=True, kw_only=True)
 class Stamped:
-    """What all commands have; none is ever changed.
+    """Fields of all commands; a command is never modified.
 
-    stamp_ns: when they act, or as their messages were stamped. entry: of a script that they come from, counted from 1.
+    stamp_ns: time at which it acts, or stamp of its message. entry: its number in a script, the first being 1.
     """
 
     stamp_ns: int = 0
@@ -60,8 +60,8 @@ class Stamped:
 class WrenchCommand(Stamped):
     """One message of the wrench topic (``held``) or the poke topic.
 
-    force [N], torque [N m] as sent (N s and N m s for an impulse). sent: the frame as a message said it; None where it
-    wasn't one.
+    force [N], torque [N m] as sent (N s and N m s for an impulse). sent: the frame_id of the message; None if the
+    command wasn't a message.
     """
 
     held: bool
@@ -72,17 +72,17 @@ class WrenchCommand(Stamped):
 
     @property
     def frame_id(self) -> str:
-        """The frame as sent, or written out."""
+        """The frame as sent, or written out in full."""
         return self.frame.text if self.sent is None else self.sent
 
     @property
     def rank(self) -> Rank:
-        """Its place among commands of one time."""
+        """Order among commands with equal times."""
         return Rank.WRENCH if self.held else Rank.POKE
 
     @property
     def kind(self) -> str:
-        """As events name it."""
+        """Name of the command in events."""
         return "wrench" if self.held else "poke"
 
     @property
@@ -97,20 +97,20 @@ class WrenchCommand(Stamped):
 
     @property
     def duration_ns(self) -> int:
-        """Of a command that says how long it lasts, else −1."""
+        """Duration that the command states [ns], or −1."""
         seconds = self.frame.duration_s
         return -1 if seconds is None else nanoseconds(seconds)
 
     @property
     def flight_kind(self) -> int:
-        """What it is to a flight: a held wrench that says how long it lasts is a pulse in its slot."""
+        """Kind in the flight's tables: a held wrench with a duration is a pulse in its slot."""
         if self.frame.impulse:
             return IMPULSE
         return HELD_WRENCH if self.held and self.frame.duration_s is None else PULSE
 
     @property
     def slot(self) -> int:
-        """By which a flight knows what it replaces."""
+        """Number of the slot whose load it replaces."""
         if self.frame.slot:
             return slot_number(self.frame.slot)
         return UNNAMED_SLOT if self.held else NO_SLOT
@@ -122,7 +122,7 @@ class WrenchCommand(Stamped):
 
 @dataclass(slots=True)
 class ThrusterCommand(Stamped):
-    """What the thrusters push with [N], in the alphabetical order of their names."""
+    """Forces of the thrusters [N], in the alphabetical order of the thrusters' names."""
 
     forces: tuple[float, ...]
     kind = "thrusters"
@@ -130,17 +130,17 @@ class ThrusterCommand(Stamped):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What an event line holds of it."""
+        """The command as an event line keeps it."""
         return {"forces": list(self.forces)}
 
 
 STATE_VALUES = {"position": 3, "orientation_xyzw": 4, "linear_velocity": 3, "angular_velocity": 3}
-"""What a SetState may set, world axes, and how many numbers it has."""
+"""Values that SetState can set, in world axes, and how many numbers each has."""
 
 
 @dataclass(slots=True)
 class SetState(Stamped):
-    """Put the body elsewhere at once: any of STATE_VALUES [m, m/s, rad/s, world axes]; the others stay."""
+    """Set the state of the body at once: any of STATE_VALUES [m, m/s, rad/s, world axes]; the others stay unchanged."""
 
     values: Mapping[str, tuple[float, ...]]
     kind = "state"
@@ -157,20 +157,20 @@ class SetState(Stamped):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What an event line holds of it."""
+        """The command as an event line keeps it."""
         return {name: list(numbers) for name, numbers in self.values.items()}
 
 
 @dataclass(slots=True)
 class ClearWrench(Stamped):
-    """End the held wrench and the running pulses; scheduled commands stay."""
+    """End all held wrenches, pulses and thruster forces; scheduled commands stay."""
 
     kind = "clear_wrench"
     rank = Rank.CHANGE
 
     @property
     def content(self) -> dict[str, Any]:
-        """What an event line holds of it."""
+        """The command as an event line keeps it."""
         return {}
 
 
@@ -178,8 +178,8 @@ class ClearWrench(Stamped):
 class Change(Stamped):
     """A change of parameters (kind ``set``) or of the whole inertia by message (``inertia``).
 
-    content: as the event log keeps it. apply() gives the new Setup from the values in force then, or raises InputError;
-    without it the simulation's ``setup_of`` does.
+    content: as the event log keeps it. apply() returns the new Setup, based on the values in force at that time, or
+    raises InputError; without it the simulation's ``setup_of`` is used.
     """
 
     content: Mapping[str, Any]
@@ -188,17 +188,17 @@ class Change(Stamped):
 
     @property
     def rank(self) -> Rank:
-        """Its place among commands of one time."""
+        """Order among commands with equal times."""
         return Rank.INERTIA if self.kind == "inertia" else Rank.CHANGE
 
 
 @dataclass(slots=True)
 class TieString(Stamped):
-    """Where on the body the string is, or will be, tied.
+    """Set the point of the body at which the string is, or will be, tied.
 
-    axes: ``mesh`` (mesh coordinates, unscaled), ``body`` (metres from the COM) or ``world``; the point is taken onto
-    the surface, nearest to it, when the command takes effect. frame_id as sent. contact: the one whose point it is to
-    be, for whoever knows the body's.
+    axes: ``mesh`` (mesh coordinates, unscaled), ``body`` (metres from the COM) or ``world``; when the command takes
+    effect the point is projected to the nearest point of the surface. frame_id: as sent. contact: name of the contact
+    to tie to, resolved by a caller that knows the body's contacts.
     """
 
     axes: str
@@ -215,13 +215,13 @@ class TieString(Stamped):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What an event line holds of it."""
+        """The command as an event line keeps it."""
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "axes": self.axes, "point": list(self.point)}
 
 
 @dataclass(slots=True)
 class MoveString(Stamped):
-    """Where the string's free end goes, point (3,) [m, world]; the first one ties the string."""
+    """Move the string's free end to point (3,) [m, world]; the first such command ties the string."""
 
     point: Vector
     frame_id: str = ""
@@ -233,20 +233,20 @@ class MoveString(Stamped):
 
     @property
     def content(self) -> dict[str, Any]:
-        """What an event line holds of it."""
+        """The command as an event line keeps it."""
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "point": list(self.point)}
 
 
 @dataclass(slots=True)
 class ReleaseString(Stamped):
-    """Let the string go."""
+    """Release the string."""
 
     kind = "string_release"
     rank = Rank.CHANGE
 
     @property
     def content(self) -> dict[str, Any]:
-        """What an event line holds of it."""
+        """The command as an event line keeps it."""
         return {}
 
 
@@ -254,7 +254,7 @@ _SLOT_CHARACTERS = "abcdefghijklmnopqrstuvwxyz0123456789_"
 
 
 def slot_number(name: str) -> int:
-    """A slot's name as an integer: digits of base 38, above the number of the unnamed slot."""
+    """Integer for a slot's name: digits of base 38, plus the number of the unnamed slot."""
     number = 0
     for character in name:
         number = 38 * number + _SLOT_CHARACTERS.index(character) + 1
@@ -278,23 +278,23 @@ def _check_point(field: str, point: Sequence[float]) -> None:
 
 
 def order_of(command: Command, listed: Listed | None, arrival: int) -> tuple[int, int, int, int]:
-    """What decides among commands of one instant: first the entries of lists, lists as they arrived and each list's in
-    its own order; then single messages by rank, those of one rank as they arrived.
+    """Sort key of commands with equal times: first the entries of lists, in the order in which the lists arrived and in
+    each list's own order; then single messages by rank, and by arrival within a rank.
     """
     return (0, *listed, arrival) if listed is not None else (1, command.rank, 0, arrival)
 
 
 Listed = tuple[int, int]
-"""The number of the list that a command is an entry of, in the order of arrival, and the entry's place there."""
+"""The number of a list of commands, in the order of arrival, and the place of an entry in that list."""
 
 Command = WrenchCommand | ThrusterCommand | SetState | ClearWrench | Change | TieString | MoveString | ReleaseString
 
 
 @dataclass(slots=True)
 class Pending:
-    """A command waiting for its time: its place among those of the same time (``order_of``) and in a list, if it is an
-    entry of one; kind, duration_ns, slot and row as the flight's tables hold them, the row empty until its load is
-    resolved, and the setup under which that was.
+    """A command waiting for its time. order: sort key among commands with equal times (``order_of``). listed: its place
+    in a list, if it is an entry of one. kind, duration_ns, slot and row: as in the flight's tables; row is empty until
+    the load is resolved, for the setup resolved_for.
     """
 
     time_ns: int
@@ -308,10 +308,10 @@ class Pending:
     row: bytes = b""
 
     def set_load(self, command: WrenchCommand, row: bytes, setup: Setup) -> None:
-        """The load of the command, a wrench or poke, was resolved under this setup."""
+        """Store the load of the command, a wrench or poke, which was resolved for this setup."""
         self.resolved_for, self.row = setup, row
         self.kind, self.duration_ns, self.slot = command.flight_kind, command.duration_ns, command.slot
 
 
 Waiting = tuple[int, tuple[int, int, int, int], Pending]
-"""A command in a heap."""
+"""An entry of the heap of pending commands."""

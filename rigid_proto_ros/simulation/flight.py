@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A flight under commands, compiled: what live simulations, offline ones, replays and sweeps advance with.
+"""The compiled flight of one body under commands, shared by live simulations, offline runs, replays and sweeps.
 
-Everything a flight is stands in one record (FLIGHT), beside a table of loads (LOAD_ROW). Commands cut it into
-segments; ``fly`` goes from event to event until the time asked for, and writes down what began and ended on the way.
-What it can't do (a ray, a change of parameters, a string tied or let go) is applied between two calls, by the same
-functions.
+The state of a flight is one record (FLIGHT) and a table of loads (LOAD_ROW). Commands divide it into segments with
+constant loads; ``fly`` advances from event to event up to a given time and records which loads began and ended. Events
+that it can't handle (a ray, a change of parameters, a string tied or released) are applied between two calls, with the
+same functions.
 """
 
 from __future__ import annotations
@@ -41,56 +41,56 @@ from .commands import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE
 FLIGHT = record_type(
     [
         ("now_ns", np.int64),
-        ("row", np.float64, 13),  # the state then
-        ("start_ns", np.int64),  # of the segment
-        ("start", np.float64, 13),  # the state then
-        ("committed_ns", np.int64),  # where the last full step of the segment ended
-        ("variables", np.float64, VARIABLES),  # there
+        ("row", np.float64, 13),  # state at now_ns
+        ("start_ns", np.int64),  # start of the segment
+        ("start", np.float64, 13),  # state at start_ns
+        ("committed_ns", np.int64),  # end of the segment's last committed step
+        ("variables", np.float64, VARIABLES),  # at committed_ns
         ("trial", np.float64, VARIABLES),
-        ("following", np.float64, VARIABLES),  # of an adaptive method
-        ("control", CONTROL),  # likewise
-        ("common", PROBLEM),  # what the problems of all segments of this body have in common
+        ("following", np.float64, VARIABLES),  # at the end of an adaptive method's pending step
+        ("control", CONTROL),  # of an adaptive method
+        ("common", PROBLEM),  # the part of the problem that all segments of this body share
         ("problem", PROBLEM),  # of the segment
         ("body", np.float64, of_body.BODY),
-        ("string", np.float64, STRING),  # while ``tied``
+        ("string", np.float64, STRING),  # valid while ``tied``
         ("tied", np.bool_),
         ("string_begin_ns", np.int64),
         ("string_end_ns", np.int64),
-        ("sums", np.float64, LOADS_SIZE),  # of the loads that act
-        # Settings; a timeout of 0 is none.
+        ("sums", np.float64, LOADS_SIZE),  # sums of the active loads
+        # Settings. A timeout of 0 means no timeout.
         ("accuracy", np.float64),
         ("degree", np.int64),
         ("step_ns", np.int64),
         ("timeout_ns", np.int64),
         ("poke_ns", np.int64),
-        ("chooses", np.bool_),  # the method by what the segment holds, as auto does
+        ("chooses", np.bool_),  # whether the method is selected for each segment, as by auto
         ("method", np.int64),
-        ("waits", np.bool_),  # for its kernel, in the middle of a call
-        ("segments", np.int64),  # begun so far
-        # Of the string's hand, and in its damper [J]: from the segment's start to now_ns, and before.
+        ("waits", np.bool_),  # whether a call was interrupted because a kernel isn't compiled yet
+        ("segments", np.int64),  # number of segments begun
+        # Work of the string's hand and heat in its damper [J]: from the segment's start to now_ns, and before it.
         ("work", np.float64),
         ("lost", np.float64),
         ("work_before", np.float64),
         ("lost_before", np.float64),
-        ("taken", np.int64),  # steps of the segment, but for those that an adaptive kernel counts
+        ("taken", np.int64),  # steps of the segment, without those counted by an adaptive kernel
         ("steps_before", np.int64),
         ("evaluations_before", np.int64),
-        ("floors", np.float64, 5),  # (FLOOR_KINDS,) the most that rounding, and not the accuracy, has set since time 0
-        # Rows of the table of loads: those that act are 0 to acting − 1, in the order in which they began; the commands
-        # that are to act next, in their order, due to due_end − 1.
+        ("floors", np.float64, 5),  # (FLOOR_KINDS,) largest error floors due to rounding since time 0
+        # Rows of the table of loads. Active loads, in the order in which they began: 0 to acting − 1. Commands to be
+        # applied next, in their order: due to due_end − 1.
         ("acting", np.int64),
         ("due", np.int64),
         ("due_end", np.int64),
-        ("load_ids", np.int64),  # given so far
-        ("events", np.int64),  # written so far in this call
-        ("timeouts", np.int64),  # held wrenches that timed out so far in this call
+        ("load_ids", np.int64),  # number of load ids assigned
+        ("events", np.int64),  # number of events written in this call
+        ("timeouts", np.int64),  # number of held wrenches that timed out in this call
     ]
 )
 
 LOAD_ROW = record_type(
     [
-        # A command: when it acts, or began; of a pulse how long it lasts, −1 as the setting for pokes says; which of
-        # the kinds below. What acts in the same slot is replaced; NO_SLOT replaces nothing.
+        # A command: the time at which it acts or began; the duration of a pulse, −1 for the default of pokes; its kind
+        # (simulation/commands.py). It replaces the active load in its slot; NO_SLOT replaces nothing.
         ("at_ns", np.int64),
         ("duration_ns", np.int64),
         ("kind", np.int64),
@@ -98,7 +98,7 @@ LOAD_ROW = record_type(
         ("end_ns", np.int64),
         ("id", np.int64),
         ("load", np.float64, LOAD),
-        ("share", np.float64, LOADS_SIZE),  # while it acts, what it adds to the sums
+        ("share", np.float64, LOADS_SIZE),  # while active, its contribution to the sums
     ]
 )
 EVENT = record_type(
@@ -106,21 +106,21 @@ EVENT = record_type(
         ("time_ns", np.int64),
         ("what", np.int64),
         ("load_id", np.int64),
-        ("row", np.int64),  # the command's row in the table; of TIMED_OUT the slot
-        ("attitude", np.float64, 4),  # xyzw of the body at that time, for APPLIED alone
+        ("row", np.int64),  # row of the command in the table; for TIMED_OUT the slot
+        ("attitude", np.float64, 4),  # xyzw of the body at that time, only for APPLIED
     ]
 )
-"""Something became of a load."""
+"""An event of a load or command."""
 
 APPLIED, BEGAN, ENDED, DONE, TIMED_OUT = range(5)
-"""What became of it. APPLIED: a command acts, before what it ends and begins. DONE: after that. TIMED_OUT: a held
-wrench has ended so.
+"""Kinds of events. APPLIED: a command is applied, before the loads that it ends and begins. DONE: after these.
+TIMED_OUT: a held wrench ended by its timeout.
 """
 
 STEP_FLOOR, PULL_FLOOR, SPIN_FLOOR, TENSOR_FLOOR, PLACE_FLOOR, FLOOR_KINDS = range(6)
-"""Why the motion is held to less than its accuracy. Error rates [1/s] of steps too short for it, and of steps on a
-string whose pull is known no better; rates [rad/s] at which the rounding of a spin, or of a tensor given in other axes
-than its own, turns the attitude; the rounding of a place far from the world's origin, in lengths of the body.
+"""Causes of rounding errors above the requested accuracy: error rates [1/s] of very short steps and of the string's
+tension; attitude error rates [rad/s] due to rounding of the spin and of a tensor that isn't given in its principal
+axes; rounding of a position far from the world's origin, relative to the body's length.
 """
 
 FLOORS = (
@@ -130,23 +130,23 @@ FLOORS = (
     "rounding of a slender tensor given in axes other than its own turns the attitude by up to {:.2g} rad a second",
     "rounding of a position far from the world's origin is {:.2g} of the body's size",
 )
-"""What is said of each of these."""
+"""Message for each kind of error floor."""
 
 ROUNDINGS = 2.0
-"""ε|ω|t that the exact free step's attitude may err. Measured in 36 flights at 1e3 to 1e6 rad/s: up to 1.1 where the
-tensor is given in its own axes, and up to 1.0 times I₃/I₁ where it isn't.
+"""Attitude error of the exact free step in units of ε|ω|t. Measured in 36 flights at 1e3 to 1e6 rad/s: up to 1.1 with a
+tensor given in its principal axes, otherwise up to 1.0 times I₃/I₁.
 """
 
 NEVER = 1 << 62
 """Later than any simulated time [ns]."""
 
 REACHED, FAILED, NO_KERNEL = range(3)
-"""How a call came back. NO_KERNEL: the segment's method must be compiled first."""
+"""Result of a call. NO_KERNEL: the segment's method must be compiled first."""
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def begin_flight(flight: np.record) -> None:
-    """Time 0, before any segment: all that a flight counts."""
+    """Reset time, counters and work of a flight to time 0, before its first segment."""
     flight.now_ns, flight.start_ns, flight.committed_ns = 0, 0, 0
     flight.method, flight.segments, flight.waits, flight.tied = 0, 0, False, False
     flight.steps_before, flight.evaluations_before = 0, 0
@@ -158,10 +158,9 @@ def begin_flight(flight: np.record) -> None:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def begin_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
-    """Begin a segment at ``start``: what acts is summed afresh, in the order in which it began, and the method is
-    chosen.
+    """Begin a segment at ``start``: sum the active loads anew, in the order in which they began, and select the method.
 
-    loads: the table. methods: motion/integrators/integrator.py. room: for the workspace of the adaptive ones.
+    loads: the table. methods: see motion/integrators/integrator.py. room: memory for the workspace of adaptive methods.
     """
     for k in range(LOADS_SIZE):
         flight.sums[k] = 0.0
@@ -177,8 +176,8 @@ def begin_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, roo
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def complete_problem(flight: np.record, row: np.ndarray, time_ns: int, p: np.record) -> None:
-    """Complete ``common`` in p to the problem of a segment under ``sums`` and the string that begins with the state
-    ``row``.
+    """Complete p, a copy of ``common``, to the problem of a segment with the initial state ``row``, the loads ``sums``
+    and the string.
     """
     begin_problem(p, flight.sums, row)
     if flight.tied:
@@ -187,7 +186,7 @@ def complete_problem(flight: np.record, row: np.ndarray, time_ns: int, p: np.rec
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def begin_variables(flight: np.record, methods: np.ndarray, room: np.ndarray) -> None:
-    """Begin a segment whose problem is made."""
+    """Set the initial variables and select the method of a segment whose problem is complete."""
     p, y = flight.problem, flight.variables
     for k in range(VARIABLES):
         y[k] = 0.0
@@ -199,7 +198,7 @@ def begin_variables(flight: np.record, methods: np.ndarray, room: np.ndarray) ->
         flight.method = 1 if p.has_string and methods.shape[0] > 1 else 0
     method = methods[flight.method]
     if flight.method != before and method.way == ADAPTIVE:
-        # Kernels may count on zeros where they never write, and another method's were here.
+        # Kernels rely on zeros in elements that they never write; another method may have written there.
         room[: method.rows * method.columns] = 0.0
     begin_control(flight.control, flight.accuracy, flight.degree)
     flight.work, flight.lost = 0.0, 0.0
@@ -209,12 +208,12 @@ def begin_variables(flight: np.record, methods: np.ndarray, room: np.ndarray) ->
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def commit_until(flight: np.record, methods: np.ndarray, room: np.ndarray, until_ns: int) -> bool:
-    """Commit every full step of the segment that ends at or before ``until_ns``; whether all were good."""
+    """Commit every full step of the segment that ends at or before ``until_ns``; returns whether all were good."""
     span_ns = until_ns - flight.committed_ns
-    # A step that waits and goes on beyond that leaves nothing to commit.
+    # If the pending step ends later, there is nothing to commit.
     if span_ns == 0 or span_ns < flight.control.accepted_ns:
         return True
-    # Sliced, they are arrays as any other to a kernel that is called by its address.
+    # Slices are plain arrays, as a kernel that is called by its address expects.
     y, following = flight.variables[:], flight.following[:]
     method = methods[flight.method]
     advanced, taken, good = commit(method, y, flight.problem, flight.control, following, room, flight.step_ns, span_ns)
@@ -225,8 +224,8 @@ def commit_until(flight: np.record, methods: np.ndarray, room: np.ndarray, until
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def sample(flight: np.record, methods: np.ndarray, room: np.ndarray, at_ns: int, row: np.ndarray) -> bool:
-    """The state at ``at_ns``, less than one step after the last committed one, into row; commits nothing.
-    Whether it is good.
+    """Write the state at ``at_ns``, less than one step after the last committed step, into row and commit nothing.
+    Returns whether the state is good.
     """
     if at_ns == flight.start_ns:
         copy_numbers(flight.start, row)
@@ -247,7 +246,7 @@ def sample(flight: np.record, methods: np.ndarray, room: np.ndarray, at_ns: int,
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def advance_segment(flight: np.record, methods: np.ndarray, room: np.ndarray, until_ns: int) -> int:
-    """Go on in the segment to ``until_ns``: full steps, then one shorter step that ends exactly there, on a copy."""
+    """Advance within the segment to ``until_ns``: full steps, then one shorter step on a copy, which ends there."""
     flight.waits = not is_provided(methods[flight.method])
     if flight.waits:
         return NO_KERNEL
@@ -260,8 +259,8 @@ def advance_segment(flight: np.record, methods: np.ndarray, room: np.ndarray, un
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> tuple[float, ...]:
-    """At now_ns, from the equations of motion: of the COM [m/s², world], angular [rad/s², body axes]; six numbers.
-    problem (1,) and y (VARIABLES,) are scratch.
+    """Accelerations at now_ns by the equations of motion: of the COM [m/s², world], angular [rad/s², body axes]; six
+    numbers. problem (1,) and y (VARIABLES,) are scratch memory.
     """
     problem[0] = flight.common
     p = problem[0]
@@ -280,7 +279,7 @@ def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def stop_in_last_good_state(flight: np.record) -> None:
-    """Stay where the last good step ended, or at now_ns where that is later."""
+    """Set the state to the end of the last good step, or leave it at now_ns if that is later."""
     row = flight.trial
     if flight.committed_ns == flight.start_ns:
         copy_numbers(flight.start, row[:13])
@@ -302,18 +301,18 @@ def steps_of_segment(flight: np.record) -> int:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def evaluations_of_segment(flight: np.record, methods: np.ndarray) -> int:
-    """Evaluations of the equations of motion in them."""
-    # The step that ends a segment takes the series of the one that waits.
+    """Evaluations of the equations of motion in the segment's committed steps."""
+    # The shorter step that ends a segment uses the series of the pending step.
     counted = flight.control.evaluations + flight.control.pending
     return int(flight.taken * methods[flight.method].evaluations + counted)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> None:
-    """Take into ``floors`` (FLOOR_KINDS,) what no method can better in the segment up to now_ns: a state is held in
-    doubles. A spin known to ε turns into an attitude known to ε|ω|t, a place is known to half a unit in its last digit,
-    and a slender body's tensor given in axes other than its own holds its smallest moment, and the difference of the
-    others, to ε I₃ alone.
+    """Update ``floors`` (FLOOR_KINDS,) with limits of double precision in the segment up to now_ns, which no method can
+    improve. Rounding ω to ε causes an attitude error of ε|ω|t. A position is rounded to half a unit in its last place.
+    The tensor of a slender body, unless given in its principal axes, holds its smallest moment and the difference of
+    the others only to ε I₃.
     """
     accuracy, control, body, row = flight.accuracy, flight.control, flight.body, flight.row
     floors[STEP_FLOOR] = max(floors[STEP_FLOOR], control.floor_rate)
@@ -334,13 +333,13 @@ def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> N
 
 
 def floor_text(floors: Iterable[float]) -> str:
-    """What floors of a flight, by kind, say; empty where there are none."""
+    """Message about the error floors of a flight, given by kind; empty when there are none."""
     return "; ".join(text.format(floor) for text, floor in zip(FLOORS, floors, strict=True) if floor)
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def finish_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
-    """Keep the segment's counts and begin another from the state at now_ns."""
+    """Add the segment's counts to the totals and begin another segment at the state at now_ns."""
     note_floors(flight, methods, flight.floors)
     flight.steps_before += steps_of_segment(flight)
     flight.evaluations_before += evaluations_of_segment(flight, methods)
@@ -353,7 +352,7 @@ def finish_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, ro
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def cut_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
-    """End the segment at now_ns by the step that sampling there took, and begin another."""
+    """End the segment at now_ns, counting the shorter step that was taken to that time, and begin another."""
     if flight.now_ns > flight.committed_ns and not methods[flight.method].sleeps:
         flight.taken += 1
     finish_segment(flight, loads, methods, room)
@@ -368,7 +367,7 @@ def _write(flight: np.record, events: np.ndarray, what: int, load_id: int, row: 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def end_due(flight: np.record, loads: np.ndarray, events: np.ndarray) -> bool:
-    """End what ends at now_ns or should have before; whether anything did."""
+    """End the loads whose end is at or before now_ns; returns whether any ended."""
     kept = 0
     for row in range(flight.acting):
         if loads[row].end_ns > flight.now_ns:
@@ -388,7 +387,7 @@ def end_due(flight: np.record, loads: np.ndarray, events: np.ndarray) -> bool:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def end_slot(flight: np.record, loads: np.ndarray, events: np.ndarray, slot: int) -> None:
-    """End what acts in a slot, if anything does."""
+    """End the active load in a slot, if there is one."""
     ended = False
     for row in range(flight.acting):
         if ended:
@@ -402,7 +401,7 @@ def end_slot(flight: np.record, loads: np.ndarray, events: np.ndarray, slot: int
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def end_all(flight: np.record, loads: np.ndarray, events: np.ndarray) -> None:
-    """End everything that acts."""
+    """End all active loads."""
     for row in range(flight.acting):
         _write(flight, events, ENDED, loads[row].id, row)
     flight.acting = 0
@@ -410,13 +409,13 @@ def end_all(flight: np.record, loads: np.ndarray, events: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def end_of_held(flight: np.record, begin_ns: int) -> int:
-    """When a held wrench that began at ``begin_ns`` ends."""
+    """End time [ns] of a held wrench that began at ``begin_ns``."""
     return max(begin_ns + flight.timeout_ns, flight.now_ns) if flight.timeout_ns != 0 else NEVER
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def take_body(flight: np.record, loads: np.ndarray) -> None:
-    """What the loads that act add to the sums, for another body and other settings."""
+    """Recompute the contributions and end times of the active loads for another body and other settings."""
     for row in range(flight.acting):
         acting = loads[row]
         accumulate_load(acting.load, flight.body, acting.share)
@@ -426,7 +425,7 @@ def take_body(flight: np.record, loads: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def _begin(flight: np.record, loads: np.ndarray, row: int, end_ns: int) -> None:
-    """Let the load of a row act from now_ns until ``end_ns``, as the last of those that act."""
+    """Make the load in a row active from now_ns until ``end_ns``, as the last of the active loads."""
     to = flight.acting
     if to != row:
         loads[to] = loads[row]
@@ -438,7 +437,7 @@ def _begin(flight: np.record, loads: np.ndarray, row: int, end_ns: int) -> None:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def apply(flight: np.record, loads: np.ndarray, events: np.ndarray, row: int) -> None:
-    """Apply the command of a row at now_ns. Rows before it may be taken by loads that act."""
+    """Apply the command in a row at now_ns. Active loads may be written to the rows before it."""
     kind, load = loads[row].kind, loads[row].load
     if kind != CLEAR:
         flight.load_ids += 1
@@ -466,7 +465,7 @@ def apply(flight: np.record, loads: np.ndarray, events: np.ndarray, row: int) ->
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def next_event_ns(flight: np.record, loads: np.ndarray) -> int:
-    """When the next load ends or command acts, or the string's free end arrives."""
+    """Time of the next event: a load ends, a command is due, or the string's free end arrives at its target."""
     event_ns = loads[flight.due].at_ns if flight.due < flight.due_end else NEVER
     for row in range(flight.acting):
         event_ns = min(event_ns, loads[row].end_ns)
@@ -484,9 +483,9 @@ def fly(
     room: np.ndarray,
     until_ns: int,
 ) -> int:
-    """Carry the body to ``until_ns``; ``row`` is its state there, before what acts at that very time.
+    """Advance the flight to ``until_ns``; ``row`` is then the state before events at that same time are applied.
 
-    Returns REACHED, FAILED (``row`` is the last good state), or NO_KERNEL: then call again with the method's kernel.
+    Returns REACHED, FAILED (``row`` is the last good state) or NO_KERNEL: provide the method's kernel and call again.
     """
     if not flight.waits:
         flight.events, flight.timeouts = 0, 0
@@ -496,7 +495,7 @@ def fly(
         came = advance_segment(flight, methods, room, event_ns)
         if came != REACHED or event_ns == until_ns:
             return came
-        # 2. What ends, then what begins; with new loads a new segment.
+        # 2. Loads end, then commands are applied; a new segment begins with the new loads.
         end_due(flight, loads, events)
         while flight.due < flight.due_end and loads[flight.due].at_ns == event_ns:
             apply(flight, loads, events, flight.due)

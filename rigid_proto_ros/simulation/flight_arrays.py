@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The arrays of one compiled flight (simulation/flight.py): made, filled from a setup, and read."""
+"""The arrays of one compiled flight (simulation/flight.py): allocation, initialization from a setup, and access."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from .flight import EVENT, FLIGHT, LOAD_ROW
 from .setup import Setup
 
 FIRST_ROWS = 8
-"""Of the tables at first; they double as needed."""
+"""Initial number of rows of the tables, which grow as needed."""
 
 _ROW_BYTES, _pack = LOAD_ROW.itemsize, struct.Struct("=6q").pack_into
 _LOAD_AT = place_of(LOAD_ROW, "load")
 
 
-# Where integers that are looked up at every advance or reset stand in the flight's memory: Python reads and writes
-# single numbers fastest so.
+# Indices of integers in the flight's memory that are accessed at every advance or reset: the fastest access to single
+# numbers in Python.
 def _numbers(*names: str) -> list[int]:
     return [place_of(FLIGHT, name) // 8 for name in names]
 
@@ -41,12 +41,12 @@ _REACHED = fl.REACHED
 
 
 def _memory(kind: np.dtype, count: int) -> np.ndarray:
-    """Of so many records, zeros: integers are made in a third of the time that records take."""
+    """Zeroed memory for ``count`` records as integers, which takes a third of the time of allocating records."""
     return np.zeros(count * kind.itemsize // 8, np.int64)
 
 
 class ActingLoad(NamedTuple):
-    """A load that acts from begin_ns until end_ns. kind and slot: as flights number them."""
+    """An active load, from begin_ns until end_ns. kind and slot: numbers as in the flight's tables."""
 
     load: Load
     begin_ns: int
@@ -57,19 +57,19 @@ class ActingLoad(NamedTuple):
 
     @property
     def thruster(self) -> int:
-        """The number of the thruster whose load it is, or −1."""
+        """Number of the thruster that causes the load, or −1."""
         return -1 - self.slot if self.slot < NO_SLOT else -1
 
     @property
     def shown_kind(self) -> str:
-        """As observers are told: wrench, poke or thruster."""
+        """Kind as reported to observers: wrench, poke or thruster."""
         return "thruster" if self.thruster >= 0 else "wrench" if self.kind == HELD_WRENCH else "poke"
 
 
 FLY, BEGIN, APPLY, CUT, FINISH, END_DUE, END_ALL, TAKE_BODY = range(8)
-"""What a call does. APPLY: the commands put last, at the time of the flight. CUT: end the segment there by the step
-that sampling took, and begin another. FINISH: keep its counts and begin another from the present state. END_DUE: end
-what ends then. END_ALL: end the held wrench and the pulses.
+"""Operations of a call, at the flight's current time. APPLY: apply the commands put last. CUT: end the segment,
+counting the shorter step taken to that time, and begin another. FINISH: add its counts to the totals and begin another
+one now. END_DUE: end the loads whose end is due. END_ALL: end all active loads.
 """
 
 
@@ -83,7 +83,7 @@ def _call(
     what: int,
     until_ns: int,
 ) -> int:
-    """One of these on the flight; how it came back."""
+    """Perform an operation on the flight; returns its result."""
     flight = flights[0]
     if what == FLY:
         return fl.fly(flight, loads, events, methods, room, until_ns)
@@ -121,8 +121,8 @@ def _entry() -> Callable[..., int]:
 
 
 class FlightArrays:
-    """integers: the memory of a flight's record; row (13,): its state. What isn't a matter of arrays is the
-    simulation's.
+    """Arrays of one flight; all other logic is in Simulation. integers: the memory of the flight's record. row (13,):
+    its current state.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -147,11 +147,11 @@ class FlightArrays:
         start = setup.flight_start
         self.integrator, self.methods = setup.integrator, start.methods
         if len(self.room) < max(start.room, 1):
-            # The workspace begins a line of the processor's cache.
+            # The workspace is aligned to a cache line.
             self.room = aligned((1, max(start.room, 1)))[0]
 
     def take(self, setup: Setup) -> None:
-        """Body, settings and integrator are those of a setup from now on; the segment in hand stays as it is."""
+        """Use the body, settings and integrator of a setup from now on; the current segment isn't changed."""
         flight = self.flight
         self._take_methods(setup)
         self.room[:] = 0.0
@@ -162,7 +162,7 @@ class FlightArrays:
         self.call(TAKE_BODY)
 
     def start_over(self, setup: Setup, tied: StringState | None) -> None:
-        """Time 0, the initial state, and nothing that acts but a string."""
+        """Restart at time 0 in the initial state, with the string ``tied`` and no other load."""
         numbers = self.integers
         load_ids = numbers[_LOAD_IDS]
         self._take_methods(setup)
@@ -173,7 +173,7 @@ class FlightArrays:
         self.call(BEGIN)
 
     def tie(self, tied: StringState | None) -> None:
-        """The string is tied like this, or not at all, from the next segment on."""
+        """Tie the string in this state, or no string if None, from the next segment on."""
         flight = self.flight
         flight.tied = tied is not None
         if tied is not None:
@@ -183,7 +183,7 @@ class FlightArrays:
     # Commands
 
     def put(self, due: list[Pending]) -> None:
-        """Put commands into the table, behind the loads that act, as those that act next."""
+        """Put commands into the table, after the active loads, to be applied next."""
         numbers = self.integers
         first = self.first_due = numbers[_ACTING]
         last = first + len(due)
@@ -199,20 +199,20 @@ class FlightArrays:
 
     @property
     def waiting(self) -> int:
-        """How many of the commands put last haven't acted yet."""
+        """Number of the commands put last that haven't been applied yet."""
         return self.integers[_DUE_END] - self.integers[_DUE]
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """What compiled functions take: flight (1,), tables of loads, events and methods, workspace."""
+        """Arguments of compiled functions: flight (1,), tables of loads, events and methods, workspace."""
         return self._flights, self._loads, self._events, self.methods, self.room
 
     def call(self, what: int, until_ns: int = 0) -> int:
-        """Do one of these; how it came back: of END_DUE, whether anything ended."""
+        """Perform an operation; returns its result: for END_DUE, whether any load ended."""
         return self._call(*self.arrays, what, until_ns)
 
     def fly(self, until_ns: int) -> bool:
-        """Advance to ``until_ns``; False when the motion failed."""
+        """Advance to ``until_ns``; returns False when the motion failed."""
         while (came := self.call(FLY, until_ns)) != _REACHED:
             if came == fl.FAILED:
                 return False
@@ -220,12 +220,12 @@ class FlightArrays:
         return True
 
     def last_events(self) -> list[tuple[int, ...]]:
-        """What the last call began and ended: time_ns, what, load_id and row of each."""
+        """Events of the last call: time_ns, what, load_id and row of each."""
         events = self._events[: self.integers[_EVENTS]]
         return list(zip(*(events[name].tolist() for name in ("time_ns", "what", "load_id", "row")), strict=True))
 
     def attitude_at(self, number: int) -> np.ndarray:
-        """The body's attitude (4,) xyzw when a command acted, by the number of its event among the last."""
+        """Attitude (4,) xyzw of the body when a command was applied, by the index of the event in the last call."""
         attitude: np.ndarray = self._events["attitude"][number].copy()
         return attitude
 
@@ -238,17 +238,17 @@ class FlightArrays:
 
     @property
     def state(self) -> State:
-        """The state now."""
+        """The current state."""
         return State(self.integers[_NOW_NS], self.row.copy())
 
     def acting(self) -> Iterator[ActingLoad]:
-        """The loads that act, in the order in which they began."""
+        """The active loads, in the order in which they began."""
         for row in self._loads[: self.integers[_ACTING]]:
             load = load_of_row(row.load)
             yield ActingLoad(load, int(row.at_ns), int(row.end_ns), int(row.id), int(row.kind), int(row.slot))
 
     def _make_tables(self, rows: int) -> None:
-        """Tables of so many rows; what acts goes on."""
+        """Allocate tables with this number of rows; active loads are kept."""
         memory, acting = _memory(LOAD_ROW, rows), self.integers[_ACTING]
         loads = np.ndarray(rows, LOAD_ROW, memory)
         if acting:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Scalars of a flight by name, and what is measured of it.
+"""Scalar quantities of a flight by name, and measures of a flight.
 
-A quantity is a function of the state now and of the start, which is kept as a row (CONTEXT,): mass, tensor, gravity,
-the state row at time 0, its energy and angular momentum. A measure is a row (MEASURE,): a kind, a quantity or
-difference by number, and what the kind needs; it makes one number of the states at the sample times.
+A quantity is a function of the current state and of a context row (CONTEXT,): mass, tensor, gravity, and the state row,
+energy and angular momentum at time 0. A measure is a row (MEASURE,): a kind, the number of a quantity or difference,
+and the kind's parameters. It reduces the states at the sample times to one number.
 """
 
 from __future__ import annotations
@@ -42,18 +42,18 @@ QUANTITIES = {
     "angular_momentum": "N m s",
     "momentum_turned": "rad",
 }
-"""Units by name; ``spin.x`` is in body axes, the rest of a state in world axes. ``distance`` and ``turned`` are from
-the start, ``energy_drift`` is |E − E₀|/|E₀|, ``momentum_turned`` the drift of L's direction.
+"""Units by name; ``spin.x`` is in body axes, the rest of a state in world axes. ``distance`` and ``turned`` are
+relative to the initial state, ``energy_drift`` is |E − E₀|/|E₀|, ``momentum_turned`` the angle between L and L₀.
 """
 
 NAMES = tuple(QUANTITIES)
 SPEED, SPIN, DISTANCE, TURNED, KINETIC, POTENTIAL, ENERGY, DRIFT, MOMENTUM, MOMENTUM_TURNED = range(13, 23)
 
 DIFFERENCES = {"attitude": "rad", "position": "m", "velocity": "m/s", "spin": "rad/s"}
-"""How far two states are apart; velocities and spins in world axes."""
+"""Differences between two states; velocities and spins are compared in world axes."""
 
 STATE = 14
-"""A state row (13,) and the string's energy [J]."""
+"""Length of a state row (13,) with the string's energy [J]."""
 
 MASS, INERTIA, GRAVITY, START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 1, 10, 13, 27, 28, 31
 
@@ -145,16 +145,16 @@ def difference(code: int, a: np.ndarray, b: np.ndarray) -> float:
 
 FINAL, LARGEST, SMALLEST, FIRST, FLIPS, DIFFERENCE = range(6)
 KIND, CODE, A, B, C, D, MEASURE = range(7)
-"""FIRST: the quantity is above (A 1) or below (A −1) the limit B. FLIPS: A margin, B to D the axis in the body, all
-zero for that of the first spin.
+"""Columns of a measure. FIRST: the quantity is above (A = 1) or below (A = −1) the limit B. FLIPS: A is the margin, B
+to D the axis in the body; all zero for the axis of the initial spin.
 """
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def count_flips(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> float:
-    """How often a body axis turns over: its cosine to where it pointed at the start passes −margin, then margin, ...
+    """Number of flips of a body axis: the cosine to its initial direction falls below −margin, then exceeds margin, ...
 
-    The margin keeps an axis that lies across from being counted at each tremble. NaN without an axis.
+    The margin (hysteresis) avoids repeated counts of an axis that is nearly perpendicular. NaN without an axis.
     """
     x, y, z = measure[B], measure[C], measure[D]
     if x == 0.0 and y == 0.0 and z == 0.0:
@@ -185,7 +185,7 @@ def _extreme(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> fl
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _first(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> int:
-    """The first sample at which the condition of a measure holds, or −1."""
+    """Index of the first sample at which the condition of a measure holds, or −1."""
     for k in range(states.shape[0]):
         if measure[A] * (quantity(int(measure[CODE]), states[k], context) - measure[B]) > 0.0:
             return k
@@ -203,8 +203,8 @@ def measure_flight(
 ) -> None:
     """Fill out (k,) with the measures (k, MEASURE) of a flight.
 
-    states, others (m, STATE): at sample_ns (m,), of the flight and of its reference. NaN for an event that didn't
-    happen.
+    states, others (m, STATE): states of the flight and of its reference at sample_ns (m,). An event that didn't happen
+    gives NaN.
     """
     last = states.shape[0] - 1
     for j in range(measures.shape[0]):

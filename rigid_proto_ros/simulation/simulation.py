@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The simulation: commands in, motion out.
 
-Simulated time is an integer number of nanoseconds. Commands cut it into segments (simulation/flight.py); within one,
-commands are constant and an integrator advances the body. ``advance`` is the whole story.
+Simulated time is an integer number of nanoseconds. Commands divide it into segments (simulation/flight.py); within a
+segment loads are constant and an integrator advances the body. ``advance`` is the main algorithm.
 """
 
 from __future__ import annotations
@@ -77,16 +77,16 @@ _UNTIL_REPLACED_NS = fl.NEVER >> 1
 
 
 FLOOR_PERIOD_NS = 50_000_000
-"""[ns, simulated] How often observers are told how far the motion is held to its accuracy."""
+"""[ns, simulated] Interval at which observers are notified of error floors."""
 
 
 class Simulation:
-    """One body under commands.
+    """Simulation of one body under commands.
 
-    Not for several threads: one owner submits and advances. ``time_ns`` and ``state`` are those last asked for.
-    ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: the place
-    of the command that acts at this moment in its list, if it is an entry of one. ``logs_timeouts``: a held wrench that
-    times out is an event. ``setup_of``: gives the setup that a change leads to which doesn't bring its own.
+    Not thread-safe: a single owner submits and advances. ``time_ns`` and ``state`` are those of the last advance.
+    ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: place in
+    its list of the command being applied, if it is an entry of one. ``logs_timeouts``: whether the timeout of a held
+    wrench is logged. ``setup_of``: returns the new setup of a change that doesn't provide its own.
     """
 
     time_ns: int
@@ -106,16 +106,16 @@ class Simulation:
         self.watch(observer or Observer())
         self._start_over()
 
-    # Who watches
+    # Observers
 
     def watch(self, observer: Observer) -> None:
-        """Tell this observer from now on, and no other."""
+        """Notify this observer from now on, and no other."""
         self.observer = observer
         self._wants_loads = not observer.takes.isdisjoint((Applied, LoadBegan, LoadEnded))
         self._told_floor, self._next_floor_ns = "", 0
 
     def introduce(self, observer: Observer) -> None:
-        """Tell an observer that comes in flight about the body, what acts on it and the string."""
+        """Notify an observer that joins a running simulation of the body, the active loads and the string."""
         observer.on(BodyChanged(self.time_ns, self.setup))
         for acting in self.acting:
             shown = shown_load(acting.shown_kind, acting.load, self.setup.body)
@@ -123,12 +123,12 @@ class Simulation:
         observer.on(self._string_as_tied())
 
     def announce(self) -> None:
-        """Tell the observer about the body as it is now."""
+        """Notify the observer of the current body."""
         self.observer.on(BodyChanged(self.time_ns, self.setup))
 
     def notify_floor(self, at_end: bool = False) -> None:
-        """Tell the observer what holds the motion to less than its accuracy, where that changed: from time to time, and
-        at the end of a run or of its watch.
+        """Notify the observer of the error floors if they have changed: every FLOOR_PERIOD_NS, and at the end of a run
+        or of the observation.
         """
         due = at_end or self.time_ns >= self._next_floor_ns
         if not due or AccuracyFloor not in self.observer.takes:
@@ -148,7 +148,7 @@ class Simulation:
         return StringChanged(self.time_ns, tied, None if tied is None else tied.arm(self.setup.body))
 
     def _notify_string(self) -> None:
-        """Tell the observer about the string, where it changed since it was last told."""
+        """Notify the observer of the string if it has changed since the last notification."""
         if self.string is self._told_string:
             return
         self._told_string = self.string
@@ -156,13 +156,13 @@ class Simulation:
             self.observer.on(self._string_as_tied())
 
     def log(self, kind: str, content: dict[str, Any]) -> None:
-        """Log an event; one that doesn't touch the motion, such as a pause, is logged by whoever causes it."""
+        """Log an event. One that doesn't affect the motion, such as a pause, is logged by the code that causes it."""
         if self.observer.wants(Logged):
             self.observer.on(Logged(self.time_ns, self.events.append(self.time_ns, kind, content)))
         else:
             self.events.note(self.time_ns, (kind, content))
 
-    # The way of a command
+    # Submission of commands
 
     def submit(
         self,
@@ -171,11 +171,11 @@ class Simulation:
         listed: Listed | None = None,
         checked: tuple[bytes, Setup] | None = None,
     ) -> int:
-        """Take a command to act at ``at_ns``, or now when that is None or past; returns the time it will act.
+        """Schedule a command for ``at_ns``, or for now if that is None or past; returns the time at which it will act.
 
-        listed: its place, when it is an entry of a list. checked: what ``check_command`` gave, and the setup that it
-        was given, where that isn't the present one: a change before it in its list may allow what that doesn't.
-        Raises CommandRefused for what can be checked now; what can't (a ray) is checked when it acts, and counted.
+        listed: its place, if it is an entry of a list. checked: result of ``check_command`` and the setup it was
+        checked for, if not the current one: an earlier change in its list may permit what this one doesn't. Raises
+        CommandRefused for what can be checked now; the rest (a ray) is checked when it acts, and a refusal counted.
         """
         when_ns = self.time_ns if at_ns is None or at_ns < self.time_ns else at_ns
         row, setup = (check_command(command, self.setup), self.setup) if checked is None else checked
@@ -192,21 +192,21 @@ class Simulation:
         heappush(self._pending, (pending.time_ns, pending.order, pending))
 
     def refuse(self, error: CommandRefused, count: int = 1) -> None:
-        """Count a refusal, of so many commands at once, and tell the observer."""
+        """Count the refusal of ``count`` commands and notify the observer."""
         self.refused[error.reason] += count
         self.observer.on(Refused(self.time_ns, error.reason, str(error)))
 
     def check_change(self, new: Setup) -> None:
-        """Raises CommandRefused (``integrator``) when the new setup's integrator doesn't support what acts, or will."""
-        # A string that is to be tied at time 0 will be, at the next reset, though it was let go since.
+        """Raises CommandRefused (``integrator``) when the new integrator can't handle current or future loads."""
+        # A string that is attached at time 0 will be tied at the next reset, even if it has been released since.
         tied = new.string.attached or (self.string is not None and not self.setup.string.attached)
         check_supported(new.integrator, needs_of(new, (acting.load for acting in self.acting), tied))
         knot = new.string.attach if new.string.attach != self.setup.string.attach else self._string.attach
         check_rates(new, knot if tied else None)
 
     def reset(self, setup: Setup | None = None) -> None:
-        """Time 0, the initial state (of a new setup, if given), no held wrench, no pulses, nothing scheduled; counters
-        stay.
+        """Restart at time 0 in the initial state (of a new setup, if given), without active loads and scheduled
+        commands; counters are kept.
         """
         self._arrays.call(END_ALL)
         self._notify([])
@@ -221,20 +221,20 @@ class Simulation:
             self._tell_of_mesh(before)
             self.announce()
 
-    # The story
+    # Main loop
 
     def advance(self, until_ns: int) -> State:
-        """Take the body to ``until_ns`` and return its state there, before what acts at that very time.
+        """Advance the body to ``until_ns`` and return its state there, before events at that same time are applied.
 
-        Running away (|x|, |v| or |ω| past 1e100) stops at the last good state and sets ``failure``.
+        A motion that diverges (|x|, |v| or |ω| above 1e100) stops at the last good state and sets ``failure``.
         """
         if until_ns < self.time_ns:
             raise ValueError(f"simulated time doesn't run backwards: {self.time_ns} to {until_ns} ns")
         arrays = self._arrays
         while True:
-            # 1. Commands that are nothing but loads are handed to the compiled flight.
+            # 1. Commands that are plain loads are passed to the compiled flight.
             event_ns, due = self._hand_over(until_ns)
-            # 2. From event to event, up to the time asked for or to an event that takes more than arithmetic.
+            # 2. The flight advances from event to event, up to until_ns or to an event that needs Python code.
             if not arrays.fly(event_ns):
                 return self._stop_in_last_good_state(due)
             if due or self._wants_loads or arrays.integers[TIMEOUTS]:
@@ -243,11 +243,11 @@ class Simulation:
             self.state = state = State(event_ns, arrays.row.copy())
             if event_ns == until_ns:
                 return state
-            # 3. That event is applied; with what acts now a new segment begins.
+            # 3. That event is applied, and a new segment begins with the loads active now.
             self._act()
 
     def _hand_over(self, until_ns: int) -> tuple[int, Sequence[Pending]]:
-        """Until when the compiled flight needs nobody, and the commands that it applies on the way."""
+        """Time until which the compiled flight can advance on its own, and the commands that it applies on the way."""
         tied, pending = self._string.tied, self._pending
         if tied is not None and tied.release_ns is not None:
             until_ns = min(until_ns, tied.release_ns)
@@ -264,7 +264,7 @@ class Simulation:
             first = entry[-1]
             if first.resolved_for is not setup and not self._is_ready(first):
                 until_ns = first.time_ns
-                # All commands of one instant act together.
+                # All commands with the same time are applied together.
                 while due and due[-1].time_ns == until_ns:
                     self._push(due.pop())
                 break
@@ -274,17 +274,17 @@ class Simulation:
         return until_ns, due
 
     def _is_ready(self, pending: Pending) -> bool:
-        """Whether nothing but arithmetic is left to do when the command acts."""
+        """Whether the compiled flight can apply the command as it is."""
         if not isinstance(pending.command, WrenchCommand):
-            # The clock of thrusters at work is no matter of the compiled flight.
+            # A clear also cancels pending changes of thrusters, which the compiled flight doesn't know.
             return isinstance(pending.command, ClearWrench) and self.thrusters.due_ns == fl.NEVER
         try:
             return self._still_holds(pending, pending.command)
         except CommandRefused:
-            return False  # refused when it acts, and not before
+            return False  # it is refused when it acts, not earlier
 
     def _notify(self, due: Sequence[Pending]) -> None:
-        """Log the commands that acted, and tell the observer what began and ended."""
+        """Log the commands that were applied, and notify the observer of the loads that began and ended."""
         observer, arrays = self.observer, self._arrays
         if not (self._wants_loads or observer.wants(Logged) or arrays.integers[TIMEOUTS]):
             for pending in due:
@@ -313,16 +313,16 @@ class Simulation:
                 self._notify_load(load_id, kind, load)
 
     def _log_command(self, command: Command) -> None:
-        # A change that waited in a queue would keep its whole setup, mesh included.
+        # A noted change would keep its whole setup in memory, mesh included.
         if self.observer.wants(Logged) or isinstance(command, Change):
             self.log(command.kind, dict(command.content))
         else:
             self.events.note(self.time_ns, command)
 
-    # What happens at an event that takes more than arithmetic
+    # Events that need Python code
 
     def _act(self) -> None:
-        """Everything that ends or begins now; a new segment if anything did."""
+        """Apply everything that ends or begins now, and begin a new segment if anything did."""
         arrays, now_ns = self._arrays, self.time_ns
         changed = bool(arrays.call(END_DUE))
         self._notify([])
@@ -379,7 +379,7 @@ class Simulation:
         self._log_command(command)
 
     def _thrust(self, loads: list[tuple[int, Load]]) -> None:
-        """Let thrusters, by number, push like this until they are told otherwise."""
+        """Apply loads of thrusters, by number, until they are replaced."""
         arrays, rows = self._arrays, []
         for number, load in loads:
             row = Pending(self.time_ns, ClearWrench(), duration_ns=_UNTIL_REPLACED_NS, row=load.packed)
@@ -396,9 +396,9 @@ class Simulation:
                 self._notify_load(load_id, "thruster", loads[row_number - arrays.first_due][1])
 
     def _still_holds(self, pending: Pending, command: WrenchCommand) -> bool:
-        """Whether the load resolved at submission holds now: it doesn't if it was a ray, or the mesh has changed since.
+        """Whether the load resolved at submission is still valid: not for a ray, and not if the mesh has changed since.
 
-        Raises CommandRefused when the body or the integrator that there is now can't take it.
+        Raises CommandRefused when the current body or integrator can't take it.
         """
         setup, before = self.setup, pending.resolved_for
         if before is setup:
@@ -413,8 +413,8 @@ class Simulation:
         return True
 
     def _change(self, new: Setup) -> None:
-        """Take another setup in flight. The same mesh at the same size stays where it is, so a COM that moves within it
-        takes position and velocity along; another mesh or size keeps the COM and its motion.
+        """Switch to another setup in flight. The same mesh at the same size stays in place: if the COM moves within it,
+        position and velocity become those of the new COM. Another mesh or size keeps the COM and its motion.
         """
         self.check_change(new)
         old, self.setup = self.setup, new
@@ -434,7 +434,7 @@ class Simulation:
             name = str(self.setup.geometry[0])
             self.observer.on(MeshChanged(self.time_ns, surface.vertices, surface.triangles, name))
 
-    # The beginning and a bad end
+    # Start and failure
 
     def _start_over(self) -> None:
         self._pending: list[Waiting] = []
@@ -450,7 +450,7 @@ class Simulation:
         self._notify_string()
 
     def _stop_in_last_good_state(self, due: Sequence[Pending]) -> State:
-        """The motion failed on the way; of these commands those that hadn't acted yet go on waiting."""
+        """Stop after a failure of the motion; commands in ``due`` that haven't been applied stay pending."""
         arrays = self._arrays
         acted = len(due) - arrays.waiting
         for pending in due[acted:]:
@@ -464,32 +464,32 @@ class Simulation:
         arrays.call(FINISH)
         return self.state
 
-    # What can be read off it, at the time it was last advanced to
+    # Observables at the time of the last advance
 
     @property
     def acting(self) -> list[ActingLoad]:
-        """The loads that act now: in the order in which they began."""
+        """The active loads, in the order in which they began."""
         return list(self._arrays.acting())
 
     @property
     def flight(self) -> np.record:
-        """All that the compiled flight knows (simulation/flight.py), to be read."""
+        """The record of the compiled flight (simulation/flight.py), for reading only."""
         return self._arrays.flight
 
     @property
     def steps(self) -> int:
-        """Steps committed since start or reset; sampling takes none."""
+        """Steps committed since start or reset; sampling adds none."""
         return int(self.flight.steps_before + fl.steps_of_segment(self.flight))
 
     @property
     def force_evaluations(self) -> int:
-        """Evaluations of the equations of motion in those steps."""
+        """Evaluations of the equations of motion in the committed steps."""
         in_segment = fl.evaluations_of_segment(self.flight, self._arrays.methods)
         return int(self.flight.evaluations_before + in_segment)
 
     @property
     def choice(self) -> str:
-        """Which method advances the body now, and why."""
+        """The method that advances the body now, and the reason for it."""
         flight = self.flight
         degree = int(flight.degree)
         return self._arrays.integrator.methods[int(flight.method)].choice.format(
@@ -501,14 +501,14 @@ class Simulation:
 
     @property
     def accuracy_floor(self) -> str:
-        """Why, since start or reset, rounding and not the accuracy asked for has set what the motion errs; empty where
-        it hasn't, or nothing adapts to the accuracy.
+        """Message if rounding, and not the requested accuracy, has limited the motion's error since start or reset;
+        empty if it hasn't, or if the integrator has no accuracy.
         """
         return fl.floor_text(self.floors)
 
     @property
     def floors(self) -> list[float]:
-        """The same by kind (flight.FLOOR_KINDS), 0 where it hasn't."""
+        """Error floors by kind (flight.FLOOR_KINDS); 0 where rounding isn't the limit."""
         if not self.setup.integrator.chooses and self.setup.integrator.name != "free_body":
             return [0.0] * fl.FLOOR_KINDS
         floors = self.flight.floors.copy()
@@ -517,9 +517,7 @@ class Simulation:
 
     @property
     def too_coarse(self) -> str:
-        """Why the fixed step says nothing here, |ω|h or ω_s h being beyond the integrator's limit; empty
-        when it does.
-        """
+        """Message if the fixed step is too long, with |ω|h or ω_s h above the integrator's limit; empty otherwise."""
         setup = self.setup
         limit, h = setup.integrator.stability_limit, setup.step_ns * 1e-9
         spin = length(self.state.angular_velocity_body) * h
@@ -533,7 +531,7 @@ class Simulation:
 
     @property
     def string(self) -> StringState | None:
-        """The string as it is tied, or None."""
+        """State of the tied string, or None."""
         return self._string.tied
 
     @property
@@ -543,19 +541,19 @@ class Simulation:
 
     @property
     def hand_work(self) -> float:
-        """What the hand at the string's free end has worked since start or reset [J]."""
+        """Work done by the hand at the string's free end since start or reset [J]."""
         return float(self.flight.work_before + self.flight.work)
 
     @property
     def string_heat(self) -> float:
-        """What the string's damper has turned to heat since start or reset [J]."""
+        """Energy dissipated in the string's damper since start or reset [J]."""
         return float(self.flight.lost_before + self.flight.lost)
 
     @property
     def potential_energy(self) -> float:
-        """−m g·x, and the string's [J]."""
+        """−m g·x plus the energy of the string [J]."""
         setup = self.setup
-        # Read once: another thread may let it go meanwhile.
+        # Read once: another thread may release it meanwhile.
         string = self.string
         energy = -setup.body.mass * dot(setup.gravity, self.state.position)
         return energy + (string.potential_energy(setup.body, self.state) if string else 0.0)
@@ -572,8 +570,8 @@ class Simulation:
 
     @property
     def angular_momentum_drift(self) -> float:
-        """|L − L₀|/|L₀| since the present segment began; 0 while something turns the body, or without spin."""
-        # Torques, and moments of forces, stand behind the forces.
+        """|L − L₀|/|L₀| since the current segment began; 0 while a torque may act on the body, or without spin."""
+        # The entries after the forces are torques and moments of forces.
         if self.string is not None or self.flight.sums[TORQUE_WORLD:].any():
             return 0.0
         if self.setup.angular_damping or not self.setup.gyroscopic:
@@ -584,18 +582,18 @@ class Simulation:
 
     @property
     def at_rest(self) -> bool:
-        """Nothing moves, acts or is about to."""
+        """Whether nothing moves, no load acts and no command is pending."""
         still = not (self.state.row[7:].any() or self.setup.gravity.any())
         return still and not self.acting and self.string is None and not self._pending
 
     def accelerations(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the COM (3,) [m/s²] and angular (3,) [rad/s²], both in world axes, now."""
+        """Current acceleration of the COM (3,) [m/s²] and angular acceleration (3,) [rad/s²], both in world axes."""
         linear, angular = self._accelerations()
         return linear, times(self.state.rotation, angular)
 
     def specific_force(self, point: Numbers) -> np.ndarray:
-        """What an accelerometer at ``point`` (3,) [m, body axes from the COM] shows now (3,) [m/s², body axes]:
-        Rᵀ(a − g) + ω' × r + ω × (ω × r).
+        """Specific force (3,) [m/s², body axes] at ``point`` r (3,) [m, body axes from the COM], as an accelerometer
+        shows it: Rᵀ(a − g) + ω' × r + ω × (ω × r).
         """
         linear, angular = self._accelerations()
         w = self.state.angular_velocity_body
@@ -604,7 +602,7 @@ class Simulation:
         return shown
 
     def _accelerations(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the COM (3,) [m/s², world] and angular (3,) [rad/s², body axes], now."""
+        """Current acceleration of the COM (3,) [m/s², world] and angular acceleration (3,) [rad/s², body axes]."""
         six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(VARIABLES)))
         return six[:3], six[3:]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What commands, timeouts and parameters do to the string of a running simulation."""
+"""Effects of commands, timeouts and parameters on the string of a running simulation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .setup import Setup, check_rates
 
 
 class StringControl:
-    """tied: the string as it is, or None. attach: where the next target ties it (mesh coordinates)."""
+    """The string. tied: its state, or None. attach: where the next target ties it (mesh coordinates)."""
 
     def __init__(self, setup: Setup, state: State) -> None:
         settings = setup.string
@@ -30,7 +30,7 @@ class StringControl:
             self.tied = tie(settings, settings.attach, settings.target, setup.body, state, 0, mass)
 
     def end_due(self, now_ns: int) -> bool:
-        """Whether the free end arrived at this very time, or the string let go."""
+        """Release the string on timeout; returns whether it was released or its free end arrived at this very time."""
         if self.tied is None:
             return False
         if self.tied.release_ns is not None and self.tied.release_ns <= now_ns:
@@ -39,7 +39,7 @@ class StringControl:
         return self.tied.end_ns == now_ns
 
     def tie_at(self, command: TieString, setup: Setup, state: State) -> None:
-        """Take the knot to a point of the body; a string that is tied stays so, its k and c computed anew."""
+        """Move the knot to a point of the body; a tied string stays tied, and its k and c are recomputed."""
         point = mesh_point(command, setup.body, state)
         attach = vector(point if setup.surface is None else setup.surface.nearest_point(point))
         if self.tied is not None:
@@ -50,7 +50,7 @@ class StringControl:
         self.attach = attach
 
     def move(self, command: MoveString, setup: Setup, state: State) -> None:
-        """Take the free end to a new target, tying the string if it wasn't; raises CommandRefused."""
+        """Move the free end to a new target, and tie the string if it isn't tied; raises CommandRefused."""
         timeout_ns = setup.string.timeout_ns
         if self.tied is None:
             check_rates(setup, self.attach)
@@ -60,11 +60,11 @@ class StringControl:
         self.tied = _checked(tied, setup.body, state)
 
     def release(self) -> None:
-        """Let go."""
+        """Release the string."""
         self.tied = None
 
     def change(self, old: Setup, new: Setup, state: State) -> None:
-        """Take changed parameters, a changed body included. ``attached`` ties or lets go when it changes itself."""
+        """Apply changed parameters or a changed body. A change of ``attached`` itself ties or releases the string."""
         before, after = old.string, new.string
         if after.attach != before.attach:
             self.attach = after.attach
@@ -85,7 +85,7 @@ class StringControl:
 
 
 def mesh_point(command: TieString, body: Body, state: State) -> np.ndarray:
-    """Where a command ties the string (3,) in mesh coordinates, before it is taken onto the surface."""
+    """Point (3,) at which a command ties the string, in mesh coordinates, before it is projected to the surface."""
     point = np.asarray(command.point, dtype=float)
     if command.axes == "world":
         point = transposed_times(state.rotation, point - state.position)
@@ -93,8 +93,8 @@ def mesh_point(command: TieString, body: Body, state: State) -> np.ndarray:
 
 
 def _checked(tied: StringState, body: Body, state: State) -> StringState:
-    """Raises CommandRefused (``magnitude``) when the string would pull beyond MAX_ACCELERATION."""
-    # Where the free end goes counts, not only where it is.
+    """The string; raises CommandRefused (``magnitude``) when its pull would exceed MAX_ACCELERATION."""
+    # Both ends of the free end's path count, not only its current position.
     farthest = max(
         float(np.abs(replace(tied, origin=end, target=end).span(body, state)).max())
         for end in (tied.target, tied.origin)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Thrusters fixed to the body: what they push with after a command, within limit, least on-time and timeout."""
+"""Thrusters fixed to the body: their forces after a command, with force limit, minimum on-time and timeout."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _NO_TORQUE = (0.0, 0.0, 0.0)
 
 
 class Thruster(NamedTuple):
-    """point (3,) and direction (3,) of the force, a unit vector, in mesh coordinates. Its force lies between ``least``,
-    0 unless it pushes both ways, and ``most`` [N]; once on it pushes for minimum_on_ns at least.
+    """point (3,) of the force in mesh coordinates and its direction (3,), a unit vector in mesh axes. The force is
+    between ``least`` (0 unless bidirectional) and ``most`` [N]; once on, it stays on for at least minimum_on_ns.
     """
 
     point: Vector
@@ -28,17 +28,17 @@ class Thruster(NamedTuple):
     minimum_on_ns: int
 
     def within(self, force: float) -> float:
-        """The force [N] that its limits leave of this one."""
+        """The force [N], clamped to the thruster's limits."""
         return max(self.least, min(self.most, force))
 
     def load(self, force: float) -> Load:
-        """Its load on the body at this force [N]."""
+        """The load on the body at this force [N]."""
         x, y, z = self.direction
         return Load("body", self.point, (force * x, force * y, force * z), _NO_TORQUE)
 
 
 def make_thruster(name: str, numbers: Sequence[float], bidirectional: bool, minimum_on_ns: int) -> Thruster:
-    """From point, direction, and where given the limit; raises InputError."""
+    """A thruster from point, direction and, optionally, the force limit; raises InputError."""
     x, y, z, dx, dy, dz, limit = (*numbers, 0.0)[:7]
     largest = max(abs(dx), abs(dy), abs(dz))
     if not largest > 0.0 or limit < 0.0:
@@ -51,7 +51,7 @@ def make_thruster(name: str, numbers: Sequence[float], bidirectional: bool, mini
 
 
 class Push(NamedTuple):
-    """What a thruster pushes with [N] since on_ns; off_ns: when it stops, kept on by its least on-time, or NEVER."""
+    """Force of a thruster [N] since on_ns. off_ns: time of a stop delayed by the minimum on-time, or NEVER."""
 
     force: float = 0.0
     on_ns: int = 0
@@ -59,8 +59,8 @@ class Push(NamedTuple):
 
 
 class ThrusterControl:
-    """The thrusters of a running simulation. pushes: what each pushes with, in the order of their names. due_ns: when
-    something becomes of them by itself.
+    """The thrusters of a running simulation. pushes: the force of each, in the order of their names. due_ns: the next
+    time at which a force changes without a command.
     """
 
     def __init__(self, thrusters: Mapping[str, Thruster]) -> None:
@@ -69,13 +69,13 @@ class ThrusterControl:
         self.clear()
 
     def clear(self) -> None:
-        """Nothing pushes any more, at once."""
+        """Switch all thrusters off at once."""
         self.pushes = [Push()] * len(self.thrusters)
         self.due_ns, self.times_out = NEVER, False
 
     def command(self, forces: Iterable[float], now_ns: int, timeout_ns: int) -> list[tuple[int, Load]]:
-        """Push with these forces; returns what each pushes with from now on, by its number, but for those that have to
-        stay on for a while.
+        """Apply commanded forces; returns the new load of each thruster with its number, except for thrusters that must
+        stay on until their minimum on-time is over.
         """
         self.last_ns = now_ns
         loads = []
@@ -91,7 +91,7 @@ class ThrusterControl:
         return loads
 
     def end_due(self, now_ns: int, timeout_ns: int) -> tuple[list[tuple[int, Load]], bool]:
-        """What pushes otherwise from now on by itself, and whether it is that the last command has timed out."""
+        """Loads of thrusters, by number, that change now by themselves, and whether the last command has timed out."""
         loads = []
         for number, (thruster, push) in enumerate(zip(self.thrusters.values(), self.pushes, strict=True)):
             if push.off_ns <= now_ns:
@@ -104,7 +104,7 @@ class ThrusterControl:
         return loads, timed_out
 
     def change(self, timeout_ns: int, now_ns: int) -> None:
-        """The timeout is another one from now on."""
+        """Apply a changed timeout."""
         self._find_due(timeout_ns)
         self.due_ns = max(self.due_ns, now_ns)
 

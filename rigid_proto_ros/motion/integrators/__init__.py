@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Integrators by name.
 
-An integrator takes the variables of a segment (motion/problem.py) forward in time under the segment's problem
-(motion/problem.py). It keeps two promises: a step is a function of the variables, the problem and the step size alone,
-and ``advance`` commits only steps at full length, so that sampling the motion never changes it.
+An integrator advances the variables of a segment under the segment's problem (both in motion/problem.py). It has two
+invariants: a step is a function of only the variables, the problem and the step size, and only full steps are
+committed, so that sampling the motion never changes it.
 
-Kernels divide as IEEE 754 does (``error_model="numpy"``): a step that explodes comes out as inf or NaN and is refused,
-where Python's rule would raise in the middle of it.
+Kernels use IEEE 754 division (``error_model="numpy"``): a step that diverges gives inf or NaN and is rejected, whereas
+Python's division would raise an exception in the middle of it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ INTEGRATORS: dict[str, Integrator] = {
 
 
 def check_supported(integrator: Integrator, needs: frozenset[str]) -> None:
-    """Raises CommandRefused (``integrator``) naming those that can when ``integrator`` can't meet all ``needs``."""
+    """Raises CommandRefused (``integrator``), listing those that can, if ``integrator`` can't meet all ``needs``."""
     lacks = integrator.lacks(needs)
     if lacks:
         able = ", ".join(name for name, other in INTEGRATORS.items() if not other.lacks(needs))

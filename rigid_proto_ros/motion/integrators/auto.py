@@ -11,8 +11,8 @@
 
 Taylor steps are as long as the accuracy allows, which follows from their coefficients. The choice depends only on the
 segment's problem and initial state, and each step only on the state at its start. Strings and damping faster than
-FASTEST are refused (simulation/setup.py): with steps of about 1.5/FASTEST the simulation would be slower than real
-time.
+FASTEST are refused (simulation/setup.py): they need steps below about 1.5/FASTEST, for which the simulation would be
+slower than real time.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def steady_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
 
 
 ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, SLACK_AT_REST, ON_STRING = range(8)
-"""Kinds of segments, as the table above has them; each is one of auto's methods."""
+"""Kinds of segments, as in the table above; each has its own method of auto."""
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -78,7 +78,7 @@ def _any(v: np.ndarray, at: int = 0) -> bool:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def kind_of_segment(p: np.record, y: np.ndarray) -> int:
-    """Which of the kinds a segment with problem p from variables y on is."""
+    """Kind of a segment with problem p and initial variables y."""
     spins = _any(y, 4)
     turned = _any(p.torque_body) or p.has_world_torque or (spins and p.damping_angular != 0.0)
     translates = p.translates
@@ -106,7 +106,7 @@ _SERIES = Method(
 
 
 def _spin_workspace(degree: int) -> np.ndarray:
-    """Room for the series of a spin alone: a segment clears it first, and it is a fifth of the other."""
+    """Workspace for the series of the spin alone, cleared when the method changes; a fifth of the other's size."""
     return np.zeros((degree + 1, SPIN_COLUMNS))
 
 

@@ -1,33 +1,33 @@
 # SPDX-License-Identifier: MIT
-"""free_body: torque-free motion, exact to rounding for any time in one step; and free_body_strang, made of its map
-``free_step`` and of kicks, for loads.
+"""free_body: torque-free motion, exact to rounding for any time in one step; and free_body_strang, for loads, which
+combines the map ``free_step`` with kicks.
 
-In a simulation each sample is one step from the segment's start, so nothing accumulates. Attitude errs less than
-50 ε (1 + |ω|h) rad. World forces at the COM, gravity and linear damping are closed form beside it.
+In a simulation each sample is one step from the segment's start, so errors don't accumulate. The attitude error is
+below 50 ε (1 + |ω|h) rad. World forces at the COM, gravity and linear damping have a separate closed form.
 
-In principal axes the angular velocity follows Jacobi's elliptic functions, the attitude a turn about the angular
-momentum. Written for A, B, C and w = (w₁, w₂, w₃) with C the axis that the angular momentum circulates about in the
-body, w₃ ≥ 0:
+In principal axes the angular velocity is given by Jacobi's elliptic functions, the attitude by a rotation about the
+angular momentum. Let A, B, C be the moments and w = (w₁, w₂, w₃), C belonging to the axis about which the angular
+momentum circulates in the body, and w₃ ≥ 0:
 
     P = B|B−A| w₂² + C|C−A| w₃²,  Q = A|C−A| w₁² + B|C−B| w₂²,  ω_p² = |C−B| P/(ABC),
     m = |B−A| Q/(|C−B| P),  m₁ = 1 − m = |C−A| (C|C−B| w₃² − A|B−A| w₁²)/(|C−B| P).
 
-ω after h comes by the addition theorem with S = sn/ω_p, c = cn, d = dn at u = ω_p h, so that no elliptic integral is
-inverted and no division vanishes: with D = 1 − β sn² and β = B|B−A| w₂²/P,
+ω after h follows from the addition theorem with S = sn/ω_p, c = cn, d = dn at u = ω_p h, without inversion of an
+elliptic integral or division by zero: with D = 1 − β sn² and β = B|B−A| w₂²/P,
 
     w₁⁺ = (w₁ c − (C−B)/A w₂w₃ S d)/D,  w₂⁺ = (w₂ c d + (C−A)/B w₁w₃ S)/D,  w₃⁺ = (w₃ d − (B−A)/C w₁w₂ S c)/D.
 
-The attitude is R = R_L R_z(ψ) B(M), B(M) the shortest turn that takes the angular momentum M = (Aw₁, Bw₂, Cw₃) to the
-third axis and ψ' = (2E + L w₃)/(L + C w₃): all terms positive. With dn = (1 − κs²)/(1 + κs²), s = sn of modulus κ =
-(1 − √m₁)/(1 + √m₁) (Gauss's transformation), ψ' becomes f_a + f_b s²/(1 + νs²), whose integral from the start of a
-period is Carlson's R_J, every argument positive. The integral from any other phase on is that over the time alone plus
-an arc tangent (addition theorem of the third kind): a difference of two incomplete integrals would cancel where both
-are large, near a middle axis that the body leaves or comes to.
+The attitude is R = R_L R_z(ψ) B(M), B(M) the shortest rotation that takes the angular momentum M = (Aw₁, Bw₂, Cw₃) to
+the third axis and ψ' = (2E + L w₃)/(L + C w₃): all terms are positive. With dn = (1 − κs²)/(1 + κs²), s = sn of modulus
+κ = (1 − √m₁)/(1 + √m₁) (Gauss's transformation), ψ' becomes f_a + f_b s²/(1 + νs²), whose integral from the start of a
+period is Carlson's R_J with positive arguments. From any other phase on, the integral is that over the same time from
+the start of a period plus an arc tangent (addition theorem of the third kind): a difference of two incomplete integrals
+would cancel where both are large, near the middle axis.
 
 Sources: Whittaker, A Treatise on the Analytical Dynamics of Particles and Rigid Bodies (1937), section 69; van Zon and
 Schofield, J. Comput. Phys. 225 (2007) 145; Celledoni, Fassò, Säfström and Zanna, SIAM J. Sci. Comput. 30 (2008) 2084;
 Byrd and Friedman, Handbook of Elliptic Integrals (1971), 116.03, for the addition theorem; the gauge and the positive
-forms are worked out here.
+forms are derived here.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ from ..problem import MAX_SPEED, damping_functions, is_good, parts_of, undamped_
 from .integrator import ANGULAR_DAMPING, LOADS, ONE_STEP, Integrator, Method
 
 ON_SEPARATRIX = 1e-290
-"""m₁ of a start that lies on the separatrix to all digits: it stays by the middle axis for 670/ω_p, and leaves it then;
-a start that is known to rounding alone does so after 40/ω_p.
+"""m₁ of an initial state on the separatrix to all digits: it stays near the middle axis for 670/ω_p, then leaves it. An
+initial state known only to rounding does so after 40/ω_p.
 """
 
 NO_SPIN = 1e-140
-"""Part of the largest ω below which a component is taken as none: its square times a ratio of moments
-would leave the doubles.
+"""Fraction of the largest component of ω below which another one is set to zero: its square times a ratio of moments
+would underflow.
 """
 
 
@@ -62,13 +62,13 @@ def free_step(q: Quaternion, w: Vector, moments: Vector, h: float) -> tuple[Quat
     largest = max(abs(wx), abs(wy), abs(wz))
     if largest == 0.0 or h == 0.0:
         return q, w
-    # Powers of two: units in which nothing under- or overflows, and no rounding.
+    # Scaling by powers of two avoids underflow and overflow, and is exact.
     _, e = math.frexp(largest)
     _, f = math.frexp(i3)
     wx, wy, wz, h = math.ldexp(wx, -e), math.ldexp(wy, -e), math.ldexp(wz, -e), math.ldexp(h, e)
     i1, i2, i3 = math.ldexp(i1, -f), math.ldexp(i2, -f), math.ldexp(i3, -f)
     if not math.isfinite(wx + wy + wz + h):
-        # A runaway of the scheme around it; the iterations below would never end.
+        # The surrounding scheme has diverged; the iterations below would never end.
         return (math.nan, math.nan, math.nan, math.nan), (wx, wy, wz)
     wx = 0.0 if abs(wx) < NO_SPIN else wx
     wy = 0.0 if abs(wy) < NO_SPIN else wy
@@ -76,11 +76,11 @@ def free_step(q: Quaternion, w: Vector, moments: Vector, h: float) -> tuple[Quat
     third, first = i3 * (i3 - i2) * wz * wz, i1 * (i2 - i1) * wx * wx
     side = third - first
     if abs(side) < 1e-14 * third:
-        # The sign is in digits that doubles have lost.
+        # The sign depends on digits lost in double precision.
         side = _side_of_separatrix(i1, i2, i3, wx, wz)
     about_third = side > 0.0 if side != 0.0 else i3 - i2 >= i2 - i1
     if not about_third:
-        # A turn that exchanges first and third axis.
+        # A rotation that exchanges the first and the third axis.
         i1, i3 = i3, i1
         wx, wy, wz = wz, -wy, wx
     flipped = wz < 0.0
@@ -98,7 +98,7 @@ def free_step(q: Quaternion, w: Vector, moments: Vector, h: float) -> tuple[Quat
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector]:
-    """The turn r xyzw (not normalized) over h, and w after it; names as above."""
+    """The rotation r xyzw (not normalized) over h, and w after it; notation of the module's docstring."""
     A, B, C = moments
     w1, w2, w3 = w
     gba, gcb, gca = abs(B - A), abs(C - B), abs(C - A)
@@ -106,14 +106,14 @@ def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector
     Q = A * gca * w1 * w1 + B * gcb * w2 * w2
     rate = math.sqrt(gcb * P / (A * B * C))
     if rate == 0.0 or Q == 0.0 or (w1 == 0.0 and w3 == 0.0):
-        # Evenly about w.
+        # Uniform rotation about w.
         size = norm(w1, w2, w3)
         s, c = sine_cosine(0.5 * size * h)
         s /= size
         return (w1 * s, w2 * s, w3 * s, c), w
     m = gba * Q / (gcb * P)
     m1 = max(gca * abs(_side_of_separatrix(A, B, C, w1, w3)) / (gcb * P), ON_SEPARATRIX)
-    # Less whole half turns, after which sn and cn change their signs.
+    # Subtract whole half periods 2K, each of which changes the signs of sn and cn.
     u, K = rate * h, complete_quarter_period(m1)
     whole = float(round(0.5 * u / K))
     odd = whole % 2.0 != 0.0
@@ -125,11 +125,11 @@ def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector
     v1 = (w1 * c - (C - B) / A * w2 * w3 * S * d) / D
     v2 = (w2 * c * d + (C - A) / B * w1 * w3 * S) / D
     v3 = (w3 * d - (B - A) / C * w1 * w2 * S * c) / D
-    # Roundings of S, c and d are the same in steps alike; what they do to Q and P is taken out, lest it add up.
+    # Equal steps repeat the rounding errors of S, c and d; their effect on Q and P is removed, lest it add up.
     excess = 0.5 * (A * gca * (v1 - w1) * (v1 + w1) + B * gcb * (v2 - w2) * (v2 + w2)) / Q
     v1, v2 = v1 - excess * v1, v2 - excess * v2
     share = C * gca * v3 * v3
-    # Where the third axis has a small share in P, Q keeps P as well.
+    # Where the third axis contributes little to P, conserving Q conserves P as well.
     if share > 0.5 * P:
         v3 -= 0.5 * (B * gba * (v2 - w2) * (v2 + w2) + C * gca * (v3 - w3) * (v3 + w3)) / share * v3
     # ψ' = f_a + f_b s²/(1 + νs²); W: the largest w₃, E2: 2E, modulus1: 1 − κ².
@@ -140,7 +140,7 @@ def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector
     most = L + C * W
     nu = kappa * A * Q / (gca * most * most)
     f_a, f_b = (E2 + L * W) / most, 2.0 * kappa * W * math.copysign(Q, C - B) / (most * most)
-    # From the start of a period, over the time alone: R_J.
+    # Integral over the time from the start of a period: R_J.
     x, y = _gauss_phase(c, s, d, k1)
     if odd:
         x = -x
@@ -148,7 +148,7 @@ def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector
     integral = x * xx / 3.0 * carlson_rj(yy, yy + modulus1 * xx, 1.0, 1.0 + nu * xx)
     if whole != 0.0:
         integral += whole * 2.0 / 3.0 * carlson_rj(0.0, modulus1, 1.0, 1.0 + nu)
-    # What the phase of the start adds: x0, x1 are sn at the start and the end.
+    # Contribution of the initial phase: x0, x1 are sn at the start and the end.
     to_1, to_2 = math.sqrt(A * gca / Q), math.copysign(1.0, C - B) * math.sqrt(B * gcb / Q)
     x0, _ = _gauss_phase(w1 * to_1, w2 * to_2, w3 / W, k1)
     x1, y1 = _gauss_phase(v1 * to_1, v2 * to_2, v3 / W, k1)
@@ -175,7 +175,7 @@ def _gauss_phase(cn: float, sn: float, dn: float, k1: float) -> tuple[float, flo
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _side_of_separatrix(A: float, B: float, C: float, w1: float, w3: float) -> float:
-    """C(C−B) w₃² − A(B−A) w₁² in pairs of doubles: near the separatrix the motion hangs on its last digits."""
+    """C(C−B) w₃² − A(B−A) w₁² in pairs of doubles: near the separatrix the motion depends on its last digits."""
     g, g_low = two_sum(C, -B)
     x, x_low = pair_multiply(g, g_low, C, 0.0)
     s, s_low = two_product(w3, w3)
@@ -215,15 +215,15 @@ FREE_BODY = Integrator(
 )
 
 
-# Elliptic functions and integrals without cancellation near the separatrix. The modulus comes as m = k² and m₁ = 1 − m,
-# both accurate, because there the motion hangs on m₁ alone. Sources: Bulirsch, Numerische Mathematik 7 (1965) for sn,
+# Elliptic functions and integrals without cancellation near the separatrix. Their parameter is m = k² and m₁ = 1 − m,
+# both accurate, because there the motion depends on m₁ alone. Sources: Bulirsch, Numerische Mathematik 7 (1965) for sn,
 # cn, dn; Carlson, Numerical Algorithms 10 (1995) for R_J; Abramowitz and Stegun, chapters 16 and 17, for the rest.
 
 SMALL_ARGUMENT = 0.03
-"""Below it the Maclaurin series of sn, cut after u⁹, errs by 2e-19 (for m = 1 the next term is 0.0089 u¹¹)."""
+"""Below it the Maclaurin series of sn, truncated after u⁹, errs by 2e-19 (for m = 1 the next term is 0.0089 u¹¹)."""
 
 _DUPLICATION = 3e-3
-"""Carlson's series of fifth order errs by about the sixth power of the arguments' relative spread: 1e-16 of it."""
+"""Relative spread of the arguments at which the error of Carlson's fifth-order series (sixth power) is about 1e-16."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -232,7 +232,7 @@ def complete_quarter_period(m1: float) -> float:
     a, b = 1.0, math.sqrt(m1)
     while abs(a - b) > 1e-8 * a:
         a, b = 0.5 * (a + b), math.sqrt(a * b)
-    # The mean of two numbers this near is exact to 1e-17.
+    # The mean of two numbers this close is exact to 1e-17.
     return math.pi / (a + b)
 
 
@@ -277,7 +277,7 @@ def _by_series(u: float, m: float) -> tuple[float, float, float]:
     for _ in range(doublings):
         t = s * s
         s = 2.0 * s * c * d / (1.0 - m * t * t)
-        # cn and dn doubled by themselves would double their rounding error each time.
+        # Separate doubling formulas for cn and dn would double their rounding errors each time.
         c, d = math.sqrt(1.0 - s * s), math.sqrt(1.0 - m * s * s)
     return s, c, d
 
@@ -315,7 +315,7 @@ def _by_landen(u: float, m1: float) -> tuple[float, float, float]:
 
 @njit(cache=True, error_model="numpy")
 def _set(values: tuple[float, ...], index: int, value: float) -> tuple[float, ...]:
-    """A tuple of 14 with one entry replaced: tuples live in registers where an array would be allocated each call."""
+    """A tuple of 14 with one entry replaced: tuples stay in registers, an array would be allocated at each call."""
     return (
         value if index == 0 else values[0],
         value if index == 1 else values[1],
@@ -378,10 +378,10 @@ def carlson_rj(x: float, y: float, z: float, p: float) -> float:
     return weight * series / (mean * math.sqrt(mean)) + 6.0 * total
 
 
-# Under loads: half a kick, exact free motion, half a kick. A kick is what loads and damping do to the velocities
-# while the attitude stands still. Order 2, time-reversible; its error has the torque as a factor, so it pays when the
-# body spins fast under weak loads, at any |ω|h; angular momentum is exact under loads without torque. Source: Strang,
-# SIAM J. Numer. Anal. 5 (1968) 506; for rigid bodies McLachlan and Quispel, Acta Numerica 11 (2002) 341.
+# With loads: half a kick, exact free motion, half a kick (Strang splitting). A kick is the effect of loads and damping
+# on the velocities at constant attitude. Order 2, time-reversible; its error is proportional to the torque, so it is
+# efficient for fast spin under weak loads, at any |ω|h; angular momentum is exact under loads without torque. Source:
+# Strang, SIAM J. Numer. Anal. 5 (1968) 506; for rigid bodies McLachlan and Quispel, Acta Numerica 11 (2002) 341.
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -397,7 +397,7 @@ def _push(y: np.ndarray, p: np.record) -> tuple[float, ...]:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _kick(y: np.ndarray, p: np.record, h: float, pushed: tuple[float, ...]) -> None:
-    """Let ``_push`` act for h seconds on ω and the added velocity, in place; damping in closed form."""
+    """Apply the rates of ``_push`` to ω and the added velocity for h seconds, in place; damping in closed form."""
     angular, linear = p.damping_angular, p.damping_linear
     for k in range(3):
         rate = pushed[k] / p.moments[k]
@@ -424,7 +424,7 @@ def free_body_strang_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int
         if p.translates:
             for k in range(3):
                 new[7 + k] += h * new[10 + k]
-        # The next step's first half kick sees the same attitude.
+        # The next step's first half kick uses the same attitude.
         pushed = _push(new, p)
         _kick(new, p, 0.5 * h, pushed)
         if not is_good(new):

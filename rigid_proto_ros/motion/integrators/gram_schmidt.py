@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """euler and midpoint: the explicit steps of the 2019 paper, on a rotation matrix kept orthonormal by Gram-Schmidt.
 
-Orders 1 and 2, one and two evaluations a step (the paper's O(n²) and O(n³) are local errors). Source: "Interactively
+Orders 1 and 2, one and two evaluations per step (the paper's O(n²) and O(n³) are local errors). Source: "Interactively
 prototyping properties of rigid bodies for physically-based animation" (2019); Hairer, Nørsett and Wanner, Solving
 Ordinary Differential Equations I (1993), section II.1. Energy grows steadily; with ``gyroscopic: false`` they solve the
 paper's eq. 9.
@@ -21,7 +21,7 @@ from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
 from .runge_kutta import ONE_STAGE, repeated
 
 _Matrix = tuple[Vector, Vector, Vector]
-"""Its three columns, the body's axes in the world."""
+"""A matrix as its three columns, the body's axes in world axes."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -53,7 +53,7 @@ def _unit(v: Vector) -> Vector:
 
 @njit(cache=True, error_model="numpy")
 def _orthonormal(matrix: _Matrix) -> _Matrix:
-    """Gram-Schmidt: the first axis keeps its direction, the second its plane, the third completes the right hand."""
+    """Gram-Schmidt: the first axis keeps its direction, the second its plane, the third is their vector product."""
     a, b, _ = matrix
     a = _unit(a)
     along = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -63,7 +63,7 @@ def _orthonormal(matrix: _Matrix) -> _Matrix:
 
 @njit(cache=True, error_model="numpy")
 def _quaternion_near(matrix: _Matrix, q: Quaternion) -> Quaternion:
-    """Unit quaternion of a rotation matrix, of the two signs the one nearer to q (Shepperd 1978)."""
+    """Unit quaternion of a rotation matrix, with the sign for which it is nearer to q (Shepperd 1978)."""
     a, b, c = matrix
     xx, yy, zz = a[0], b[1], c[2]
     trace = xx + yy + zz
@@ -83,7 +83,7 @@ def _quaternion_near(matrix: _Matrix, q: Quaternion) -> Quaternion:
 
 @njit(cache=True, error_model="numpy")
 def _moved(y: np.ndarray, at: np.ndarray, p: np.record, h: float, pulls: bool, out: np.ndarray) -> None:
-    """y + h f(at) into out, which may be ``at``; of the attitude the matrix."""
+    """Write y + h f(at) into out, which may be ``at``; the attitude is advanced as a matrix."""
     q, w, d, u = parts_of(at)
     turning, moving, work, heat = accelerations(q, w, d, u, p, pulls)
     start, _, _, _ = parts_of(y)
@@ -106,7 +106,7 @@ def _step(
 
 
 def _steps(tableau: np.ndarray) -> Kernel:
-    """The kernel of the method with this tableau, of whose stages each takes the one before it alone."""
+    """The kernel of a method with this tableau, in which each stage uses only the previous one."""
 
     @njit(cache=True, error_model="numpy")
     def steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""What every integrator is: a name, facts about it, what it supports, and how a segment is stepped: fixed steps, one
-exact step, nothing at all, or steps whose length follows from the error.
+"""Definition of an integrator: name, properties, supported loads, and the way it steps through a segment: fixed steps,
+one exact step, no step at all, or steps whose length follows from the error.
 
-A kernel's address stands in an array of integers, so that one loop can call whichever kernel a segment needs without
-compiling the others in; what is called there is the machine code that numba made of the kernel for one fixed signature.
-Compiling or loading it waits until somebody asks for the address.
+Addresses of kernels are stored in an array of integers, so that one loop can call the kernel that a segment needs
+without compiling all others into it. An address refers to the machine code of a kernel for one fixed signature; the
+kernel is compiled or loaded when its address is first requested.
 
-All keep the same promise. ``commit`` commits only steps that are functions of the variables they start from; ``reach``
-takes one shorter step from there on a copy. So neither depends on when anybody asked.
+All integrators share one invariant: ``commit`` commits only steps that are functions of their initial variables, and
+``reach`` takes one shorter step from there on a copy. So neither depends on the times of sampling.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ STRING = "a string"
 NO_GYROSCOPIC_TERM = "gyroscopic: false"
 
 LOADS = frozenset({BODY_TORQUE, WORLD_TORQUE, BODY_FORCE})
-"""What wrenches and pokes can ask for. Gravity, world forces at the COM and linear damping are closed form for all."""
+"""Needs of wrenches and pokes. Gravity, world forces at the COM and linear damping have a closed form for all."""
 EVALUATED = LOADS | {STRING, *ENVIRONMENT_NEEDS.values()}
-"""What an integrator supports that takes all rates from ``accelerations`` (motion/problem.py)."""
+"""Needs that integrators support which take all rates from ``accelerations`` (motion/problem.py)."""
 
 
 def needs_of_load(load: Load) -> frozenset[str]:
-    """What a wrench or poke asks of the integrator."""
+    """Needs of a wrench or poke, to be supported by the integrator."""
     turns = any(load.torque) or (load.mesh_point is not None and any(load.force))
     if load.axes == "world":
         return frozenset({WORLD_TORQUE}) if turns else frozenset()
@@ -49,26 +49,26 @@ def needs_of_load(load: Load) -> frozenset[str]:
 
 
 NOTHING, ONE_STEP, FIXED_STEPS, ADAPTIVE = range(4)
-"""Ways to step. ONE_STEP: a single one from the segment's start, however far: for exact maps. NOTHING:
-the variables stay.
+"""Ways to step. ONE_STEP: a single step of any length from the segment's start, for exact maps. NOTHING: the variables
+are constant.
 """
 
 
 Kernel = Callable[[np.ndarray, np.record, float, int], int]
 """(y, p, h, n): takes up to n steps of h seconds in place and returns how many were good; a step whose result isn't
-finite or passes MAX_SPEED is undone.
+finite or exceeds MAX_SPEED is undone.
 """
 
 
 @dataclass(frozen=True)
 class Method:
-    """A way to step, and the kernel that does it.
+    """A way to step, and its kernel.
 
     kernel: a Kernel, or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps, or
-    samples; control: CONTROL. choice: what it is and why, in words, with places for
-    {step_s}, for {degree} and {degree_of_motion} of series, and for {swing}, the string's fastest [rad/s]. evaluations:
-    of the equations of motion in a step; adaptive kernels count themselves. workspace(degree): room for the kernel.
-    sleeps: nothing moves. on_string: for segments with a string alone.
+    samples; control: CONTROL. choice: description and reason, a format string with {step_s}, {degree} and
+    {degree_of_motion} of series, and {swing}, the string's highest frequency [rad/s]. evaluations: of the equations of
+    motion per step; adaptive kernels count their own. workspace(degree): memory for the kernel. sleeps: nothing moves.
+    on_string: only for segments with a string.
     """
 
     way: int
@@ -82,10 +82,10 @@ class Method:
 
 @dataclass(frozen=True)
 class Integrator:
-    """order: global order of accuracy, None when exact. evaluations: of the equations of motion per step. source: where
-    it is from. limits: what it is good for and what breaks it, one sentence. stability_limit: largest |ω|h, and ω_s h
-    of a string, at which a fixed step still says something. supports: which needs of a scene (above) it can meet.
-    kernel: for fixed steps; None for auto. ways: how segments are stepped where that isn't by fixed steps of it.
+    """order: global order of accuracy, None when exact. evaluations: of the equations of motion per step. source:
+    reference. limits: range of use and limits, in one sentence. stability_limit: largest |ω|h, and ω_s h of a string,
+    at which a fixed step is still meaningful. supports: needs of a scene (above) that it can meet. kernel: for fixed
+    steps; None for auto. ways: its methods, if they aren't fixed steps of the kernel.
     """
 
     name: str
@@ -100,12 +100,12 @@ class Integrator:
 
     @property
     def chooses(self) -> bool:
-        """Whether it goes by what a segment holds (auto), and not by whether a string is tied alone."""
+        """Whether the method depends on all loads of a segment (auto), not only on whether a string is tied."""
         return self.kernel is None
 
     @cached_property
     def methods(self) -> tuple[Method, ...]:
-        """How segments are stepped, in the order of auto's kinds, or without and with a string."""
+        """Its methods, in the order of auto's kinds of segments, or without and with a string."""
         if self.ways:
             return self.ways
         choice = f"{self.name}: fixed steps of {{step_s:g}} s"
@@ -118,42 +118,42 @@ class Integrator:
         return self.supports >= LOADS
 
     def lacks(self, needs: frozenset[str]) -> frozenset[str]:
-        """What of a scene's needs it doesn't support; empty when it fits."""
+        """The needs of a scene that it doesn't support; empty if it supports all."""
         return needs - self.supports
 
 
-# How a segment is stepped
+# Stepping through a segment
 
 CONTROL = record_type(
     [
-        ("accuracy", np.float64),  # local error rate asked for [1/s]
+        ("accuracy", np.float64),  # requested local error rate [1/s]
         ("degree", np.int64),  # of the series of the spin
-        ("accepted_ns", np.int64),  # length of the step that waits for its commitment; 0 for none
+        ("accepted_ns", np.int64),  # length of the pending step, which isn't committed yet; 0 for none
         ("elapsed_ns", np.int64),  # committed since the segment's start
         ("steps", np.int64),  # committed
         ("evaluations", np.int64),  # in committed steps, one for each series
-        ("pending", np.int64),  # evaluations spent on the step that waits
-        # The largest [1/s] that rounding, and not the accuracy, has allowed a step; and where it is most of all the
-        # rounding of a string's pull.
+        ("pending", np.int64),  # evaluations spent on the pending step
+        # Largest error rates of a step [1/s] that are set by rounding instead of the accuracy; and those set by
+        # rounding of a string's tension.
         ("floor_rate", np.float64),
         ("pull_floor_rate", np.float64),
-        ("failed", np.bool_),  # a nanosecond would be too long a step, or the motion ran away
-        ("series", np.bool_),  # the workspace holds the series from the committed variables on
-        # Of the step that waits, where the string's law changes within it:
+        ("failed", np.bool_),  # even a step of a nanosecond is too long, or the motion diverged
+        ("series", np.bool_),  # the workspace holds the series about the committed variables
+        # Of the pending step, if the string's law changes within it:
         ("law", np.float64),  # the string's law at its start
-        ("switch", np.float64),  # time after which the last series holds and no more the first [s]; infinite for none
-        ("last_start", np.float64),  # where the last series starts [s]
+        ("switch", np.float64),  # time [s] at which the last series replaces the first; infinite for none
+        ("last_start", np.float64),  # start time of the last series [s]
         ("last_law", np.float64),  # the law of the last series
     ]
 )
-"""What an adaptive kernel keeps between calls."""
+"""State of an adaptive kernel between calls."""
 
 _kept: dict[int, Any] = {}
-"""What stands at the addresses given away: code must not be collected while an array points at it."""
+"""Objects at the addresses handed out: code must not be garbage collected while an array refers to it."""
 
 
 def address_of(kernel: Callable[..., Any], taken_as: types.FunctionType) -> int:
-    """The address of a compiled function for this signature, compiled or loaded from the cache if it isn't yet."""
+    """The address of a function compiled for this signature; it is compiled or loaded from the cache if necessary."""
     if INTERPRETED:
         found, address = kernel, id(kernel)
     else:
@@ -174,7 +174,7 @@ def function_at(taken_as: types.FunctionType) -> Callable[..., Any]:
             nothing = cgutils.get_null_value(cgutils.voidptr_t)
             function.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
             function.py_addr, function.jit_addr = nothing, nothing
-            return function._getvalue()  # noqa: SLF001 (so numba's guide to extensions does it)
+            return function._getvalue()  # noqa: SLF001 (as in numba's guide to extensions)
 
         return taken_as(int64), code
 
@@ -205,8 +205,8 @@ METHOD = record_type(
 
 @functools.lru_cache(maxsize=256)
 def method_table(integrator: Integrator, degree: int) -> np.ndarray:
-    """The integrator's methods as compiled loops read them (n,) METHOD; kernels have no address until they are
-    wanted.
+    """The integrator's methods (n,) METHOD as compiled loops read them; a kernel gets its address when it is first
+    needed.
     """
     table = np.zeros(len(integrator.methods), METHOD)
     for number, method in enumerate(integrator.methods):
@@ -216,7 +216,7 @@ def method_table(integrator: Integrator, degree: int) -> np.ndarray:
 
 
 def workspace_size(table: np.ndarray) -> int:
-    """Of the method that needs most [doubles]; of one table or several."""
+    """Size of the largest workspace [doubles] of the methods in one table or several."""
     return int((table["rows"] * table["columns"]).max())
 
 
@@ -244,8 +244,8 @@ def commit(
     step_ns: int,
     span_ns: int,
 ) -> tuple[int, int, bool]:
-    """Commit steps in y that fit into ``span_ns``; returns how far it came [ns], how many were counted here, and
-    whether all were good. room: for the workspace, of any size that is enough.
+    """Commit the steps in y that fit into ``span_ns``; returns the time advanced [ns], the number of steps counted
+    here, and whether all were good. room: memory for the workspace, at least as large as needed.
     """
     if method.way == FIXED_STEPS:
         wanted = span_ns // step_ns
@@ -270,7 +270,7 @@ def reach(
     room: np.ndarray,
     rest_ns: int,
 ) -> bool:
-    """One step of ``rest_ns`` in y, a copy; whether it was good."""
+    """Take one step of ``rest_ns`` in y, a copy; returns whether it was good."""
     if method.way == NOTHING:
         return True
     if method.way == ADAPTIVE:

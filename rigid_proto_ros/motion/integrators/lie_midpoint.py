@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""lie_midpoint: the implicit midpoint rule on the rotation group, which keeps energy and angular momentum to rounding.
+"""lie_midpoint: the implicit midpoint rule on the rotation group, which conserves energy and angular momentum to
+rounding.
 
-Order 2, implicit: Newton's method evaluates the loads 3 to 6 times a step.
-Stable at any |ω|h at which the iteration finds a solution (about 2); attitude still errs with h², so a bounded energy
-is no proof of a right motion.
+Order 2, implicit: Newton's method evaluates the loads 3 to 6 times per step. Stable at any |ω|h for which the iteration
+converges (up to about 2). The attitude error is still of order h²: a bounded energy doesn't prove accuracy.
 
-With the mean spin ω̄ = ½(ω + ω⁺) and the Cayley turn F = (1 − ½hΩ̄)⁻¹(1 + ½hΩ̄), R⁺ = R F, the angular momentum balance
-R⁺Iω⁺ = R(Iω + h t), t the torque in the axes of the step's start, is
+With the mean spin ω̄ = ½(ω + ω⁺) and the Cayley map F = (1 − ½hΩ̄)⁻¹(1 + ½hΩ̄), R⁺ = R F, the angular momentum balance
+R⁺Iω⁺ = R(Iω + h t), t the torque in the axes at the start of the step, is
 
     I(ω⁺ − ω) = h (t − ½h ω̄ × t − ω̄ × Iω̄):
 
-angular momentum changes by h t exactly and energy by h ω̄·t. Source: Simo and Wong, Int. J. Numer. Meth. Engng 31
+angular momentum changes by exactly h t and energy by h ω̄·t. Source: Simo and Wong, Int. J. Numer. Meth. Engng 31
 (1991) 19; Lewis and Simo, J. Nonlinear Sci. 4 (1994) 253; with the Cayley map, Austin, Krishnaprasad and Wang, J.
 Comput. Phys. 107 (1993) 105. A torque τ given in the body's axes at the mean attitude enters as t − ½h ω̄ × t = sτ −
 ¼h²/(1 + s)(ω̄·τ) ω̄, s² = 1 + ¼h²|ω̄|².
@@ -29,14 +29,14 @@ from ..problem import is_good, parts_of, torque
 from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 
 _MAX_ITERATIONS = 60
-"""Newton's method needs 3 to 6; far more only where the step is too long for a solution to be found."""
+"""Newton's method needs 3 to 6; many more only if the step is too long to converge."""
 
 _ROUNDING = 2.0**-52
 
 
 @njit(cache=True, error_model="numpy")
 def _half_turned(q: Quaternion, o: Vector, h: float) -> Quaternion:
-    """The mean attitude: half of the Cayley turn of ω̄ = o after q."""
+    """Attitude at the middle of the step: q followed by half of the Cayley rotation of ω̄ = o."""
     a, b, c = 0.5 * h * o[0], 0.5 * h * o[1], 0.5 * h * o[2]
     w = math.sqrt(1.0 + a * a + b * b + c * c)
     return normalize(*multiply(*q, a, b, c, 1.0 + w))
@@ -52,7 +52,7 @@ def _mean_torque(o: Vector, t: Vector, h: float) -> Vector:
 
 @njit(cache=True, error_model="numpy")
 def _change_of_momentum(q: Quaternion, o: Vector, p: np.record, h: float) -> Vector:
-    """I(ω⁺ − ω) that follows from the mean spin."""
+    """I(ω⁺ − ω) for the mean spin o."""
     tx, ty, tz = _mean_torque(o, torque(_half_turned(q, o, h), o, p), h)
     A, B, C = p.moments[0], p.moments[1], p.moments[2]
     gx, gy, gz = (B - C) * o[1] * o[2], (C - A) * o[2] * o[0], (A - B) * o[0] * o[1]
@@ -61,16 +61,16 @@ def _change_of_momentum(q: Quaternion, o: Vector, p: np.record, h: float) -> Vec
 
 @njit(cache=True, error_model="numpy")
 def _newton_correction(o: Vector, r: Vector, h: float, p: np.record) -> Vector:
-    """δ with J δ = −residual r of 2I(ω̄ − ω) − h(...) = 0.
+    """Newton correction δ: J δ = −r for the residual r of 2I(ω̄ − ω) − h(...) = 0.
 
-    J = 2I + h([ω̄]× I − [Iω̄]× + c): gyroscopic term and damping exactly (its torque is −c ω̄ in the axes of the start
-    too).
+    J = 2I + h([ω̄]× I − [Iω̄]× + c): exact for the gyroscopic term and damping, whose torque is −c ω̄ in the axes of
+    the start, too.
     """
     damping = h * p.damping_angular
     ox, oy, oz = o
     A, B, C = p.moments[0], p.moments[1], p.moments[2]
     j00, j11, j22 = 2.0 * A + damping, 2.0 * B + damping, 2.0 * C + damping
-    # Row i of ω̄ × Iω̄ differentiated; for instance (C − B) ω̄₂ω̄₃.
+    # Derivatives of row i of ω̄ × Iω̄; for instance of (C − B) ω̄₂ω̄₃.
     j01, j02 = h * (C - B) * oz, h * (C - B) * oy
     j10, j12 = h * (A - C) * oz, h * (A - C) * ox
     j20, j21 = h * (B - A) * oy, h * (B - A) * ox
@@ -100,7 +100,7 @@ def _step(y: np.ndarray, p: np.record, h: float, out: np.ndarray) -> bool:
         o = o[0] + ex, o[1] + ey, o[2] + ez
         before, change = change, max(abs(ex), abs(ey), abs(ez))
         size = max(abs(o[0]), abs(o[1]), abs(o[2]))
-        # Converged when corrections are rounding and no longer shrink.
+        # Converged when corrections are at rounding level, or near it and no longer shrinking.
         if change <= _ROUNDING * size or (
             change <= 64.0 * _ROUNDING * size and before != 0.0 and change >= 0.5 * before
         ):
@@ -108,14 +108,14 @@ def _step(y: np.ndarray, p: np.record, h: float, out: np.ndarray) -> bool:
             break
     kx, ky, kz = _change_of_momentum(q, o, p, h)
     out[4], out[5], out[6] = wx + kx / A, wy + ky / B, wz + kz / C
-    # The whole Cayley turn: q ⊗ (½hω̄, 1).
+    # The full Cayley rotation: q ⊗ (½hω̄, 1).
     turned = multiply(*q, 0.5 * h * o[0], 0.5 * h * o[1], 0.5 * h * o[2], 1.0)
     out[0], out[1], out[2], out[3] = normalize(*turned)
     if p.translates:
         own, added, c = p.acceleration_body, p.acceleration_added, p.damping_linear
         push = rotate(*_half_turned(q, o, h), own[0], own[1], own[2])
         for k in range(3):
-            # v⁺ = v + h(a − c ½(v + v⁺)), solved.
+            # Solution of v⁺ = v + h(a − c ½(v + v⁺)).
             mean = (y[10 + k] + 0.5 * h * (push[k] + added[k])) / (1.0 + 0.5 * h * c)
             out[7 + k] = y[7 + k] + h * mean
             out[10 + k] = y[10 + k] + h * (push[k] + added[k] - c * mean)

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Steps of one length: the loop that all methods with fixed steps share, explicit Runge-Kutta methods by their tableau
-(rk4, dop853), and semi_implicit_euler.
+"""Methods with fixed steps: the loop of the explicit methods, explicit Runge-Kutta methods by their tableau (rk4,
+dop853), and semi_implicit_euler.
 
 Source: Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I (1993), section II.1. The quaternion is
-normalized after the step; the right-hand side takes its direction only, so stages may leave the unit sphere. Euler's
+normalized after the step; the right-hand side uses only its direction, so stages may leave the unit sphere. Euler's
 equations with the gyroscopic term: Goldstein, Classical Mechanics (2002), section 5.5.
 
-semi_implicit_euler steps as game engines do: Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), section
-I.1 (symplectic Euler). Symplectic only where velocities do not act on velocities: the gyroscopic term is taken
-explicitly, so a spinning body gains energy.
+semi_implicit_euler is the usual method of game engines: Hairer, Lubich and Wanner, Geometric Numerical Integration
+(2006), section I.1 (symplectic Euler). It is symplectic only if accelerations don't depend on velocities: the
+gyroscopic term is explicit, so a spinning body gains energy.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ from .string_law import is_one_sided, shortening_heat
 
 Step = Callable[[np.ndarray, np.record, float, bool, np.ndarray, np.ndarray, np.ndarray], None]
 """One step (y, p, h, pulls, tableau, k, out) of h seconds from variables y into out with the string's law given.
-tableau (s + 1, s): the weights aᵢⱼ of s stages, and as its last row those of the step, bⱼ; k (s, 16): room for rates.
+tableau (s + 1, s): the weights aᵢⱼ of s stages, and as its last row those of the step, bⱼ; k (s, 16): memory for rates.
 """
 
 ONE_STAGE = np.array([[0.0], [1.0]])
 """The tableau of Euler's method."""
 
 _MAX_PARTS = 1000
-"""Of one step: more is chatter of a step far too long for its string, and the rest of it is taken with one law."""
+"""Maximum number of parts of a step; more is chattering in a step too long for its string: the rest uses one law."""
 _MAX_TRIALS = 120
 _SECANTS = 60
-"""Trials of a step that find any simple root; what is left then is halved."""
+"""Trials by regula falsi, enough for any simple root; later trials are bisections."""
 _RESOLUTION = 2.0**-49
-"""Of a step: to that much a change of the law is known."""
+"""Fraction of a step to which the time of a change of law is determined."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -77,7 +77,7 @@ def tableau_step(
 ) -> None:
     """A ``Step``: kᵢ = f(y + h Σ aᵢⱼ kⱼ), out = y + h Σ bᵢ kᵢ."""
     stages = tableau.shape[1]
-    # What was stored one by one is loaded one by one: nothing waits until it is written.
+    # Loaded one by one, as they were stored: a vector load would stall on store-to-load forwarding.
     start = joined(
         four(y[0], y[1], y[2], y[3]),
         four(y[SPIN], y[SPIN + 1], y[SPIN + 2], y[HAND_WORK]),
@@ -103,10 +103,10 @@ def tableau_step(
 
 @njit(inline="always", error_model="numpy")
 def repeated(step: Step, tableau: np.ndarray, y: np.ndarray, p: np.record, h: float, n: int) -> int:
-    """Up to n steps of h seconds in place, each cut where a pull-only string turns slack or taut; returns the number of
-    good ones.
+    """Up to n steps of h seconds in place, each split where a pull-only string becomes slack or taut; returns the
+    number of good ones.
 
-    Put into the kernel that calls it, since numba keeps no compiled code that was handed a function.
+    Inlined into the kernel that calls it, since numba can't cache compiled code that takes a function as an argument.
     """
     new, k = y.copy(), np.zeros((tableau.shape[1], 16))
     for done in range(n):
@@ -124,17 +124,17 @@ def repeated(step: Step, tableau: np.ndarray, y: np.ndarray, p: np.record, h: fl
 def _step_on_string(
     step: Step, tableau: np.ndarray, y: np.ndarray, p: np.record, h: float, k: np.ndarray, end: np.ndarray
 ) -> None:
-    """A step of h seconds from y into ``end``: the law of tension has a kink (a jump, with a damper) where it changes,
-    and a step across that would lose its order.
+    """A step of h seconds from y into ``end``, split where the law of tension changes: the law has a kink there (a
+    jump, with a damper), and a step across it would lose its order.
     """
     here, left, resolution = y.copy(), h, h * _RESOLUTION
     for part in range(_MAX_PARTS):
-        # 1. All that is left, with the law at its start.
+        # 1. Step over all that is left, with the law at its start.
         low, high, at_low = 0.0, left, tension_margin(here, p)
         pulls = at_low > 0.0
         step(here, p, left, pulls, tableau, k, end)
         at_high = tension_margin(end, p)
-        # 2. The change is closed in on: regula falsi, Illinois variant (Dowell and Jarratt, BIT 11, 1971).
+        # 2. Locate the change of law: regula falsi, Illinois variant (Dowell and Jarratt, BIT 11, 1971).
         if (at_high > 0.0) != pulls and part < _MAX_PARTS - 1:
             for trial in range(_MAX_TRIALS):
                 if high - low <= resolution:
@@ -143,7 +143,7 @@ def _step_on_string(
                 if trial < _SECANTS and at_high != at_low:
                     root = high - at_high * (high - low) / (at_high - at_low)
                     middle = root if low <= root <= high else middle
-                # A root at one end is closed in on from the other side by the smallest step.
+                # A root at one end is bracketed from the other side by the smallest step.
                 middle = min(max(middle, low + 0.5 * resolution), high - 0.5 * resolution)
                 step(here, p, middle, pulls, tableau, k, end)
                 margin = tension_margin(end, p)
@@ -194,8 +194,8 @@ RK4 = Integrator(
 )
 
 
-# Of the code dop853.f (Prince and Dormand 1981; Hairer, section II.10): row i weighs the earlier stages for stage i
-# (0 to 11), and all of them for the step (12).
+# Coefficients of dop853.f (Prince and Dormand 1981; Hairer, section II.10): row i has the weights of the earlier stages
+# in stage i (0 to 11), row 12 those of all stages in the step.
 DOP853_TABLEAU = np.zeros((13, 12))
 DOP853_TABLEAU[1, [0]] = [0.05260015195876773]
 DOP853_TABLEAU[2, [0, 1]] = [0.0197250569845379, 0.0591751709536137]

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Power series of the motion: its coefficients, and their sums.
+"""Taylor series of the motion: recurrences for the coefficients, and summation.
 
 The equations of motion are made of products, quotients and one square root, so every coefficient follows from those
-before it by Cauchy products. There are two recurrences. ``spin_series`` is for loads that turn with the body: Euler's
+before it by Cauchy products. There are two recurrences. ``spin_series`` is for loads that rotate with the body: Euler's
 equations, q' = ½ q ⊗ ω and u' = R g_b + a are polynomial. ``motion_series`` is for all others and for a string: R from
 the products of q, the knot's a = d + R r, its distance l from l² = a·a, its direction n from n l = a, the tension T =
 k(l − rest) + c l', the force −T n and its torque r × RᵀF. The first takes half of the second's time.
 
-Numbers go through in fours (base/simd.py): a vector's three components and one that counts for q alone. Source: Jorba
+Numbers are processed four at a time (base/simd.py): a vector's three components and one that only q uses. Source: Jorba
 and Zou, Experimental Mathematics 14 (2005) 99, section 2; Moore, Methods and Applications of Interval Analysis (1979),
 chapter 3.
 """
@@ -42,20 +42,20 @@ from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _spread(v: Packed) -> tuple[Packed, Packed, Packed]:
-    """The first three numbers of v, each four times."""
+    """The first three numbers of v, each repeated four times."""
     return arranged(v, (0, 0, 0, 0)), arranged(v, (1, 1, 1, 1)), arranged(v, (2, 2, 2, 2))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _axes(q: Packed) -> tuple[Packed, Packed, Packed]:
-    """q ⊗ x, q ⊗ y, q ⊗ z, whose sum weighed by the components of v is q ⊗ v."""
+    """q ⊗ x, q ⊗ y, q ⊗ z, whose sum weighted by the components of v is q ⊗ v."""
     return arranged(q, (3, 2, 5, 4)), arranged(q, (6, 3, 0, 5)), arranged(q, (1, 4, 3, 6))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def power_sum(c: np.ndarray, at: int, columns: int, degree: int, h: float, like: Packed) -> Packed:
-    """Σ cₖ hᵏ to k = degree, 4 or more, of the numbers from ``at`` on in rows of ``columns``: every fourth power by
-    itself, each from the smallest term (Horner), so that none waits for another; the largest term comes last.
+    """Σ cₖ hᵏ up to k = degree ≥ 4 of the numbers at ``at`` in rows of ``columns``: four independent Horner schemes,
+    each over every fourth power, which the processor overlaps; the largest term is added last.
     """
     square = h * h
     fourth = square * square
@@ -81,18 +81,17 @@ def power_sum(c: np.ndarray, at: int, columns: int, degree: int, h: float, like:
     return load(c, at, like) + ((a * fourth + e * square) + (b + f * square) * h)
 
 
-# Loads that turn with the body
+# Loads that rotate with the body
 
-# Where the parts of a coefficient stand in its row, four numbers each, of which the fourth counts for q alone. Two of
-# them fill a line of the processor's cache: q times the unit vectors, and ω in another order; the variables; what those
-# are multiplied by, each component of ω four times and ω in a third order; q z and q once more; and likewise g_b ⊗ q*,
-# its real part negated.
+# Layout of a coefficient's row: parts of four numbers each, of which only q uses the fourth. Two parts fill a cache
+# line: q times the unit vectors, and ω permuted; the variables; the factors of these, each component of ω four times
+# and ω in another permutation; q z and q again; and likewise g_b ⊗ q*, with its real part negated.
 _QX, _QZ, _Q, _W, _D, _U = 0, 8, 16, 20, 24, 28
 _WX, _WZ, _QZ_Q, _GX, _GZ = 32, 40, 48, 56, 64
 SPIN_COLUMNS = 72
 
 VARIABLES_AT = _Q
-"""Where q, ω, d and u begin, one behind the other."""
+"""Offset of q, ω, d and u, which are contiguous."""
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -106,7 +105,7 @@ def spin_series(y: np.ndarray, p: np.record, degree: int, c: np.ndarray) -> None
     bx, by, bz = _spread(triple(p.acceleration_body, 0, 0.0))
     zeros, eight = filled(0.0, 4), filled(0.0, 8)
     q, w, d, u = load(y, 0, zeros), triple(y, 4, 0.0), triple(y, 7, 0.0), triple(y, 10, 0.0)
-    # What is constant counts in the first order alone.
+    # Constant terms enter only the first order.
     turning, pushing = triple(p.torque_body, 0, 0.0) / moments, triple(p.acceleration_added, 0, 0.0)
     q0, (qx0, qy0, qz0), (wx0, wy0, wz0) = q, _axes(q), _spread(w)
     yzx0, zxy0 = gyroscopic * arranged(w, (1, 2, 0, 3)), gyroscopic * arranged(w, (2, 0, 1, 3))
@@ -115,15 +114,15 @@ def spin_series(y: np.ndarray, p: np.record, degree: int, c: np.ndarray) -> None
         qx, qy, qz = _axes(q)
         wx, wy, wz = _spread(w)
         yzx, zxy = arranged(w, (1, 2, 0, 3)), arranged(w, (2, 0, 1, 3))
-        # Of rows i and j = k − i both products at once, from the middle outwards: the newest row comes last, and those
-        # with the first and the latest, which are still in registers, after that.
+        # Both products of rows i and j = k − i at once, from the middle outwards: the newest row comes last. Products
+        # with the first and the latest row, which are still in registers, are added after that.
         turn, rest, push, far = eight, eight, eight, eight
         i, j = (k // 2) * SPIN_COLUMNS, row - (k // 2) * SPIN_COLUMNS
         if k % 2 == 0 and k > 0:
             turn = load(c, i + _QX, eight) * load(c, i + _WX, eight)
             rest = load(c, i + _QZ, eight) * load(c, i + _WZ, eight)
             if translates:
-                # Half of a sum that is symmetric counts twice, its middle once.
+                # Of a symmetric sum half is computed and doubled; the middle term counts once.
                 push = load(c, i + _QX, eight) * load(c, i + _GX, eight) * 0.5
                 far = load(c, i + _QZ_Q, eight) * load(c, i + _GZ, eight) * 0.5
             i -= SPIN_COLUMNS
@@ -145,7 +144,7 @@ def spin_series(y: np.ndarray, p: np.record, degree: int, c: np.ndarray) -> None
         store(c, row + _WZ, paired(wz, zxy))
         f = 1.0 / (k + 1.0)
         half_f = 0.5 * f
-        # What the next coefficient waits for, the products with the latest one, is multiplied and added once each.
+        # The next coefficient depends on products with the latest one: one multiplication and one addition for each.
         before = (gyroscopic * half(rest, 1) - cw * w + turning) * f
         turned = (half(turn, 0) + half(turn, 1) + half(rest, 0)) * half_f
         if k > 0:
@@ -178,7 +177,7 @@ def spin_series(y: np.ndarray, p: np.record, degree: int, c: np.ndarray) -> None
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def spin_at(c: np.ndarray, degree: int, h: float, y: np.ndarray) -> None:
-    """The variables h seconds on into y (≥ 13,), with a unit quaternion; degree: 4 or more."""
+    """Write the variables after h seconds into y (≥ 13,), with a unit quaternion; degree: 4 or more."""
     sums = power_sum(c, _Q, SPIN_COLUMNS, degree, h, filled(0.0, 16))
     q, w, d, u = component(sums, 0), component(sums, 1), component(sums, 2), component(sums, 3)
     q1, q2, q3, q4 = number(q, 0), number(q, 1), number(q, 2), number(q, 3)
@@ -189,8 +188,8 @@ def spin_at(c: np.ndarray, degree: int, h: float, y: np.ndarray) -> None:
 
 
 TAYLOR_DEGREE = 18
-"""Of the integrator taylor: fixed steps of a spin's series, for a held body-axes wrench. Within its disc of convergence
-(|ω|h of about 1 to 3) the best there is for that; beyond it the series diverges.
+"""Degree of the integrator taylor: fixed steps of a spin's series, for a constant wrench in body axes. Within its disc
+of convergence (|ω|h of about 1 to 3) the best method for that; beyond it the series diverges.
 """
 
 
@@ -227,24 +226,24 @@ TAYLOR = Integrator(
 
 # Loads of any kind, and a string
 
-# Columns of the coefficient array c (degree + 2, MOTION_COLUMNS); the first 15 are the variables of
-# motion/problem.py. What products take, sixteen numbers at once, in fours: ω and q as above; q's numbers each four
-# times, and (a, l); q three times, and (a, l); R's columns, and n; each component of ω × r, and l, four times; the
-# force F three times, and T four times.
+# Columns of the coefficient array c (degree + 2, MOTION_COLUMNS); the first 15 are the variables of motion/problem.py.
+# Then factors of products, sixteen numbers at a time, in fours: ω and q as above; q's numbers each four times, and (a,
+# l); q three times, and (a, l); R's columns, and n; each component of ω × r, and l, four times; the force F three
+# times, and T four times.
 _LEFT, _RIGHT, _SPREAD, _REPEATED, _COLUMNS, _SWING, _FORCE = 16, 32, 48, 64, 80, 96, 112
 A_KNOT, DISTANCE = _SPREAD + 12, _SPREAD + 15
 TENSION = _FORCE + 12
 STRETCH, _RATE = 128, 129
-"""Of the distance: less the rest length, at the start alone; and its derivative."""
+"""Columns of l − rest length, only in the first row, and of the derivative of l."""
 MOTION_COLUMNS = 136
 
 Knot = tuple[float, float, float, float, float]
-"""From the free end to the knot (3,) [m, world], its length l, and l − rest length [m]."""
+"""Vector from the free end to the knot (3,) [m, world], its length l, and l − rest length [m]."""
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _dot(a: Packed, b: Packed) -> float:
-    """Of the first three components."""
+    """Scalar product of the first three components."""
     ab = a * b
     return float(number(ab, 0) + number(ab, 1) + number(ab, 2))
 
@@ -256,8 +255,8 @@ def _cross(a: Packed, b: Packed) -> Packed:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _columns(xs: Packed, ys: Packed, zs: Packed, one: float) -> tuple[Packed, Packed, Packed]:
-    """Columns of R, or of a coefficient of it, from the products x q, y q and z q; one: 1 for R itself, 0
-    for its derivatives.
+    """Columns of R, or of a coefficient of it, from the products x q, y q and z q; one: 1 for R itself, 0 for higher
+    coefficients.
     """
     x = mixed(ys, xs, (1, 5, 6, 3)) * four(-2.0, 2.0, 2.0, 0.0) + mixed(zs, ys, (2, 3, 7, 3)) * four(
         -2.0, 2.0, -2.0, 0.0
@@ -273,7 +272,7 @@ def _columns(xs: Packed, ys: Packed, zs: Packed, one: float) -> tuple[Packed, Pa
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _put_variables(c: np.ndarray, k: int, q: Packed, w: Packed, d: Packed, u: Packed) -> None:
-    """Coefficient k of the variables; each vector's fourth number gives way to the next one's first."""
+    """Store coefficient k of the variables; each vector's fourth number is overwritten by the next one's first."""
     at = k * MOTION_COLUMNS
     store(c, at, q)
     store(c, at + SPIN, w)
@@ -284,7 +283,7 @@ def _put_variables(c: np.ndarray, k: int, q: Packed, w: Packed, d: Packed, u: Pa
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _put_factors(c: np.ndarray, k: int, q: Packed, w: Packed, span: Packed) -> None:
-    """What products take of coefficient k of q, ω and (a, l)."""
+    """Store the factors of products from coefficient k of q, ω and (a, l)."""
     at = k * MOTION_COLUMNS
     axes = _axes(q)
     store(c, at + _LEFT, joined(arranged(w, (1, 2, 0, 3)), axes[0], axes[1], axes[2]))
@@ -297,7 +296,7 @@ def _put_factors(c: np.ndarray, k: int, q: Packed, w: Packed, span: Packed) -> N
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def distance_series(c: np.ndarray, degree: int) -> None:
-    """Fill in the knot's distance for a string that doesn't pull, whose motion needs it not."""
+    """Compute the series of the knot's distance for a string that doesn't pull, whose motion doesn't need it."""
     for k in range(1, degree + 1):
         square = 0.0
         for i in range(1, k):
@@ -309,7 +308,7 @@ def distance_series(c: np.ndarray, degree: int) -> None:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _heat_at_the_end(c: np.ndarray, k: int) -> float:
-    """Coefficient k of |a'|², for a string without length."""
+    """Coefficient k of |a'|², for a string of rest length 0."""
     heat = 0.0
     for i in range(k + 1):
         for j in range(3):
@@ -343,7 +342,7 @@ def _turned_over(x: Packed, y: Packed, z: Packed) -> tuple[Packed, Packed, Packe
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _weighed(x: Packed, y: Packed, z: Packed, v: Packed) -> Packed:
-    """The sum of x, y, z, weighed by the components of v."""
+    """The sum of x, y, z, weighted by the components of v."""
     v1, v2, v3 = _spread(v)
     return x * v1 + y * v2 + z * v3
 
@@ -352,8 +351,8 @@ def _weighed(x: Packed, y: Packed, z: Packed, v: Packed) -> Packed:
 def motion_series(  # noqa: C901 - the recurrences of one order, in their order; a call in between costs more than they do
     y: np.ndarray, p: np.record, knot: Knot, degree: int, taut: bool, c: np.ndarray
 ) -> None:
-    """Fill c with the coefficients of the motion from variables y up to ``degree``; knot: where a string is tied,
-    its knot; taut: its law.
+    """Fill c with the coefficients of the motion from variables y up to ``degree``. knot: that of the string, if one is
+    tied; taut: whether its law of tension holds.
     """
     tied, turned = p.has_string, p.has_world_torque
     moments = four(p.moments[0], p.moments[1], p.moments[2], 1.0)
@@ -383,11 +382,11 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
     column1, column2, column3 = r1, r2, r3
     row1, row2, row3 = _turned_over(r1, r2, r3)
     swing0 = _cross(w, arm)
-    # n·R (ω × r) = ω·lever: tension and spin wait for each other by way of it alone.
+    # n·R (ω × r) = ω·lever: the only term through which tension and spin depend on each other.
     lever = _cross(arm, _weighed(row1, row2, row3, along0))
     for k in range(degree):
         at, f = k * MOTION_COLUMNS, 1.0 / (k + 1.0)
-        # Sums of products of old coefficients first: none of them waits for those that this round finds.
+        # Sums of products of earlier coefficients first: they don't depend on those computed in this iteration.
         products, squares, swings, pulled, heat = many, many, many, many, 0.0
         i, j = MOTION_COLUMNS, at - MOTION_COLUMNS
         for m in range(1, k):
@@ -402,7 +401,7 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
             i += MOTION_COLUMNS
             j -= MOTION_COLUMNS
         if k > 0:
-            # Row k with row 1: the last old products of what goes up to k + 1.
+            # Row k with row 1: the last products of earlier coefficients in sums that go up to k + 1.
             squares = squares + load(c, at + _SPREAD, many) * load(c, MOTION_COLUMNS + _REPEATED, many)
             products = products + load(c, _LEFT, many) * load(c, at + _RIGHT, many)
         products = products + load(c, at + _LEFT, many) * load(c, _RIGHT, many)
@@ -466,10 +465,10 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def motion_at(c: np.ndarray, p: np.record, degree: int, h: float, y: np.ndarray) -> None:
-    """Take the variables y, those that c is the series of, h seconds on."""
+    """Advance the variables y, about which c is the series, by h seconds."""
     columns = 15 if p.has_string else 13 if p.translates else 7
     sums = power_sum(c, MOTION_COLUMNS, MOTION_COLUMNS, degree - 1, h, filled(0.0, 16))
-    # The row past the last coefficient's is spare.
+    # The row after the last coefficient is scratch memory.
     changes = c[degree + 1]
     store(c, (degree + 1) * MOTION_COLUMNS, sums)
     for j in range(columns):
@@ -479,7 +478,7 @@ def motion_at(c: np.ndarray, p: np.record, degree: int, h: float, y: np.ndarray)
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def stretch_at(c: np.ndarray, p: np.record, degree: int, h: float) -> tuple[float, float]:
-    """x = l − rest length, and its rate, h seconds on."""
+    """x = l − rest length, and its rate, after h seconds."""
     a, b = filled(0.0, 4), filled(0.0, 4)
     at = degree * MOTION_COLUMNS + A_KNOT
     for k in range(degree, 0, -1):

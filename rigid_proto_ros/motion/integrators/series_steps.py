@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Steps by the power series of the motion, as long as the accuracy allows, with slack and taut found on the series.
+"""Adaptive steps by Taylor series of the motion; changes between slack and taut are located on the series.
 
-An error's size is the largest of attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s).
-``accuracy`` is a rate in this measure: a step of h seconds may err by accuracy·h, but rounding allows no less than 32 ε
-a step, and on a stiff string more (``floor_of_step``). With the coefficients' size σᵏ the remainder after degree N is
-(σh)^(N+1)/(1 − σh); h is where that is the accuracy times h. So the length of a step is read off the coefficients, and
-none is rejected. Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, section 3.
+The error norm is the largest of attitude angle, |Δx|/ℓ, |Δω|/max(|ω|, 1 rad/s) and |Δv|/max(|v|, ℓ·1 rad/s).
+``accuracy`` is a rate in this norm: a step of h seconds may err by accuracy·h, but rounding allows no less than 32 ε
+per step, and more on a stiff string (``floor_of_step``). If coefficients grow as σᵏ, the remainder after degree N is
+(σh)^(N+1)/(1 − σh), and h is chosen so that this is the accuracy times h. So the step length follows from the
+coefficients, and no step is rejected. Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, section 3.
 
-Loads that turn with the body take the series of the spin, all others that of the whole motion. Where a pull-only
-string turns slack or taut (integrators/string_law.py) the series is left and another one, with the other law, begun. A
-step is laid out at its full length first: a series from its start, and where the law changes within it a last one from
-that time on. It ends at a whole nanosecond, so that times of commands stay integers. Committing it and sampling within
-it evaluate those same series.
+Loads that rotate with the body use the series of the spin, all others that of the whole motion. Where a pull-only
+string becomes slack or taut (integrators/string_law.py), another series begins, with the other law. A step is first
+planned at its full length: a series from its start and, if the law changes within it, a last one from that time on. It
+ends at a whole nanosecond, so that times of commands stay integers. Committing it and sampling within it evaluate the
+same series.
 
-An accepted step that reaches beyond the time asked for is kept, in CONTROL and ``following``, until it can be
-committed, so that when anybody asks never changes the steps.
+An accepted step that extends beyond the requested time is kept, in CONTROL and ``following``, until it can be
+committed, so that the times of sampling never change the steps.
 """
 
 from __future__ import annotations
@@ -57,36 +57,36 @@ LONGEST = 1e6
 """Longest step [s]: 10¹⁵ ns are exact in a double."""
 
 PART = 0.5
-"""Of what is allowed, a remainder gets this part: the last coefficients are no bound on those to come. Measured over
-random scenes at accuracies 1e-3 to 1e-12 the error stays below 0.6 of what is allowed.
+"""Safety factor: the fraction of the allowed error for a remainder, since the last coefficients don't bound later ones.
+Measured over random scenes at accuracies 1e-3 to 1e-12 the error stays below 0.6 of the allowed one.
 """
 PART_ON_A_STRING = 0.1
-"""The same for a string, whose coefficients fall less evenly: the nearer the knot to its free end, the nearer the
+"""The same for a string, whose coefficients decrease less evenly: the nearer the knot to its free end, the nearer the
 poles.
 """
 
 MAX_DEGREE = 26
 _HIGHER = 3
-"""By so much the degree is higher than that of a series of the spin: what a step costs beside its series
-is more here.
+"""Added to the degree of a series of the spin for the whole motion, where the cost of a step besides its series is
+higher.
 """
 
 _MAX_PARTS = 200
-"""In one step, all but the first and last within one nanosecond; more is chatter, and the rest of the
-step is taken with one law.
+"""Maximum number of series in one step, all but the first and last within one nanosecond; more means chattering, and
+the rest of the step uses a single law.
 """
 
 
-# How large an error is
+# Error norm
 
 WEIGHINGS = 4
-"""Of a step whose end weighs errors more than its start did, each shorter than the one before."""
+"""Maximum number of attempts at a step with larger error weights at its end than at its start; each is shorter."""
 
 EPSILON = 2.0**-52
 FLOOR = 32.0 * EPSILON
 
 Weights = tuple[float, float, float, float]
-"""Of attitude (as quaternion difference), ω, x and v in the measure."""
+"""Weights of attitude (as quaternion difference), ω, x and v in the error norm."""
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
@@ -108,8 +108,8 @@ def scales(y: np.ndarray, p: np.record, elapsed: float) -> Weights:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def heavier(ending: Weights, weights: Weights) -> tuple[Weights, bool]:
-    """The larger of the weights at a step's end and start, and whether they are clearly more than those
-    at the start: a quarter.
+    """The larger of the weights at a step's end and start, and whether they exceed those at the start by more than a
+    quarter.
     """
     spin, speed = max(ending[1], weights[1]), max(ending[3], weights[3])
     return (weights[0], spin, weights[2], speed), spin > 1.25 * weights[1] or speed > 1.25 * weights[3]
@@ -117,22 +117,22 @@ def heavier(ending: Weights, weights: Weights) -> tuple[Weights, bool]:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def response_at_knot(p: np.record, spin: float, speed: float) -> float:
-    """What an impulse of 1 N s at the string's knot does to velocities whose errors have these weights, at most."""
+    """Largest weighted velocity change by an impulse of 1 N s at the string's knot, for these weights of ω and v."""
     arm = norm(p.attach[0], p.attach[1], p.attach[2])
     return float(max(speed / p.mass, spin * arm / p.moments[0]))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def jump_of_displacement(p: np.record, spin: float, speed: float) -> float:
-    """Error that a displacement by one unit of the measure causes when a damped string jerks taut that
-    much too early or late.
+    """Weighted velocity error per unit of displacement error, which makes a damped string become taut too early or too
+    late.
     """
     return float(p.string_damping * p.length * response_at_knot(p, spin, speed)) if p.has_string else 0.0
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def fastest_swing(p: np.record) -> float:
-    """The fastest that the string can swing the body [rad/s], whatever its direction."""
+    """Upper bound of the angular frequency [rad/s] of the body on the string, over all directions."""
     arm, I = p.attach, p.moments
     yields = most_yielding(p.mass, I[0], I[1], I[2], arm[0], arm[1], arm[2])
     return math.sqrt(p.stiffness * yields)
@@ -140,10 +140,10 @@ def fastest_swing(p: np.record) -> float:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def floor_of_step(y: np.ndarray, p: np.record, weights: Weights, pulls: bool, h: float) -> float:
-    """What rounding may err in a step of h seconds from y, in the measure: 32 ε, and on a string that pulls what its
-    force does that is known no better than the place of its knot. The span from free end to knot errs by ε of itself
-    and of the arm, k and c multiply that, and a swing takes it back after a radian. Near its free end a string that
-    pushes errs in its direction, too.
+    """Rounding error, in the error norm, of a step of h seconds from y: 32 ε and, for a string that pulls, the effect
+    of a force known only to the rounding of its knot's position. The span from free end to knot errs by ε times itself
+    and the arm, k and c multiply that, and an oscillation reverses it after a radian. Near the free end, a string that
+    pushes also errs in its direction.
     """
     if not pulls:
         return FLOOR
@@ -154,11 +154,11 @@ def floor_of_step(y: np.ndarray, p: np.record, weights: Weights, pulls: bool, h:
     speed = norm(y[10], y[11], y[12]) + norm(y[4], y[5], y[6]) * arm
     time = min(h, 1.0 / fastest_swing(p))
     impulse = EPSILON * (size * (k * time + c) + speed * c * time)
-    # Within the step, velocities move place and attitude.
+    # Within the step, velocity errors change position and attitude.
     return FLOOR + impulse * response_at_knot(p, max(weights[1], h), max(weights[3], h * weights[2]))
 
 
-# How long a step may be
+# Step length
 
 # log₂(1 − 2ˣ) is concave: chords from σh = 0.18 to 0.6, and from there to 0.9, as constant − slope x.
 _REST, _SLOPE = -1.7613260844219780, 0.5962259201961054
@@ -167,22 +167,22 @@ _LOG2_MOST = -0.15200309344504997
 """log₂ of 0.9"""
 
 
-# log₂ and 2ˣ to two digits from a double's own exponent: a tenth of the time of libm's, and everywhere the same bits.
+# log₂ and 2ˣ to two digits from the exponent of a double: ten times faster than libm, with the same bits everywhere.
 
 
 @njit(cache=True, error_model="numpy")
 def fast_log2(x: float) -> float:
     """log₂ x for x > 0 with an error below 0.006; −1023 for subnormal x."""
     bits = bits_of(x)
-    # m − 1 with x = 2ⁿ m: exact where x is normal. log₂ m − (m − 1) vanishes at m = 1 and 2; the line has its slopes
-    # there.
+    # m − 1 with x = 2ⁿ m: exact if x is normal. log₂ m − (m − 1) is zero at m = 1 and 2; the linear factor matches its
+    # slopes there.
     f: float = double_of((bits & MANTISSA) | (BIAS << MANTISSA_BITS)) - 1.0
     return float((bits >> MANTISSA_BITS) - BIAS) + f + f * (1.0 - f) * (0.4427 - 0.164 * f)
 
 
 @njit(cache=True, error_model="numpy")
 def fast_exp2(x: float) -> float:
-    """2ˣ with a relative error below 0.001, for x cut to ±1000."""
+    """2ˣ with a relative error below 0.001, for x clamped to ±1000."""
     whole = math.floor(min(max(x, -1000.0), 1000.0))
     f = min(max(x, -1000.0), 1000.0) - whole
     power: float = double_of((int(whole) + BIAS) << MANTISSA_BITS)
@@ -191,15 +191,15 @@ def fast_exp2(x: float) -> float:
 
 @functools.cache
 def degree_for(accuracy: float) -> int:
-    """The degree at which work per time is smallest for this accuracy: measured, a flat minimum (12 at
-    1e-3, 19 at 1e-9).
+    """Degree with the least work per simulated time at this accuracy, as measured; the minimum is flat (12 at 1e-3, 19
+    at 1e-9).
     """
     return min(max(round(8.5 - 1.15 * logarithm(accuracy) / logarithm(10.0)), 6), MAX_DEGREE)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def degree_of_motion(degree: int) -> int:
-    """The degree of a series of the whole motion, where that of the spin alone would be ``degree``."""
+    """Degree of a series of the whole motion, if ``degree`` is that of the spin alone."""
     return min(degree + _HIGHER, MAX_DEGREE)
 
 
@@ -207,17 +207,17 @@ def degree_of_motion(degree: int) -> int:
 def _length_for(
     c: np.ndarray, at: int, columns: int, degree: int, weights: Packed, accuracy: float, part: float
 ) -> float:
-    """h [s] with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor) times ``part``, or a little less. at: where a row's
-    variables begin, of ``columns`` numbers; weights: of each of them.
+    """h [s] with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor) times ``part``, or a little less. at: offset of the
+    variables in a row of ``columns`` numbers; weights: one for each of them.
     """
-    # log₂ σ from the last three coefficients: of the largest k-th root of a bound on their measure.
+    # log₂ σ from the last three coefficients: the largest k-th root of a bound on their norm.
     last = degree * columns + at
-    # No length is more than twice the largest number in it, and no square of a large coefficient overflows.
+    # A vector's length is at most twice its largest component, which unlike squares of coefficients doesn't overflow.
     growth = fast_log2(2.0 * largest(load(c, last - 2 * columns, weights) * weights)) * (1.0 / (degree - 2.0))
     growth = max(growth, fast_log2(2.0 * largest(load(c, last - columns, weights) * weights)) * (1.0 / (degree - 1.0)))
     growth = max(growth, fast_log2(2.0 * largest(load(c, last, weights) * weights)) * (1.0 / degree))
     share, least = fast_log2(part * accuracy) - growth, fast_log2(part * FLOOR)
-    # (N + 1) x = max(share + x, least) + log₂(1 − 2ˣ) for x = log₂ σh, the last term replaced by two chords below it.
+    # (N + 1) x = max(share + x, least) + log₂(1 − 2ˣ) for x = log₂ σh, the last term bounded from below by two chords.
     x = max(
         min((share + _REST) / (degree + _SLOPE), (share + _REST_NEAR) / (degree + _SLOPE_NEAR)),
         min((least + _REST) / (degree + 1.0 + _SLOPE), (least + _REST_NEAR) / (degree + 1.0 + _SLOPE_NEAR)),
@@ -227,7 +227,7 @@ def _length_for(
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _allowed_length(c: np.ndarray, degree: int, weights: Weights, accuracy: float, part: float) -> float:
-    """h [s] after which a series of the motion errs by this part of the accuracy times h."""
+    """h [s] at which the error of a series of the motion is this part of the accuracy times h."""
     attitude, spin, place, speed = weights
     of_row = joined(
         filled(attitude, 4),
@@ -240,19 +240,19 @@ def _allowed_length(c: np.ndarray, degree: int, weights: Weights, accuracy: floa
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _known_length(c: np.ndarray, degree: int, place: float, accuracy: float, part: float) -> float:
-    """h [s] after which the series of the knot's place errs as much. It turns with the body, and attitude by half the
-    angle: of the degree N its remainder is up to 2ᴺ times that of the attitude's series.
+    """h [s] at which the series of the knot's position has the same error. The position rotates by the full angle, the
+    quaternion by half of it: the remainder after degree N is up to 2ᴺ times that of the attitude.
     """
     of_row = four(place, place, place, 0.0)
     return _length_for(c, A_KNOT, MOTION_COLUMNS, degree, of_row, accuracy, part)
 
 
-# The step that waits
+# The pending step
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def begin_control(control: np.record, accuracy: float, degree: int) -> None:
-    """What a segment starts with."""
+    """Initialize the control record of a segment."""
     control.accuracy, control.degree = accuracy, degree
     control.accepted_ns, control.elapsed_ns = 0, 0
     control.steps, control.evaluations, control.pending = 0, 0, 0
@@ -263,7 +263,7 @@ def begin_control(control: np.record, accuracy: float, degree: int) -> None:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _note_floor(y: np.ndarray, p: np.record, control: np.record, weights: Weights, h: float) -> None:
-    """Keep the floor of a step of h seconds from y where it is more than the accuracy allows."""
+    """Record the error floor of a step of h seconds from y if it exceeds what the accuracy allows."""
     pulls = p.has_string and (control.law == PULLS or control.switch < math.inf)
     floor = floor_of_step(y, p, weights, pulls, h)
     if floor <= control.accuracy * h:
@@ -276,7 +276,7 @@ def _note_floor(y: np.ndarray, p: np.record, control: np.record, weights: Weight
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _count(control: np.record) -> None:
-    """The step that waits is committed."""
+    """Count the pending step as committed."""
     control.elapsed_ns += control.accepted_ns
     control.evaluations += control.pending
     control.steps += 1
@@ -286,21 +286,21 @@ def _count(control: np.record) -> None:
 
 
 def series_workspace(degree: int) -> np.ndarray:
-    """Room for the coefficients from the step's start, those of its last series, and the variables that one starts
-    from. They stay there until the step is committed: every sample before takes them once more.
+    """Workspace for the coefficients of the step's first series and of its last one, and for the initial variables of
+    the last one. They are kept until the step is committed, because samples within the step evaluate them.
     """
     return aligned((2 * (degree_of_motion(degree) + 2) + 1, MOTION_COLUMNS))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _is_spin(p: np.record) -> bool:
-    """Whether all loads turn with the body."""
+    """Whether all loads rotate with the body."""
     return not (p.has_string or p.has_world_torque)
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _spin_length(y: np.ndarray, p: np.record, control: np.record, weights: Weights, c: np.ndarray) -> int:
-    """Series of the spin from y into c; returns the step's length [ns]."""
+    """Compute the series of the spin from y into c; returns the step's length [ns]."""
     if not control.series:
         spin_series(y, p, control.degree, c)
         control.series = True
@@ -311,7 +311,7 @@ def _spin_length(y: np.ndarray, p: np.record, control: np.record, weights: Weigh
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, c: np.ndarray) -> int:
-    """Series of one step from y into c and control; returns its length [ns], 0 when there is none.
+    """Compute the series of one step from y into c and control; returns its length [ns], 0 if no step is possible.
     weights: of errors.
     """
     if _is_spin(p):
@@ -332,12 +332,12 @@ def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, 
             control.pending += 1
         control.series = True
         parts += 1
-        # A damped string that jerks taut turns an error of place into one of velocity: free flight must be that much
-        # better.
+        # A damped string that becomes taut turns a position error into a velocity error: free flight must be that much
+        # more accurate.
         allowance = part if law == PULLS else part / (1.0 + jerk_of_place)
         h = _allowed_length(series, degree, weights, accuracy, allowance)
         if law != PULLS:
-            # The time at which it pulls again is read off that series.
+            # The time at which it pulls again is computed from that series.
             h = min(h, _known_length(series, degree, weights[2], accuracy, allowance))
         h = clear_of_the_end(series, p, degree, knot[3], h)
         if not h * 1e9 >= 1.0 or not is_good(series[1]):
@@ -349,7 +349,7 @@ def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, 
             break
         before_ns = int(math.floor((gone + switch) * 1e9))
         if parts > 1 and before_ns * 1e-9 > gone:
-            # One switch a step: each multiplies what the step has erred before it.
+            # One change of law per step: each multiplies the error of the step before it.
             return before_ns
         if parts == 1:
             copy_numbers(y, last[:VARIABLES])
@@ -360,13 +360,13 @@ def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, 
         gone, law = gone + switch, after
         control.last_start, control.last_law = gone, law
     length_ns = int(math.floor((gone + h) * 1e9))
-    # The last series must be of some use.
+    # The last series must cover a part of the step.
     return length_ns if length_ns * 1e-9 > gone else length_ns + 1
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _reach(p: np.record, control: np.record, c: np.ndarray, time_ns: int, out: np.ndarray) -> None:
-    """Take the variables at the beginning of the step that is laid out ``time_ns`` into it."""
+    """Advance out, the variables at the start of the planned step, by ``time_ns`` within this step."""
     degree, t = degree_of_motion(control.degree), time_ns * 1e-9
     if _is_spin(p):
         spin_at(c, control.degree, t, out)
@@ -386,7 +386,7 @@ def _move(c: np.ndarray, p: np.record, degree: int, h: float, law: float, out: n
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def _accept(y: np.ndarray, p: np.record, control: np.record, following: np.ndarray, c: np.ndarray) -> bool:
-    """Lay out the next step and take it into ``following``; returns whether there is one."""
+    """Plan the next step and write its end into ``following``; returns whether there is one."""
     elapsed = control.elapsed_ns
     weights = scales(y, p, elapsed * 1e-9)
     length, good = 0, False
@@ -397,7 +397,7 @@ def _accept(y: np.ndarray, p: np.record, control: np.record, following: np.ndarr
         copy_numbers(y, following)
         _reach(p, control, c, length, following)
         good = is_good(following)
-        # The errors of velocities are measured by those at the end: where they fall within the step, that counts.
+        # Velocity errors are also weighted by velocities at the end, which matters if these decrease within the step.
         weights, more = heavier(scales(following, p, (elapsed + length) * 1e-9), weights)
         if not (good and more):
             break
@@ -416,10 +416,10 @@ def series_steps(
     span_ns: int,
     sampling: bool,
 ) -> int:
-    """Commit steps in y that fit into span_ns; returns how far it came [ns]. control: CONTROL. following: where the
-    step that waits ends. c: workspace.
+    """Commit the steps in y that fit into span_ns; returns the time advanced [ns]. control: CONTROL. following:
+    variables at the end of the pending step. c: workspace.
 
-    sampling: go span_ns into the step that waits instead, which is longer, and leave no trace; returns 0 if it failed.
+    sampling: advance y by span_ns within the pending step, which is longer, and commit nothing; returns 0 on failure.
     """
     advanced = 0
     while True:

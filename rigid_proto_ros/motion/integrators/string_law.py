@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Which law a pull-only string obeys, and when it changes: along a power series, or along a fixed step.
+"""The law of a pull-only string, and the time at which it changes, along a Taylor series or a fixed step.
 
-It is slack while x = l − rest length ≤ 0; else it pulls while k x + c l' > 0; else it is stretched but shortens faster
-than its damper lets it pull. A step of a series ends where a polynomial rises above zero, and the first such time is
-found (``first_rise``): slack ends where |a|² − rest² does, a the way from free end to knot, a polynomial
-however near the knot passes its free end; the other two where the tension, or the stretch, changes sign, whose series
-are at hand. A fixed step at whose end another law holds than at its start is repeated until the change is known to a
-double's digits (integrators/runge_kutta.py).
+The string is slack while x = l − rest length ≤ 0; otherwise it pulls while k x + c l' > 0; otherwise it is stretched,
+but shortens too fast for its damper to let it pull. A step of a series ends where a polynomial first rises above zero
+(``first_rise``). A slack string becomes taut where |a|² − rest² does, with a the vector from free end to knot; this is
+a polynomial however near the knot passes the free end. The other two laws end where the tension, or the stretch,
+changes sign, whose series are known. A fixed step with different laws at start and end is repeated until the time of
+the change is known to double precision (integrators/runge_kutta.py).
 
-A bilateral string with a rest length pushes at the full length of that when its knot meets the free end, in a
-direction n = a/l that has no limit at l = 0. A knot that goes straight through meets no pole of its series, which lead
-on as if l became negative. So no step comes near the free end, and a knot that meets it to within a nanosecond ends
-the motion: there is no force to go on with.
+A bilateral string with a rest length pushes with k times this length when its knot meets the free end, along n = a/l,
+which has no limit at l = 0. A knot that passes straight through meets no pole of its series, which continue as if l
+became negative. So no step comes near the free end, and a knot that meets it to within a nanosecond ends the motion,
+since the force is undefined.
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ SLACK, PULLS, SHORTENS = 0.0, 1.0, 2.0
 
 _AGREEMENT = 0.03
 _AGREEMENT_SLACK = 1e-3
-"""Times the root of the accuracy, of the tension's terms: by so much the series of the distance may differ from what
-the motion's series give, which converge where it may not. The law changes where the tension is zero, so that a tension
-of the wrong sign counts by its square. Less where the string doesn't pull: there the length of the step knows nothing
-of it.
+"""Tolerance in units of √accuracy times the tension's terms: by this much the series of the distance may differ from
+the result of the motion's series, which converge where it may not. The law changes at tension zero, so a tension of the
+wrong sign has an effect of second order. Smaller for a string that doesn't pull, whose step length doesn't depend on
+this series.
 """
 
 _NEGLIGIBLE = 1e-19
-"""Of the square of the rest length: what the highest terms of |a|² may come to before they are left out."""
+"""Fraction of the squared rest length below which the highest terms of |a|² are neglected."""
 
 _APPROACH = 0.75
-"""Of its distance from the free end, the knot of a string that pushes moves no more in a step."""
+"""Largest motion of the knot of a string that pushes in one step, as a fraction of its distance from the free end."""
 
 
 @njit(cache=True, error_model="numpy")
 def is_one_sided(p: np.record) -> bool:
-    """Whether the string's law may change at all."""
+    """Whether a string is tied whose law can change, that is, a pull-only one."""
     return p.has_string and not p.bilateral
 
 
 @njit(cache=True, error_model="numpy")
 def knot_at(y: np.ndarray, p: np.record) -> Knot:
-    """The knot of a string at variables y; zeros where none is tied."""
+    """The knot of the string at variables y; zeros without a string."""
     if not p.has_string:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     a, _ = knot_of(y, p)
@@ -61,7 +61,7 @@ def knot_at(y: np.ndarray, p: np.record) -> Knot:
 
 @njit(cache=True, error_model="numpy")
 def law_of(y: np.ndarray, p: np.record) -> float:
-    """The law at variables y."""
+    """The law at variables y: SLACK, PULLS or SHORTENS."""
     if not is_one_sided(p):
         return PULLS
     x, rate = stretch(y, p)
@@ -72,36 +72,34 @@ def law_of(y: np.ndarray, p: np.record) -> float:
 
 @njit(cache=True, error_model="numpy")
 def shortening_heat(p: np.record, before: float, after: float) -> float:
-    """What the damper takes while the string doesn't pull [J]: all of ½ k x² lost from one stretch to another."""
+    """Energy that the damper dissipates while the string doesn't pull [J]: the loss of ½ k x² between two stretches."""
     before, after = max(before, 0.0), max(after, 0.0)
     return float(0.5 * p.stiffness * (before - after) * (before + after))
 
 
-# The first time at which a polynomial rises above zero: never just some root of it. On an interval a polynomial lies
-# within the hull of its Bernstein coefficients, and with one change of sign among them it has exactly one root there
-# (Lane and Riesenfeld, BIT 21 (1981) 112). So intervals without a positive coefficient are passed over, those with
-# one change are closed in on, and all others are halved, the earlier half first. Halving averages neighbours (de
-# Casteljau), so what it rounds is small against the interval's own values, and a double root is told from none as
-# well as its coefficients can tell it.
+# The first time at which a polynomial rises above zero, not just any root. On an interval a polynomial lies within the
+# convex hull of its Bernstein coefficients, and with one change of sign among them it has exactly one root there (Lane
+# and Riesenfeld, BIT 21 (1981) 112). So intervals without a positive coefficient are skipped, in those with one change
+# the root is refined, and all others are bisected, the earlier half first. Bisection averages neighbours (de
+# Casteljau), so its rounding is small relative to the values in the interval, and a double root is distinguished from
+# none as well as the coefficients allow.
 
 _DEEPEST = 110
-"""Halvings of an interval: a millionth of a nanosecond in a million seconds, to all digits."""
+"""Maximum number of bisections of an interval: they resolve 1e-15 s within 1e6 s to 12 digits."""
 
 _RESOLUTION = 2.0**-51
-"""Of an interval against its place in time."""
+"""Smallest width of an interval relative to its position in time."""
 
 _NEWTONS = 40
 _MOST_TRIALS = 1200
-"""Newton's steps that a root is given before it is halved in on, and all together: as often as a double
-can be halved.
-"""
+"""Newton steps for a root before bisection, and maximum number of all trials: as often as a double can be halved."""
 
 NONE = -1.0
 
 
 @njit(cache=True, error_model="numpy")
 def first_rise(g: np.ndarray, degree: int) -> float:
-    """First s in [0, 1] past which Σ gₖ sᵏ is above zero, which it isn't at 0; NONE if it never is."""
+    """First s in [0, 1] after which Σ gₖ sᵏ is positive, for a polynomial that isn't at 0; NONE if it never is."""
     while degree > 0 and g[degree] == 0.0:
         degree -= 1
     reach = g[0]
@@ -138,7 +136,7 @@ def first_rise(g: np.ndarray, degree: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _bernstein(g: np.ndarray, degree: int, b: np.ndarray) -> None:
-    """Coefficients b on [0, 1]: bᵢ = Σ C(i, k)/C(n, k) gₖ."""
+    """Bernstein coefficients b on [0, 1]: bᵢ = Σ C(i, k)/C(n, k) gₖ."""
     scale = 1.0
     for k in range(degree + 1):
         b[k] = g[k] * scale
@@ -166,7 +164,7 @@ def _signs(b: np.ndarray, degree: int) -> tuple[int, int]:
 
 @njit(cache=True, error_model="numpy")
 def _halve(b: np.ndarray, left: np.ndarray, degree: int) -> None:
-    """Coefficients of the left half into ``left``, those of the right one in place."""
+    """Bisection: coefficients of the left half into ``left``, those of the right one into b."""
     left[0] = b[0]
     for j in range(1, degree + 1):
         for i in range(degree - j + 1):
@@ -176,7 +174,7 @@ def _halve(b: np.ndarray, left: np.ndarray, degree: int) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _root(g: np.ndarray, degree: int, low: float, high: float) -> float:
-    """The one root in an interval over which the polynomial rises: Newton's steps kept within it, or halving."""
+    """The only root in an interval over which the polynomial rises: Newton's method, safeguarded by bisection."""
     t = 0.5 * (low + high)
     for trial in range(_MOST_TRIALS):
         value, slope = g[degree], 0.0
@@ -203,12 +201,12 @@ def _root(g: np.ndarray, degree: int, low: float, high: float) -> float:
 def next_law(
     c: np.ndarray, p: np.record, degree: int, h: float, law: float, accuracy: float
 ) -> tuple[float, float, float]:
-    """When within h seconds the law first changes, NONE for never; the one that follows; and how far of h
-    that is known.
+    """Time of the first change of law within h seconds, NONE for never; the law that follows; and the part of h [s] for
+    which this is known.
     """
     if law == SLACK:
         return _tautens(c, p, degree, h), PULLS, h
-    g = c[degree + 1]  # spare
+    g = c[degree + 1]  # scratch memory
     tolerance = math.sqrt(accuracy) * (_AGREEMENT if law == PULLS else _AGREEMENT_SLACK)
     if law == SHORTENS:
         distance_series(c, degree)
@@ -243,7 +241,7 @@ def _square_less_rest(a: np.ndarray, x: float, rest: float) -> np.ndarray:
 
 @njit(cache=True, error_model="numpy")
 def _tautens(c: np.ndarray, p: np.record, degree: int, h: float) -> float:
-    """When |a|² first rises above the square of the rest length; NONE if it doesn't within h seconds."""
+    """Time at which |a|² first rises above the square of the rest length; NONE if it doesn't within h seconds."""
     rest = p.rest_length
     reach, power, last = c[0, DISTANCE], 1.0, 0
     for k in range(1, degree + 1):
@@ -273,8 +271,8 @@ def _tautens(c: np.ndarray, p: np.record, degree: int, h: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _stops_shortening(c: np.ndarray, p: np.record, degree: int, h: float, g: np.ndarray) -> tuple[float, float]:
-    """At which part of h the string's stretch is gone or it begins to pull, whichever is first, and the
-    law after that.
+    """Fraction of h at which the string's stretch is zero or it begins to pull, whichever is first, and the law after
+    that.
     """
     power = 1.0
     for k in range(1, degree + 1):
@@ -282,7 +280,7 @@ def _stops_shortening(c: np.ndarray, p: np.record, degree: int, h: float, g: np.
         g[k] = -c[k, DISTANCE] * power
     g[0] = -max(c[0, STRETCH], 0.0)
     gone = first_rise(g, degree)
-    # It pulls before its stretch is gone, or not at all.
+    # It begins to pull before its stretch is zero, or not at all.
     end = h if gone == NONE else gone * h
     power = 1.0
     for k in range(degree):
@@ -298,7 +296,7 @@ def _stops_shortening(c: np.ndarray, p: np.record, degree: int, h: float, g: np.
 
 @njit(cache=True, error_model="numpy")
 def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: float) -> bool:
-    """Whether the series of the knot's distance gives the tension that the motion's series give."""
+    """Whether the series of the knot's distance gives the same tension as the motion's series."""
     stiffness, damping = p.stiffness, p.string_damping
     tension, terms, power = stiffness * c[0, STRETCH], 0.0, 1.0
     for k in range(1, degree + 1):
@@ -315,8 +313,8 @@ def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: fl
 
 @njit(cache=True, error_model="numpy")
 def clear_of_the_end(c: np.ndarray, p: np.record, degree: int, distance: float, h: float) -> float:
-    """h cut down so that along the series c the knot of a string that pushes keeps from the free end, from which it
-    starts at this distance.
+    """h, reduced so that along the series c the knot of a string that pushes, which starts at this distance from the
+    free end, stays clear of it.
     """
     if p.has_string and p.bilateral and p.rest_length != 0.0:
         while h * 1e9 >= 1.0 and _moves(c, degree, h) > max(_APPROACH * distance, NO_DIRECTION * p.rest_length):
@@ -326,7 +324,7 @@ def clear_of_the_end(c: np.ndarray, p: np.record, degree: int, distance: float, 
 
 @njit(cache=True, error_model="numpy")
 def _moves(c: np.ndarray, degree: int, h: float) -> float:
-    """A bound of how far the knot moves within h seconds [m]."""
+    """Upper bound of the knot's displacement within h seconds [m]."""
     reach = 0.0
     for k in range(degree, 0, -1):
         reach = (reach + abs(c[k, A_KNOT]) + abs(c[k, A_KNOT + 1]) + abs(c[k, A_KNOT + 2])) * h
