@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Mass, COM and inertia in closed form from a mesh's ten numbers or from given ones, ballast included; compiled, for
-one body and for the many of a sweep.
+"""Mass, COM and inertia in closed form from the ten moments of a mesh or from given numbers, ballast included;
+compiled, for one body and for sweeps.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ Principal = tuple[np.ndarray, np.ndarray]
 def loaded(
     mass: float, center: np.ndarray, second: np.ndarray, stretch: np.ndarray, reference: np.ndarray, points: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray, Principal]:
-    """Mass, COM from the (stretched) reference, inertia (3, 3), its principal moments and axes, ballast included.
+    """Mass, COM relative to the stretched reference, inertia (3, 3), its principal moments and axes, ballast included.
 
-    mass [kg]; center (3,) from the reference and second (3, 3) about it, both stretched already; ``points`` (k, 4) in
-    mesh coordinates, ``stretch`` and ``reference`` (3,) in mesh coordinates bring them there. Each point mass adds by
-    the parallel-axis theorem, so that nothing cancels.
+    mass [kg]; center (3,) relative to the reference and second (3, 3) about it, both stretched already; ``points`` (k,
+    4): ballast in mesh coordinates; ``stretch`` and ``reference`` (3,) convert its positions. Each point mass is added
+    by the parallel-axis theorem, which avoids cancellation.
     """
     total = mass
     moved = mass * center
@@ -68,10 +68,10 @@ def spread_mass(
     second: np.ndarray,
     points: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray, Principal]:
-    """Of a mass [kg] spread over a mesh: total, COM (3,), inertia (3, 3), its principal moments and axes.
+    """Mass [kg] distributed over a mesh: total, COM (3,), inertia (3, 3), its principal moments and axes.
 
     measure, reference, center and center_low (3,), second (6,): the moments at unit density. scale (3,) of the mesh;
-    left (3,): what of it the moments don't have in them yet. points (k, 4): ballast in mesh coordinates.
+    left (3,): the part of it that the moments don't include yet. points (k, 4): ballast in mesh coordinates.
     """
     place, base, com, matrix = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
     slot, per_measure = 0, mass / measure
@@ -92,8 +92,8 @@ def spread_mass(
 def given_mass(
     mass: float, center: np.ndarray, inertia: np.ndarray, scale: np.ndarray, points: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray, Principal]:
-    """The same of a given mass [kg], COM (3,) in mesh coordinates and inertia (3, 3) about it, which ``scale`` doesn't
-    touch.
+    """The same for a given mass [kg], COM (3,) in mesh coordinates and inertia (3, 3) about it, which doesn't depend on
+    ``scale``.
     """
     base = scale * center
     if points.shape[0] == 0:
@@ -108,6 +108,6 @@ def given_mass(
 
 @njit(cache=True, error_model="numpy")
 def is_plainly_good(principal: np.ndarray) -> bool:
-    """Whether ``check_tensor`` would say nothing about principal moments (3,)."""
+    """Whether ``check_tensor`` has nothing to report about principal moments (3,)."""
     a, b, c = principal[0], principal[1], principal[2]
     return a > 0.0 and c <= MAX_MOMENT_RATIO * a and c < math.inf and a + b >= c * (1.0 - TRIANGLE_SLACK_COMPUTED)

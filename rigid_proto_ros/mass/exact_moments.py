@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The solid's moments in rational arithmetic: no rounding at all on the vertices as the doubles they are.
+"""Moments of a solid in rational arithmetic, without rounding, for vertices as given in double precision.
 
-Coordinates become integers over a common power of two; sums over tetrahedra to the origin are integers, too. Numpy's
-object arrays carry them in chunks, some microseconds a triangle. This is the reference for the floating-point path,
-never a part of it.
+Coordinates become integers in units of a power of two; sums over tetrahedra about a reference point are integers, too.
+NumPy object arrays hold them in chunks, which takes some microseconds per triangle. This is a reference for the
+floating-point computation, which never uses it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fractions import Fraction
 import numpy as np
 
 CHUNK = 4096
-"""Triangles at a time: the object arrays' size."""
+"""Triangles per chunk: the size of the object arrays."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class ExactMoments:
 
 
 def _as_integers(vertices: np.ndarray) -> tuple[np.ndarray, int]:
-    """Vertices (n, 3) as Python integers times 2**power, exactly."""
+    """Vertices (n, 3) as Python integers in units of 2**power, exactly."""
     mantissa, exponent = np.frexp(vertices)
     power = int(exponent[vertices != 0.0].min(initial=0)) - 53
     whole = (mantissa * 2.0**53).astype(np.int64)
@@ -40,13 +40,13 @@ def _as_integers(vertices: np.ndarray) -> tuple[np.ndarray, int]:
 def exact_solid_moments(
     vertices: np.ndarray, triangles: np.ndarray, scale: Iterable[float] = (1.0, 1.0, 1.0)
 ) -> ExactMoments:
-    """Exact moments of the solid that triangles (m, 3) over vertices (n, 3) float64 bound, as if wound outward, after
+    """Exact moments of the solid bounded by triangles (m, 3) over vertices (n, 3) float64, as if wound outward, after
     its coordinates are multiplied by ``scale`` (3 doubles, taken exactly).
 
     Raises ZeroDivisionError when the volume is zero.
     """
     whole, power = _as_integers(np.asarray(vertices, dtype=np.float64))
-    # A reference amid the vertices keeps the integers short; it drops out of a closed surface's sums exactly.
+    # A reference near the vertices keeps the integers short; it cancels exactly in the sums of a closed surface.
     used = np.unique(triangles)
     middle = [sum(whole[used, k].tolist()) // len(used) for k in range(3)]
     points = whole - np.array(middle, dtype=object)
@@ -78,8 +78,8 @@ def exact_solid_moments(
 def relative_errors(
     exact: ExactMoments, volume: float, centroid: np.ndarray, inertia: np.ndarray, diagonal: float
 ) -> dict[str, float]:
-    """How far doubles are from ``exact``: volume_error |ΔV|/V, inertia_error max|ΔI|/max|I| (unit density, about the
-    centroid), center_of_mass_error the largest |Δc_k| beyond one ulp of c_k, over the box's ``diagonal``."""
+    """Relative errors of doubles against ``exact``: volume_error |ΔV|/V, inertia_error max|ΔI|/max|I| (unit density,
+    about the centroid), center_of_mass_error the largest |Δc_k| beyond one ulp of c_k, over the box's ``diagonal``."""
     truth = exact.inertia
     largest = max(abs(value) for row in truth for value in row)
     worst = max(abs(Fraction(float(inertia[i, j])) - truth[i][j]) for i in range(3) for j in range(3))

@@ -49,8 +49,8 @@ def sdf_inertial(properties: MassProperties) -> str:
 def mjcf_inertial(properties: MassProperties) -> str:
     """An MJCF <inertial> element: principal moments and their axes' quaternion.
 
-    MuJoCo takes eigenvalues of a full tensor itself, and of a flat body their rounding may break A + B ≥ C, which it
-    refuses.
+    MuJoCo computes the eigenvalues of a full tensor itself; for a flat body their rounding may violate A + B ≥ C, which
+    it refuses.
     """
     (a, b, c), axes = principal_axes(properties.inertia)
     x, y, z, w = quaternion_from_matrix(axes).tolist()

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""From a mesh to its moments: the verdict first, then repair or a stand-in where they are asked for.
+"""From a mesh to its moments: first the verdict, then repair or a substitute shape if requested.
 
-Verdicts on files are kept in the user's cache folder under the hash of their bytes and of the code that made them, so
-that a newer version never serves an older one's verdicts. A cache that can't be written or read is no error: the work
-is then done again. ``RIGID_PROTO_CACHE=off`` turns it off.
+Verdicts on files are cached in the user's cache folder under a hash of the file's bytes and of the code, so that a
+newer version never uses verdicts of an older one. A cache that can't be written or read is no error: the verdict is
+then computed again. ``RIGID_PROTO_CACHE=off`` disables the cache.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from .repair import close_surface, repair_surface
 from .verdict import NESTED, WARNING, Finding, Verdict, check_surface
 
 FALLBACKS = ("", "hull", "box")
-"""What stands in for a surface that bounds no solid: nothing (refuse), its convex hull, or its bounding box."""
+"""Substitute for a surface that bounds no solid: none (refuse), its convex hull, or its bounding box."""
 PASSING = "rigid_proto_upload_"
-"""In the paths of files that are gone tomorrow: nothing of them is kept."""
+"""Part of the paths of temporary files, whose verdicts aren't cached."""
 
 
 @dataclass(frozen=True)
 class MeshBody:
-    """A mesh, the verdict on it, and its moments; ``vertices`` and ``triangles`` are those the moments were taken of
-    (repaired ones when repair was asked for and needed)."""
+    """A mesh, the verdict on it, and its moments; ``vertices`` and ``triangles`` are those used for the moments
+    (repaired ones if repair was requested and needed)."""
 
     mesh: Mesh
     verdict: Verdict
@@ -46,24 +46,24 @@ class MeshBody:
 
     @property
     def vertices(self) -> np.ndarray:
-        """Vertices (n, 3) in mesh coordinates; repair appends to the file's, never renumbers them."""
+        """Vertices (n, 3) in mesh coordinates; repair keeps their numbers and positions."""
         return self.moments.vertices
 
     @property
     def triangles(self) -> np.ndarray:
-        """Triangles (m, 3), turned outward when the file winds them inward throughout."""
+        """Triangles (m, 3), reversed if the file winds them inward throughout."""
         triangles = self.moments.triangles
         return np.ascontiguousarray(triangles[:, [0, 2, 1]]) if self.verdict.inward else triangles
 
 
 def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", accept_open: float = 0.0) -> MeshBody:
-    """The moments of a mesh (or of the one that a path, URI or bundled name stands for) with its verdict.
+    """The moments of a mesh (or of the mesh with a path, URI or bundled name) with its verdict.
 
-    A surface that bounds no solid is not refused here: asking its moments for the solid, or for a mass from a density,
-    raises MeshError with the reason and the flags that help. ``repair`` welds, drops duplicates, orients (cavities stay
-    cavities) and caps holes first; ``accept_open`` then closes what is still open with flat caps where whatever closes
-    it changes volume and tensor by less than that part of themselves; ``fallback`` "hull" or "box" lets that shape
-    stand in for what is open all the same.
+    A surface that bounds no solid is not refused here: the moments of the solid, or a mass from a density, then raise
+    MeshError with the reason and the flags that help. ``repair`` welds, drops duplicates, orients (cavities stay
+    cavities) and caps holes first. ``accept_open`` then closes a surface that is still open with flat caps, if no way
+    of closing it changes volume and tensor by more than this fraction. ``fallback`` "hull" or "box" uses that shape for
+    a surface that is open nevertheless.
     """
     if fallback not in FALLBACKS:
         raise InputError("mesh_fallback", fallback, "'' (refuse), hull or box")
@@ -102,7 +102,7 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
 
 
 def folder() -> Path | None:
-    """The cache folder, or None when it is turned off or there is no home."""
+    """The cache folder, or None if it is disabled or there is no home directory."""
     if os.environ.get("RIGID_PROTO_CACHE", "").lower() in ("off", "0", "no"):
         return None
     base = os.environ.get("XDG_CACHE_HOME", "")
@@ -113,11 +113,11 @@ def folder() -> Path | None:
 
 
 def check_mesh(mesh: Mesh) -> Verdict:
-    """The verdict on a mesh, from the cache or anew."""
+    """The verdict on a mesh, cached or computed."""
     base = None if PASSING in mesh.path else folder()
     if base is None:
         return check_surface(mesh.vertices, mesh.triangles)
-    # Sums may round otherwise where they aren't compiled.
+    # Sums may round differently when they aren't compiled.
     ways = mesh.path.rpartition(".")[2].lower(), "united" if can_unite() else "body", str(INTERPRETED)
     path = base / f"{mesh.sha256}-{'-'.join(ways)}-{source_stamp(__file__).hex()[:16]}.json"
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):

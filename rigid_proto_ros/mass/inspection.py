@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""All that is to be said of one mesh at one scale and mass: every model's mass properties, how they differ from the
-solid's in what counts for the motion, and the remarks on them.
+"""Inspection of one mesh at one scale and mass: mass properties of every model, their differences from the solid's that
+matter for the motion, and findings.
 """
 
 from __future__ import annotations
@@ -29,15 +29,14 @@ JSON_KEYS = (
 
 
 LARGE_M = 5.0
-"""Longest side [m] beyond which another unit is suspected: few bodies that one pokes are longer, and every part of more
-than 5 mm drawn in millimetres is."""
+"""Longest side [m] above which a wrong unit is suspected: few simulated bodies are longer, but every part of more than
+5 mm drawn in millimetres is."""
 
 
 @dataclass(frozen=True)
 class ModelDifference:
-    """principal_moments (3,): relative errors of the moments, in ascending order, each by its own. axes_turned [rad]:
-    the smallest turn that brings the principal axes onto the true ones. center_of_mass (3,): offset from the true one
-    [m].
+    """principal_moments (3,): relative error of each moment, in ascending order. axes_turned [rad]: the smallest
+    rotation that takes the principal axes to the true ones. center_of_mass (3,): offset from the true one [m].
     """
 
     principal_moments: np.ndarray
@@ -54,14 +53,14 @@ def model_difference(properties: MassProperties, true: MassProperties) -> ModelD
 
 
 ANY = -1
-"""The axis of symmetry of what has the same moment about every axis."""
+"""The axis of symmetry of a tensor with three equal moments: any axis."""
 EQUAL = 1e-9
-"""Part of the largest moment by which two that count as one may differ: their axes are then any pair at right angles in
-the plane that they span."""
+"""Difference, relative to the largest moment, up to which two moments count as equal: their axes are then any
+orthogonal pair in the plane that they span."""
 
 
 def _symmetry_axis(moments: np.ndarray) -> int | None:
-    """The axis about which a tensor is symmetric, None without one, ANY where all moments are the same."""
+    """The axis about which a tensor is symmetric, None without one, ANY if all moments are equal."""
     first, last = np.diff(moments) <= EQUAL * moments[2]
     if first and last:
         return ANY
@@ -71,8 +70,8 @@ def _symmetry_axis(moments: np.ndarray) -> int | None:
 def _axes_turned(axes: np.ndarray, mine: int | None, others: np.ndarray, theirs: int | None) -> float:
     """The smallest angle [rad] of a rotation that takes one set of principal axes (3, 3), columns, to another.
 
-    An axis has no sign. Those across an axis of symmetry are arbitrary, and what turns within their span is no
-    difference.
+    Axes have no sign. Axes perpendicular to an axis of symmetry are arbitrary: a rotation in the plane that they span
+    is no difference.
     """
     if mine is ANY or theirs is ANY:
         return 0.0
@@ -87,15 +86,15 @@ def _axes_turned(axes: np.ndarray, mine: int | None, others: np.ndarray, theirs:
     other = theirs if theirs is not None else mine
     a, b = axes[:, one], others[:, other]
     between = math.atan2(float(np.linalg.norm(np.cross(a, b))), abs(float(a @ b)))
-    # Where the axes of symmetry are different ones, mine has to end anywhere across theirs.
+    # If the axes of symmetry have different numbers, mine must become perpendicular to theirs.
     return between if one == other else 0.5 * math.pi - between
 
 
 @dataclass(frozen=True)
 class Inspection:
-    """All that is known of a mesh at one scale, mass and model. ``refusal`` is the error that stands in the way of the
-    chosen model, ``models`` the mass properties of those that can be had. lower and upper (3,): the scaled mesh's
-    box, NaN when its coordinates aren't finite."""
+    """The inspection of a mesh at one scale, mass and model. ``refusal`` is the error that prevents the chosen model,
+    ``models`` the mass properties of all models that can be computed. lower and upper (3,): the scaled mesh's box, NaN
+    for a mesh that isn't usable."""
 
     body: MeshBody
     scale: np.ndarray
@@ -128,7 +127,7 @@ def inspect_mesh(
     density: float = 1000.0,
     ballast: Iterable = (),
 ) -> Inspection:
-    """Mass properties of every model that ``body`` can have, and the remarks that belong to them."""
+    """Mass properties of every model that can be computed for ``body``, and the findings on them."""
     s = scale_vector(scale)
     findings = list(body.verdict.findings)
     if body.mesh.unit != 1.0:
@@ -146,7 +145,7 @@ def inspect_mesh(
         units = f"it would be {side:.4g} mm if the file is in millimetres (--scale 0.001)"
         findings.append(Finding("unit_suspicion", WARNING, f"the body is {side:.4g} m across; {units} (scale)"))
     models, refusal = {}, None
-    # Mass, density, scale and ballast are checked by any model: their refusal comes first and is the same for all.
+    # Every model checks mass, density, scale and ballast: a refusal of these comes first and is the same for all.
     for name in (model, *(other for other in MODELS if other != model)):
         try:
             models[name] = moments.mass_properties(name, scale=s, mass=mass, density=density, ballast=ballast)
@@ -195,7 +194,7 @@ def as_json(inspection: Inspection) -> dict:
 def verify_moments(body: MeshBody, scale: np.ndarray) -> dict[str, float]:
     """Errors of the solid's volume, centroid and inertia against rational arithmetic on the same vertices."""
     moments = body.moments
-    vertices, triangles = moments.solid_surface()  # refuses what bounds no solid
+    vertices, triangles = moments.solid_surface()  # raises MeshError if there is no solid
     exact = exact_solid_moments(vertices, triangles, scale.tolist())
     unit = moments.mass_properties("solid", scale=scale, density=1.0)
     points = referenced_vertices(vertices, triangles) * scale

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Ten numbers of a mesh: measure, first and second moments at unit density, for each way to spread mass over it.
+"""The ten moments of a mesh: measure, first and second moments at unit density, for each inertia model.
 
 All models but the box are sums over vertices or triangles about a reference point near the bounding box's centre,
-chosen so that subtracting it from a vertex never rounds. Far from the origin a mesh is therefore as exact as at the
+chosen so that subtracting it from a vertex never rounds. Far from the origin a mesh is therefore as accurate as at the
 origin. With the reference point as the fourth corner, a triangle (a, b, c) spans a tetrahedron of signed volume d/6,
 where d = a · (b − a) × (c − a), and with s = a + b + c (Tonon, J. Math. Stat. 1, 2005; Eberly, "Polyhedral mass
 properties", 2002)
 
     ∫ 1 = d/6,   ∫ x = d/24 s,   ∫ x xᵀ = d/120 (s sᵀ + a aᵀ + b bᵀ + c cᵀ).
 
-Over the triangle itself, of area A, the integrals are A, A/3 s and A/12 times the same bracket. d is taken from the
-edges, not from the corners: its rounding error then falls with the triangle's area and doesn't add up over a fine
+Over the triangle itself, of area A, the integrals are A, A/3 s and A/12 times the same bracket. d is computed from the
+edges, not from the corners: its rounding error then decreases with the triangle's area and doesn't add up over a fine
 mesh.
 
-Sums stand in the order 1, x, y, z, xx, xy, xz, yy, yz, zz, each a pair of doubles: its value and what that lacks.
+Sums are in the order 1, x, y, z, xx, xy, xz, yy, yz, zz, each a pair of doubles: its value and the rounding error.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ from ..base.errors import MeshError
 from ..base.simd import Packed, filled, load, number, store
 
 SMALL_MESH = 16
-"""Up to this many triangles the compensated sums cost less than the call, so they are always taken."""
+"""Up to this many triangles the compensated sums cost less than the call, so they are always used."""
 ROUNDING_LIMIT = 5e-14
-"""Above this estimated relative rounding of the volume the compensated sums take over. Below it no volume, centroid or
-tensor of 3,000 random convex hulls, many of them thin, and of 548 parts of robots erred by more than 1.1e-14.
+"""Estimated relative rounding error of the volume above which compensated sums are used. Below it the error of volume,
+centroid and tensor was at most 1.1e-14 for 3,000 random convex hulls, many of them thin, and 548 parts of robots.
 """
 PATHS = ("auto", "blocked", "compensated")
-"""How a solid is summed up: in doubles, block by block, in pairs of doubles, or in pairs where doubles don't do."""
+"""Summation of a solid: in pairs of doubles only where needed, in doubles block by block, or always in pairs."""
 _BLOCK = 256
-"""Triangles whose plain sum is added to the total without error; their corners, 18 KB, stay in the nearest cache."""
+"""Triangles whose plain sum is added to the total without error; their corners, 18 KB, stay in the L1 cache."""
 _LANES = 8
-"""Triangles side by side in vector registers; a compiler left to choose their order would choose it by processor."""
+"""Triangles processed together in vector registers; an order chosen by the compiler would depend on the processor."""
 _UNIT_ROUNDOFF = 2.0**-53
 _OUTSIDE, _NOT_FINITE, _ONE_POINT = 1, 2, 3
 
-_Pair = tuple[Packed, Packed]  # the nearest doubles, and what they lack
+_Pair = tuple[Packed, Packed]  # the nearest doubles, and their rounding errors
 _Point = tuple[float, float, float]
 
 
 class Moments(NamedTuple):
-    """Mass distribution at unit density; lengths in mesh units. numbers (16,): all that follows, in this order."""
+    """Mass distribution at unit density; lengths in mesh units. numbers (16,): all properties below, in this order."""
 
     numbers: np.ndarray
 
@@ -70,7 +70,7 @@ class Moments(NamedTuple):
 
     @property
     def center_low(self) -> np.ndarray:
-        """What doubles couldn't hold of ``center`` (3,)."""
+        """The rounding error of ``center`` (3,), to be added to it."""
         return self.numbers[7:10]
 
     @property
@@ -80,11 +80,11 @@ class Moments(NamedTuple):
 
     @property
     def centroid(self) -> np.ndarray:
-        """Centroid (3,) in mesh coordinates, rounded once."""
+        """Centroid (3,) in mesh coordinates, without ``center_low``."""
         return self.reference + self.center
 
     def outward(self) -> Moments:
-        """The same solid wound outward."""
+        """The moments of the same solid wound outward."""
         if self.measure >= 0.0:
             return self
         return Moments(np.concatenate([-self.numbers[:1], self.numbers[1:10], -self.second]))
@@ -92,7 +92,7 @@ class Moments(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
-    """Lower and upper corner and whether all coordinates are finite; the corners mean nothing otherwise."""
+    """Lower and upper corner, and whether all coordinates are finite; otherwise the corners are meaningless."""
     x0 = y0 = z0 = np.inf
     x1 = y1 = z1 = -np.inf
     zero = 0.0  # or NaN
@@ -106,7 +106,7 @@ def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
 
 @njit(cache=True, nogil=True)
 def _leads_outside(triangles: np.ndarray, count: int) -> bool:
-    """Whether a triangle uses a vertex that isn't one of ``count``."""
+    """Whether a triangle uses a vertex number outside 0 to ``count`` − 1."""
     signs, last = 0, count - 1
     for vertex in triangles.ravel():  # contiguous, so that this makes no copy
         signs |= vertex | (last - vertex)
@@ -123,7 +123,7 @@ def _arrays(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _refuse(flaw: int, count: int) -> None:
-    """Raise MeshError for a flaw, one of the numbers below, of a mesh of ``count`` vertices."""
+    """Raise MeshError for a flaw, one of the numbers above, of a mesh of ``count`` vertices; 0 is no flaw."""
     if flaw == _OUTSIDE:
         raise MeshError("mesh", f"a face uses a vertex outside 0 to {count - 1}")
     if flaw == _NOT_FINITE:
@@ -134,11 +134,11 @@ def _refuse(flaw: int, count: int) -> None:
 
 @njit(cache=True, nogil=True)
 def _exact_reference(vertices: np.ndarray) -> tuple[int, np.ndarray, float, float]:
-    """A point near the bounding box's centre from which no vertex differs by more than a double holds exactly.
+    """A point near the bounding box's centre from which the differences of all vertices are exact in double precision.
 
     Per axis: the centre c if the box's half extent is below |c|/2, since v − c is then exact (Sterbenz), otherwise 0.
-    Returns (_NOT_FINITE, _ONE_POINT or 0, reference (3,), power of two that brings the largest |v − reference| to
-    about 1, that largest).
+    Returns (_NOT_FINITE, _ONE_POINT or 0, reference (3,), power of two that scales the largest |v − reference| to about
+    1, that largest).
     """
     lower, upper, finite = _bounds(vertices)
     reference, size = np.zeros(3), 0.0
@@ -162,10 +162,10 @@ def _central(
     dimension: int,
     numbers: np.ndarray,
 ) -> None:
-    """Fill in the numbers (16,) of Moments, in its order, from the raw sums (10, 2) of (v − reference)·factor over what
-    has a measure of that dimension; divisors: of the measure, the first and the second moments.
+    """Compute the numbers (16,) of Moments, in its order, from the raw sums (10, 2) of (v − reference)·factor;
+    dimension: that of the measure; divisors: of the measure, the first and the second moments.
 
-    The subtraction that cancels is done in pairs. Without a measure the numbers stay as they are.
+    The subtraction that cancels is done in pairs. If the measure is zero, the numbers stay unchanged.
     """
     first, center = np.zeros((3, 2)), np.zeros((3, 2))
     measure, measure_low = pair_divide(sums[0, 0], sums[0, 1], divisors[0], 0.0)
@@ -196,9 +196,9 @@ def _moments(numbers: np.ndarray, no_measure: str) -> Moments:
 
 @njit(cache=True, nogil=True)
 def _gather(vertices: np.ndarray, triangles: np.ndarray, start: int, corners: np.ndarray) -> int:
-    """Put the corners of the next triangles from ``start`` on side by side into ``corners`` (9, n), a, b and c.
+    """Copy the corners a, b, c of the triangles from ``start`` on into the columns of ``corners`` (9, n).
 
-    Their number is a multiple of _LANES: what is missing are triangles without an extent.
+    Returns their number, padded to a multiple of _LANES with triangles of zero size.
     """
     count = min(corners.shape[1], triangles.shape[0] - start)
     for t in range(count):
@@ -213,7 +213,7 @@ def _gather(vertices: np.ndarray, triangles: np.ndarray, start: int, corners: np
 
 @njit(cache=True, nogil=True)
 def _corner(corners: np.ndarray, corner: int, t: int, reference: np.ndarray, factor: float) -> tuple[Packed, ...]:
-    """x, y and z of a corner of _LANES triangles, from the reference in units of 1/factor."""
+    """x, y and z of one corner of _LANES triangles, relative to the reference in units of 1/factor."""
     zero, first = filled(0.0, _LANES), 3 * corner * corners.shape[1] + t
     x = load(corners, first, zero)
     y = load(corners, first + corners.shape[1], zero)
@@ -223,7 +223,7 @@ def _corner(corners: np.ndarray, corner: int, t: int, reference: np.ndarray, fac
 
 @njit(cache=True, nogil=True)
 def _across(lanes: Packed) -> float:
-    """The sum of eight numbers, by halves."""
+    """The sum of eight numbers, by halves (pairwise)."""
     even = (number(lanes, 0) + number(lanes, 4)) + (number(lanes, 2) + number(lanes, 6))
     return even + ((number(lanes, 1) + number(lanes, 5)) + (number(lanes, 3) + number(lanes, 7)))
 
@@ -232,9 +232,9 @@ def _across(lanes: Packed) -> float:
 def _blocked_sums(
     vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float
 ) -> tuple[np.ndarray, float]:
-    """The solid's ten sums (10, 2) in plain doubles, block by block; blocks are combined without error.
+    """The solid's ten sums (10, 2) in plain doubles, block by block; the sums of blocks are added without error.
 
-    Also Σ(|b − a|² + |c − a|²), which measures how much d can round.
+    Also Σ(|b − a|² + |c − a|²), which measures the rounding error of d.
     """
     sums = np.zeros((10, 2))
     edges = 0.0
@@ -300,7 +300,7 @@ def _scalar_product(a: tuple[_Pair, ...], b: tuple[_Pair, ...]) -> _Pair:
 
 @njit(cache=True, nogil=True)
 def _add(sums: np.ndarray, slot: int, p: _Pair) -> None:
-    """Add to a sum of ``sums`` (10, 2, _LANES)."""
+    """Add p to one sum of ``sums`` (10, 2, _LANES)."""
     high = 2 * slot * _LANES
     total = load(sums, high, p[0]), load(sums, high + _LANES, p[0])
     total = _plus(total, p)
@@ -310,8 +310,8 @@ def _add(sums: np.ndarray, slot: int, p: _Pair) -> None:
 
 @njit(cache=True, nogil=True)
 def _compensated_sums(vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float) -> np.ndarray:
-    """The solid's ten sums (10, 2) in pairs (about 104 bits), for bodies so thin that a double's products round too
-    much: from the reference every corner is exact."""
+    """The solid's ten sums (10, 2) in pairs (about 104 bits), for bodies so thin that products of doubles round too
+    much; relative to the reference every corner is exact."""
     of_lanes = np.zeros((10, 2, _LANES))
     corners = np.empty((9, _BLOCK))
     zero = filled(0.0, _LANES)
@@ -346,8 +346,8 @@ def _compensated_sums(vertices: np.ndarray, triangles: np.ndarray, reference: np
 
 @njit(cache=True, nogil=True)
 def _solid(vertices: np.ndarray, triangles: np.ndarray, path: int, numbers: np.ndarray) -> int:
-    """Fill in the solid's ``numbers`` as ``_central`` does, with sums by the path of that number of PATHS; returns the
-    flaw of a mesh that has one, or 0.
+    """Compute the solid's ``numbers`` as in ``_central``, with the summation of that number in PATHS; returns the flaw
+    of the mesh, or 0.
     """
     if _leads_outside(triangles, vertices.shape[0]):
         return _OUTSIDE
@@ -367,12 +367,12 @@ def _solid(vertices: np.ndarray, triangles: np.ndarray, path: int, numbers: np.n
 
 
 def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "auto") -> Moments:
-    """Moments of the solid that ``triangles`` (m, 3) over ``vertices`` (n, 3) bound, exact to about 1e-14.
+    """Moments of the solid bounded by ``triangles`` (m, 3) over ``vertices`` (n, 3), accurate to about 1e-14.
 
-    Signed: a surface wound inward gives a negative volume and negative second moments. One pass in plain doubles;
-    where the estimated rounding ε·size·Σ|edge|²/V is too large (thin bodies, few triangles) one in pairs takes over.
-    ``path``: one of PATHS. Raises MeshError for an empty or non-finite mesh, a vertex number out of range, or zero
-    volume.
+    Signed: a surface wound inward gives a negative volume and negative second moments. One pass in plain doubles; where
+    the estimated rounding ε·size·Σ|edge|²/V is too large (thin bodies, few triangles) a pass in pairs of doubles is
+    used. ``path``: one of PATHS. Raises MeshError for an empty or non-finite mesh, a vertex number out of range, or
+    zero volume.
     """
     vertices, triangles = _arrays(vertices, triangles)
     numbers = np.zeros(16)
@@ -381,7 +381,7 @@ def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "a
 
 
 def _surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """``_arrays``; raises MeshError also for a triangle with a vertex that isn't there."""
+    """``_arrays``; also raises MeshError for a vertex number out of range."""
     vertices, triangles = _arrays(vertices, triangles)
     _refuse(_OUTSIDE if _leads_outside(triangles, vertices.shape[0]) else 0, vertices.shape[0])
     return vertices, triangles
@@ -401,7 +401,7 @@ def _point(points: np.ndarray, i: int) -> _Point:
 
 @njit(cache=True, nogil=True)
 def _normal(points: np.ndarray, triangle: np.ndarray) -> _Point:
-    """The triangle's normal, twice its area long."""
+    """The triangle's normal; its length is twice the area."""
     a, b, c = _point(points, triangle[0]), _point(points, triangle[1]), _point(points, triangle[2])
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     wx, wy, wz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
@@ -410,7 +410,7 @@ def _normal(points: np.ndarray, triangle: np.ndarray) -> _Point:
 
 @njit(cache=True, nogil=True)
 def _shell_sums(points: np.ndarray, triangles: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Ten sums (10, 2) over polygons, of which the triangles from one number in ``starts`` to the next are the fans."""
+    """The ten sums (10, 2) over polygons; polygon k consists of the triangles starts[k] to starts[k + 1] − 1, a fan."""
     sums = np.zeros((10, 2))
     for polygon in range(starts.shape[0] - 1):
         mx = my = mz = 0.0  # twice the Newell normal: the fan triangles' normals add up to it
@@ -438,9 +438,9 @@ def _shell_sums(points: np.ndarray, triangles: np.ndarray, starts: np.ndarray) -
 def shell_moments(vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None) -> Moments:
     """Moments of the surface as a thin shell of uniform thickness; the measure is its area.
 
-    vertices (n, 3), triangles (m, 3); polygon_starts (p + 1,) says which fan triangles make up a polygon, None that
-    each triangle is one. A fan triangle of a concave polygon that lies outside it counts negative: its sign is that of
-    its normal against the polygon's Newell normal. Raises MeshError for an empty mesh, non-finite vertices, or zero
+    vertices (n, 3), triangles (m, 3); polygon_starts (p + 1,) says which fan triangles form a polygon; None if each
+    triangle is one. A fan triangle of a concave polygon that lies outside it counts negative: its sign is that of its
+    normal relative to the polygon's Newell normal. Raises MeshError for an empty mesh, non-finite vertices, or zero
     area.
     """
     vertices, triangles = _surface(vertices, triangles)
@@ -494,7 +494,7 @@ def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     side = high - low
     volume = float(side[0] * side[1] * side[2])
     second = np.zeros(6)
-    # A flat box has no volume but a distribution all the same: a unit measure then stands for its mass.
+    # A flat box has no volume, but a mass distribution: its measure is then 1.
     measure = volume if volume > 0.0 else 1.0
     second[[0, 3, 5]] = measure * (side * side) / 12.0
     return Moments(np.concatenate([[measure], 0.5 * low + 0.5 * high, np.zeros(6), second]))
@@ -506,8 +506,6 @@ MODELS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray | None], Moments]
     "points": lambda vertices, triangles, _: point_moments(vertices, triangles),
     "bounding_box": lambda vertices, triangles, _: box_moments(vertices, triangles),
 }
-"""How mass is spread over vertices, triangles and polygon_starts: the moments of each of INERTIA_MODELS that a mesh
-has.
-"""
+"""The moments of each of INERTIA_MODELS that a mesh has, as functions of vertices, triangles and polygon_starts."""
 STRETCHED = ("shell",)
-"""Models whose measure stretches by direction, so that a scale that isn't uniform takes a new pass."""
+"""Models whose measure stretches depending on direction, so that a non-uniform scale needs a new pass."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mass, centre of mass and inertia of a mesh under each model; every change but the mesh itself is closed form."""
+"""Mass, centre of mass and inertia of a mesh for each model, in closed form except for a change of the mesh itself."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Surface = tuple[np.ndarray, np.ndarray]
 class MassProperties:
     """mass [kg], center_of_mass (3,) [m, mesh axes, after scale], inertia (3, 3) [kg m², about the COM, mesh axes].
 
-    warnings: what the tensor check had to say.
+    warnings: those of the tensor check.
     """
 
     mass: float
@@ -54,7 +54,7 @@ def scale_vector(scale: ArrayLike) -> np.ndarray:
 
 
 def _checked_ballast(ballast: Iterable) -> np.ndarray:
-    """Entries with a mass, (k, 4): m, x, y, z."""
+    """Ballast entries with a mass above 0, (k, 4): m, x, y, z."""
     checked = []
     for entry in ballast:
         try:
@@ -73,13 +73,13 @@ _NO_BALLAST = np.empty((0, 4))
 
 @dataclass
 class MeshMoments:
-    """A mesh's moments at unit density, each model's computed when first asked for and never again.
+    """A mesh's moments at unit density; each model's are computed on first use and kept.
 
-    vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as ``shell_moments`` takes it. ``no_solid``
-    says why the surface bounds no solid and what helps, "" that it bounds one: the solid model, and a density, are then
-    refused with it. ``stand_in`` makes another solid's vertices (k, 3) and triangles (l, 3), which is
-    then taken instead, for a surface that bounds none or whose parts overlap.
-    Of a surface wound inward throughout the results are those of the outward one.
+    vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as in ``shell_moments``. ``no_solid``: why
+    the surface bounds no solid and what helps, "" if it bounds one; with it the solid model, and a density, are
+    refused. ``stand_in`` returns vertices (k, 3) and triangles (l, 3) of another solid that is used instead, for a
+    surface that bounds none or whose parts overlap. For a surface wound inward throughout the results are those of the
+    outward one.
     """
 
     vertices: np.ndarray
@@ -99,10 +99,10 @@ class MeshMoments:
         return self.vertices, self.triangles
 
     def moments(self, model: str, scale: ArrayLike = (1.0, 1.0, 1.0)) -> Moments:
-        """Unscaled moments of ``model`` at unit density, outward; ``scale`` counts for STRETCHED alone.
+        """Unscaled moments of ``model`` at unit density, outward; ``scale`` matters only for STRETCHED.
 
-        A shell's area elements stretch by direction, so a non-uniform scale takes a new pass over the surface; it is
-        kept per ratio of the components. Its moments are then those of the shape stretched by scale/|scale_x|.
+        The area elements of a shell stretch by direction, so a non-uniform scale needs a new pass over the surface; it
+        is kept per ratio of the components. Its moments are then those of the shape stretched by |scale|/|scale_x|.
         """
         if model not in MODELS:
             raise InputError("inertia_model", model, ", ".join(MODELS))
@@ -138,12 +138,12 @@ class MeshMoments:
         ballast: Iterable = (),
         com: str = "model",
     ) -> MassProperties:
-        """Mass properties of ``model`` at any scale, mass, density and ballast, in closed form on its ten numbers.
+        """Mass properties of ``model`` at any scale, mass, density and ballast, in closed form from its ten moments.
 
-        com: one of MODEL_COMS; "solid" carries the model's tensor, as it is about its own centre, to the solid's.
-        scale: one or three nonzero numbers; an odd number of negative ones mirrors the body. ballast: entries (m [kg],
-        x, y, z [mesh coordinates]); the position scales with the mesh, the mass is added to the body's. Raises
-        InputError, MeshError (surface not closed where a volume is needed) or TensorError (collinear body).
+        com: one of MODEL_COMS; "solid" moves the model's tensor, unchanged about its own centre, to the solid's. scale:
+        one or three nonzero numbers; an odd number of negative ones mirrors the body. ballast: entries (m [kg], x, y, z
+        [mesh coordinates]); the position scales with the mesh, the mass is added to the body's. Raises InputError,
+        MeshError (surface not closed where a volume is needed) or TensorError (collinear body).
         """
         if com not in MODEL_COMS:
             raise InputError("inertia_model_com", com, ", ".join(MODEL_COMS))
@@ -151,7 +151,7 @@ class MeshMoments:
         points = _checked_ballast(ballast)
         moments = self.moments(model, s)
         own = self.body_mass(scale=s, mass=mass, density=density)
-        # The shell's pass already stretched the shape: what is left is the uniform part and the mirroring.
+        # A shell's moments include the stretch: the uniform part and the mirroring are left.
         left = np.copysign(abs(s[0]), s) if model in STRETCHED else s
         place, low, base = moments.center, moments.center_low, moments.reference
         if com == "solid":
@@ -176,8 +176,8 @@ def explicit_mass_properties(
     ballast: Iterable = (),
     scale: ArrayLike = (1.0, 1.0, 1.0),
 ) -> MassProperties:
-    """Given numbers as they are: mass [kg], center_of_mass (3,) [mesh coordinates], tensor6 (ixx, ixy, ixz, iyy, iyz,
-    izz) [kg m², about the COM]. ``scale`` moves the COM and the ballast with the picture; mass and tensor are final.
+    """Mass properties from given numbers: mass [kg], center_of_mass (3,) [mesh coordinates], tensor6 (ixx, ixy, ixz,
+    iyy, iyz, izz) [kg m², about the COM]. ``scale`` moves COM and ballast with the mesh; mass and tensor are final.
     """
     s = scale_vector(scale)
     if not (0.0 < float(mass) < math.inf):

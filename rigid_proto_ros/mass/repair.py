@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Repair of a surface: drop copies, weld rims, orient (cavities stay cavities), cap holes. Each step says what it did.
+"""Repair of a surface: drop duplicates, weld rims, orient (cavities stay cavities), cap holes. Each step reports what
+it did.
 
-The file's vertices keep their numbers; nothing is moved but rim vertices that are welded onto a neighbour by using its
-number instead of theirs.
+Vertices keep their numbers and positions. A vertex on a rim (boundary of a hole) is welded by using another's number.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from ..mesh.topology import Topology, component_sums, fan, joined_sets, mesh_top
 from .verdict import MAX_NESTED_COMPONENTS, counted
 
 WELD = 1e-5
-"""Rim vertices closer than this part of the diagonal are one: files with six digits round by up to that."""
+"""Rim vertices closer than this fraction of the diagonal are welded: the rounding of files with six digits."""
 
 
 @dataclass
 class RepairedSurface:
-    """Triangles (m, 3) over vertices (n, 3) with polygon_starts (p + 1,) or None, changed step by step."""
+    """Triangles (m, 3) over vertices (n, 3) with polygon_starts (p + 1,) or None, modified step by step."""
 
     vertices: np.ndarray
     triangles: np.ndarray
@@ -41,21 +41,21 @@ class RepairedSurface:
         self.triangles = np.where(triangles[:, None], self.triangles[:, [0, 2, 1]], self.triangles)
 
     def add_polygon(self, ring: list[int]) -> None:
-        """Append a polygon, fanned from its first corner."""
+        """Append a polygon as a fan of triangles from its first corner."""
         if self.polygon_starts is None:
             self.polygon_starts = np.arange(len(self.triangles) + 1)
         self.triangles = np.concatenate([self.triangles, fan(ring)])
         self.polygon_starts = np.append(self.polygon_starts, len(self.triangles))
 
     def topology(self) -> Topology:
-        """The topology as it is now."""
+        """The current topology."""
         return mesh_topology(self.vertices, self.triangles)
 
 
 def repair_surface(
     vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray | None, tuple[str, ...]]:
-    """Repaired triangles (k, 3), their polygon starts, and what was done, one phrase a step; empty when nothing was."""
+    """Repaired triangles (k, 3), their polygon starts, and what was done, one phrase per step; empty if nothing was."""
     surface = RepairedSurface(vertices, triangles, polygon_starts)
     done = [*_drop_copies(surface), *_weld_rims(surface), *_orient(surface), *_cap_holes(surface)]
     done += _turn_outward(surface)
@@ -70,12 +70,12 @@ def _drop_copies(surface: RepairedSurface) -> list[str]:
     return [f"removed {counted(int(np.count_nonzero(surplus)), 'duplicate face')}"]
 
 
-_SWEEP = np.array([0.8163, 0.3719, 0.4421])  # along no rim's plane: few points share a place along it
+_SWEEP = np.array([0.8163, 0.3719, 0.4421])  # oblique, so that few points project to the same place
 
 
 @njit(cache=True, nogil=True)
 def _near_pairs(points: np.ndarray, order: np.ndarray, tolerance: float, target: np.ndarray) -> None:
-    """For points (k, 3), visited in order along _SWEEP, the first point within ``tolerance`` as target (k,)."""
+    """Set target (k,) of points (k, 3) to the first point within ``tolerance``, in their order along _SWEEP."""
     rounding = 0.0
     for k in range(3):
         rounding = max(rounding, 1e-14 * np.max(np.abs(points[:, k])))
@@ -93,7 +93,7 @@ def _near_pairs(points: np.ndarray, order: np.ndarray, tolerance: float, target:
 
 
 def _weld_rims(surface: RepairedSurface) -> list[str]:
-    """Let triangles use one number for rim vertices closer than WELD of the diagonal."""
+    """Use one number for rim vertices closer than WELD of the diagonal."""
     topology = surface.topology()
     rim = np.unique(topology.boundary[:, :2])
     if not len(rim):
@@ -109,7 +109,7 @@ def _weld_rims(surface: RepairedSurface) -> list[str]:
     far = float(np.max(np.linalg.norm(points - points[target], axis=1)))
     number = np.arange(len(surface.vertices))
     number[rim] = rim[target]
-    # Corners that aren't moved keep their own numbers, also where several stand at one place.
+    # Corners that aren't welded keep their own numbers, even where several have the same position.
     moves = number[topology.corners] != topology.corners
     surface.triangles = np.where(moves, number[topology.corners], surface.triangles)
     flat = np.where(moves, surface.triangles, topology.corners)
@@ -118,10 +118,10 @@ def _weld_rims(surface: RepairedSurface) -> list[str]:
 
 
 def _turns(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Whether to turn each triangle (m,) so that neighbours agree with the first one of their patch, that one (m,), and
-    whether all can; edges (e, 6) as in Topology, those of two triangles alone.
+    """Whether to reverse each triangle (m,) so that it agrees with the first one of its patch, that first one (m,), and
+    whether all can agree; edges (e, 6) as in Topology, of which only those of two triangles matter.
 
-    Each triangle is there twice, as it is and turned; those that agree across an edge are of one set.
+    Union-find with two elements per triangle, as it is and reversed; those that agree across an edge are joined.
     """
     edges = edges[(edges[:, 2] + edges[:, 3] == 2) & (edges[:, 4] != edges[:, 5])]
     one, other = edges[:, 4].astype(np.int64), edges[:, 5].astype(np.int64)
@@ -142,7 +142,7 @@ def _orient(surface: RepairedSurface) -> list[str]:
         return ["could not orient it: it has only one side, as a Moebius strip"]
     turned = np.bincount(patch, weights=turn, minlength=len(turn))
     size = np.bincount(patch, minlength=len(turn))
-    turn ^= (turned > 0.5 * size)[patch]  # keep the way that most of a patch has
+    turn ^= (turned > 0.5 * size)[patch]  # keep the winding of most of a patch
     surface.turn(turn)
     return [f"turned {counted(int(np.count_nonzero(turn)), 'face')} to agree with the neighbours"]
 
@@ -150,7 +150,7 @@ def _orient(surface: RepairedSurface) -> list[str]:
 def close_surface(
     vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Triangles and polygon starts with a cap over whatever keeps the surface open or its edges unbalanced."""
+    """Triangles and polygon starts with caps added where the surface is open or its edges are unbalanced."""
     surface = RepairedSurface(vertices, triangles, polygon_starts)
     for walk in rims(surface.topology().unbalanced):
         surface.add_polygon(walk)
@@ -158,7 +158,7 @@ def close_surface(
 
 
 def _cap_holes(surface: RepairedSurface) -> list[str]:
-    """Close each rim with one polygon; rims that meet in a vertex are walked one after the other."""
+    """Close each rim with one polygon; rims that meet in a vertex are followed one after the other."""
     topology = surface.topology()
     rim = topology.boundary
     if not len(rim):
@@ -171,7 +171,7 @@ def _cap_holes(surface: RepairedSurface) -> list[str]:
 
 
 def _turn_outward(surface: RepairedSurface) -> list[str]:
-    """Outermost components outward, those inside one of them inward, and so on by parity."""
+    """Orient outermost components outward, those inside one of them inward, and so on by parity."""
     topology = surface.topology()
     if len(topology.unbalanced) or not 0 < topology.components <= MAX_NESTED_COMPONENTS:
         return []
@@ -179,7 +179,7 @@ def _turn_outward(surface: RepairedSurface) -> list[str]:
     wrong = sums.volume < 0.0
     if topology.components > 1:
         nesting = component_nesting(surface.vertices, topology, sums)
-        # Where it is unknown how they lie they stay as they are.
+        # Components stay as they are if their nesting is unknown.
         wrong = (np.sign(sums.volume) == np.where(nesting.depth % 2 == 0, -1.0, 1.0)) & nesting.complete
     if not wrong.any():
         return []

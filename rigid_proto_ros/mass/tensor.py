@@ -12,17 +12,17 @@ from ..base.compilation import njit
 from ..base.errors import TensorError
 
 TRIANGLE_SLACK_GIVEN = 1e-5
-"""Given tensors may miss A + B ≥ C by this much of C: published ones are rounded to five or six digits."""
+"""Fraction of C by which given tensors may violate A + B ≥ C: published ones are rounded to five or six digits."""
 TRIANGLE_SLACK_COMPUTED = 1e-14
-"""Tensors computed here meet A + B ≥ C to rounding."""
+"""The same for tensors computed here, which satisfy A + B ≥ C to rounding."""
 MAX_MOMENT_RATIO = 1e12
-"""Largest C/A: beyond it the body is a line to double precision and its spin about itself has no meaning."""
-_EQUAL_COMPONENT = 1e-9  # components closer than this tie; the first one then decides the column's sign
+"""Largest C/A: beyond it the body is a line to double precision, and its rotation about that line is undefined."""
+_EQUAL_COMPONENT = 1e-9  # components closer than this count as equal; the first one then decides the column's sign
 
 
 @njit(cache=True)
 def _rotate(a: np.ndarray, v: np.ndarray, p: int, q: int) -> bool:
-    """Turn a (3, 3) so that a[p, q] vanishes, and v (3, 3) along, in place; False when it is below rounding already."""
+    """Jacobi rotation of a (3, 3) to a[p, q] = 0, and of v (3, 3), in place; False if it is below rounding already."""
     g = a[p, q]
     if abs(g) <= 1e-17 * math.sqrt(abs(a[p, p]) * abs(a[q, q])) or g == 0.0:
         return False
@@ -51,7 +51,7 @@ def _rotate(a: np.ndarray, v: np.ndarray, p: int, q: int) -> bool:
 
 @njit(cache=True)
 def _sign_columns(axes: np.ndarray) -> None:
-    """Sign the columns of axes (3, 3), in place: the largest component of the first two positive, a right hand."""
+    """Fix the signs of axes (3, 3), columns, in place: largest component of the first two positive, right-handed."""
     for column in range(2):
         largest = max(abs(axes[0, column]), abs(axes[1, column]), abs(axes[2, column]))
         k = 0
@@ -74,12 +74,12 @@ def _sign_columns(axes: np.ndarray) -> None:
 def principal_axes_kernel(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Principal moments (3,) ascending and axes (3, 3), columns, of a symmetric ``inertia`` (3, 3).
 
-    Cyclic Jacobi rotations until every off-diagonal is below rounding of its own two diagonals: for a well-scaled
-    positive definite tensor each moment then has high relative accuracy (Demmel and Veselić, SIAM J. Matrix Anal.
-    Appl. 13, 1992), the smallest one too. The tensor of a slender body in axes other than its own holds the smallest
-    moment, and the difference of the others, to ε times the largest alone: flights say so where it matters
-    (simulation/flight.py). The axes form a proper rotation: the largest component of the first and second column is
-    positive, the third completes the right hand.
+    Cyclic Jacobi rotations until every off-diagonal element is below the rounding of its two diagonal elements: for a
+    well-scaled positive definite tensor each moment then has high relative accuracy (Demmel and Veselić, SIAM J. Matrix
+    Anal. Appl. 13, 1992), the smallest one too. The tensor of a slender body, unless given in its principal axes, holds
+    the smallest moment, and the difference of the others, only to ε times the largest: flights report this where it
+    matters (simulation/flight.py). The axes form a proper rotation: the largest component of the first and second
+    column is positive, the third makes them right-handed.
     """
     a = inertia.copy()
     v = np.eye(3)
@@ -106,12 +106,12 @@ def principal_axes_kernel(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments (3,) ascending [kg m²] and axes (3, 3), columns, of ``inertia`` (3, 3), as the kernel says."""
+    """Principal moments (3,) ascending [kg m²] and axes (3, 3), columns, of ``inertia`` (3, 3); see the kernel."""
     return principal_axes_kernel(np.ascontiguousarray(inertia, dtype=np.float64))
 
 
 def tensor_from_six(six: Sequence[float]) -> np.ndarray:
-    """(ixx, ixy, ixz, iyy, iyz, izz) as a symmetric (3, 3) matrix; off-diagonals carry the tensor's sign."""
+    """(ixx, ixy, ixz, iyy, iyz, izz) as a symmetric (3, 3) matrix; off-diagonals carry the tensor's sign, −∫xy dm."""
     ixx, ixy, ixz, iyy, iyz, izz = (float(value) for value in six)
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
@@ -123,7 +123,7 @@ def six_from_tensor(inertia: np.ndarray) -> tuple[float, float, float, float, fl
 
 
 def check_tensor(inertia: np.ndarray, *, source: str = "inertia tensor") -> tuple[str, ...]:
-    """Warnings about ``inertia`` (3, 3) [kg m², about the COM]; empty when nothing is to be said.
+    """Warnings about ``inertia`` (3, 3) [kg m², about the COM]; empty if there are none.
 
     Raises TensorError, its field ``source``, when no rigid body has such a tensor: not finite, not symmetric, a moment
     that isn't positive, C/A beyond 1e12, or A + B < C (1 − 1e-5) for principal moments A ≤ B ≤ C.

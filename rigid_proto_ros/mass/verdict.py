@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A verdict on a surface before any number is taken from it: what is wrong, how much, and what can be done."""
+"""Checks of a surface before its moments are computed: what is wrong, how large the effect is, and what can be done."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from .moments import referenced_vertices, solid_moments
 INFO, WARNING, ERROR = "info", "warning", "error"
 NESTED = "nested_components"
 NO_OVERLAP = 1e-6
-"""Part of the volume below which an overlap is a remark, no warning."""
+"""Fraction of the volume below which an overlap is a remark, not a warning."""
 MAX_NESTED_COMPONENTS = 2000
-"""Above this many components their mutual position isn't examined: the tables grow with the square."""
+"""Number of components above which their nesting isn't examined: the tables grow with its square."""
 NO_VOLUME = 1e-14
-"""V/(area·diagonal) below which the surface encloses nothing: both sides coincide to rounding."""
+"""V/diagonal³ below which the volume is recomputed in pairs; it is none if V/(area·diagonal) is below 1e-2 of this."""
 SIZE_RANGE = 1e-60, 1e60
-"""Longest sides of surfaces that are judged: moments grow with the fifth power, and doubles end at 1e308."""
+"""Smallest and largest longest side of a surface: moments grow with the fifth power, and doubles end at 1e308."""
 SMALL_HOLES = 0.1
-"""Largest effect of holes that is said together with the option that accepts it."""
+"""Largest effect of holes for which the message includes the option that accepts it."""
 MAX_RIM = 20_000
-"""Unbalanced edges up to which caps are tried; walking along more takes long."""
+"""Unbalanced edges up to which caps are tried; following more takes too long."""
 MAX_SELF_CROSSING = 20_000
-"""Triangles above which a single component isn't examined for passing through itself."""
+"""Triangles above which a single component isn't examined for self-intersection."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class Finding:
 
 @dataclass
 class Verdict:
-    """What was found. ``usable``: coordinates are finite, so that the other models have a meaning; ``closed``: the
-    surface bounds a solid; ``reason``: why not; ``inward``: it is wound inward throughout and is to be turned.
-    ``hole_effect``: by what part of itself the volume, or the tensor by that of its largest entry, changes at most by
-    what closes an open surface, None where that isn't known; ``united``: components overlap, and the solid is their
-    union."""
+    """Result of the checks. ``usable``: there are faces, coordinates are finite, and the longest side is in SIZE_RANGE,
+    so that other models can be computed; ``closed``: the surface bounds a solid; ``reason``: why not; ``inward``: it is
+    wound inward throughout and must be reversed. ``hole_effect``: the largest change of volume, relative to itself, or
+    of the tensor, relative to its largest entry, that closing an open surface can cause; None if unknown; ``united``:
+    components overlap, and the solid is their union."""
 
     findings: list[Finding] = field(default_factory=list)
     usable: bool = True
@@ -62,7 +62,7 @@ class Verdict:
     united: bool = False
 
     def add(self, code: str, severity: str, message: str, remedy: str = "") -> None:
-        """Append a finding; an error also closes the way to the solid, the first one giving the reason."""
+        """Append a finding. An error also rules out the solid; the first error is the reason."""
         self.findings.append(Finding(code, severity, f"{message}; {remedy}" if remedy else message))
         if severity == ERROR:
             self.closed = False
@@ -70,12 +70,12 @@ class Verdict:
 
 
 def counted(number: int, noun: str) -> str:
-    """``number`` and the noun, in the plural but for one."""
+    """``number`` and the noun, in the plural unless it is 1."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray) -> None:
-    """Open, inconsistently wound, duplicated, and how much depends on how holes are closed."""
+    """Check for open edges, inconsistent winding and duplicate faces, and for the effect of closing holes."""
     verdict.watertight = topology.odd == 0
     verdict.winding_consistent = topology.flipped == 0
     surplus = int(np.count_nonzero(surplus_copies(topology)))
@@ -105,11 +105,11 @@ def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray) -> 
 
 
 def _hole_effect(topology: Topology, vertices: np.ndarray) -> float | None:
-    """As ``Verdict.hole_effect``, of a surface that flat caps close: the largest that any surface over the holes can do
-    that has the caps' area and lies no farther from the centre of mass. None for one without a volume.
+    """``Verdict.hole_effect`` of a surface that flat caps close: the largest effect of any surface over the holes that
+    has the caps' area and lies no farther from the centre of mass. None for one without a volume.
 
-    Seen from there, an element dA at the distance r adds at most r dA/3 to the volume, r² dA/4 to the first and r³ dA/5
-    to the second moments.
+    Relative to the centre of mass, an element dA at the distance r adds at most r dA/3 to the volume, r² dA/4 to the
+    first and r³ dA/5 to the second moments.
     """
     if not 0 < len(topology.unbalanced) <= MAX_RIM:
         return None
@@ -131,13 +131,13 @@ def _hole_effect(topology: Topology, vertices: np.ndarray) -> float | None:
 
 
 def _rounded_up(value: float) -> str:
-    """Two digits that are no less than ``value``."""
+    """``value`` rounded up to two digits."""
     step = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0.0 else 1e-12
     return f"{step * math.ceil(value / step + 1e-9):.2g}"
 
 
 def _check_components(verdict: Verdict, topology: Topology, sums: Components, vertices: np.ndarray) -> None:
-    """Outward or inward, cavities, parts that count twice or pass through themselves; for balanced edges."""
+    """Check balanced surfaces for orientation, cavities, parts that count twice, and self-intersection."""
     count, volume = topology.components, sums.volume
     whole = float(np.sum(volume))
     verdict.inward = whole < 0.0
@@ -160,7 +160,7 @@ def _check_components(verdict: Verdict, topology: Topology, sums: Components, ve
 
 
 def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> None:
-    """Which of the components, of signed volume (k,), count with the wrong sign."""
+    """Find the components, of signed volume (k,), that count with the wrong sign."""
     expected = np.where(nesting.depth % 2 == 0, 1.0, -1.0)
     matters = volume != 0.0
     wrong = matters & (np.sign(volume) != expected)
@@ -184,7 +184,7 @@ def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> No
 def _check_overlap(
     verdict: Verdict, nesting: Nesting, volume: float, vertices: np.ndarray, triangles: np.ndarray
 ) -> None:
-    """Components that cross: by how much their volumes' sum exceeds that of the union, where it can be had."""
+    """For components that intersect: how much the sum of volumes exceeds that of the union, if it can be computed."""
     overlap, whole = f"{counted(len(nesting.crossing), 'pair')} of components overlap", 0.0
     if verdict.closed and not verdict.inward:
         with contextlib.suppress(MeshError):
@@ -204,7 +204,7 @@ def _check_overlap(
 
 
 def _check_size(verdict: Verdict, side: float) -> None:
-    """Nothing can be computed of a surface whose longest side is zero, or so large or small that moments overflow."""
+    """Refuse a surface whose longest side is zero, or so large or small that moments overflow or underflow."""
     verdict.usable = SIZE_RANGE[0] <= side <= SIZE_RANGE[1]
     if side == 0.0:
         verdict.add("zero_volume", ERROR, "all vertices lie in one point")
@@ -248,7 +248,7 @@ def check_surface(vertices: np.ndarray, triangles: np.ndarray) -> Verdict:
 
 
 def _no_volume(vertices: np.ndarray, triangles: np.ndarray, diagonal: float) -> bool:
-    """Whether the volume, taken in pair arithmetic, is below rounding of area × diagonal."""
+    """Whether the volume, computed in pairs of doubles, is below the rounding of area × diagonal."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     area = 0.5 * float(np.sum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
     try:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Meshes from files, their cache, and the topology of their surfaces."""
+"""Meshes from files, and the topology and intersections of their surfaces."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the readers of text files share: words to numbers, and the refusal of a line."""
+"""Common parts of the readers of text files: parsing of numbers, and errors that name a line."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from ..base.errors import MeshError
 
 
 def as_numbers(text: bytes, count: int = -1, kind: type = float) -> tuple[np.ndarray, bool]:
-    """The blank separated numbers (k,) at the beginning of a text, up to the first word that is none, and whether that
-    is all of it, ``count`` numbers if that isn't −1.
+    """The whitespace separated numbers (k,) at the beginning of a text, up to the first word that isn't a number, and
+    whether they are all of it, and ``count`` numbers unless that is −1.
 
-    Doubles are the nearest to the decimals; nan and inf are numbers here, a verdict refuses them.
+    Doubles are the nearest to the decimals; nan and inf count as numbers here and are refused by the verdict.
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", DeprecationWarning)  # as which older versions of NumPy tell it
+            warnings.simplefilter("error", DeprecationWarning)  # older versions of NumPy only warn
             numbers: np.ndarray = np.fromstring(text, kind, sep=" ")
-            if count in (-1, len(numbers)) and b"\0" not in text:  # at which reading would end
+            if count in (-1, len(numbers)) and b"\0" not in text:  # NumPy stops at NUL
                 return numbers, True
     except (DeprecationWarning, ValueError):
         pass
     values = []
     for word in text.split():
         try:
-            values.append(float(kind(word.replace(b"_", b"?"))))  # which Python takes within a number
+            values.append(float(kind(word.replace(b"_", b"?"))))  # Python allows _ in numbers
         except (ValueError, OverflowError):
             break
     return np.array(values), False
 
 
 def error_at(data: bytes, position: int, name: str, accepted: str, first_line: int = 1) -> MeshError:
-    """The refusal of what stands at byte ``position``: file, line, the text there, and what is accepted."""
+    """The error for the text at byte ``position``: file, line, the text there, and what is accepted."""
     line = data.count(b"\n", 0, position) + first_line
     return MeshError(f"{name} line {line}", excerpt(data, position), accepted)
 

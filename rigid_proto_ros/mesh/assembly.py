@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Scenes of placed parts as one surface, and those that a library reads: COLLADA through pycollada, without looks,
-lights and motion, and formats that have no reader here through trimesh.
+"""Scenes of placed parts as one surface, and formats read by a library: COLLADA by pycollada, without materials, lights
+and animation, and by trimesh formats that have no reader here.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from ..base.errors import MeshError, is_missing
 
 _LIBRARIES = ("images", "effects", "materials", "cameras", "lights", "animations", "animation_clips", "controllers")
 _UNUSED = (*(f"library_{kind}" for kind in _LIBRARIES), "bind_material", "instance_camera", "instance_light", "extra")
-"""Elements that no triangle depends on. pycollada drops a geometry whose material it can't read."""
+"""Elements without effect on triangles. pycollada drops a geometry whose material it can't read."""
 _ARCHIVES = ("zip", "bz2", "tar.bz2", "tar.gz", "zae")
 MAX_TRIANGLES = 20_000_000
-"""A mesh of more is refused: this many take about 1.5 GB."""
+"""A mesh with more triangles is refused: this many take about 1.5 GB."""
 
 
 class Assembly:
@@ -31,9 +31,9 @@ class Assembly:
         self._count = self._held = 0
 
     def add(self, vertices: np.ndarray, triangles: np.ndarray, matrix: np.ndarray, part: str) -> None:
-        """Append ``part``: vertices (n, 3) as matrix (4, 4) places them, and triangles (m, 3), turned where it mirrors.
+        """Append ``part``: vertices (n, 3) transformed by matrix (4, 4), triangles (m, 3) reversed if it mirrors.
 
-        Raises MeshError for a triangle that names a vertex that the part doesn't have, and beyond MAX_TRIANGLES.
+        Raises MeshError for a vertex number out of range, and beyond MAX_TRIANGLES.
         """
         triangles = np.asarray(triangles, dtype=np.int64).reshape(-1, 3)
         wrong = triangles[(triangles < 0) | (triangles >= len(vertices))]
@@ -43,9 +43,9 @@ class Assembly:
         if max(self._held, (self._count + len(vertices)) // 3) > MAX_TRIANGLES:
             raise MeshError(self.name, f"it has more than {MAX_TRIANGLES} triangles", "a smaller mesh")
         linear, shift = matrix[:3, :3], matrix[:3, 3]
-        with np.errstate(all="ignore"):  # the verdict refuses what isn't finite
+        with np.errstate(all="ignore"):  # the verdict refuses numbers that aren't finite
             x, y, z = np.asarray(vertices, dtype=np.float64).T[:, :, None]
-            # Summed in a fixed order: BLAS would pick one by processor.
+            # Summed in a fixed order: that of BLAS depends on the processor.
             self._vertices.append(x * linear[:, 0] + y * linear[:, 1] + z * linear[:, 2] + shift)
         if np.linalg.det(linear) < 0.0:
             triangles = triangles[:, [0, 2, 1]]
@@ -63,7 +63,7 @@ def tag_of(element: ElementTree.Element) -> str:
 
 
 def _geometry_alone(data: bytes, name: str) -> bytes:
-    """The document without what isn't geometry."""
+    """The document reduced to its geometry."""
     root = ElementTree.fromstring(data)
     for parent in list(root.iter()):
         for child in list(parent):
@@ -77,7 +77,7 @@ def _geometry_alone(data: bytes, name: str) -> bytes:
 
 
 def add_collada(data: bytes, assembly: Assembly) -> float:
-    """Add the geometry of the scene in a file's bytes, in its unit; returns the metres in that unit.
+    """Add the geometry of the scene in a file's bytes, in the file's unit; returns this unit in metres.
 
     Raises MeshError, or pycollada's errors.
     """
@@ -98,17 +98,17 @@ def add_collada(data: bytes, assembly: Assembly) -> float:
 
 
 def other_formats() -> tuple[str, ...]:
-    """Endings that trimesh, as it is installed, reads."""
+    """File extensions that the installed trimesh reads, without archives."""
     import trimesh
 
     return tuple(sorted(set(trimesh.available_formats()) - set(_ARCHIVES)))
 
 
 def add_by_trimesh(data: bytes, suffix: str, assembly: Assembly) -> float:
-    """Add what trimesh reads of a file's bytes; returns the metres in its unit, 1 if it says none.
+    """Add what trimesh reads from a file's bytes; returns the file's unit in metres, 1 if it states none.
 
-    Vertices stay as the file has them: nothing is merged or sorted. Raises MeshError for a file that shows something
-    else than triangles, for which the rest would stand in silence, and trimesh's errors.
+    Vertices stay as in the file, neither merged nor sorted. Raises MeshError for a file with anything but triangles,
+    which would otherwise be left out silently, and trimesh's errors.
     """
     import trimesh
 

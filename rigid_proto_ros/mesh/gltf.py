@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""glTF 2.0 (.gltf, .glb), as the Khronos specification has it: the triangles of the default scene.
+"""glTF 2.0 (.gltf, .glb) according to the Khronos specification: the triangles of the default scene.
 
-Strips, fans, normalized integers, sparse accessors, instances and Draco's compression are refused by name.
+Strips, fans, normalized integers, sparse accessors, instances and Draco compression are refused by name.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _READ = "KHR_mesh_quantization"
 _LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_")
-"""Beginnings of the names of extensions that change no triangle."""
+"""Prefixes of the names of extensions that change no triangle."""
 
 
 def _chunks(data: bytes, name: str) -> tuple[dict, bytes]:
@@ -45,7 +45,7 @@ def _chunks(data: bytes, name: str) -> tuple[dict, bytes]:
 
 
 class _Document:
-    """A file's JSON object, and the numbers that its accessors stand for."""
+    """The JSON object of a file, and the numbers in its accessors."""
 
     def __init__(self, data: bytes, name: str, beside: Callable[[str], bytes]) -> None:
         self.name = name
@@ -94,7 +94,7 @@ class _Document:
 
 
 def _node_matrix(node: dict) -> np.ndarray:
-    """The matrix (4, 4) that scales, then turns, then shifts, or the given one."""
+    """The matrix (4, 4) of a node: scale, then rotation, then translation; or the given matrix."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     matrix = np.eye(4)
@@ -105,7 +105,7 @@ def _node_matrix(node: dict) -> np.ndarray:
 
 
 def _triangles(document: _Document, primitive: dict) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and triangles (m, 3) of a primitive; none of points and lines."""
+    """Vertices (n, 3) and triangles (m, 3) of a primitive; empty for points and lines."""
     mode = primitive.get("mode", TRIANGLES)
     if mode < TRIANGLES:
         return np.empty((0, 3)), np.empty((0, 3), np.int64)
@@ -124,7 +124,7 @@ def _triangles(document: _Document, primitive: dict) -> tuple[np.ndarray, np.nda
 
 
 def _add_node(document: _Document, number: int, above: np.ndarray, seen: set[int], assembly: Assembly) -> None:
-    """The meshes of a node and of those below it."""
+    """Add the meshes of a node and of its descendants."""
     if number in seen:
         raise MeshError(document.name, f"node {number} occurs twice in the scene; its nodes must be a tree")
     seen.add(number)
@@ -145,10 +145,10 @@ def _add_node(document: _Document, number: int, above: np.ndarray, seen: set[int
 
 
 def add_gltf(data: bytes, beside: Callable[[str], bytes], assembly: Assembly) -> None:
-    """Add the meshes in the default scene of a file's bytes, or of all its nodes where it has no scene.
+    """Add the meshes in the default scene of a file's bytes, or of all its nodes if it has no scene.
 
-    ``beside`` gives the bytes of the file that a buffer's URI names. Raises MeshError, or other errors where the file
-    isn't built as glTF says.
+    ``beside`` returns the bytes of the file that a buffer's URI names. Raises MeshError, or other errors if the file
+    doesn't follow the specification.
     """
     document = _Document(data, assembly.name, beside)
     for extension in document.json.get("extensionsRequired", []):

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Which triangles pass through each other, and which closed components lie inside which others.
+"""Triangles that intersect, and nesting of closed components.
 
-Both ask a bounding volume hierarchy, so that a query visits the few triangles that may matter: these are sorted along a
-Morton curve through their boxes' centres (Morton, IBM 1966; Karras, High Performance Graphics 2012) and taken LEAF at a
-time; the boxes above them form a complete binary tree: node i has the children 2i + 1 and 2i + 2, and leaf l is node
-leaves − 1 + l.
+Both use a bounding volume hierarchy, so that a query visits only few triangles: these are sorted along a Morton curve
+through their boxes' centres (Morton, IBM 1966; Karras, High Performance Graphics 2012) and grouped into leaves of LEAF;
+the boxes above them form a complete binary tree: node i has children 2i + 1 and 2i + 2, leaf l is node leaves − 1 + l.
 
-Two triangles cross where each lies on both sides of the other's plane and the pieces that they cut from the planes'
-common line overlap (Möller, Journal of Graphics Tools 2, 1997). Touching and coplanar triangles don't.
+Two triangles intersect if each lies on both sides of the other's plane and the intervals that they cut from the planes'
+common line overlap (Möller, Journal of Graphics Tools 2, 1997). Touching and coplanar triangles don't count.
 
-A point lies inside a closed component when a ray from it leaves the component more often than it enters it. A ray that
-comes too near an edge to be sure is shot again in another direction, and a point on the other surface decides nothing.
+A point lies inside a closed component if a ray from it leaves and enters the component unequally often. A ray too near
+an edge is repeated in another direction; points on the other surface are ignored.
 """
 
 from __future__ import annotations
@@ -24,23 +23,23 @@ from ..base.compilation import njit
 from .topology import Components, Topology
 
 LEAF = 8
-"""Triangles in a leaf: fewer cost more boxes, more cost tests in vain."""
+"""Triangles per leaf: fewer need more boxes, more need more tests of triangles."""
 WORK_LIMIT = 100_000_000
-"""Boxes visited after which the question is left undecided and said to be so: about a second."""
+"""Visited boxes after which a result is reported as undecided: about a second."""
 TEST = 10
-"""Boxes that cost as much as a test of two triangles."""
+"""Cost of a test of two triangles, in visited boxes."""
 TOUCHING = 1e-9
-"""Part of the triangles' size up to which a distance or an overlap is taken for rounding."""
+"""Fraction of the triangles' size up to which a distance or an overlap counts as rounding error."""
 SAMPLES = 24
-"""Points of a component, inside evenly picked triangles, of which it is asked whether they lie inside another one."""
+"""Points per component, in evenly spaced triangles, that are tested for lying inside another component."""
 NEAR = 1e-9
-"""Part of a triangle's size, or of the mesh's, within which a hit on an edge, or on the surface itself, isn't
-trusted."""
-_CELLS = 1 << 20  # places along each axis that the curve tells apart
+"""Fraction of a triangle's size, or of the mesh's, within which a hit near an edge, or near the ray's origin, is
+uncertain."""
+_CELLS = 1 << 20  # cells of the curve along each axis
 _SPREADING = ((32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F), (4, 0x10C30C30C30C30C3),
               (2, 0x1249249249249249))  # fmt: skip  # put two zeros between the bits of a number
 
-# Directions that no mesh is aligned with; the first alone is used unless a ray meets an edge.
+# Directions unlikely to be aligned with a mesh; only the first is used unless a ray meets an edge.
 _DIRECTIONS = ((0.8163, 0.3719, 0.4421), (-0.2917, 0.9013, -0.3204), (0.1373, -0.5381, 0.8316))
 # Barycentric coordinates of the sample in its triangle: not on any of its symmetry lines.
 _SAMPLE = (0.4479, 0.3413, 0.2108)
@@ -116,8 +115,8 @@ def _boxes_meet(boxes: np.ndarray, i: int, others: np.ndarray, j: int) -> bool:
 
 @njit(cache=True, nogil=True)
 def _heights(triangle: _Triangle, other: _Triangle) -> tuple[_Vector, _Vector]:
-    """Normal of a triangle, as long as twice its area, and its products with the corners of the other one from its
-    first corner; 0 for those in its plane to rounding.
+    """Normal of a triangle, with a length of twice its area, and its scalar products with the corners of the other one
+    relative to its first corner; 0 for corners in its plane to rounding.
     """
     u, w = _minus(triangle[1], triangle[0]), _minus(triangle[2], triangle[0])
     normal = _cross(u, w)
@@ -129,7 +128,7 @@ def _heights(triangle: _Triangle, other: _Triangle) -> tuple[_Vector, _Vector]:
 
 @njit(cache=True, nogil=True)
 def _piece(triangle: _Triangle, heights: _Vector, axis: int, origin: float) -> tuple[float, float]:
-    """Where, along ``axis`` from ``origin``, a triangle begins and ends in the plane over which its corners have
+    """Interval along ``axis``, from ``origin``, in which a triangle meets the plane above which its corners have
     ``heights``."""
     low, high = math.inf, -math.inf
     for k in range(3):
@@ -144,7 +143,7 @@ def _piece(triangle: _Triangle, heights: _Vector, axis: int, origin: float) -> t
 
 @njit(cache=True, nogil=True)
 def triangles_cross(vertices: np.ndarray, corners: np.ndarray, i: int, j: int) -> bool:
-    """Whether triangles i and j of ``corners`` (m, 3) over vertices (n, 3) pass properly through each other."""
+    """Whether triangles i and j of ``corners`` (m, 3) over vertices (n, 3) properly intersect."""
     one, other = _triangle(vertices, corners, i), _triangle(vertices, corners, j)
     normal, above = _heights(one, other)
     if not (min(above) < 0.0 < max(above)):
@@ -172,8 +171,8 @@ def _share_a_corner(corners: np.ndarray, i: int, j: int) -> bool:
 def crossings(
     vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, count: int, tree: Hierarchy, limit: int
 ) -> tuple[int, np.ndarray, bool]:
-    """Pairs of triangles of one component that cross without sharing a corner; which components cross each other,
-    (count, count); and whether ``limit`` visits sufficed. corners (m, 3): over welded vertices; component (m,).
+    """Number of intersecting pairs of triangles of one component without a common corner; which components intersect,
+    (count, count); whether ``limit`` visits sufficed. corners (m, 3): over welded vertices; component (m,).
     """
     order, own, boxes = tree
     inner = len(boxes) // 2
@@ -210,10 +209,10 @@ def crossings(
 
 @njit(cache=True, nogil=True)
 def _hit(triangle: _Triangle, origin: _Vector, direction: _Vector, reach: float) -> tuple[int, bool]:
-    """(sign, sure): +1 where the ray leaves through the triangle, −1 where it enters, 0 for a miss; sure: not near an
-    edge or within ``reach`` of the origin.
+    """(sign, sure): +1 where the ray leaves through the triangle, −1 where it enters, 0 for a miss; sure: neither near
+    an edge nor within ``reach`` of the origin.
 
-    The ray's sides of the three edges are triple products; they weigh the corners to the point that is hit.
+    The ray's sides of the three edges are triple products, which are also the weights of the corners in the hit point.
     """
     a, b, c = _minus(triangle[0], origin), _minus(triangle[1], origin), _minus(triangle[2], origin)
     u, v, w = _dot(direction, _cross(b, c)), _dot(direction, _cross(c, a)), _dot(direction, _cross(a, b))
@@ -245,8 +244,8 @@ def _shoot(
     winding: np.ndarray,
     sure: np.ndarray,
 ) -> int:
-    """Put the signed hits of all components but ``own`` into winding (k,), and into sure (k,) whether they are certain;
-    returns the boxes visited.
+    """Sum the signed hits of all components but ``own`` in winding (k,); sure (k,): whether they are certain. Returns
+    the number of boxes visited.
     """
     winding[:] = 0
     sure[:] = True
@@ -259,7 +258,7 @@ def _shoot(
         node = stack[top]
         visits += 1
         near, far = 0.0, math.inf
-        for k in range(3):  # widened, so that no hit is lost that isn't sure
+        for k in range(3):  # widened, so that no uncertain hit is missed
             a = (boxes[node, k] - reach - origin[k]) / direction[k]
             b = (boxes[node, 3 + k] + reach - origin[k]) / direction[k]
             near, far = max(near, min(a, b)), min(far, max(a, b))
@@ -290,7 +289,7 @@ def _sides(
 ) -> tuple[np.ndarray, np.ndarray, bool]:
     """Which components have samples outside and inside which others, (k, k) each, and whether the work limit sufficed.
 
-    samples (s,): triangles in whose middle a ray begins; near (k, k): pairs whose boxes overlap.
+    samples (s,): triangles in which a ray begins; near (k, k): pairs whose boxes overlap.
     """
     outside, inside = np.zeros_like(near), np.zeros_like(near)
     winding, sure = np.zeros(len(near), np.int64), np.ones(len(near), np.bool_)
@@ -318,8 +317,8 @@ def _sides(
 
 @dataclass(frozen=True)
 class Nesting:
-    """inside (k, k) bool: component i lies in component j. crossing: pairs (i, j) whose surfaces cross. within: pairs
-    of triangles of one component that cross. complete: False when the work limit left this open."""
+    """inside (k, k) bool: component i lies in component j. crossing: pairs (i, j) whose surfaces intersect. within:
+    pairs of triangles of one component that intersect. complete: False if the work limit was reached before."""
 
     inside: np.ndarray
     crossing: tuple[tuple[int, int], ...]
@@ -328,12 +327,12 @@ class Nesting:
 
     @property
     def depth(self) -> np.ndarray:
-        """In how many other components each one lies, (k,)."""
+        """Number of other components in which each one lies, (k,)."""
         return np.count_nonzero(self.inside, axis=1)
 
 
 def component_nesting(vertices: np.ndarray, topology: Topology, sums: Components) -> Nesting:
-    """How closed components lie to each other, and whether they pass through themselves."""
+    """Nesting, intersections and self-intersections of closed components."""
     component, count = topology.component, topology.components
     tree = hierarchy(vertices, topology.corners)
     within, found, complete = crossings(vertices, topology.corners, component, count, tree, WORK_LIMIT)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which file a mesh's name stands for: a path, a ``package://`` or ``model://`` URI, or a bundled name."""
+"""The file for the name of a mesh: a path, a ``package://`` or ``model://`` URI, or a bundled name."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ..base.errors import MeshError, did_you_mean
 
 @dataclass(frozen=True)
 class Search:
-    """Where else to look: ``near``, the folder of the file that names the mesh, from which relative paths count and
-    packages are looked for upwards; ``folders`` that hold packages or models, or are one themselves."""
+    """Additional places to search: ``near``, the folder of the file that names the mesh, for relative paths and for
+    packages in it or above it; ``folders`` that hold packages or models, or are one themselves."""
 
     near: Path | None = None
     folders: tuple[Path, ...] = ()
@@ -36,7 +36,7 @@ def _installed_package(package: str) -> Path | None:
 
 
 def _names_itself(folder: Path, package: str) -> bool:
-    """Whether the folder is called ``package``, or its package.xml is."""
+    """Whether the folder or its package.xml is named ``package``."""
     if folder.name == package:
         return True
     try:
@@ -48,7 +48,7 @@ def _names_itself(folder: Path, package: str) -> bool:
 
 
 def _package_folders(package: str, search: Search) -> Iterator[Path]:
-    """Folders that may be the package or model: those asked for, then installed ones, then upwards from the file."""
+    """Candidates for the package or model: the given folders, then installed ones, then upwards from the file."""
     for folder in search.folders:
         if _names_itself(folder.absolute(), package):
             yield folder
@@ -67,9 +67,9 @@ def _package_folders(package: str, search: Search) -> Iterator[Path]:
 
 
 def resolve_mesh(name: str, search: Search = NOWHERE_ELSE) -> Path:
-    """The file that ``name`` (a path, ``package://package/path``, ``model://model/path`` or a bundled name) stands for.
+    """The file for ``name`` (a path, ``package://package/path``, ``model://model/path`` or a bundled name).
 
-    Raises MeshError when there is none, with the bundled names and the one most like it.
+    Raises MeshError when there is none, with the bundled names and the closest match.
     """
     scheme, colon, rest = name.partition("://")
     try:
@@ -81,7 +81,7 @@ def resolve_mesh(name: str, search: Search = NOWHERE_ELSE) -> Path:
     except (OSError, RuntimeError, ValueError) as error:
         if isinstance(error, MeshError):
             raise
-        # a name too long or with a NUL, a folder that may not be read, a user's home unknown
+        # a name too long or with a NUL, an unreadable folder, an unknown home directory
         reason = getattr(error, "strerror", None) or str(error).rstrip(".")
         accepted = f"a file that can be read, package://<package>/<path>, or a bundled name ({reason})"
         raise MeshError("mesh", name, accepted) from None
@@ -103,7 +103,7 @@ def _at_path(name: str, search: Search) -> Path:
 
 
 def _in_package(name: str, package: str, inside: str, search: Search) -> Path:
-    """The file ``inside`` a package or model; a folder of that name without the file isn't the last word."""
+    """The file ``inside`` a package or model; a folder of that name without the file doesn't end the search."""
     missing: Path | None = None
     for folder in _package_folders(package, search):
         for path in dict.fromkeys((folder / inside, folder / unquote(inside))):

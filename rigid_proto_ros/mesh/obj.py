@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Wavefront .obj: vertices and faces in the file's order, polygons fanned from their first corner.
 
-Blank or tab separated, negative indices counted back from the vertices read so far (also when v and f lines
-interleave), continued lines, ``v/vt/vn`` corners. Lines that carry no geometry of the surface (vt, vn, l, p, groups,
+Supported: blanks and tabs, negative indices counted back from the vertices read so far (also when v and f lines
+interleave), continued lines, ``v/vt/vn`` corners. Lines without geometry of the surface (vt, vn, l, p, groups,
 materials) are skipped, and so is a byte order mark, which would hide the first line.
 """
 
@@ -27,7 +27,7 @@ _EITHER = re.compile(rb"\n([vf])" + _BLANK)
 
 
 def _error(text: bytes, letter: bytes, number: int, name: str, accepted: str) -> MeshError:
-    """The refusal of a line: of those that begin with that letter, the one of that number from 0 on."""
+    """The error for a line: the one with this number, from 0 on, among those that begin with ``letter``."""
     lines = (match.start() + 1 for match in _EITHER.finditer(text) if match[1] == letter)
     return error_at(text, next(itertools.islice(lines, number, None), 0), name, accepted, first_line=0)
 
@@ -45,14 +45,14 @@ def _vertices(text: bytes, name: str) -> np.ndarray:
 
 
 def _faces(text: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Vertex numbers (c,) as they are written, and how many each face has (p,)."""
+    """Vertex numbers (c,) as written, and the number of corners of each face (p,)."""
     found = _F.findall(text)
     sizes = np.array([len(line.split()) for line in found], np.int64)
     if len(sizes) and sizes.min() < 3:
         raise _error(text, b"f", int(np.argmin(sizes)), name, "f with three or more corners")
     corners = b" ".join(found)
     if b"/" in corners:
-        corners = re.sub(rb"/\S*", b"", corners)  # of a corner as v/vt/vn the vertex counts
+        corners = re.sub(rb"/\S*", b"", corners)  # only the vertex of a corner v/vt/vn matters
     numbers, whole = as_numbers(corners, int(sizes.sum()), int)
     wrong = np.flatnonzero(numbers == 0)
     if not whole or len(wrong):
@@ -63,7 +63,7 @@ def _faces(text: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _known(text: bytes) -> np.ndarray:
-    """How many vertices stand before each face (p,)."""
+    """Number of vertices before each face (p,)."""
     letters = np.frombuffer(b"".join(_EITHER.findall(text)), np.uint8)
     return np.cumsum(letters == ord("v"))[letters == ord("f")]
 

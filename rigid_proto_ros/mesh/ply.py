@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Stanford .ply, ASCII and binary, whose faces have one number of corners: every element is then a table.
+"""Stanford .ply, ASCII and binary, with the same number of corners in all faces: every element is then a table.
 
-Read here and not by trimesh, which renumbers textured vertices and takes the first face's number of corners for all.
+Not read by trimesh, which renumbers textured vertices and assumes the first face's number of corners for all.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from .ascii_floats import as_numbers, excerpt
 _KINDS = {"i1": "char int8", "u1": "uchar uint8", "i2": "short int16", "u2": "ushort uint16", "i4": "int int32"}
 _KINDS |= {"u4": "uint uint32", "i8": "int64", "u8": "uint64", "f4": "float float32", "f8": "double float64"}
 _TYPES = {name: kind for kind, names in _KINDS.items() for name in names.split()}
-"""By the header's names, those of numpy."""
+"""NumPy's type codes by the names of types in a header."""
 _FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
 _INDEX_NAMES = ("vertex_indices", "vertex_index")
 _REMEDY = "faces that all have the same number of corners; save the mesh as .obj or .stl"
 SPARE = 2
 """Bytes of a line end that may follow a binary body."""
 MAX_HEADER = 1_000_000
-"""Bytes; a header has some lines of 20 to 60."""
+"""Bytes; a header has some lines of 20 to 60 bytes."""
 
-_Property = tuple[str, str, str]  # name, type, and that of a list's length or ""
+_Property = tuple[str, str, str]  # name, type, and the type of a list's length or ""
 _Element = tuple[str, int, list[_Property]]  # name, rows, properties
 
 
@@ -59,8 +59,8 @@ def _header(data: bytes, name: str) -> tuple[str, list[_Element], int]:
 
 
 def _rows(data: bytes, position: int, element: _Element, order: str, text: bool, name: str) -> np.ndarray:
-    """The element's rows from ``position`` on: fields p0, p1, …, and of lists, all as long as in the first row, their
-    lengths n0, n1, … too. ``text``: all are doubles."""
+    """The element's rows from ``position`` on: fields p0, p1, … and, for lists, which must all be as long as in the
+    first row, their lengths n0, n1, …. ``text``: all numbers are doubles."""
     label, count, properties = element
     label = excerpt(label.encode(), 0)
     short = MeshError(name, f"it can't hold the {count} rows of {label} that it announces; the file may be truncated")
@@ -111,7 +111,7 @@ def read_ply(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray
         scalars = {column: f"p{k}" for k, (column, _, length) in enumerate(properties) if not length}
         lists = [f"p{k}" for k, (column, _, length) in enumerate(properties) if length and column in _INDEX_NAMES]
         if label == "vertex":
-            with np.errstate(invalid="ignore"):  # the verdict refuses what isn't finite
+            with np.errstate(invalid="ignore"):  # the verdict refuses numbers that aren't finite
                 vertices = np.stack([rows[scalars[axis]].astype(np.float64) for axis in "xyz"], axis=1)
         elif label == "face" and lists and count:
             corners = rows[lists[0]]

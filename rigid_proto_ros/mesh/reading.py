@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Meshes from files: which reader takes a file, and what its unit is."""
+"""Meshes from files: selection of the reader, and the file's unit."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from .stl import read_stl
 from .threemf import add_threemf
 
 OWN_FORMATS = ("obj", "off", "ply", "stl")
-"""Formats of one surface. trimesh 5.2 misreads some files of each in silence (benchmarks/mesh_readers.py)."""
+"""Formats of one surface. trimesh 5.2 silently misreads some files of each (benchmarks/mesh_readers.py)."""
 FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae")
-"""Formats read as they are specified; those beyond OWN_FORMATS are scenes of placed parts. What else trimesh reads is
-taken from it."""
+"""Formats read according to their specifications; those beyond OWN_FORMATS are scenes of placed parts. Other formats
+are read by trimesh."""
 MAX_BYTES = 400 * MAX_TRIANGLES
-"""A larger file is refused unread; .obj text with normals takes about 150 bytes a triangle."""
+"""A larger file is refused without reading it; .obj text with normals takes about 150 bytes per triangle."""
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """A surface in mesh coordinates, as its file has it.
+    """A surface in mesh coordinates, as in its file.
 
-    vertices (n, 3) float64 in the file's order, unreferenced ones counted. triangles (m, 3) int64; a polygon's fan
-    triangles follow each other: polygon k is triangles[polygon_starts[k]:polygon_starts[k + 1]]; polygon_starts is
-    None when every face is a triangle. sha256 is the hex digest of the file's bytes, and of those of every other file
-    that was read with it; path its absolute path. unit: metres that the file says its unit has, by which the vertices
-    have been multiplied; 1 when it says nothing.
+    vertices (n, 3) float64 in the file's order, including unreferenced ones. triangles (m, 3) int64; a polygon's fan
+    triangles are contiguous: polygon k is triangles[polygon_starts[k]:polygon_starts[k + 1]]; polygon_starts is None
+    when every face is a triangle. sha256 is the hex digest of the file's bytes, and of those of every other file that
+    was read with it; path its absolute path. unit: the unit that the file states [m], by which the vertices have been
+    multiplied; 1 if it states none.
     """
 
     name: str
@@ -67,8 +67,8 @@ def fan_polygons(corners: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[np.ndarray, np.ndarray, float, dict[str, str]]:
-    """What a file of placed parts shows: vertices (n, 3) in metres, triangles (m, 3), the metres in its unit, and names
-    and hashes of the other files that it took.
+    """Read a file of placed parts: vertices (n, 3) in metres, triangles (m, 3), the file's unit [m], and names and
+    hashes of the other files that were read.
     """
     files: dict[str, str] = {}
 
@@ -90,7 +90,7 @@ def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[np.ndarray, np.nd
             unit = add_by_trimesh(data, suffix, assembly)
     except InputError as error:
         raise MeshError(error.field, error.received, error.accepted) from None
-    except Exception as error:  # whatever a damaged file leads to in a reader that takes it as specified
+    except Exception as error:  # a damaged file may cause any error in a reader
         reason = " ".join(str(error).split())[:120]
         raise MeshError(path.name, f"the .{suffix} file can't be read ({type(error).__name__}: {reason})") from None
     if not 1e-9 <= unit <= 1e9:
@@ -100,7 +100,7 @@ def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[np.ndarray, np.nd
 
 
 def read_mesh(data: bytes, path: Path) -> Mesh:
-    """The mesh that a file's bytes are, by the ending of its name; raises MeshError naming what is wrong with it."""
+    """The mesh in a file's bytes, read according to the file's extension; raises MeshError naming what is wrong."""
     suffix = path.suffix.lower().lstrip(".")
     if suffix not in FORMATS and suffix not in other_formats():
         raise MeshError("mesh", path.name, f"a file named .{', .'.join(FORMATS)}, or another format that trimesh reads")
@@ -124,7 +124,7 @@ def read_mesh(data: bytes, path: Path) -> Mesh:
 
 
 def load_mesh(name: str, *, search: Search = NOWHERE_ELSE) -> Mesh:
-    """The mesh that ``name`` stands for, exactly as the file has it but for the unit that it states.
+    """The mesh with this name, exactly as in the file except for its stated unit, which is converted to metres.
 
     Raises MeshError naming the file and what is wrong with it.
     """

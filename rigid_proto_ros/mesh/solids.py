@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Solids made of others: the union of components that overlap, by manifold3d (Lalish, github.com/elalish/manifold),
-and a mesh's convex hull and bounding box.
+"""Solids derived from others: the union of components that overlap, by manifold3d (Lalish,
+github.com/elalish/manifold), and a mesh's convex hull and bounding box.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from .intersection import Nesting, component_nesting
 from .topology import component_sums, fan, mesh_topology
 
 MAX_UNITED = 300_000
-"""Triangles up to which overlaps are measured: about a second of manifold3d's work."""
+"""Triangles up to which unions are computed: about a second of manifold3d's work."""
 FLAT = 1e-12
-"""Points that spread by less than this part of their extent along an axis lie in a plane: rounding does as much."""
+"""Relative extent along an axis below which points count as lying in a plane: rounding has the same effect."""
 
 
 def can_unite() -> bool:
@@ -27,11 +27,11 @@ def can_unite() -> bool:
 def united_surface(
     vertices: np.ndarray, triangles: np.ndarray, nesting: Nesting | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and triangles (m, 3) of the union of closed components that overlap; nesting: how they lie, where
-    it is known.
+    """Vertices (n, 3) and triangles (m, 3) of the union of closed components that overlap; nesting: theirs, if it is
+    known.
 
-    Outermost first, they are united where they are wound outward and cut out where inward. Raises MeshError where that
-    can't be done, or would take long.
+    Outermost first, components wound outward are added and those wound inward subtracted. Raises MeshError if that
+    isn't possible, or would take too long.
     """
     refusal = MeshError("mesh", "components that overlap can't be united")
     if not can_unite() or len(triangles) > MAX_UNITED:
@@ -59,8 +59,8 @@ def united_surface(
 
 
 def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3), some of points (k, 3), and outward triangles (m, 3) of their convex hull, to rounding of the
-    extent, by Qhull (Barber, Dobkin, Huhdanpaa, ACM TOMS 22, 1996).
+    """Vertices (n, 3), a subset of points (k, 3), and outward triangles (m, 3) of their convex hull, accurate to
+    rounding of the extent, by Qhull (Barber, Dobkin, Huhdanpaa, ACM TOMS 22, 1996).
 
     Raises MeshError when the points lie in one plane, and without SciPy.
     """
@@ -69,8 +69,8 @@ def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     except ImportError:
         raise MeshError("mesh_fallback", f"hull: {is_missing('scipy', 'meshes')}; box needs no package") from None
     flat = MeshError("mesh_fallback", "the points lie in one plane and have no hull with a volume; use box instead")
-    # Stretched until all directions spread alike, which leaves the hull's faces as they are: Qhull would take a thin
-    # slab at an angle for flat.
+    # Scaled to the same extent in all directions, which leaves the hull's faces as they are: Qhull would treat a thin
+    # slab at an angle as flat.
     shape = points - 0.5 * (points.min(axis=0) + points.max(axis=0))
     shape = shape / (float(np.max(np.abs(shape))) or 1.0)
     axes = np.linalg.svd(shape - shape.mean(axis=0), full_matrices=False)[2].T
@@ -82,8 +82,8 @@ def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         raise flat
     shape = shape / half
     try:
-        # Points in one plane but for rounding can leave cracks between triangles; moved by 1e-11 of the extent
-        # ("joggled") they can't.
+        # Points that are coplanar to rounding can leave cracks between triangles; joggled by 1e-11 of the extent they
+        # can't.
         hull = ConvexHull(shape, qhull_options="QJ")
     except QhullError:
         raise flat from None

@@ -15,7 +15,7 @@ from .ascii_floats import as_numbers, error_at
 from .topology import first_equal_rows
 
 _HEAD = 100
-"""Words, however many blanks stand between them, within which an ASCII file names its first facet."""
+"""Words, with any number of blanks in between, within which an ASCII file must begin its first facet."""
 _SPARE = 2
 """Bytes that may follow the last facet: a line end, or one more attribute count."""
 _CORNER = rb"\s+vertex\s+(\S+\s+\S+\s+\S+)"
@@ -23,7 +23,7 @@ _FACET_TEXT = re.compile(
     rb"\bfacet\s+normal(?:\s+\S+){3}\s+outer\s+loop" + 3 * _CORNER + rb"\s+endloop\s+endfacet(?!\S)"
 )
 _FACET_PART = re.compile(rb"\bfacet\s+normal|\bouter\s+loop|\bvertex(?:\s+[-+.\d]\S*){3}|\bendloop")
-"""What no solid's name has."""
+"""Parts of a facet, which don't occur in the name of a solid."""
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -35,7 +35,7 @@ def _merge(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def is_ascii_stl(data: bytes) -> bool:
-    """Whether the bytes read as ASCII STL: binary files, too, may begin with the word solid."""
+    """Whether the bytes are ASCII STL; binary files, too, may begin with the word solid."""
     if len(data) >= 84 and len(data) == 84 + 50 * struct.unpack_from("<I", data, 80)[0]:
         return False
     words = itertools.islice(re.finditer(rb"\S{1,80}", data), _HEAD)
@@ -51,7 +51,7 @@ def read_stl(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
         raise MeshError(name, f"{len(data)} bytes, no STL file", "ASCII, or a binary header of 84 bytes and facets")
     (count,) = struct.unpack_from("<I", data, 80)
     held, beyond = divmod(len(data) - 84, _FACET.itemsize)
-    if count == 0 and beyond <= _SPARE:  # left for later by some that write facets as they come
+    if count == 0 and beyond <= _SPARE:  # some programs that stream facets leave it at 0
         count = held
     if count > held:
         raise MeshError(name, f"the header announces {count} facets, but it holds {held}; the file may be truncated")
@@ -63,11 +63,11 @@ def read_stl(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _ascii_points(data: bytes, name: str) -> np.ndarray:
-    """Corner points (3m, 3) in file order: line ends count as blanks. Beside whole facets only names of solids may
-    stand, so that nothing of a damaged file is left out in silence.
+    """Corner points (3m, 3) in file order; line ends count as blanks. Only the names of solids may stand beside whole
+    facets, so that no part of a damaged file is silently left out.
     """
     text = data.lower()
-    parts = _FACET_TEXT.split(text)  # what stands before a facet, then its three corners, by turns
+    parts = _FACET_TEXT.split(text)  # alternately the text before a facet and its three corners
     rest = b" ".join(parts[::4])
     facets = len(parts) // 4
     if not rest.lstrip().startswith(b"solid") or _FACET_PART.search(rest):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""3D Manufacturing Format (.3mf), core specification 1.3 with the production extension: what is to be built."""
+"""3D Manufacturing Format (.3mf), core specification 1.3 with the production extension: the items to be built."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from .assembly import Assembly, tag_of
 
 UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 SUPPORTS = ("support", "solidsupport")
-"""Types of objects that hold a part while it is printed and are no part of it."""
+"""Types of objects that support a part during printing and don't belong to it."""
 MAX_PLACES = 100_000
-"""Times that objects are placed, within each other too; a file that goes beyond is refused."""
+"""Maximum number of placements of objects, nested ones included; a file with more is refused."""
 _CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 _PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
 _READ = (_CORE, _PRODUCTION, "http://schemas.microsoft.com/3dmanufacturing/material/2015/02")
 
 
 def _matrix(text: str | None) -> np.ndarray:
-    """The matrix (4, 4) of a transform's twelve numbers, which multiply rows from the right."""
+    """The matrix (4, 4), for column vectors, of a transform's twelve numbers, which apply to row vectors."""
     matrix = np.eye(4)
     if text is not None:
         rows = np.array([float(word) for word in text.split()]).reshape(4, 3)
@@ -42,11 +42,11 @@ class _Package:
         self._places = 0
 
     def refusal(self, reason: str, accepted: str = "") -> MeshError:
-        """The error that names the file."""
+        """An error that names the file."""
         return MeshError(self._assembly.name, reason, accepted)
 
     def root(self) -> str:
-        """Path of the file that holds what is to be built."""
+        """Path of the model file with the items to be built."""
         if "/_rels/.rels" in self._names:
             for relation in ElementTree.fromstring(self._archive.read(self._names["/_rels/.rels"])):
                 if relation.get("Type", "").endswith("/3dmodel"):
@@ -73,14 +73,14 @@ class _Package:
         return self._models[path]
 
     def unit(self, path: str) -> float:
-        """Metres in the unit of a model file."""
+        """Unit of a model file in metres."""
         unit = self.model(path)[0].get("unit", "millimeter")
         if unit not in UNITS:
             raise self.refusal(f"unit {unit}", f"a file in one of {', '.join(UNITS)}")
         return UNITS[unit]
 
     def place(self, reference: ElementTree.Element, path: str, above: np.ndarray, depth: int) -> None:
-        """Add the object that an item or component of the file ``path`` names."""
+        """Add the object that an item or component in the file ``path`` refers to."""
         self._places += 1
         if self._places > MAX_PLACES or depth > 100:
             raise self.refusal(f"its components place objects more than {MAX_PLACES} times, or within themselves")
@@ -116,11 +116,11 @@ class _Package:
 
 
 def add_threemf(data: bytes, assembly: Assembly, max_bytes: int) -> float:
-    """Add the items to be built by a file's bytes, in its unit, but for supports; returns the metres in that unit.
+    """Add the items to be built, except supports, in a file's bytes, in the file's unit; returns this unit in metres.
 
     An archive of more than ``max_bytes``, unpacked, is refused.
 
-    Raises MeshError, or other errors where the file isn't built as the specification says.
+    Raises MeshError, or other errors if the file doesn't follow the specification.
     """
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         size = sum(entry.file_size for entry in archive.infolist())

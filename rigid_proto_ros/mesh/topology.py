@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Which triangles meet at which edges: closed or open, wound alike or not, how many components, what lies twice.
+"""Topology of a triangle mesh: edges, holes, consistent winding, components and duplicate faces.
 
-Vertices at bit-equal places count as one here, so that a mesh whose corners are split for textures is taken by its
-shape. The volume of a surface is the same from every origin exactly when each edge is used as often in one direction
-as in the other; that is what ``balanced`` counts.
+Vertices at bit-equal positions count as one here, so that splitting corners for textures has no effect. The volume of a
+surface is the same for every origin exactly if each edge is used equally often in both directions; ``unbalanced`` holds
+the edges that aren't.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def first_equal_rows(rows: np.ndarray) -> np.ndarray:
 
 
 def weld_equal(vertices: np.ndarray) -> np.ndarray:
-    """For each vertex (n, 3) the first one at the bit-equal place (−0 is 0), (n,) int64."""
+    """For each vertex (n, 3) the first one at the bit-equal position (−0 equals 0), (n,) int64."""
     return first_equal_rows((vertices + 0.0).view(np.int64))
 
 
@@ -58,7 +58,7 @@ def _root(parent: np.ndarray, i: int) -> int:
 
 @njit(cache=True, nogil=True)
 def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray:
-    """The smallest member of the set that each of 0 to count − 1 is in, when first[k] and second[k] are in one set."""
+    """Union-find: the smallest member of the set of each of 0 to count − 1, if first[k] and second[k] share a set."""
     parent = np.arange(count)
     for k in range(first.shape[0]):
         a, b = _root(parent, first[k]), _root(parent, second[k])
@@ -69,8 +69,8 @@ def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray
 
 
 def _edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Edges (e, 6) of ``corners`` (m, 3) as Topology has them, and for each triangle (m,) the first one of its
-    component: triangles that share an edge are of one.
+    """Edges (e, 6) of ``corners`` (m, 3) as in Topology, and for each triangle (m,) the first one of its component:
+    triangles that share an edge belong to one.
     """
     tails, heads = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     owner = np.repeat(np.arange(len(corners)), 3)
@@ -90,7 +90,7 @@ def _edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarr
 
 @dataclass(frozen=True)
 class Topology:
-    """How the triangles of a mesh hang together.
+    """Connectivity of the triangles of a mesh.
 
     corners (m, 3): triangles over welded vertices. edges (e, 6): low vertex, high vertex, uses low→high, uses high→low,
     first triangle, second triangle or −1. component (m,): number of each triangle's component, counted from 0 by first
@@ -105,12 +105,12 @@ class Topology:
 
     @property
     def boundary(self) -> np.ndarray:
-        """Edges (k, 6) that one triangle alone uses."""
+        """Edges (k, 6) of only one triangle."""
         return self.edges[self._uses == 1]
 
     @property
     def unbalanced(self) -> np.ndarray:
-        """Edges (k, 6) used more often in one direction than in the other: none where the surface bounds a volume."""
+        """Edges (k, 6) used more often in one direction than in the other: none if the surface bounds a volume."""
         return self.edges[self.edges[:, 2] != self.edges[:, 3]]
 
     @property
@@ -137,15 +137,15 @@ def mesh_topology(vertices: np.ndarray, triangles: np.ndarray) -> Topology:
     _, component = np.unique(root, return_inverse=True)
     smallest = np.argmin(corners, axis=1)[:, None]
     turned = np.take_along_axis(corners, (smallest + np.arange(3)) % 3, axis=1)  # keeps the winding
-    # A triangle with two corners in one place adds nothing, however often it is there.
+    # A triangle with two equal corners has no effect, however often it occurs.
     real = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
     duplicates = (first_equal_rows(turned) != np.arange(len(corners))) & real
     return Topology(corners, edges, component, int(component.max(initial=-1)) + 1, duplicates)
 
 
 def surplus_copies(topology: Topology) -> np.ndarray:
-    """Which of the ``duplicates`` (m,) bool spoil the surface: those of components whose edges are balanced no worse
-    without them. The others it needs to be closed.
+    """Which of the ``duplicates`` (m,) bool are defects: those of components whose edges are balanced at least as well
+    without them. The others are needed to close the surface.
     """
     rest = np.flatnonzero(~topology.duplicates)
     edges, _ = _edges(topology.corners[rest], int(topology.corners.max(initial=0)) + 1)
@@ -186,7 +186,7 @@ class Components:
 
 
 def component_sums(vertices: np.ndarray, topology: Topology) -> Components:
-    """The components' volumes and boxes, from the middle of their triangles' first corners."""
+    """Volumes and boxes of the components; reference of the volumes is the middle of the triangles' first corners."""
     corners = vertices[topology.corners[:, 0]]
     middle = 0.5 * corners.min(axis=0) + 0.5 * corners.max(axis=0)
     return Components(*_component_sums(vertices, topology.corners, topology.component, topology.components, middle))
@@ -195,8 +195,8 @@ def component_sums(vertices: np.ndarray, topology: Topology) -> Components:
 def rims(edges: np.ndarray) -> list[list[int]]:
     """Closed walks of three or more vertices along ``edges`` (e, 6) of a topology, against the more frequent direction.
 
-    Each edge is walked as often as one direction is used more than the other, so that polygons over all walks close the
-    surface. Walks that end nowhere, of edges chosen from a topology's, are left out.
+    Each edge is used as often as one direction is used more than the other, so that polygons over all walks close the
+    surface. Open walks, which a subset of a topology's edges may have, are left out.
     """
     excess = edges[:, 2] - edges[:, 3]
     tails = np.repeat(np.where(excess > 0, edges[:, 1], edges[:, 0]), np.abs(excess)).tolist()
@@ -223,6 +223,6 @@ def rims(edges: np.ndarray) -> list[list[int]]:
 
 
 def fan(walk: list[int]) -> np.ndarray:
-    """Triangles (k, 3) of a polygon, from its first corner."""
+    """Triangles (k, 3) of a polygon, as a fan from its first corner."""
     corners = np.array(walk, dtype=np.int64)
     return np.stack([np.full(len(walk) - 2, walk[0]), corners[1:-1], corners[2:]], axis=1)
