@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""How kernels are compiled and kept: ``njit`` for this package, and word of it when something is being compiled; and
-records that are read by name, ``p.moments``, in Python and in compiled functions alike.
+"""Compilation and caching of kernels: ``njit`` for this package, and notification when something is being compiled; and
+records whose fields are accessed by name, ``p.moments``, in Python and in compiled functions alike.
 
-numba keeps compiled code on disk and compiles anew when the file of a function has changed, but not when a file has
-that this one imports from, though its functions are compiled in. After an update the old numbers would go on for ever.
-So a kernel of this package is kept under the content of its file and of all that this imports, directly or not.
+numba caches compiled code on disk and recompiles a function if its file has changed, but not if only a file has that it
+imports from, though functions of that file are compiled in. After an update old results would persist. So a kernel of
+this package is cached under a hash of its file and of all that this imports, directly or not.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 _ABSENT: Any = None
-"""What Python takes for a module that isn't there."""
-# numba imports these wherever they are installed, a third of its own time: coverage is of use while something is
-# measured, scipy for its version and for linear algebra, and cffi for C functions, neither of which a kernel here uses.
+"""Entry in sys.modules for a module that can't be imported."""
+# numba imports these if they are installed, which takes a third of its own time. coverage is needed only for
+# measurements, scipy for its version and linear algebra, and cffi for C functions; no kernel here uses the last two.
 _HIDDEN = [name for name in ("coverage", "scipy", "cffi") if name not in sys.modules]
 sys.modules.update(dict.fromkeys(_HIDDEN, _ABSENT))
 try:
@@ -34,17 +34,17 @@ try:
     from numba.core import event
     from numba.core.caching import CompileResultCacheImpl, FunctionCache
     from numba.core.runtime.nrt import rtsys
-    from numba.core.typing import cffi_utils  # noqa: F401  # looks for cffi, at the first kernel if not here
+    from numba.core.typing import cffi_utils  # noqa: F401  # otherwise looks for cffi at the first kernel
     from numba.extending import intrinsic as numba_intrinsic
-    from numba.np import arraymath  # looks for scipy's linear algebra, at the first kernel if not here
+    from numba.np import arraymath  # otherwise looks for scipy's linear algebra at the first kernel
 finally:
     for _name in _HIDDEN:
         del sys.modules[_name]
 arraymath._HAVE_BLAS = importlib.util.find_spec("scipy") is not None  # noqa: SLF001  # for kernels of others
 
-_CONFIG: Any = config  # its settings are made when it is imported
+_CONFIG: Any = config  # its attributes are set at import
 Emitted = tuple[Any, Any]
-"""Of an intrinsic: the signature, and the function that makes the code."""
+"""Result of an intrinsic: the signature, and the function that generates the code."""
 INTERPRETED = bool(_CONFIG.DISABLE_JIT)
 """NUMBA_DISABLE_JIT=1: kernels are plain functions, for readable tracebacks."""
 
@@ -77,7 +77,7 @@ def _source(file: str) -> tuple[bytes, list[str]]:
         for _ in dots:
             folder = os.path.dirname(folder)
         module = os.path.join(folder, *filter(None, name.split(".")))
-        # What is imported is a name in a module, or a module of a package.
+        # An imported name is defined in a module, or is a module of a package.
         candidates |= {f"{module}.py", os.path.join(module, "__init__.py")}
         candidates |= {os.path.join(module, f"{name}.py") for name in re.findall(r"\w+", in_brackets or plain)}
     return hashlib.sha256(text.encode()).digest(), [file for file in candidates if _exists(file)]
@@ -88,12 +88,12 @@ _exists = functools.cache(os.path.isfile)
 
 @functools.cache
 def kernel_folder(file: str) -> str:
-    """The folder of a source file's kernels, made and writable: named by the content of the file and of all that it
-    imports, so that every checkout, build and installation of the same sources shares it, and none meets another's.
+    """The cache folder for a source file's kernels, created and writable. Its name has a hash of the file and of all
+    that it imports, so that all checkouts, builds and installations of the same sources share it, and no others.
 
-    It lies in NUMBA_CACHE_DIR, in the user's cache folder, or, where neither can be written to, beside the package.
+    It is in NUMBA_CACHE_DIR, in the user's cache folder or, if neither is writable, in the package's __pycache__.
     """
-    # With the package's own name, which compiled code refers to.
+    # Includes the package's own name, which compiled code refers to.
     module = os.path.relpath(file, os.path.dirname(PACKAGE)).removesuffix(".py").replace(os.sep, ".")
     base = os.environ.get("XDG_CACHE_HOME", "")
     user = base if os.path.isabs(base) else os.path.join(os.path.expanduser("~"), ".cache")
@@ -110,15 +110,15 @@ def kernel_folder(file: str) -> str:
 
 
 class KernelLocator:
-    """Tells numba where a kernel of this package is kept, and which state of the sources it is of."""
+    """Cache locator for numba: the folder of a kernel of this package, and the stamp of its sources."""
 
     def __init__(self, file: str, line: int) -> None:
-        # numba reads these two names where it warns of what can't be kept.
+        # numba reads these two attributes to warn about functions that can't be cached.
         self._py_file, self._lineno = file, line
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> Any:
-        """A locator as numba wants it; None for what isn't of this package."""
+        """A locator, as numba expects it; None for a function outside this package, or if no folder is writable."""
         path = os.path.realpath(file)
         if not path.startswith(PACKAGE + os.sep):
             return None
@@ -129,31 +129,31 @@ class KernelLocator:
         return cls(path, function.__code__.co_firstlineno)
 
     def get_cache_path(self) -> str:
-        """The folder."""
+        """The cache folder."""
         return kernel_folder(self._py_file)
 
     def ensure_cache_path(self) -> None:
-        """Make the folder again where somebody has removed it meanwhile."""
+        """Create the folder again if it has been removed meanwhile."""
         os.makedirs(self.get_cache_path(), exist_ok=True)
 
     def get_source_stamp(self) -> bytes:
-        """State of the sources; where another one is found on the disk, numba compiles anew."""
+        """Stamp of the sources; if the one on disk is different, numba recompiles."""
         return source_stamp(self._py_file)
 
     def get_disambiguator(self) -> str:
-        """Tells apart functions of one name in one file."""
+        """Distinguishes functions of the same name in one file."""
         return str(self._lineno)
 
 
 class _KernelFiles(CompileResultCacheImpl):
-    """Which of numba's locators are asked."""
+    """Adds KernelLocator to numba's cache locators."""
 
     _locator_classes = [KernelLocator, *CompileResultCacheImpl._locator_classes]  # noqa: SLF001 (numba's place for it)
 
 
 class KernelCache(FunctionCache):
-    """The kernels of one function on disk. Its files are looked for when they are wanted: most functions are compiled
-    into others only.
+    """The cached kernels of one function. Its files are searched only when they are needed: most functions are only
+    compiled into others.
     """
 
     _impl_class = _KernelFiles
@@ -162,10 +162,10 @@ class KernelCache(FunctionCache):
         self._function = function
 
     def load_overload(self, signature: Any, target: Any) -> Any:
-        """The kernel for a signature, or None.
+        """The cached kernel for a signature, or None.
 
-        numba imports its whole compiler first, which takes longer than the rest of a short command; the compiler
-        itself does that, too, once something is to be compiled (tried with 0.68).
+        numba's method first imports its whole compiler, which takes longer than the rest of a short command; the
+        compiler does that itself, too, when something must be compiled (tested with 0.68).
         """
         if not hasattr(self, "_impl"):
             super().__init__(self._function)
@@ -177,14 +177,14 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def njit(*, allocates: bool = True, cache: bool = False, **options: Any) -> Callable[[_Function], _Function]:
-    """numba's, with kernels kept by ``KernelCache``. To a type checker what it makes is the Python function.
+    """numba's njit, with kernels cached by ``KernelCache``. For a type checker the result is the Python function.
 
-    allocates: False where the function makes no arrays but slices of given ones, whose references nobody counts then:
-    each slice costs two atomic operations otherwise. numba refuses to compile such a function if it does allocate.
+    allocates: False for a function that creates no arrays except slices of given ones. References aren't counted then,
+    which saves two atomic operations per slice. numba refuses to compile such a function if it does allocate.
     """
 
     def decorated(function: _Function) -> _Function:
-        # numba's own name (tried with 0.68); where it isn't given the caller's would count.
+        # numba's internal name (tested with 0.68); without it the caller's value would apply.
         options["_nrt"] = allocates
         compiled: Any = numba.njit(**options)(function)
         if cache and not INTERPRETED:
@@ -196,9 +196,9 @@ def njit(*, allocates: bool = True, cache: bool = False, **options: Any) -> Call
 
 
 def entry_of(kernel: Callable[..., Any], signature: Any) -> Callable[..., Any]:
-    """The compiled function itself for this signature: called without looking at its arguments' types.
+    """The compiled function for this signature, called without type dispatch.
 
-    A call through numba's dispatcher looks them up each time, which costs more than a short kernel takes.
+    A call through numba's dispatcher determines the arguments' types each time, which takes longer than a short kernel.
     """
     if INTERPRETED:
         return kernel
@@ -210,7 +210,7 @@ def entry_of(kernel: Callable[..., Any], signature: Any) -> Callable[..., Any]:
 if TYPE_CHECKING:
 
     def intrinsic(*function: Callable[..., Any], **options: Any) -> Any:
-        """numba's; what it makes takes the arguments without the first, and those are values and not types."""
+        """numba's intrinsic; the result takes the same arguments without the first one, as values instead of types."""
 
 else:
     intrinsic = numba_intrinsic
@@ -239,7 +239,7 @@ def notify_when_compiling(notify: Callable[[], None]) -> Iterator[None]:
 
 
 def record_type(fields: list[tuple[Any, ...]]) -> np.dtype[Any]:
-    """The type of records with these fields (name, type) or (name, type, length), each where the processor likes it."""
+    """The type of records with these fields (name, type) or (name, type, length), aligned for the processor."""
     return np.dtype((np.record, np.dtype(fields, align=True)))
 
 
@@ -250,7 +250,7 @@ def new_record(kind: np.dtype[Any]) -> np.record:
 
 
 def place_of(kind: np.dtype[Any], name: str) -> int:
-    """Where a field begins [bytes]."""
+    """Byte offset of a field."""
     fields = kind.fields
     assert fields is not None
     return int(fields[name][1])
@@ -258,8 +258,8 @@ def place_of(kind: np.dtype[Any], name: str) -> int:
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
 def copy_numbers(of: np.ndarray, to: np.ndarray) -> None:
-    """The first numbers of one array to all of another, one by one: numba's own way with slices looks first whether the
-    two share memory, and makes room for a copy if they do.
+    """Copy the first numbers of one array to all of another, one by one: numba's assignment of slices first checks
+    whether the two share memory, and allocates a copy if they do.
     """
     for k in range(to.shape[0]):
         to[k] = of[k]

@@ -21,23 +21,23 @@ def cross(a: Numbers, b: Numbers) -> np.ndarray:
 
 
 def dot(a: Numbers, b: Numbers) -> float:
-    """a · b of three components, summed in their order: NumPy's dot and norm leave that to BLAS."""
+    """a · b of three components, summed in their order; in NumPy's dot and norm the order depends on BLAS."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @njit(cache=True)
 def norm(x: float, y: float, z: float) -> float:
-    """|v| of v = (x, y, z), where squares neither over- nor underflow."""
+    """|v| of v = (x, y, z), if squares neither overflow nor underflow."""
     return math.sqrt(x * x + y * y + z * z)
 
 
 def length(v: Numbers) -> float:
-    """|v| of v (3,), likewise."""
+    """|v| of v (3,), with the same restriction."""
     return norm(float(v[0]), float(v[1]), float(v[2]))
 
 
 def times(matrix: np.ndarray, v: Numbers) -> np.ndarray:
-    """The matrix (3, 3) times v (3,), summed in a fixed order: BLAS would pick one by processor."""
+    """The matrix (3, 3) times v (3,), summed in a fixed order: that of BLAS depends on the processor."""
     return matrix[:, 0] * v[0] + matrix[:, 1] * v[1] + matrix[:, 2] * v[2]
 
 
@@ -62,7 +62,7 @@ def multiply(
 
 @njit(cache=True)
 def rotate(qx: float, qy: float, qz: float, qw: float, vx: float, vy: float, vz: float) -> tuple[float, float, float]:
-    """Turn v from body into world axes: v + 2w(u × v) + 2u × (u × v), u the vector part."""
+    """Rotate v from body to world axes: v + 2w(u × v) + 2u × (u × v), u the vector part."""
     tx = 2.0 * (qy * vz - qz * vy)
     ty = 2.0 * (qz * vx - qx * vz)
     tz = 2.0 * (qx * vy - qy * vx)
@@ -77,7 +77,7 @@ def rotate(qx: float, qy: float, qz: float, qw: float, vx: float, vy: float, vz:
 def rotate_inverse(
     qx: float, qy: float, qz: float, qw: float, vx: float, vy: float, vz: float
 ) -> tuple[float, float, float]:
-    """Turn v from world into body axes."""
+    """Rotate v from world to body axes."""
     return rotate(-qx, -qy, -qz, qw, vx, vy, vz)
 
 
@@ -90,9 +90,9 @@ def normalize(qx: float, qy: float, qz: float, qw: float) -> tuple[float, float,
 
 @njit(cache=True, error_model="numpy")
 def to_unit(qx: float, qy: float, qz: float, qw: float) -> tuple[float, float, float, float]:
-    """A given quaternion scaled to unit length; zeros when it has none.
+    """A given quaternion scaled to unit length; zeros if its length is zero or not finite.
 
-    One that is unit already, to rounding, is kept bit for bit, so that a dumped state is read back as it was.
+    A quaternion of unit length, to rounding, is kept bit for bit, so that a saved state is restored exactly.
     """
     largest = max(abs(qx), abs(qy), abs(qz), abs(qw))
     if not 0.0 < largest < math.inf:
@@ -104,7 +104,7 @@ def to_unit(qx: float, qy: float, qz: float, qw: float) -> tuple[float, float, f
 
 @njit(cache=True, error_model="numpy")
 def exponential(x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """Unit quaternion xyzw of the turn by |v| [rad] about v = (x, y, z); exact in the limit of small turns too."""
+    """Unit quaternion xyzw of the rotation by |v| [rad] about v = (x, y, z); accurate for small angles, too."""
     angle = norm(x, y, z)
     # sin(a/2)/a: below 1e-4 the series ½ − a²/48 errs by 1e-19.
     sine, cosine = sine_cosine(0.5 * angle)
@@ -140,9 +140,9 @@ def matrix_from_quaternion(q: Numbers) -> np.ndarray:
 
 @njit(cache=True, error_model="numpy")
 def quaternion_of_axes(R: np.ndarray, q: np.ndarray) -> None:
-    """Unit quaternion into q (4,) xyzw, of a proper rotation matrix R (3, 3).
+    """Write the unit quaternion xyzw of a proper rotation matrix R (3, 3) into q (4,).
 
-    The largest of the four squared components is taken as the divisor (Shepperd 1978), so that no digits cancel.
+    The largest of the four squared components is the divisor (Shepperd 1978), which avoids cancellation.
     """
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     k, largest = 0, R[0, 0]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Vectors of doubles in processor registers, for compiled kernels: several numbers go through each operation at once.
+"""SIMD vectors of doubles for compiled kernels: each operation processes several numbers at once.
 
-Operations are those of IEEE 754 on every number by itself, in the order written and never contracted to a fused one:
-the bits are those of the same operations on single numbers. The one fused operation is asked for by its name.
+Operations are those of IEEE 754 on each element, in the order written and never contracted to fused ones: the bits are
+those of the same operations on single numbers. The only fused operation is ``fused_multiply_add``.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from .compilation import INTERPRETED, Emitted, intrinsic, njit
 
 _DOUBLE, _NUMBER, _BITS = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
 LINE = 8
-"""Doubles in a line of the processor's cache."""
+"""Doubles in a cache line."""
 Packed = Any
-"""A vector within a kernel, to a type checker."""
+"""Type of a vector in a kernel, for type checkers."""
 
 
 class Doubles(types.Type):
@@ -43,8 +43,8 @@ class _DoublesModel(models.PrimitiveModel):
 
 
 def aligned(shape: tuple[int, int], before: int = 0) -> np.ndarray:
-    """Zeros whose first number, or the one ``before`` numbers behind it, begins a line of the processor's cache: a
-    vector that crosses two takes twice as long.
+    """Zeros whose first number, or the one with index ``before``, is aligned to a cache line: a vector that crosses two
+    lines takes twice as long.
     """
     whole = np.zeros(shape[0] * shape[1] + LINE)
     first = -(whole.__array_interface__["data"][0] // 8 + before) % LINE
@@ -52,7 +52,7 @@ def aligned(shape: tuple[int, int], before: int = 0) -> np.ndarray:
 
 
 def _operation_on_vectors(plain: Callable[..., Any], **options: bool) -> Callable[[Any], Callable[..., Any]]:
-    """An intrinsic; where nothing is compiled vectors are arrays, and ``plain`` does the same with them."""
+    """Decorator of an intrinsic; if kernels are interpreted, vectors are arrays and ``plain`` is used instead."""
     if INTERPRETED:
         return lambda _: plain
     of_types: Callable[[Any], Callable[..., Any]] = intrinsic(**options) if options else intrinsic
@@ -60,13 +60,13 @@ def _operation_on_vectors(plain: Callable[..., Any], **options: bool) -> Callabl
 
 
 def _pointer(context: Any, builder: ir.IRBuilder, kind: Any, array: Any, at: Any, count: Any) -> Any:
-    """Of ``count`` doubles in a contiguous array, from the one numbered ``at`` on."""
+    """Pointer to ``count`` doubles in a contiguous array, from index ``at`` on."""
     first = builder.gep(context.make_array(kind)(context, builder, array).data, [at])
     return builder.bitcast(first, ir.VectorType(_DOUBLE, count).as_pointer())
 
 
 def _shuffled(builder: ir.IRBuilder, a: Any, b: Any, chosen: Any) -> Any:
-    """Elements of a, then of b, by their numbers."""
+    """Elements of a and b, concatenated, with the indices ``chosen``."""
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_NUMBER, len(chosen)), chosen))
 
 
@@ -77,7 +77,7 @@ def _filled(builder: ir.IRBuilder, x: Any, count: Any) -> Any:
 
 @_operation_on_vectors(lambda array, at, like: array.reshape(-1)[at : at + like.size].copy())
 def load(_typing_context: Any, array: Any, _at: Any, like: Any) -> Emitted:
-    """Numbers of a contiguous array from the number ``at`` on, as many as the vector ``like`` has."""
+    """Load numbers of a contiguous array from index ``at`` on, as many as the vector ``like`` has."""
 
     def code(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
         return builder.load(
@@ -89,7 +89,7 @@ def load(_typing_context: Any, array: Any, _at: Any, like: Any) -> Emitted:
 
 @_operation_on_vectors(lambda array, at, vector: array.reshape(-1).__setitem__(slice(at, at + vector.size), vector))
 def store(_typing_context: Any, array: Any, _at: Any, vector: Any) -> Emitted:
-    """Put a vector into a contiguous array from the number ``at`` on."""
+    """Store a vector in a contiguous array from index ``at`` on."""
 
     def code(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
         pointer = _pointer(context, builder, signature.args[0], arguments[0], arguments[1], vector.count)
@@ -101,7 +101,7 @@ def store(_typing_context: Any, array: Any, _at: Any, vector: Any) -> Emitted:
 
 @_operation_on_vectors(lambda x, count: np.full(count, float(x)), prefer_literal=True)
 def filled(_typing_context: Any, _x: Any, count: Any) -> Emitted:
-    """A constant number of times x."""
+    """A vector of ``count`` numbers x; count is a compile-time constant."""
     kind = Doubles(count.literal_value)
     return kind(types.float64, count), lambda _, builder, _signature, arguments: _filled(
         builder, arguments[0], kind.count
@@ -110,7 +110,7 @@ def filled(_typing_context: Any, _x: Any, count: Any) -> Emitted:
 
 @_operation_on_vectors(lambda *parts: np.concatenate(parts))
 def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Emitted:
-    """The vector of the components a, b, c, d."""
+    """Concatenation of a, b, c and d, which have equal lengths."""
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
         n = a.count
@@ -122,7 +122,7 @@ def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Emitted:
 
 @_operation_on_vectors(lambda a, b: np.concatenate([a, b]))
 def paired(_typing_context: Any, a: Any, b: Any) -> Emitted:
-    """The vector of a's numbers, then b's, of which there are as many."""
+    """Concatenation of a and b, which have equal lengths."""
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
         return _shuffled(builder, arguments[0], arguments[1], list(range(2 * a.count)))
@@ -138,7 +138,7 @@ def half(_typing_context: Any, vector: Any, number: Any) -> Emitted:
 
 @_operation_on_vectors(lambda vector: float(np.max(np.abs(vector))))
 def largest(_typing_context: Any, vector: Any) -> Emitted:
-    """The largest absolute value; what is no number is larger than all."""
+    """The largest absolute value; NaN counts as larger than any number."""
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
         # The bits of positive doubles are in the order of their values.
@@ -155,7 +155,7 @@ def largest(_typing_context: Any, vector: Any) -> Emitted:
     prefer_literal=True,
 )
 def arranged(_typing_context: Any, vector: Any, order: Any) -> Emitted:
-    """Components of a vector of four in another order; 4 to 7 stand for the negatives of 0 to 3."""
+    """Permutation of the components of a vector of four; 4 to 7 stand for the negatives of 0 to 3."""
     each = vector.count // 4
     chosen = [part.literal_value * each + k for part in order for k in range(each)]
 
@@ -169,7 +169,7 @@ def arranged(_typing_context: Any, vector: Any, order: Any) -> Emitted:
     lambda a, b, order: np.concatenate([a.reshape(4, -1), b.reshape(4, -1)])[list(order)].ravel(), prefer_literal=True
 )
 def mixed(_typing_context: Any, a: Any, b: Any, order: Any) -> Emitted:
-    """Components of two vectors of four: 0 to 3 of the first, 4 to 7 of the second."""
+    """Selection of components of two vectors of four: 0 to 3 of the first, 4 to 7 of the second."""
     each = a.count // 4
     chosen = [part.literal_value * each + k for part in order for k in range(each)]
 
@@ -198,7 +198,7 @@ def _part(vector: Any, number: Any, count: int) -> Emitted:
 
 @_operation_on_vectors(lambda vector, at: float(vector[at]), prefer_literal=True)
 def number(_typing_context: Any, vector: Any, at: Any) -> Emitted:
-    """One of a vector's doubles."""
+    """One element of a vector."""
     index = ir.Constant(_NUMBER, at.literal_value)
     return types.float64(vector, at), lambda _, builder, _signature, arguments: builder.extract_element(
         arguments[0], index
@@ -207,13 +207,13 @@ def number(_typing_context: Any, vector: Any, at: Any) -> Emitted:
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def four(a: float, b: float, c: float, d: float) -> Packed:
-    """Four numbers side by side. What was stored one by one and is loaded together has to wait until it is written."""
+    """A vector of four numbers. A vector load of numbers just stored one by one would stall until they are written."""
     return joined(filled(a, 1), filled(b, 1), filled(c, 1), filled(d, 1))
 
 
 @njit(cache=True, error_model="numpy", allocates=False)
 def triple(array: np.ndarray, at: int, last: float) -> Packed:
-    """Three numbers of an array from ``at`` on, and ``last``."""
+    """A vector of three numbers of an array from index ``at`` on, and ``last``."""
     return four(array[at], array[at + 1], array[at + 2], last)
 
 
@@ -233,7 +233,7 @@ def _operation(name: str) -> Callable[..., Any]:
 
         return kind(*(side if isinstance(side, Doubles) else types.float64 for side in (a, b))), code
 
-    # numba compares the annotations of both.
+    # numba compares the annotations of both functions.
     def implementation(a: Any, b: Any) -> Any:
         return of_vectors(a, b)
 
@@ -269,7 +269,7 @@ def _fused_exactly(a: Any, b: Any, c: Any) -> Any:
 
 @_operation_on_vectors(_fused_exactly)
 def fused_multiply_add(_typing_context: Any, a: Any, _b: Any, _c: Any) -> Emitted:
-    """a b + c, rounded once; of three numbers, or of three vectors."""
+    """a b + c, rounded once; for three numbers, or for three vectors."""
     kind = a if isinstance(a, Doubles) else types.float64
 
     def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
