@@ -11,7 +11,6 @@ written, and the exit status is 1 if a document is out of date.
 from __future__ import annotations
 
 import argparse
-import ast
 import csv
 import math
 import re
@@ -377,12 +376,6 @@ def _default(parameter: Parameter) -> str:
 
 def _code(text: str) -> str:
     return f"`{text}`"
-
-
-def _first_sentence(path: Path) -> str:
-    text = ast.get_docstring(ast.parse(path.read_text("utf-8"))) or ""
-    paragraph = " ".join(text.split("\n\n")[0].split()).replace("``", "`")
-    return re.split(r"(?<=\.) (?=[A-Z])", paragraph)[0].rstrip(".:")
 
 
 def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

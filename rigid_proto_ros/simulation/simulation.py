@@ -276,8 +276,8 @@ class Simulation:
     def _is_ready(self, pending: Pending) -> bool:
         """Whether the compiled flight can apply the command as it is."""
         if not isinstance(pending.command, WrenchCommand):
-            # A clear also cancels pending changes of thrusters, which the compiled flight doesn't know.
-            return isinstance(pending.command, ClearWrench) and self.thrusters.due_ns == fl.NEVER
+            # A clear also switches off thrusters that push, which the compiled flight doesn't know.
+            return isinstance(pending.command, ClearWrench) and not self.thrusters.pushing
         try:
             return self._still_holds(pending, pending.command)
         except CommandRefused:

@@ -73,6 +73,11 @@ class ThrusterControl:
         self.pushes = [Push()] * len(self.thrusters)
         self.due_ns, self.times_out = NEVER, False
 
+    @property
+    def pushing(self) -> bool:
+        """Whether any thruster is on."""
+        return any(push.force for push in self.pushes)
+
     def command(self, forces: Iterable[float], now_ns: int, timeout_ns: int) -> list[tuple[int, Load]]:
         """Apply commanded forces; returns the new load of each thruster with its number, except for thrusters that must
         stay on until their minimum on-time is over.

@@ -134,3 +134,15 @@ def test_the_wrong_number_of_forces_is_refused_with_the_names() -> None:
         flown("[{t: 0, thrusters: [1, 2]}]", 1.0, **{"thrusters.a": [0, 0, 0, 1, 0, 0]})
     with pytest.raises(InputError, match="none is declared"):
         flown("[{t: 0, thrusters: [1]}]", 1.0)
+
+
+def test_after_clear_wrench_the_least_on_time_counts_from_the_next_command() -> None:
+    # Without a timeout nothing is due when the wrench is cleared.
+    script = (
+        "[{t: 0, thrusters: [2]}, {t: 1, service: clear_wrench}, {t: 1.1, thrusters: [2]}, {t: 1.2, thrusters: [0]}]"
+    )
+    scene = {"thrusters.a": [0.0, 0.0, 0.0, 1.0, 0.0, 0.0], "thruster.minimum_on_time": 0.5}
+    run, told = flown(script, 3.0, **scene)
+    # 2 N at 2 kg for 1 s, and again for 0.5 s.
+    assert run.simulation.state.linear_velocity[0] == pytest.approx(1.5, rel=1e-12)
+    assert not told.acting
