@@ -101,6 +101,18 @@ def test_an_environment_that_is_not_whole_or_not_of_this_place_is_made_anew_and_
     assert script.defect(inner, version, here) == "its Python doesn't run any more"
 
 
+def test_tests_and_headers_in_packages_go_and_nothing_else_does(script, monkeypatch, tmp_path) -> None:
+    monkeypatch.setattr(script, "called", lambda *_: (0, ""))
+    site = tmp_path / "lib" / "python3.13" / "site-packages"
+    gone = [site / name for name in ("numpy/_core/tests", "numba/tests", "pyarrow/include")]
+    kept = [site / name for name in ("numpy/testing", "pyarrow/lib", "numpy/_core/include")]
+    for folder in (*gone, *kept):
+        folder.mkdir(parents=True)
+    script.remove_what_no_flight_needs("python")
+    assert not [folder for folder in gone if folder.exists()]
+    assert not [folder for folder in kept if not folder.exists()]
+
+
 def test_the_set_up_compiles_what_every_scene_lesson_and_script_needs() -> None:
     spec = importlib.util.spec_from_file_location("compile_kernels", SOURCE / "requirements" / "compile_kernels.py")
     module = importlib.util.module_from_spec(spec)

@@ -104,6 +104,15 @@ def test_colcon_puts_the_executables_where_ros2_run_looks(source_copy: Path, tmp
     _check_installed(prefix, installed_bundle(site, tmp_path, AMENT_PREFIX_PATH=str(prefix)))
 
 
+def test_setup_runs_through_a_link_elsewhere_as_a_symlinked_colcon_build_does(
+    source_copy: Path, tmp_path: Path
+) -> None:
+    for name in ("setup.py", "setup.cfg", "rigid_proto_ros"):
+        (tmp_path / name).symlink_to(source_copy / name)
+    told = run(sys.executable, "setup.py", "--version", cwd=tmp_path).stdout
+    assert told.split()[-1] == rigid_proto_ros.__version__
+
+
 def _check_installed(prefix: Path, found: list[str]) -> None:
     scene, body, scenes = found
     assert (prefix / "share/ament_index/resource_index/packages/rigid_proto_ros").is_file()

@@ -386,6 +386,21 @@ def test_tables_are_the_codes(capsys: pytest.CaptureFixture) -> None:
         assert f"<!-- table: {name} -->" in text
 
 
+def test_a_table_that_is_behind_is_written_anew() -> None:
+    behind = "before\n<!-- table: services -->\n| old |\n<!-- end -->\nafter\n"
+    new = docs_tables.filled(behind)
+    assert "| old |" not in new and new.startswith("before\n") and new.endswith("after\n")
+    assert docs_tables.filled(new) == new
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "largest"), [("flight.png", b"\x89PNG", 300_000), ("flight.gif", b"GIF89a", 2_000_000)]
+)
+def test_pictures_of_the_documents_are_small(name, head, largest) -> None:
+    data = (SOURCE / "docs" / name).read_bytes()
+    assert data.startswith(head) and 20_000 < len(data) < largest
+
+
 def test_every_scene_stands_in_the_list_of_lessons() -> None:
     text = (SOURCE / "docs" / "lessons" / "README.md").read_text("utf-8")
     for name in scene_names():

@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     if asked(args):
         _export(runs, args, given)
     if args.as_scene:
-        _branch(runs[-1], args)
+        _branch(runs[-1], args, given)
     status = _verify(runs, args) if args.verify else 0
     if status == 0 and args.publish:
         status = _publish(runs[-1], args)
@@ -173,13 +173,18 @@ def _given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
     return read_scene(path, None, lambda text: print(f"rigid_proto: {text}", file=sys.stderr))
 
 
-def _branch(session: RecordedSession, args: argparse.Namespace) -> None:
-    from ..session.as_script import branch_at
+def _branch(session: RecordedSession, args: argparse.Namespace, given: Scenario | None) -> None:
+    from ..session.as_script import branch_at, recorded_branch
     from ..simulation.commands import nanoseconds
 
-    if session.missing:
-        raise InputError("--as-scene", f"a recording without {', '.join(session.missing)}", "one that has them")
-    branch = branch_at(session, nanoseconds(args.at))
+    if session.missing and given is None:
+        accepted = "one that has them, or its scene by --scene FILE"
+        raise InputError("--as-scene", f"a recording without {', '.join(session.missing)}", accepted)
+    if given is None:
+        branch = branch_at(session, nanoseconds(args.at))
+    else:
+        branch, state_ns = recorded_branch(session, given, nanoseconds(args.at))
+        print(f"  the state is that recorded at {state_ns / 1e9:.9g} s; what acts then isn't recorded")
     scene = output_file("--as-scene", args.as_scene)
     scene.write_text(branch.scene, encoding="utf-8")
     script = scene.with_name(f"{scene.stem}_script.yaml")

@@ -161,12 +161,23 @@ def branch_at(session: RecordedSession, time_ns: int) -> SceneAndScript:
     if simulation.failure:
         raise InputError("--at", time_ns / 1e9, f"a time before the motion failed: {simulation.failure}")
     entries = [*_load_entries(simulation), *_thruster_entries(simulation), *_string_entries(simulation)]
-    return SceneAndScript(_scene(again, row).text, entries)
+    return SceneAndScript(_scene(again.scenario, row, _string_values(simulation)).text, entries)
 
 
-def _scene(again: Resimulation, row: np.ndarray) -> Scenario:
-    """The scene that begins with this state, and with the string as it is."""
-    numbers, scenario, tied = row.tolist(), again.scenario, again.simulation.string
+def recorded_branch(session: RecordedSession, scenario: Scenario, time_ns: int) -> tuple[SceneAndScript, int]:
+    """The same for a session without scene or events, in a scene given with it: the scene that begins with the recorded
+    state at ``time_ns`` or the last one before it, and that state's time [ns]. What acts there isn't known.
+    """
+    before = np.flatnonzero(session.times <= time_ns)
+    if not len(before) or time_ns > session.end_ns:
+        span = f"{session.times.min() / 1e9:.9g} to {session.end_ns / 1e9:.9g} s" if len(session.times) else "none"
+        raise InputError("--at", time_ns / 1e9, f"a time of the recorded states, {span}")
+    return SceneAndScript(_scene(scenario, session.rows[before[-1]], {}).text, []), int(session.times[before[-1]])
+
+
+def _scene(scenario: Scenario, row: np.ndarray, changes: dict[str, object]) -> Scenario:
+    """The scene that begins with this state."""
+    numbers = row.tolist()
     velocities = PROJECTIONS["twist"](numbers)
     values = {
         **scenario.parameters.named(),
@@ -175,13 +186,22 @@ def _scene(again: Resimulation, row: np.ndarray) -> Scenario:
         "initial.linear_velocity": velocities[:3],
         "initial.angular_velocity": velocities[3:],
         "record": "",
-        "string.attached": tied is not None,
-        "string.attach": list(again.simulation.attach if tied is None else tied.attach),
+        **changes,
     }
-    if tied is not None:
-        values["string.target"] = tied.free_end(again.simulation.time_ns).tolist()
-        values["initial.string_mass"] = tied.effective_mass
     return make_scenario(values, scenario.body_mesh.mesh if scenario.body_mesh else None)
+
+
+def _string_values(simulation: Simulation) -> dict[str, object]:
+    """The parameters that begin a scene with the string as it is."""
+    tied = simulation.string
+    if tied is None:
+        return {"string.attached": False, "string.attach": list(simulation.attach)}
+    return {
+        "string.attached": True,
+        "string.attach": list(tied.attach),
+        "string.target": tied.free_end(simulation.time_ns).tolist(),
+        "initial.string_mass": tied.effective_mass,
+    }
 
 
 def _string_entries(simulation: Simulation) -> Iterator[Entry]:

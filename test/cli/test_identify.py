@@ -10,6 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from conftest import needs_rerun
 
 from rigid_proto_ros.cli.main import main
 
@@ -44,6 +45,16 @@ def test_a_poked_session_gives_back_the_body_that_was_flown(flight: tuple, capsy
     assert found["mass"]["value"] == pytest.approx(truth["mass"], rel=1e-6)
     assert found["inertia"]["iyy"]["value"] == pytest.approx(truth["inertia"][1][1], rel=1e-6)
     assert found["inertia"]["izz"]["value"] == pytest.approx(truth["inertia"][2][2], rel=1e-6)
+
+
+@needs_rerun
+def test_a_recording_for_rerun_is_a_session_too(flight: tuple, capsys: pytest.CaptureFixture) -> None:
+    folder = flight[1]["folder"]
+    flown = ["t_handle", "--script", str(folder / "pokes.yaml"), "--duration", "1.5"]
+    assert main(["simulate", *flown, "--record", str(folder / "flight.rrd")]) == 0
+    found = _json(capsys, str(folder / "flight.rrd"))
+    assert found["hidden"] == []
+    assert found["mass"]["value"] == pytest.approx(_inspected(capsys)["mass"], rel=1e-5)
 
 
 def test_held_wrenches_count_as_long_as_they_acted(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

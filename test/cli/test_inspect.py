@@ -154,6 +154,8 @@ def test_millimetres_are_suspected(capsys, meshes):
         (("book", "--ballast", "-1", "0", "0", "0"), "mass >= 0"),
         (("--lump", "robot.urdf", "--scale", "2"), "the robot's file says"),
         (("--lump", "robot.urdf", "--model", "shell"), "the robot's file says"),
+        (("hammer", "--fix", "OUT"), "--compare ROBOT"),
+        (("hammer", "--tolerance", "0.1"), "--compare ROBOT"),
         ((), "--compare"),
     ],
 )

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Refused input: exit status 2 and one line that names what, where and what would be accepted; through the real commands."""
 
+import errno
 import os
 import sys
 from pathlib import Path
@@ -107,14 +108,30 @@ def test_a_mesh_that_bounds_no_solid_is_refused(name, tmp_path, capfd):
     assert name.split(".")[0] in line and part in line
 
 
-def test_an_unreadable_mesh_or_a_folder_is_refused(tmp_path, capfd):
-    assert "folder" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--set", f"mesh={tmp_path}"])
-    unreadable = tmp_path / "cow.obj"
-    unreadable.write_text(TETRAHEDRON)
-    unreadable.chmod(0)
-    if os.access(unreadable, os.R_OK):
-        pytest.skip("root reads everything")
-    assert "cow.obj" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--set", f"mesh={unreadable}"])
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        (".", "a folder"),
+        ("~nosuchuser/part.obj", "home directory"),
+        ("x" * 300 + ".obj", "File name too long"),
+        ("package://rigid_proto_ros/" + "x" * 300, "File name too long"),
+    ],
+)
+@pytest.mark.parametrize("command", ["inspect {}", "simulate t_handle --set mesh={}"])
+def test_a_mesh_name_that_the_system_itself_refuses_is_refused(command, name, reason, capfd):
+    line = one_line(capfd, rigid_proto, command.format(name).split())
+    assert name in line and reason in line
+
+
+@pytest.mark.parametrize("method", ["is_file", "open"])
+def test_a_mesh_or_its_folder_that_may_not_be_read_is_refused(method, tmp_path, monkeypatch, capfd):
+    def denied(*_):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    (tmp_path / "cow.obj").write_text(TETRAHEDRON)
+    monkeypatch.setattr(Path, method, denied)  # root, who may run this, is denied nothing
+    line = one_line(capfd, rigid_proto, ["inspect", str(tmp_path / "cow.obj")])
+    assert "cow.obj" in line and "Permission denied" in line
 
 
 def test_a_format_that_needs_a_package_says_so_where_it_is_not_installed(tmp_path, monkeypatch, capfd):
@@ -188,6 +205,16 @@ def test_what_is_refused_overwrites_no_recording(option, tmp_path, capfd):
     for refused in (["--script", str(script)], elsewhere or ["--set", "mass=-1"], ["--duration", "-1"]):
         one_line(capfd, rigid_proto, ["simulate", "t_handle", *recorded, *refused])
         assert kept.read_bytes() == b"an earlier flight"
+
+
+def test_a_demo_of_an_open_mesh_names_what_helps_and_keeps_the_session_before_it(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    session = Path("out/session.rrd")
+    session.parent.mkdir()
+    session.write_bytes(b"an earlier flight")
+    Path("open.obj").write_text(MESHES["open.obj"][0])
+    assert "mesh_repair" in one_line(capfd, rigid_proto, ["demo", "--mesh", "open.obj"])
+    assert session.read_bytes() == b"an earlier flight"
 
 
 def test_two_recordings_of_one_flight_are_two_files(tmp_path, capfd):

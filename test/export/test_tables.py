@@ -5,12 +5,15 @@ from __future__ import annotations
 
 import json
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.export.table import STATE_COLUMNS, UNITS
+from rigid_proto_ros.export.flight_record import FlightRecord
+from rigid_proto_ros.export.table import STATE_COLUMNS, UNITS, state_columns, write_csv
 from rigid_proto_ros.rerun_view.session_files import read_runs
 
 ENDING = ["--duration", "0.5", "--set", "gravity=[0, 0, -9.81]"]
@@ -84,6 +87,23 @@ def test_what_cannot_be_written_is_refused_in_one_line_before_the_flight(argumen
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and all(word in err for word in words)
     assert {path.name for path in tmp_path.iterdir()} == {"file", "folder.csv"}
+
+
+def test_an_interrupted_write_leaves_the_old_file_and_no_half(tmp_path):
+    def values():
+        yield 0.0
+        raise KeyboardInterrupt
+
+    out = tmp_path / "a.csv"
+    out.write_text("before")
+    with pytest.raises(KeyboardInterrupt):
+        write_csv(str(out), {"time": SimpleNamespace(tolist=values)})
+    assert out.read_text() == "before" and list(tmp_path.iterdir()) == [out]
+
+
+def test_a_flight_without_a_state_is_refused():
+    with pytest.raises(InputError, match="no states to export"):
+        state_columns(FlightRecord())
 
 
 @pytest.mark.parametrize(("module", "file"), [("pxr", "a.usda"), ("pyarrow.parquet", "a.parquet")])

@@ -150,6 +150,17 @@ def _poses(tmp_path: Path, **others) -> Path:
     return fb.write(tmp_path / "bag.mcap", {"/pose": ("geometry_msgs/msg/PoseStamped", messages)} | others)
 
 
+def test_transforms_without_a_tree_are_poses(tmp_path: Path) -> None:
+    position, attitude = mf.mocap(_truth(), mf.tumbling(), np.random.default_rng(3), 0.5).series
+    rows = zip(position.times_ns, position.values, attitude.values, strict=True)
+    messages = [(t, fb.transform(t, p, q, "map", "drone")) for t, p, q in rows]
+    bag = fb.write(tmp_path / "vicon.mcap", {"/vicon/drone": ("geometry_msgs/msg/TransformStamped", messages)})
+    found = bag_flight(bag, Choice()).series
+    assert [one.kind for one in found] == ["position", "attitude"]
+    assert np.array_equal(found[0].values, position.values)
+    assert np.abs(found[1].values - attitude.values).max() < 1e-15
+
+
 @pytest.mark.parametrize("storage", list(StoragePlugin))
 def test_a_folder_of_rosbag2_says_what_the_bare_file_does_and_a_broken_one_is_refused(
     tmp_path: Path, storage: StoragePlugin

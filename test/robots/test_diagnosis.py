@@ -127,6 +127,14 @@ def test_several_shapes_of_a_link_are_put_together(tmp_path):
     assert compare_robot(path)[0].causes == ("parts summed about their own centres",)
 
 
+def test_the_worst_verdict_stands_first_and_of_equal_ones_the_farthest_off(tmp_path):
+    moments = [(0.15,), (SIXTH,), (0.2,), (20.0,), (0.02, 0.2, 0.9)]
+    path = urdf(tmp_path, mesh("cube.obj"), *(mesh("cube.obj") + inertial("1.00000", *each) for each in moments))
+    verdicts = [("l5", "impossible"), ("l4", "impossible for its shape"), ("l3", "not uniform"), ("l1", "not uniform")]
+    verdicts += [("l2", "uniform"), ("l0", "unknown")]
+    assert [(one.link, one.status) for one in compare_robot(path)] == verdicts
+
+
 def test_visual_and_collision_are_judged_and_the_better_is_named(tmp_path):
     coarse = '<collision><geometry><box size="1 1.2 1"/></geometry></collision>'
     cube = mesh("cube.obj", role="collision")

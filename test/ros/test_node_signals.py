@@ -8,7 +8,7 @@ import time
 
 import pytest
 from conftest import needs_rerun
-from ros_process import RosProcess, catches, start_node
+from ros_process import RosProcess, alive, catches, descendants, start_node
 
 from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.rerun_view.rrd_reading import read_session
@@ -44,6 +44,23 @@ def test_a_recording_node_a_waiting_client_and_an_offline_run_end(ros_environmen
     assert read_session(run).complete
     recorded = read_session(flown)
     assert recorded.complete and recorded.mesh_chunks == 1
+
+
+@pytest.mark.stress
+@needs_rerun
+@BOTH
+def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environment, tmp_path, number):
+    demo = RosProcess("rigid_proto", "demo", "--duration", 60, environment=ros_environment, log=tmp_path / "demo")
+    session = tmp_path / "out" / "session.rrd"
+    while not (session.exists() and session.stat().st_size > 10_000):
+        assert demo.process.poll() is None, demo.errors
+        time.sleep(0.02)
+    children = descendants(demo.pid)
+    assert len(children) >= 2
+    assert demo.end(number) == 128 + number, demo.errors
+    assert "Traceback" not in demo.errors
+    assert not [pid for pid in children if alive(pid)]
+    assert read_session(session).complete
 
 
 @BOTH

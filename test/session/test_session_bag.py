@@ -28,6 +28,8 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene import cdr
+from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.messages import DEFINITIONS, PROJECTIONS, read_state, read_string
 from rigid_proto_ros.session.messages import TOPICS as WRITTEN
@@ -231,7 +233,7 @@ def test_a_bag_that_began_later_is_verified_from_a_reset_on_alone(flown, mesh_be
 
 
 @pytest.mark.parametrize("missing", [("events",), ("scene",), ("events", "scene"), ("pose", "twist", "odom")])
-def test_a_bag_that_lacks_a_topic_is_shown_with_a_scene_and_verify_names_the_topic(
+def test_a_bag_that_lacks_a_topic_is_shown_and_branched_with_a_scene_and_verify_names_the_topic(
     flown, mesh_beside, tmp_path, capsys, missing
 ):
     write_bag(tmp_path / "bag", _without(flown, *missing))
@@ -245,7 +247,15 @@ def test_a_bag_that_lacks_a_topic_is_shown_with_a_scene_and_verify_names_the_top
     if "scene" in missing:
         status, _, err = _command(capsys, bag, "--record", tmp_path / "x.mcap")
         assert status == 2 and "--scene FILE" in err and len(err.splitlines()) == 1
-    scene.write_text(f"rigid_body:\n  ros__parameters:\n    mesh: {tmp_path / 'bracket.obj'}\n")
+    branch = (bag, "--at", 1, "--as-scene", tmp_path / "x.yaml")
+    status, _, err = _command(capsys, *branch)
+    assert status == 2 and "--scene FILE" in err and len(err.splitlines()) == 1
+    scene.write_text(f"rigid_body:\n  ros__parameters:\n    mesh: {tmp_path / 'bracket.obj'}\n    density: 3.0\n")
+    status, out, _ = _command(capsys, *branch, "--scene", scene)
+    assert status == 0 and "recorded at 1 s; what acts then isn't recorded" in out
+    begun, last = read_scene(str(tmp_path / "x.yaml")), read_runs(bag)[-1]
+    assert np.abs(begun.setup.initial - last.rows[last.times.tolist().index(SECOND)]).max() < 1e-12
+    assert begun.parameters.density == 3.0 and read_script(tmp_path / "x_script.yaml") == []
     shown = tmp_path / "shown.mcap"
     assert _command(capsys, bag, "--scene", scene, "--record", shown)[0] == 0
     recorded = read_runs(bag)
@@ -292,12 +302,15 @@ def test_what_is_no_bag_is_refused_in_one_line(flown, tmp_path, capsys):
     garbled = tmp_path / "garbled.mcap"
     bad = [replace(m, data=b"\x00\x01") if m.topic.endswith("pose") else m for m in flown]
     write_bag_file(garbled, bad)
+    clock, line = tmp_path / "clock.mcap", '{"time_ns": 0, "kind": "clock", "content": {"offset_ns": 5}}'
+    write_bag_file(clock, [*flown, Logged("/rigid_body/events", WRITTEN["events"], 1, cdr.string(line))])
     database = tmp_path / "bag.db3"
     database.write_bytes(b"SQLite format 3\0")
     for path, word in (
         (empty, "ros2 bag convert"),
         (other, "/chatter"),
         (garbled, "pose"),
+        (clock, "a recording by the parameter record"),
         (database, "ros2 bag convert"),
     ):
         status, _, err = _command(capsys, path)

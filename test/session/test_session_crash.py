@@ -118,6 +118,14 @@ def test_repair_makes_a_file_that_the_stock_reader_opens(recording, tmp_path, ca
         assert counts.get("/rigid_body/pose", 0) == len(before.times)
 
 
+def test_repair_is_refused_where_it_would_harm(recording, tmp_path, capsys):
+    before = recording.read_bytes()
+    for target in (recording, tmp_path / "other.rrd", recording / "x.mcap"):
+        assert main(["replay", str(recording), "--repair", str(target)]) == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
+        assert recording.read_bytes() == before
+
+
 def test_damage_inside_is_refused_in_one_line(recording, tmp_path, capsys):
     data = recording.read_bytes()
     chunks = [at for at, opcode in records(data) if opcode == 0x06]
@@ -128,6 +136,18 @@ def test_damage_inside_is_refused_in_one_line(recording, tmp_path, capsys):
         assert main(["replay", str(tmp_path / "damaged.mcap")]) == 2
         error = capsys.readouterr().err
         assert len(error.splitlines()) == 1 and "damaged.mcap" in error
+
+
+def test_random_bytes_never_end_in_a_traceback(recording, tmp_path, capsys):
+    data, rng = recording.read_bytes(), random.Random(6)
+    path = tmp_path / "random.mcap"
+    for _ in range(40):
+        damaged = bytearray(data[: rng.randrange(1, len(data))])
+        for _ in range(rng.randrange(1, 4)):
+            damaged[rng.randrange(len(damaged))] = rng.randrange(256)
+        path.write_bytes(damaged)
+        assert main(["replay", str(path), "--verify"]) in (0, 1, 2)
+        assert "Traceback" not in capsys.readouterr().err
 
 
 # A node killed

@@ -108,6 +108,18 @@ def test_events_scene_applied_and_inertia_are_there(flown):
     assert np.linalg.norm([force.x, force.y, force.z]) == pytest.approx(np.linalg.norm(pokes[0]["content"]["force"]))
 
 
+def test_a_run_without_a_clock_is_logged_at_simulated_time_in_chunks_of_half_a_second(flown):
+    path, kept = flown
+    with open(path, "rb") as stream:
+        reader = make_reader(stream)
+        chunks, (attachment,) = reader.get_summary().chunk_indexes, reader.iter_attachments()
+        assert reader.get_header().profile == "ros2"
+    assert [log for log, _ in decoded(path)["/rigid_body/pose"]] == list(kept.states)
+    # What a cut loses.
+    assert max(chunk.message_end_time - chunk.message_start_time for chunk in chunks) <= SECOND // 2
+    assert attachment.data == resolve_mesh("t_handle").read_bytes()
+
+
 def test_a_session_is_read_back_and_verified(flown):
     path, kept = flown
     (session,) = read_runs(path)
@@ -120,18 +132,18 @@ def test_a_session_is_read_back_and_verified(flown):
     assert verify(session) is None
 
 
-def test_the_mesh_comes_from_inside_where_its_file_is_gone(tmp_path):
-    mesh = tmp_path / "mine.obj"
-    # Not a bundled one's bytes.
-    mesh.write_text("# mine\n" + resolve_mesh("book").read_text())
-    session = tmp_path / "session.mcap"
-    scene = tmp_path / "scene.yaml"
-    scene.write_text(
-        f"rigid_body:\n  ros__parameters:\n    mesh: {mesh}\n    initial.angular_velocity: [1.0, 2.0, 3.0]\n"
-    )
-    assert main(["simulate", str(scene), "--duration", "0.5", "--bag", str(session)]) == 0
-    mesh.unlink()
-    assert main(["replay", str(session), "--verify"]) == 0
+def test_meshes_come_from_inside_where_their_files_are_gone(tmp_path):
+    book, hammer = tmp_path / "book.obj", tmp_path / "hammer.obj"
+    for mesh in (book, hammer):
+        # Not a bundled one's bytes.
+        mesh.write_text("# mine\n" + resolve_mesh(mesh.stem).read_text())
+    session, script = str(tmp_path / "session.mcap"), tmp_path / "script.yaml"
+    script.write_text(f"- {{t: 0.2, set: {{mesh: {hammer}}}}}\n- {{t: 0.3, at: com, impulse: [1, 0, 0]}}\n")
+    flown = ["book", "--set", f"mesh={book}", "--script", str(script), "--duration", "0.5"]
+    assert main(["simulate", *flown, "--bag", session]) == 0
+    book.unlink()
+    hammer.unlink()
+    assert main(["replay", session, "--verify"]) == 0
 
 
 def test_without_rerun_a_session_is_recorded_and_verified(tmp_path):

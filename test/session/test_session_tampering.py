@@ -23,10 +23,11 @@ from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import read_script
-from rigid_proto_ros.session.check import verify
+from rigid_proto_ros.session.check import broken_link, verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
 from rigid_proto_ros.session.messages import FIELDS
 from rigid_proto_ros.session.recorded_session import RecordedSession
+from rigid_proto_ros.simulation.observer import EventLog
 
 SECOND = 10**9
 
@@ -89,6 +90,22 @@ def test_a_random_change_of_an_event_is_found_and_named(session, rng):
     difference = verify(with_line(session, number, json.dumps(event)))
     assert difference is not None, path
     assert f"command {number + 1} " in str(difference), (path, difference)
+
+
+@pytest.mark.parametrize(
+    ("force", "words"),
+    # The first state after it began at .1 s.
+    [(0.02, r"at 0\.11 s: state .* differs"), (1e30, r"at 0\.1 s: command 1 .* refused")],
+)
+def test_with_hashes_made_to_fit_the_motion_or_a_refusal_still_tells(session, force, words):
+    log, events = EventLog(), []
+    for number, (time_ns, line) in enumerate(session.events):
+        event = json.loads(line)
+        if number == 0:
+            event["content"]["force"][1] = force
+        events.append((time_ns, log.append(event["time_ns"], event["kind"], event["content"])))
+    assert broken_link([line for _, line in events]) is None
+    assert re.match(words, str(verify(replace(session, events=events))))
 
 
 def test_events_added_dropped_or_swapped_are_found(session):

@@ -71,6 +71,11 @@ def test_grids_make_every_combination_and_lists_go_in_step() -> None:
     assert study(PLAIN, vary=powers).columns(np.arange(7))[0].tolist() == [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1000.0]
 
 
+def test_names_that_are_numbers_are_names() -> None:
+    conditions = {1: {"quantity": "turned", "above": 1.0}, "half": {"quantity": "turned", "above": 3.0}}
+    assert study(PLAIN, measure={"first": conditions}).measures.columns == ("first.1", "first.half")
+
+
 def numpys(seed: int, row: int, count: int) -> np.ndarray:
     """The same by numpy's own generator."""
     key = np.random.SeedSequence(seed).generate_state(2, np.uint64)
