@@ -6,13 +6,15 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pytest
-from mass_solids import moved, prism, sphere
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mass_solids import moved, prism, rotation, sphere
 
-from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.base.rotation import matrix_from_quaternion, quaternion_from_matrix
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
 from rigid_proto_ros.mass.properties import MassProperties, MeshMoments
-from rigid_proto_ros.robots.reading import read_robot
+from rigid_proto_ros.robots.reading import read_robot, rotation_from_wxyz
 
 BODIES = {
     "lopsided": moved(prism([[1, 0], [0.2, 0.8], [-0.9, 0.3], [-0.1, -0.7]], 1.3, 0.5, 3), (0.3, -0.2, 5.0), 4),
@@ -78,3 +80,13 @@ def test_the_command_prints_what_the_json_says(capsys):
     assert float(urdf.find("inertia").get("ixz")) == report["inertia"][0][2]
     assert [float(number) for number in mjcf.get("diaginertia").split()] == report["principal_moments"]
     assert float(sdf.findtext("inertia/izz")) == report["inertia"][2][2]
+
+
+HALF_TURNS = (np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, 1.0, -1.0]), np.diag([-1.0, -1.0, 1.0]))
+
+
+@given(st.one_of(st.sampled_from((np.eye(3), *HALF_TURNS)), st.integers(0, 2**31).map(rotation)))
+@settings(deadline=None, max_examples=30)
+def test_a_quaternion_gives_its_rotation_back_half_turns_too(R):
+    x, y, z, w = quaternion_from_matrix(R)
+    assert rotation_from_wxyz((w, x, y, z)) == pytest.approx(R, abs=2e-15)

@@ -81,13 +81,16 @@ def test_cuboid_and_tetrahedron_have_their_closed_forms():
     assert tetrahedron.inertia[0, 1] == pytest.approx(1 / 80, rel=1e-14)  # -∫xy = -(1/120 - 1/96)·6
 
 
-def test_far_from_the_origin_the_tensor_keeps_its_digits():
+def test_far_from_the_origin_tensor_and_com_keep_their_digits():
     vertices, triangles = sphere(12)
     near = MeshMoments(vertices, triangles).mass_properties(density=1.0)
     far = MeshMoments(vertices + 2.0**30, triangles).mass_properties(density=1.0)
     rounded = MeshMoments((vertices + 2.0**30) - 2.0**30, triangles).mass_properties(density=1.0)
     assert far.inertia == pytest.approx(rounded.inertia, rel=1e-14, abs=1e-14)
     assert near.mass == pytest.approx(far.mass, rel=1e-6)
+    # The COM itself is rounded to 1e-7; from the reference near the box's centre it isn't.
+    moments = MeshMoments(vertices + 2.0**30, triangles).moments("solid")
+    assert moments.center + (moments.reference - 2.0**30) == pytest.approx(rounded.center_of_mass, abs=1e-15)
 
 
 def test_thin_bodies_take_the_second_path_by_themselves_and_need_it():

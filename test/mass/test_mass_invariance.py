@@ -71,3 +71,32 @@ def test_every_computed_tensor_meets_the_triangle_inequality(mesh, exponents, mo
     a, b, c = principal_axes(properties(mesh, model, scale=scale).inertia)[0]
     assert a > 0.0
     assert a + b >= c * (1.0 - 1e-14)
+
+
+@given(bodies(), SEEDS, st.sampled_from(TURNED_WITH_THE_BODY))
+@settings(PROFILE)
+def test_the_order_of_vertices_faces_and_corners_is_of_no_matter(mesh, seed, model):
+    vertices, triangles = mesh
+    random = np.random.default_rng(seed)
+    order = random.permutation(len(vertices))
+    shuffled = np.argsort(order)[random.permutation(triangles)]
+    shuffled = np.array([np.roll(corners, random.integers(3)) for corners in shuffled])
+    center, inertia = off(properties((vertices[order], shuffled), model), properties(mesh, model))
+    assert max(center, inertia) <= 1e-13 + 2 * np.spacing(np.max(np.abs(vertices))) / np.ptp(vertices)
+
+
+@given(bodies(), st.sampled_from(["solid", "shell"]))
+@settings(PROFILE)
+def test_triangles_cut_in_four_change_neither_solid_nor_shell(mesh, model):
+    vertices, triangles = mesh
+    # Rounded, so that halves of sums are exact.
+    unit = 2.0 ** np.ceil(np.log2(np.max(np.abs(vertices))) - 30)
+    vertices = np.round(vertices / unit) * unit
+    following = triangles[:, [1, 2, 0]]
+    middles = 0.5 * (vertices[triangles] + vertices[following])
+    a, b, c = triangles.T
+    ab, bc, ca = len(vertices) + np.arange(triangles.size).reshape(-1, 3).T
+    cut = np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    fine = np.concatenate([vertices, middles.reshape(-1, 3)]), cut
+    center, inertia = off(properties(fine, model), properties((vertices, triangles), model))
+    assert max(center, inertia) <= 1e-13 + 4 * np.spacing(np.max(np.abs(vertices))) / np.ptp(vertices)

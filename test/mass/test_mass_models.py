@@ -64,6 +64,17 @@ def test_ballast_is_point_masses_added_by_the_parallel_axis_theorem(lopsided):
     assert loaded.inertia == pytest.approx(inertia, rel=1e-13, abs=1e-13)
 
 
+def test_ballast_far_from_the_origin_keeps_its_digits(lopsided):
+    vertices, triangles = np.round(lopsided[0] * 2**20) / 2**20, lopsided[1]
+    near, far = (
+        MeshMoments(vertices + shift, triangles).mass_properties(
+            density=1.0, ballast=((1.0, shift + 0.5, shift + 0.25, shift),)
+        )
+        for shift in (0.0, 2.0**20)
+    )
+    assert far.inertia == pytest.approx(near.inertia, rel=1e-14, abs=1e-14)
+
+
 def test_explicit_numbers_are_final_and_move_with_the_picture():
     given = (0.2, 0.01, -0.02, 0.3, 0.03, 0.25)
     plain = explicit_mass_properties(3.0, (1.0, 2.0, 3.0), given, scale=(2.0, -1.0, 1.0))
@@ -113,6 +124,14 @@ def test_an_open_surface_is_refused_where_a_volume_is_needed_and_only_there():
         opened.mass_properties("solid", mass=1.0)
     for model in COMPUTED[1:]:
         assert opened.mass_properties(model, mass=1.0).mass == 1.0
+
+
+def test_a_flat_surface_has_its_other_models():
+    square = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.0, 1.0, 0], [0.0, 1.0, 0]])
+    flat = MeshMoments(square, np.array([[0, 1, 2], [0, 2, 3]]), no_solid="open")
+    for model in COMPUTED[1:]:
+        a, b, c = np.diag(flat.mass_properties(model, mass=1.0).inertia)
+        assert a == pytest.approx(b, rel=1e-14) and a + b == pytest.approx(c, rel=1e-14)
 
 
 def test_points_on_a_line_are_refused_by_the_models_name():

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mass_solids import box
 
+from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.inspection import model_difference
 from rigid_proto_ros.mass.moments import MODELS
-from rigid_proto_ros.mass.properties import MassProperties
+from rigid_proto_ros.mass.properties import MassProperties, MeshMoments
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.workbench.body_tab import comparison
 
@@ -76,6 +78,16 @@ def test_a_model_at_the_solids_com_has_its_own_tensor_there(model: str, scale, w
     )
     # A weight moves the COM of both alike, since both began at one place with one mass.
     assert np.abs(loaded.center_of_mass - truly.center_of_mass).max() < 1e-15 * size
+
+
+def test_explicit_numbers_keep_their_com_and_without_a_solid_there_is_no_com_of_it() -> None:
+    given_com = [0.01, 0.02, 0.03]
+    values = {"inertia_model": "explicit", "explicit_inertia.center_of_mass": given_com, "inertia_model_com": "solid"}
+    assert read_scene("hammer", values).setup.body.center_of_mass.tolist() == given_com
+    vertices, triangles = box()
+    opened = MeshMoments(vertices, triangles[1:], no_solid="open")
+    with pytest.raises(MeshError, match="open"):
+        opened.mass_properties("bounding_box", mass=1.0, com="solid")
 
 
 def test_the_pages_table_says_what_counts_and_not_the_largest_entry() -> None:

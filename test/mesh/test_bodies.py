@@ -26,6 +26,8 @@ def test_body_is_a_closed_outward_wound_solid(name: str) -> None:
     cavities = {"cavities": "info"} if name == "hollow_box" else {}
     assert codes(made) == cavities
     assert made.verdict.components == 1 + len(cavities)
+    assert 250 <= len(made.triangles) <= 7000
+    assert 0.05 <= np.ptp(made.vertices, axis=0).max() <= 0.7  # m: one can hold it
     assert np.all(mesh_topology(made.vertices, made.triangles).edges[:, 2:4] == 1)
     assert len(np.unique(made.vertices, axis=0)) == len(made.vertices), "duplicate vertices"
     corners = made.vertices[made.triangles]
@@ -54,6 +56,9 @@ def test_bodies_have_what_they_are_there_to_show() -> None:
     assert 1.2 * iyy < izz < ixx / 1.2  # about its middle axis: measured 1 : 1.418 : 2.376
     assert abs(handle.inertia - np.diag(np.diag(handle.inertia))).max() < 1e-5 * izz
     assert abs(handle.center_of_mass[:2]).max() < 1e-7
+    top = mesh_body("spinning_top").moments.mass_properties().inertia
+    # Coordinates are rounded to 10 nm on a radius of 36 mm.
+    assert abs(top[0, 0] - top[1, 1]) < 1e-6 * top[2, 2]
     hammer = mesh_body("hammer")
     low, high = hammer.vertices.min(axis=0), hammer.vertices.max(axis=0)
     offset = hammer.moments.mass_properties().center_of_mass - (low + high) / 2.0

@@ -70,6 +70,7 @@ UNREADABLE = [
 # file name, bytes, code of the verdict, words of the one line; the file can be read but bounds no solid
 REFUSED = [
     ("nan.obj", obj(WITH_NAN), "nonfinite", "1 of 8 vertices"),
+    ("unused_nan.obj", b"v nan 0 inf\n" + obj(faces=T + 1), "nonfinite", "the first is vertex 0"),
     ("nan.stl", stl(WITH_NAN), "nonfinite", "not finite"),
     ("inf.obj", replaced(obj(), b"v 0.0 0.0 1.0", b"v 0.0 1e999 1.0"), "nonfinite", "not finite"),
     ("open.obj", obj(faces=T[:-1]), "open", "3 boundary edges"),

@@ -46,6 +46,12 @@ def test_every_format_gives_the_cube_in_file_order(tmp_path, name):
     assert mesh_body(mesh).moments.moments("shell").measure == pytest.approx(6.0, rel=1e-15)
 
 
+def test_stl_corners_that_are_not_bit_equal_stay_apart(tmp_path):
+    nudged = np.vstack([CUBE_VERTICES, CUBE_VERTICES[0] + [1e-7, 0.0, 0.0]])
+    faces = np.concatenate([[[8, *CUBE_TRIANGLES[0, 1:]]], CUBE_TRIANGLES[1:]])
+    assert len(load(tmp_path, "a.stl", stl(nudged, faces)).vertices) == 9
+
+
 def test_interleaved_negative_obj_indices_count_back_from_the_vertices_so_far(tmp_path):
     text = []
     for a, b, c in CUBE_TRIANGLES:
@@ -61,6 +67,11 @@ def test_obj_corners_with_texture_and_normal_numbers_tabs_and_continued_lines(tm
     text = "mtllib a.mtl\nvt 0 0\nvn 0 0 1\ng side\nusemtl m\ns 1\n" + text + "l 1 2\np 1\n"
     mesh = load(tmp_path, "rich.obj", text.encode())
     assert (volume(mesh), len(mesh.polygon_starts)) == (1.0, 7)
+
+
+def test_numbers_behind_the_coordinates_of_an_obj_vertex_are_left_aside(tmp_path):
+    text = obj().decode().replace("\nf", " 0.1 0.2 0.3\nf", 1).replace("\nv", " 0.1 0.2 0.3\nv")
+    assert volume(load(tmp_path, "colours.obj", text.encode())) == 1.0
 
 
 def test_unreferenced_vertices_are_counted_and_carry_nothing(tmp_path):
@@ -145,6 +156,17 @@ def test_no_facet_of_a_damaged_text_is_left_out_in_silence(tmp_path, damaged):
                 load(tmp_path, "a.stl", line_end.join([*lines[:k], damaged, *lines[k + 1 :]]))
 
 
+@pytest.mark.parametrize("kind", ["off", "ply", "stl", "stl_ascii", "glb"])
+def test_files_that_trimesh_writes_are_read_as_it_had_them(tmp_path, meshes, kind):
+    trimesh = pytest.importorskip("trimesh")
+    mesh = load_mesh(str(meshes / "sword.obj"))
+    data = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False).export(file_type=kind)
+    again = load(tmp_path, "a." + kind.split("_")[0], data.encode() if isinstance(data, str) else data)
+    # Single precision, but for .ply and .off.
+    corners, expected = again.vertices[again.triangles], mesh.vertices[mesh.triangles]
+    assert np.max(np.abs(corners - expected)) <= 1e-7 * np.max(np.abs(expected))
+
+
 def test_names_of_bundled_bodies_and_package_uris_find_the_same_file():
     assert {"t_handle", "hammer", "hollow_box"} <= set(body_names())
     by_name, by_uri = load_mesh("t_handle"), load_mesh("package://rigid_proto_ros/bodies/t_handle.obj")
@@ -169,3 +191,10 @@ def test_a_second_look_judges_nothing_and_a_cache_that_fails_is_no_error(tmp_pat
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert mesh_body(load_mesh(str(tmp_path / "a.obj"))).verdict == first
+
+
+def test_without_a_cache_nothing_is_kept_and_all_is_judged(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
+    assert volume(load(tmp_path, "a.obj", obj())) == 1.0
+    assert [path.name for path in tmp_path.iterdir()] == ["a.obj"]

@@ -58,15 +58,28 @@ def test_parts_apart_or_touching_are_not_called_overlapping():
     assert codes(body(together(*parts))) == {}
 
 
+BUBBLE = sphere(4, (0.02, 0.02, 0.02))
+
+
+def bubbly(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """A ball with count³ spherical bubbles."""
+    middle = 0.5 * (count - 1)
+    holes = [inward(moved(BUBBLE, 0.12 * (np.array(place) - middle))) for place in np.ndindex(count, count, count)]
+    return together(sphere(12), *holes)
+
+
+def test_a_ball_with_many_bubbles_is_right_as_it_is():
+    made = body(bubbly(6), repair=True)
+    assert codes(made) == {"cavities": "info"}
+    assert volume(made) == pytest.approx(volume(body(sphere(12))) - 216 * volume(body(BUBBLE)), rel=1e-12)
+
+
 def test_what_is_left_undecided_accuses_no_component_and_turns_none(monkeypatch):
-    """A ball with 64 spherical bubbles."""
-    bubble = sphere(4, (0.02, 0.02, 0.02))
-    holes = [inward(moved(bubble, 0.12 * (np.array(place) - 1.5))) for place in np.ndindex(4, 4, 4)]
     monkeypatch.setattr(intersection, "WORK_LIMIT", 3000)
-    made = body(together(sphere(12), *holes), repair=True)
+    made = body(bubbly(4), repair=True)
     assert codes(made)["components_unchecked"] == "warning"
     assert "component_inward" not in codes(made) and "repaired" not in codes(made)
-    assert volume(made) == pytest.approx(volume(body(sphere(12))) - 64 * volume(body(bubble)), rel=1e-12)
+    assert volume(made) == pytest.approx(volume(body(sphere(12))) - 64 * volume(body(BUBBLE)), rel=1e-12)
 
 
 def test_repair_turns_faces_to_agree():
@@ -76,6 +89,20 @@ def test_repair_turns_faces_to_agree():
     repaired = body(broken, repair=True)
     assert volume(repaired) == pytest.approx(volume(body(BALL)), rel=1e-14)
     assert codes(repaired) == {"repaired": "warning"}
+    vertices, triangles = HOLLOW
+    broken = vertices, turned(triangles, np.random.default_rng(2).random(len(triangles)) < 0.3)
+    assert volume(body(broken, repair=True)) == pytest.approx(volume(body(HOLLOW)), rel=1e-14)
+
+
+def test_repair_turns_parts_that_would_subtract(meshes):
+    apart = together(box(), inward(moved(box(), (3.0, 0.0, 0.0))), inward(moved(box(), (6.0, 0.0, 0.0), 2)))
+    assert codes(body(apart)) == {"component_inward": "error"}
+    assert volume(body(apart, repair=True)) == pytest.approx(3.0, rel=1e-14)
+    made = mesh_body(load_mesh(str(meshes / "multibody.stl")), repair=True)
+    topology = mesh_topology(made.vertices, made.triangles)
+    parts = [made.triangles[topology.component == c] for c in range(topology.components)]
+    assert len(parts) > 1
+    assert volume(made) == pytest.approx(sum(abs(solid_moments(made.vertices, p).measure) for p in parts), rel=1e-13)
 
 
 def test_a_shell_of_polygons_is_the_same_after_repair(meshes):
@@ -105,6 +132,14 @@ def test_repair_welds_a_torn_surface_and_caps_flat_holes_exactly():
     assert repaired.moments.moments("shell").measure == pytest.approx(22.0, rel=1e-14)
     few = body((vertices, np.delete(triangles, [3, 40, 41, 90], axis=0)), repair=True)
     assert volume(few) == pytest.approx(6.0, rel=1e-15)
+
+
+def test_vertices_at_zero_and_minus_zero_are_one_for_the_verdict():
+    vertices, triangles = box()
+    vertices = vertices - 0.5
+    mixed = triangles.copy()
+    mixed[::2] += len(vertices)
+    assert body((np.vstack([vertices, np.where(vertices == 0.0, -0.0, vertices)]), mixed)).verdict.closed
 
 
 def test_copies_that_close_the_surface_stay_and_those_that_spoil_it_go():

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from flights import AT_REST, SECOND, flight, spinning, wrench
-from integrator_scenes import BODY, Scene, error
+from integrator_scenes import BODY, ROW, Scene, error
 from reference_motion import angle_between, free_motion
 
 from rigid_proto_ros.motion.body import make_body
@@ -44,6 +44,19 @@ def test_the_method_is_the_cheapest_that_fits_the_segment(simulation, method):
     assert method in simulation.choice
     simulation.advance(SECOND // 100)
     assert np.isfinite(simulation.state.row).all()
+
+
+@pytest.mark.parametrize(("frame", "why"), [("body", "turn with the body"), ("world", "depend on the attitude")])
+def test_held_wrenches_are_stepped_by_series_and_the_choice_says_why(frame, why):
+    simulation = auto(spinning((1, 2, 3)))
+    simulation.submit(wrench(frame, (1.0, 0.0, 0.0), (0.0, 0.5, 0.0)))
+    simulation.advance(SECOND // 100)
+    assert "taylor" in simulation.choice and why in simulation.choice
+
+
+def test_its_steps_follow_from_accuracy_and_not_from_step():
+    ends = {auto(ROW, step_s=step, string=STRING).advance(SECOND).sha256() for step in (1e-6, 1e-3, 1.0)}
+    assert len(ends) == 1
 
 
 def test_a_body_at_rest_takes_no_step_and_wakes_at_a_poke():

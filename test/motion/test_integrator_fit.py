@@ -95,3 +95,10 @@ def test_a_command_scheduled_before_the_change_is_judged_again_when_it_acts():
 def test_a_step_too_long_for_its_integrator_is_told(name, step_s, spin, coarse):
     simulation = flight(BODY, integrator=name, step_s=step_s, initial=spinning((0.0, 0.0, spin)))
     assert bool(simulation.too_coarse) == coarse
+
+
+@pytest.mark.parametrize(("name", "coarse"), [("rk4", True), ("auto", False)])
+def test_a_step_too_long_for_a_string_is_told(name, coarse):
+    string = StringSettings(attached=True, target=(0.0, 0.0, 1.0), frequency=1e4, rest_length=1.0)
+    simulation = flight(BODY, integrator=name, initial=SPIN, string=string)
+    assert ("string frequency times step = 10" in simulation.too_coarse) == coarse

@@ -68,6 +68,14 @@ def test_a_ball_that_leaves_its_own_target_bounces_between_both_ends_of_its_rope
         assert abs(x - away * (-1.0) ** bounces) <= 1e-9, time
 
 
+def test_a_rope_that_is_reached_after_hours_pulls_then():
+    rope = StringSettings(attached=True, rest_length=1000.0, stiffness=50.0, damping_ratio=0.0)
+    row = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.125, 0.0, 0.0, 0.0, 0.0, 0.0]
+    end = flight(BALL, integrator="auto", initial=row, string=rope).advance(10_000 * SECOND)
+    # Taut after 8000 s for half a swing of the spring; measured 1e-8 m off.
+    assert end.position[0] == pytest.approx(1000.0 - (2000.0 - math.pi / 5.0) * 0.125, abs=1e-6)
+
+
 @pytest.mark.parametrize("accuracy", [1e-8, 1e-9])
 def test_a_body_that_spins_on_a_slack_rope_is_caught_when_the_rope_ends(accuracy):
     """Its knot turns by 1.1 rad in one step of free flight; 2e-8 s too late was 1e-6 beside a measured 5e-10."""

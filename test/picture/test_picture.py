@@ -10,7 +10,7 @@ from drawn import Drawn
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.base.rotation import matrix_from_quaternion, multiply
 from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.state import State
@@ -335,6 +335,22 @@ def test_angles_are_accurate_at_both_ends(angle: float) -> None:
     other = np.array([np.cos(angle), np.sin(angle), 0.0])
     assert angle_to(np.array([2.0, 0.0, 0.0]), 5.0 * other[np.newaxis])[0] == pytest.approx(angle, rel=1e-9, abs=1e-16)
     assert angle_to(np.zeros(3), other[np.newaxis])[0] == 0.0
+
+
+@settings(deadline=None)
+@given(SPINS, st.floats(-14.0, 0.49).map(lambda e: 10.0**e), st.sampled_from([1.0, -1.0]))
+def test_the_angle_between_two_attitudes_is_accurate_down_to_round_off(axis, angle, sign):
+    turn = np.append(np.sin(0.5 * angle) * axis / np.linalg.norm(axis), np.cos(0.5 * angle))
+    start = np.array([0.5, -0.5, 0.5, 0.5])
+    found = attitude_angle(start, sign * np.array(multiply(*start, *turn)))
+    assert found == pytest.approx(angle, rel=1e-13, abs=1e-15)
+
+
+def test_the_bounding_box_follows_a_scale_that_mirrors():
+    _, drawn = pictured(flight.setup_of(com=[-0.3, 0.1, 0.05], scale=np.array([-2.0, 1.0, 1.0])))
+    corners = np.concatenate(drawn.at_end(style.BOUNDING_BOX))
+    assert corners.min(axis=0) == pytest.approx([-0.3, -0.1, -0.05])
+    assert corners.max(axis=0) == pytest.approx([0.3, 0.1, 0.05])
 
 
 @settings(deadline=None, max_examples=30)

@@ -7,10 +7,14 @@ import numpy as np
 import pytest
 import trimesh
 from flights import SECOND
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rigid_proto_ros.base.errors import CommandRefused
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.motion.string import free_end_at
+from rigid_proto_ros.motion.string import StringSettings, free_end_at, tie
 from rigid_proto_ros.scene.command_codec import of_event
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, MoveString, ReleaseString, TieString
@@ -203,6 +207,55 @@ def test_a_string_pulls_when_stretched_and_pushes_only_when_bilateral(bilateral)
         gained = scenario.setup.body.mass * simulation.state.linear_velocity
         tension = SCENE["string.stiffness"] * (distance - 0.5) if stretched or bilateral else 0.0
         assert gained == pytest.approx([0.0, 0.0, tension * 1e-3], abs=1e-3 * abs(tension) * 1e-3 + 1e-18)
+
+
+@pytest.mark.parametrize("released", [True, False], ids=["released", "detached by its parameter"])
+def test_a_string_that_was_let_go_is_tied_again_by_the_next_target(released):
+    simulation, scenario = simulated(string__attached=True, string__target=[0.0, 0.0, 1.0])
+    detached = Change({}, lambda: scenario.with_changes({"string.attached": False}).setup)
+    simulation.submit(ReleaseString() if released else detached, 100 * MS)
+    simulation.advance(101 * MS)
+    assert simulation.string is None
+    simulation.submit(MoveString((0.5, 0.0, 0.0)), 200 * MS)
+    simulation.advance(201 * MS)
+    assert simulation.string.free_end(201 * MS).tolist() == [0.5, 0.0, 0.0]
+
+
+def test_without_a_mesh_the_knot_is_where_it_was_asked_for():
+    simulation, _ = simulated(mesh="", inertia_model="explicit", string__timeout=0.0)
+    simulation.submit(TieString("mesh", (1.0, 2.0, 3.0)))
+    simulation.submit(MoveString((0.0, 0.0, 0.0)))
+    simulation.advance(1)
+    assert simulation.string.attach == (1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize("rest_length", [0.0, 0.5])
+def test_a_knot_at_the_very_place_of_the_free_end_is_no_singularity(rest_length):
+    simulation, _ = simulated(
+        mesh="",
+        inertia_model="explicit",
+        string__attached=True,
+        string__target=SCENE["initial.position"],
+        string__rest_length=rest_length,
+        string__bilateral=True,
+    )
+    simulation.advance(MS)
+    assert not simulation.failure and simulation.state.linear_velocity.tolist() == [0.0, 0.0, 0.0]
+    assert np.isfinite([simulation.potential_energy, simulation.hand_work, simulation.string_heat]).all()
+
+
+@given(
+    st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1), st.sampled_from([0.0, 1.0, 1e3])
+)
+@settings(deadline=None, max_examples=30)
+def test_a_span_that_is_rounding_alone_gives_the_effective_mass_no_direction(attitude, far):
+    """The mean of 1/m_eff over all directions."""
+    body, arm = make_body(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.04])), np.array([0.1, 0.15, 0.2])
+    mean = sum(1.0 / effective_mass(body, arm, n) for n in np.eye(3)) / 3.0
+    q, target = np.array(attitude) / np.linalg.norm(attitude), far * np.array([0.3, -0.7, 1.1])
+    state = State(0, np.array([*(target - matrix_from_quaternion(q) @ arm), *q, *np.zeros(6)]))
+    string = tie(StringSettings(attached=True), arm, target, body, state, 0)
+    assert string.effective_mass == pytest.approx(1.0 / mean, rel=1e-12)
 
 
 def test_reset_ties_the_string_as_its_parameters_say():
