@@ -40,6 +40,14 @@ def test_real_time_that_is_given_up_is_warned_of_and_not_every_second(rig):
         assert grown and all(report["level"] == 1 and words in report["message"] for report in grown)
 
 
+def test_a_fixed_step_too_long_for_the_motion_is_a_warning_as_long_as_it_is_in_force(rig):
+    rig.set(integrator="rk4", step=0.5)
+    report = rig.diagnostics()
+    assert report["level"] == 1 and "rk4: |w| step = 6" in report["message"] == report["warning"]
+    rig.set(integrator="auto")
+    assert not rig.diagnostics()["warning"]
+
+
 @pytest.mark.parametrize("name", ["flight.mcap", "flight.rrd"])
 def test_a_recording_that_stops_is_told_by_log_diagnostics_and_parameter_until_another_begins(rig, tmp_path, name):
     path, unlimited, began_ns = tmp_path / name, (resource.RLIM_INFINITY, resource.RLIM_INFINITY), time.time_ns()
