@@ -54,14 +54,22 @@ class FlownPage:
         self.page, self.server = self.workbench.page, self.workbench.page.server
         self.said: list[str] = []
         self.page.flight.say = self.said.append
-        self._socket = bare_page(self.server.get_port())
-        self.browser = self._socket.__enter__()
+        self.come()
         self.until(lambda: self.page.picture.setup is not None, "body")
         self.fly(0.0)
 
     def end(self) -> None:
-        self._socket.__exit__(None, None, None)
+        self.leave()
         self.workbench.close()
+
+    def come(self) -> None:
+        """Open the page."""
+        self._socket = bare_page(self.server.get_port())
+        self.browser = self._socket.__enter__()
+
+    def leave(self) -> None:
+        """Close it."""
+        self._socket.__exit__(None, None, None)
 
     def do(self, function: Callable):
         """Run a function on the page's thread."""

@@ -98,6 +98,7 @@ class Browser:
         self.flown = flown
         self.page = chromium.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=True)
         self.page.set_default_timeout(PATIENCE_S * 1e3)
+        self._fingers = self.page.context.new_cdp_session(self.page)
         self.page.add_init_script(f"({RARELY_DRAWN})({DRAWN_MS})")
         known = set(flown.server.get_clients())
         self.page.goto(flown.workbench.address)
@@ -206,6 +207,12 @@ class Browser:
 
     def release(self, button: str = "left") -> None:
         self.page.mouse.up(button=button)
+
+    def touch(self, phase: str, *points: tuple[float, float]) -> None:
+        """Fingers on the glass: phase touchStart, touchMove or touchEnd, all points where they are."""
+        fingers = [{"x": float(x), "y": float(y), "id": k} for k, (x, y) in enumerate(points)]
+        self._fingers.send("Input.dispatchTouchEvent", {"type": phase, "touchPoints": fingers})
+        time.sleep(SAID_S)
 
 
 @contextmanager

@@ -58,8 +58,9 @@ class Tracks(Backend):
         self.size = min(size, self.size or size)
 
     def mesh(self, name: str, surface: DrawnMesh | None) -> None:
-        """Keep the mesh; raises InputError for another one in flight."""
-        if surface is not None and self._surfaces.setdefault(name, surface) is not surface:
+        """Keep the mesh; raises InputError for another one, or none, in flight."""
+        gone = surface is None and name == style.BODY_MESH and name in self._surfaces
+        if gone or (surface is not None and self._surfaces.setdefault(name, surface) is not surface):
             reason = f"the mesh changes at {self._times[0] / 1e9:.9g} s"
             raise InputError("session", reason, "a simulation without a change of mesh, for --gltf and --usd")
 

@@ -430,9 +430,9 @@ class Simulation:
 
     def _tell_of_mesh(self, before: Setup) -> None:
         surface = self.setup.surface
-        if surface is not before.surface and surface is not None:
-            name = str(self.setup.geometry[0])
-            self.observer.on(MeshChanged(self.time_ns, surface.vertices, surface.triangles, name))
+        if surface is not before.surface:
+            vertices, triangles = (None, None) if surface is None else (surface.vertices, surface.triangles)
+            self.observer.on(MeshChanged(self.time_ns, vertices, triangles, str(self.setup.geometry[0])))
 
     # Start and failure
 

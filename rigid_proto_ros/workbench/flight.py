@@ -114,7 +114,8 @@ class RunMemory(Observer):
 
 
 class Flight:
-    """say(text) tells the users of a refusal. busy(text): what takes time from now on, "" when it is over.
+    """say(text) tells the users of a refusal, and refused() is called after it. busy(text): what takes time from now
+    on, "" when it is over.
 
     scenario: the one in force; scenes_begun: how many others began since the start. moment_ns: the time of the past
     that is looked at, None while the present is.
@@ -124,6 +125,7 @@ class Flight:
         self.live = live
         self.memory = RunMemory(live.name)
         self.say = say
+        self.refused: Callable[[], None] = lambda: None
         self._doing, self._since_s = "", 0.0
         self._worker = ThreadPoolExecutor(1, "page")
         self.scenes_begun = 0
@@ -164,6 +166,7 @@ class Flight:
             return await asyncio.get_running_loop().run_in_executor(self._worker, self._work, doing, function)
         except InputError as error:
             self.say(f"Refused: {error}")
+            self.refused()
             return None
 
     def _work(self, doing: str, function: Callable[[], Result]) -> Result:

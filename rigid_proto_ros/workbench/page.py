@@ -167,6 +167,7 @@ class Page:
     def _make_panel(self) -> None:
         gui, flight = self.server.gui, self.flight
         self.controls = Controls(gui, flight)
+        flight.refused = self.controls.show_again
         self.bar = TimeBar(gui, self.controls, flight)
         self._class_mode = ClassMode(self.server)
         tabs = gui.add_tab_group()
@@ -351,8 +352,9 @@ class Page:
     def _scene_changed(self) -> None:
         before, self._scenario = self._scenario, self.live.scenario
         self.lessons.changed(before, self._scenario)
-        self.controls.update(self._scenario.parameters.named())
+        # First: the body of a new scene is what the factors are shown relative to.
         self.body_tab.changed(self._scenario, self._new_scene)
+        self.controls.update(self._scenario.parameters.named())
 
     def _reset(self) -> None:
         self._new_scene |= self.flight.scenes_begun != self._scenes_seen

@@ -156,8 +156,9 @@ def test_a_motion_that_cannot_be_simulated_again_is_drawn_as_recorded():
         assert made is record and reason in said
 
 
-def test_a_flight_of_several_meshes_is_refused(tmp_path, capsys):
-    (tmp_path / "swap.yaml").write_text("- {t: 0.1, set: {mesh: book}}")
+@pytest.mark.parametrize("change", ["mesh: book", "mesh: '', inertia_model: explicit"])
+def test_a_flight_of_several_meshes_is_refused(tmp_path, capsys, change):
+    (tmp_path / "swap.yaml").write_text(f"- {{t: 0.1, set: {{{change}}}}}")
     words = ["--script", str(tmp_path / "swap.yaml"), "--duration", "0.2", "--gltf", str(tmp_path / "a.glb")]
     assert main(["simulate", "hammer", *words]) == 2
     assert "the mesh changes at 0.1 s" in capsys.readouterr().err

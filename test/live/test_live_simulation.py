@@ -101,6 +101,21 @@ def test_commands_act_and_are_counted_and_a_refusal_is_raised(live):
     assert live.call(lambda: dict(live.loop.simulation.refused)) == counted
 
 
+def test_two_simulations_in_one_process_have_nothing_in_common(live):
+    other = LiveSimulation(make_scenario({"mesh": "hammer", "start_paused": True}), "other")
+    other.start()
+    live.submit(WrenchCommand(False, parse_frame("world@tip;impulse"), (1.0, 0.0, 0.0), ZERO))
+    with pytest.raises(CommandRefused):
+        live.schedule("{t: -1, force: [1, 0, 0]}")
+    live.step()
+    other.step(2)
+    assert live.state.linear_velocity[0] > 0.0 and live.state.time_ns == PERIOD_NS
+    assert not other.state.row[7:13].any() and other.state.time_ns == 2 * PERIOD_NS
+    assert not other.commands.received and not other.loop.simulation.refused
+    assert other.loop.simulation.events.count == 1, "its own step"
+    other.stop()
+
+
 def test_time_runs_pauses_steps_and_starts_anew(live, watcher):
     live.step(3)
     assert live.state.time_ns == 3 * PERIOD_NS and live.paused

@@ -68,6 +68,18 @@ def test_commands_and_requests_get_in_meanwhile():
     assert rig.loop.simulation.time_ns == reached_ns
 
 
+def test_a_step_that_takes_years_goes_on_tick_by_tick_and_is_given_up_by_resuming() -> None:
+    rig = Rig({**ENDLESS, "start_paused": True})
+    rig.loop.tick()
+    assert not rig.loop.step()
+    begun_ns = rig.loop.simulation.time_ns
+    rig.loop.tick()
+    assert rig.loop.stepping and rig.loop.simulation.time_ns > begun_ns
+    assert set(rig.published) <= {0}, "a state of the middle of a step"
+    rig.loop.pause(False)
+    assert not rig.loop.stepping
+
+
 def test_a_step_asked_for_while_another_is_made_follows_it(monkeypatch) -> None:
     rig = Rig({"start_paused": True, "publish_rate": 1000.0})
     rig.loop.tick()

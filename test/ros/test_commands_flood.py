@@ -2,13 +2,18 @@
 """Floods of commands: all received, or the loss told."""
 
 import itertools
+import os
 import signal
+import subprocess
+import sys
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from command_rig import wrench_message
 from ros_client import RosClient
+from ros_process import from_source
 
 HARMLESS = wrench_message(0, "world", (0.0, 0.0, 1e-9))
 PUSH = wrench_message(0, "world;impulse", (0.0, 0.0, 1e-9))
@@ -66,6 +71,34 @@ def test_ten_publishers_at_a_thousand_messages_a_second_are_all_heard_or_a_full_
         client.repeat(names, HARMLESS, messages, 1000.0)
         client.repeat(names, LAST, 1)
         all_known_or_told(rig, before, 10 * (messages + 2), 10)
+
+
+GUEST = """
+import os, signal, sys
+from ros_client import RosClient
+from test_commands_flood import PUSH
+with RosClient(dict(os.environ), "/rigid_body") as guest:
+    guest.advertise("poke")
+    guest.repeat(["poke"], PUSH, 5)
+    guest.acknowledged("poke")
+    if sys.argv[1] == "killed":
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_publishers_that_leave_or_are_killed_beside_another_count_as_no_loss(rig):
+    before, sent = rig.counters(), 0
+    environment = from_source(rig.environment)
+    environment["PYTHONPATH"] += f"{os.pathsep}{Path(__file__).parent}"
+    guests = [subprocess.Popen([sys.executable, "-c", GUEST, end], env=environment) for end in ("leaves", "killed")]
+    while any(guest.poll() is None for guest in guests):
+        rig.repeat(["poke"], PUSH, 30, 300.0)
+        sent += 30
+    assert [guest.returncode for guest in guests] == [0, -signal.SIGKILL]
+    rig.repeat(["poke"], PUSH, 30)
+    sent += 5 + 5 + 30
+    rig.sent += sent
+    assert rig.gained(before, "poke_received") == {"poke_received": sent}
 
 
 @contextmanager

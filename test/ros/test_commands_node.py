@@ -363,6 +363,17 @@ def test_a_list_is_judged_in_the_scene_that_it_makes_and_one_refused_in_any_entr
     assert gained == {"refused_total": 4, "refused_integrator": 4}
 
 
+def test_a_scheduled_change_that_fits_no_more_when_its_time_comes_is_refused_then(rig):
+    before = rig.counters()
+    rig.start_over(paused=True)
+    rig.schedule("{t: 0.3, set: {mesh: '', inertia_model: explicit}}", "{t: 0.6, set: {inertia_model: solid}}")
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    rig.fly_until(700 * MS)
+    assert rig.gained(before) == {"refused_total": 1, "refused_schedule": 1}
+    assert rig.get("inertia_model") == {"inertia_model": "explicit"}
+
+
 def energy_at_the_start(scene: dict) -> float:
     return Simulation(make_scenario(scene).setup).kinetic_energy
 

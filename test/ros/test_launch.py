@@ -38,6 +38,14 @@ def test_arguments_that_become_parameters_are_parameters_with_accepted_defaults(
         PARAMETERS[name].convert(arguments[name][0])
 
 
+def test_every_argument_is_described_and_used(tree: ast.Module) -> None:
+    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    used = {n.value for function in functions for n in ast.walk(function) if isinstance(n, ast.Constant)}
+    for name, (_, description) in declared(tree).items():
+        assert len(description) > 10
+        assert name in used, f"{name} is declared and not used"
+
+
 def test_client_accepts_the_options_that_the_launch_file_gives_it(tree: ast.Module, capsys) -> None:
     text = FILE.read_text("utf-8")
     for option in ("--node", "--timeout", "--reset"):

@@ -2,8 +2,10 @@
 """poke_client: every entry of a script, sent by the real client to a real node, and what it says of what went wrong."""
 
 import json
+import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import Parameter
 from ros_client import RosClient, stamp_ns
-from ros_process import from_source, run
+from ros_process import READY_S, RosProcess, catches, from_source, run
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
@@ -177,9 +179,11 @@ def test_what_comes_late_or_is_refused_is_reported_and_makes_exit_1(rig, client,
 
 
 class SlowNode(RosClient):
-    """Stands in for a node that is slow to confirm: not before 500 wait for it, or all of ``count`` have come."""
+    """Stands in for a node that is slow to confirm: not before 500 wait for it, or all of ``count`` have come; its
+    simulated time stands.
+    """
 
-    def __init__(self, environment: dict, count: int) -> None:
+    def __init__(self, environment: dict, count: int, time_ns: int = 0) -> None:
         super().__init__(environment, "/tester")
         self.received = self.confirmed = self.most_ahead = 0
         self.calls: list[str] = []
@@ -210,7 +214,8 @@ class SlowNode(RosClient):
         def report() -> None:
             if self.received - self.confirmed >= 500 or self.received == count:
                 self.confirmed = self.received
-            values = {"commands_received": self.confirmed, "late": 0, "refused_total": 0, "sim_time_ns": 0}
+            values = {"commands_received": self.confirmed, "late": 0, "refused_total": 0}
+            values["sim_time_ns"] = time_ns
             status = DiagnosticStatus(name="/tester: simulation")
             status.values = [KeyValue(key=k, value=str(v)) for k, v in values.items()]
             diagnostics.publish(DiagnosticArray(status=[status]))
@@ -231,6 +236,21 @@ def test_never_more_than_500_commands_are_ahead_of_what_the_node_has_confirmed(
         assert slow.most_ahead == 500
         assert slow.received == 1600
         assert slow.calls == ["pauseTrue", "reset", "pauseFalse"]
+
+
+def test_a_client_without_a_time_limit_waits_for_a_node_that_starts_later(ros_environment, tmp_path):
+    path = tmp_path / "poke.yaml"
+    path.write_text("- {t: 0, impulse: [1.0e-6, 0, 0]}\n")
+    words = (path, "--node", "tester", "--reset", "--timeout", "0")
+    client = RosProcess("poke_client", *words, environment=ros_environment, log=tmp_path / "client")
+    # It handles signals when it has begun to look for the node.
+    while not catches(client.pid, signal.SIGINT):
+        assert client.process.poll() is None, client.errors
+        time.sleep(0.02)
+    with SlowNode(ros_environment, 1, time_ns=1) as late:
+        assert client.process.wait(READY_S) == 0, client.errors
+        assert late.received == 1
+    assert "sent 1 poke; 0 late, 0 refused" in client.output
 
 
 LOADED = f"""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -242,3 +243,33 @@ def test_entries_are_the_commands_of_the_hand() -> None:
             ("poke", "normal@tip", (0.02, 0.0, 0.0), (0.0, 0.0, 0.0)),
         )
     ]
+
+
+def test_a_session_of_a_node_of_another_name_becomes_words_that_every_node_reads() -> None:
+    hand = HandSession(SCENE)
+    for kind, content in (
+        ("poke", {"frame_id": "spinning_top@tip;impulse", "force": [1e-4, 0, 0], "torque": [0, 0, 0]}),
+        ("string_attach", {"frame_id": "spinning_top/mesh", "point": [0.0, 0.0, 0.07]}),
+    ):
+        hand.submit(of_event(kind, content, ("world", "spinning_top")))
+    hand.wait(SECOND)
+    assert "spinning_top" in "".join(hand.session().lines)
+    saved = script_of_session(replace(hand.session(), node_name="lab/spinning_top"))
+    assert flown(saved, hand.now_ns).sha256() == hand.simulation.state.sha256()
+    assert "spinning_top" not in saved.scene + saved.script
+    knot, poke = parse_script(saved.script)
+    assert (knot.axes, poke.frame.text) == ("mesh", "body@tip;impulse")
+
+
+def test_a_change_that_only_a_later_scene_allows_flies_again() -> None:
+    tensor = [1.0e-4, 0.0, 0.0, 2.0e-4, 0.0, 2.5e-4]
+    hand = HandSession({"mesh": "", "inertia_model": "explicit", "explicit_inertia.tensor": tensor})
+    hand.wait(SECOND // 10)
+    hand.set(mesh="t_handle")
+    hand.wait(SECOND // 10)
+    hand.set(inertia_model="solid")
+    hand.load(False, "world@vertex/3", [0.01, 0.0, 0.0])
+    hand.wait(SECOND // 10)
+    with pytest.raises(InputError):
+        hand.first.with_changes({"inertia_model": "solid"})
+    assert len(parse_script(assert_flies_again(hand).script)) == 3

@@ -36,6 +36,16 @@ def commanded(count: int):
     return simulation
 
 
+def test_no_line_is_written_for_nobody(monkeypatch):
+    def written(*_):
+        raise AssertionError("a line was written")
+
+    monkeypatch.setattr(observer.EventLog, "append", written)
+    simulation = commanded(20)
+    simulation.advance(SECOND)
+    assert simulation.events.count == 20
+
+
 def test_events_chained_later_give_the_hash_of_those_chained_at_once(monkeypatch):
     monkeypatch.setattr(observer, "MOST_NOTED", 7)
     read, unread, now_and_then = commanded(50), commanded(50), commanded(50)

@@ -9,6 +9,7 @@ import threading
 import zipfile
 from collections.abc import Iterator
 from contextlib import nullcontext
+from pathlib import Path
 from types import SimpleNamespace
 
 import numba
@@ -26,10 +27,12 @@ from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.simulation.commands import Command
+from rigid_proto_ros.simulation.observer import Published, SceneChanged
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench import controls
 from rigid_proto_ros.workbench import page as page_module
-from rigid_proto_ros.workbench.flight import COMPILING
+from rigid_proto_ros.workbench.flight import COMPILING, RunMemory
 from rigid_proto_ros.workbench.lessons import COURSES, FREE
 from rigid_proto_ros.workbench.page import CLASS_LABELS
 from rigid_proto_ros.workbench.panel import CENTRE_OF_MASS, SEE_INTO, motion_words
@@ -112,6 +115,29 @@ def test_nothing_of_the_body_before_stays_when_another_scene_begins(flown: Flown
     assert not parameters.thrusters
     assert set(parameters.contacts) == set(read_scene("teapot").parameters.contacts)
 
+    def drawn() -> list[str]:
+        return [n for n in flown.server.scene._handle_from_node_name if n.startswith(f"/{style.BODY_MESH}")]
+
+    assert len(drawn()) == 1
+    flown.do(lambda: flown.page.flight.fly({"mesh": "", "inertia_model": "explicit"}))
+    flown.fly(0.0)
+    assert not drawn()
+
+
+def flies_again(flown: FlownPage, folder: Path) -> tuple[dict, list[Command]]:
+    """What is saved of the run since the last reset, parameters and commands, which give the same motion."""
+    packed, note = flown.page.session_tab._take()
+    assert "simulate scene.yaml --script script.yaml" in note
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        archive.extractall(folder)
+    values = dict(read_scene_text((folder / "scene.yaml").read_text()).values)
+    script = parse_script((folder / "script.yaml").read_text())
+    beside = folder / values["mesh"]
+    again = OfflineRun(make_scenario({**values, "mesh": str(beside)} if beside.exists() else values), script)
+    again.advance(flown.live.state.time_ns)
+    assert again.simulation.state.row.tobytes() == flown.live.state.row.tobytes()
+    return values, script
+
 
 def test_an_upload_flies_alone_and_its_take_holds_it(flown: FlownPage, tmp_path) -> None:
     folder = flown.page.body_tab.upload
@@ -123,17 +149,66 @@ def test_an_upload_flies_alone_and_its_take_holds_it(flown: FlownPage, tmp_path)
     assert not parameters.contacts and not parameters.thrusters and not parameters.ballast
     flown.do(lambda: flown.page.flight.do({"at": {"point": [0.06, 0.0, 0.29]}, "force": [1.0, 0.0, 0.0]}))
     flown.fly(1.0)
-    packed, note = flown.page.session_tab._take()
-    assert "simulate scene.yaml --script script.yaml" in note
-    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
-        archive.extractall(tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["my_hammer.obj", "scene.yaml", "script.yaml"]
-    values = dict(read_scene_text((tmp_path / "scene.yaml").read_text()).values)
+    values, _ = flies_again(flown, tmp_path)
     assert values["mesh"] == "my_hammer.obj"
-    values["mesh"] = str(tmp_path / "my_hammer.obj")
-    again = OfflineRun(make_scenario(values), parse_script((tmp_path / "script.yaml").read_text()))
-    again.advance(1_000_000_000)
-    assert again.simulation.state.row.tobytes() == flown.live.state.row.tobytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my_hammer.obj", "scene.yaml", "script.yaml"]
+
+
+OPEN_BOX = b"# z up\n" + b"".join(b"v %d %d %d\n" % (k >> 2, k >> 1 & 1, k & 1) for k in range(8))
+OPEN_BOX += b"f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\n"
+"""A cube of a metre that lacks a side."""
+
+
+@pytest.mark.parametrize(("stand_in", "parameter"), [("it repaired", "mesh_repair"), ("its hull", "mesh_fallback")])
+def test_for_an_open_mesh_the_page_offers_repair_or_hull_and_flies_it(
+    flown: FlownPage, stand_in: str, parameter: str
+) -> None:
+    body = flown.page.body_tab
+    flown.do(lambda: body.upload.take("open box.obj", OPEN_BOX))
+    assert "refused" in body._verdict.content and "boundary" in body._verdict.content
+    assert "1 × 1 × 1 m" in body.upload._size.content
+    assert not flown.widget("Simulate it").visible
+    flown.press(stand_in, of="Simulate")
+    flown.fly(0.0)
+    parameters = flown.scenario.parameters
+    assert parameters.mesh.endswith("open_box.obj") and parameters.named()[parameter] in (True, "hull")
+    assert flown.scenario.setup.body.mass == pytest.approx(1000.0) and not flown.said
+
+
+def test_what_was_done_before_a_reset_is_no_part_of_what_is_saved(flown: FlownPage, tmp_path: Path) -> None:
+    push = {"at": {"point": [0.0, 0.0, 0.068]}, "force": [0.0, 1.0, 0.0]}
+    flown.do(lambda: flown.page.flight.set({"mass": 0.2}))
+    flown.do(lambda: flown.page.flight.do(push))
+    flown.fly(0.5)
+    flown.reset()
+    flown.do(lambda: flown.page.flight.do(push))
+    flown.fly(0.5)
+    values, script = flies_again(flown, tmp_path)
+    assert values["mass"] == 0.2 and [command.kind for command in script] == ["poke"]
+
+
+def test_what_is_done_after_going_back_is_saved_from_there(flown: FlownPage, tmp_path: Path) -> None:
+    for force, seconds in (([0.0, 1.0, 0.0], 1.0), ([0.0, 0.0, 2.0], 1.0)):
+        flown.do(lambda force=force: flown.page.flight.do({"at": "tip", "force": force}))
+        flown.fly(seconds)
+    flown._update(flown.widget("Seconds back"), 1.5)
+    flown.until(lambda: not flown.widget("Go on from here").disabled, "button")
+    flown.press("Go on from here")
+    flown.fly(0.3)
+    flown.do(lambda: flown.page.flight.do({"at": "tip", "force": [1.0, 0.0, 0.0]}))
+    flown.fly(0.7)
+    _, script = flies_again(flown, tmp_path)
+    assert [command.force for command in script] == [(1.0, 0.0, 0.0)]
+
+
+def test_one_can_go_back_five_minutes_and_the_oldest_goes_first() -> None:
+    memory = RunMemory("rigid_body")
+    memory.on(SceneChanged(0, make_scenario({}).text))
+    row = np.zeros(13)
+    for k in range(40_000):
+        memory.on(Published(k * 10_000_000, row))
+    times = memory.session().times
+    assert times[-1] == 39_999 * 10_000_000 and times[-1] - times[0] == pytest.approx(300e9, rel=1e-4)
 
 
 def test_a_take_is_saved_as_gltf_with_a_key_for_each_frame(flown: FlownPage) -> None:
@@ -202,6 +277,26 @@ def test_the_energy_holds_the_string_of_its_moment_also_of_one_that_is_looked_ba
     assert flown.live.paused and flown.page.lessons._asked
 
 
+@pytest.mark.parametrize("paused", [False, True])
+def test_the_last_page_that_closes_while_it_looks_back_leaves_the_body_as_it_was(
+    flown: FlownPage, paused: bool
+) -> None:
+    page = flown.page
+    flown.do(lambda: page.flight.pause(paused))
+    flown.fly(1.0)
+    flown._update(flown.widget("Seconds back"), 0.5)
+    flown.until(lambda: page.flight.moment_ns, "moment of the past")
+    flown.wait_until_asked()
+    assert flown.live.paused
+    flown.leave()
+    flown.until(lambda: page._told not in flown.live._observers, "end of listening")
+    flown.wait_until_asked()
+    assert page.flight.moment_ns is None and flown.live.paused == paused
+    flown.come()
+    flown.until(lambda: page._told in flown.live._observers, "page that hears again")
+    flown.fly(0.1)
+
+
 def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -> None:
     flown.press("Pause", of="Simulation")
     flight = flown.page.flight
@@ -218,6 +313,80 @@ def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -
         "poke",
         "string_release",
     ]
+
+
+def string_events(flown: FlownPage) -> list[str]:
+    lines = [json.loads(line)["kind"] for _, line in flown.page.flight.memory.session().events]
+    return [kind for kind in lines if kind.startswith("string")]
+
+
+def test_the_string_is_of_the_page_that_grabbed_first_and_goes_with_it(flown: FlownPage) -> None:
+    pointer, place = flown.page.pointer, np.zeros(3)
+    flown.grab((0.0, 0.045, 0.0))
+    flown.do(lambda: pointer.grab(2, place, place))
+    flown.do(lambda: pointer.left(2))
+    flown.fly(0.1)
+    assert string_events(flown) == ["string_attach", "string_target"] and flown.live.loop.simulation.string
+    flown.do(lambda: pointer.left(1))
+    flown.fly(0.1)
+    assert string_events(flown)[-1] == "string_release" and flown.live.loop.simulation.string is None
+    flown.do(lambda: pointer.grab(2, place, place))
+    flown.fly(0.1)
+    assert string_events(flown)[-2:] == ["string_attach", "string_target"]
+    flown.let_go()
+
+
+def test_a_hand_that_stands_still_goes_on_holding_longer_than_the_strings_timeout(flown: FlownPage) -> None:
+    flown.do(lambda: flown.page.flight.set({"string.timeout": 0.15}))
+    place = flown.grab((0.0, 0.045, 0.0))
+    flown.pull(place + [0.0, 0.0, 0.1])
+    for _ in range(3):
+        said = flown.live.commands.received["schedule"]
+        flown.until(lambda said=said: flown.live.commands.received["schedule"] > said, "word of the hand")
+        flown.fly(0.1)
+    assert set(string_events(flown)) == {"string_attach", "string_target"}
+    assert flown.live.loop.simulation.string is not None
+    flown.let_go()
+
+
+def test_an_input_that_is_refused_says_why_and_shows_what_is_in_force_as_one_that_is_set_elsewhere_does(
+    flown: FlownPage,
+) -> None:
+    field = flown.widget("Density [kg/m³]")
+    for typed, why in (("two", "accepted: "), ("-1", "Refused: density"), ("1e+300", "Refused: density")):
+        before = field.value
+        flown.set("Density [kg/m³]", typed)
+        flown.until(lambda: flown.said, "refusal")
+        assert why in flown.said[0] and typed in flown.said.pop()
+        flown.until(lambda before=before: field.value == before, "density that is in force")
+    flown.live.set_parameters({"density": 1234.5})
+    flown.until(lambda: field.value == "1234.5", "density set elsewhere")
+
+
+@pytest.mark.parametrize(
+    ("values", "parameter"),
+    [
+        ({"density": 5000.0}, "mass"),
+        ({"mass": 0.4}, "mass"),
+        ({"inertia_model": "explicit", "explicit_inertia.mass": 0.4}, "explicit_inertia.mass"),
+    ],
+)
+def test_a_factor_is_ten_to_its_slider_that_of_the_mass_without_the_ballast(
+    flown: FlownPage, values: dict, parameter: str
+) -> None:
+    scene = {"mesh": "t_handle", "ballast.weight": [0.6, 0.0, 0.0, 0.0], **values}
+    flown.do(lambda: flown.page.flight.fly(scene))
+    flown.fly(0.0)
+    own = flown.scenario.setup.body.mass - 0.6
+    assert flown.widget("Mass ×").value == (0.0,)
+    flown.set("Mass ×", (1.0,))
+    flown.fly(0.0)
+    assert flown.scenario.parameters.named()[parameter] == pytest.approx(10.0 * own, rel=1e-12)
+    assert flown.scenario.setup.body.mass == pytest.approx(10.0 * own + 0.6)
+    assert flown.widget("Mass ×").value == (1.0,)
+    tools = flown.page.tools
+    flown.set("Force ×", (-0.5,))
+    assert tools.force == pytest.approx(10.0**-0.5 * tools.usual_force, rel=5e-3)
 
 
 def test_the_status_line_says_in_plain_words_what_the_body_does() -> None:

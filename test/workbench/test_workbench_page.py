@@ -148,6 +148,76 @@ def test_a_click_pokes_where_it_points_and_a_shift_click_pushes_inward(page) -> 
         page.until(lambda: re.search(r"speed of the COM\s+(?!0 m/s)[\d.e-]+ m/s", page.text), "speed in the readouts")
 
 
+def poked(page: Browser) -> np.ndarray:
+    """Where the picture has the point that a click poked of a body at rest at its start."""
+    (load,) = page.until(lambda: [c["content"] for c in commands(page) if c["kind"] == "poke"], "poke")
+    point = [float(x) for x in load["frame_id"].partition("point/")[2].partition(";")[0].split(",")]
+    flown = page.flown
+    return (np.array(flown.live.scenario.setup.body.point(point)) - flown.page.backend.origin) / flown.page.backend.unit
+
+
+@pytest.mark.stress
+def test_a_finger_taps_to_poke_and_drags_to_pull(page) -> None:
+    x, y = com_pixel(page)
+    page.touch("touchStart", (x, y))
+    page.touch("touchEnd")
+    assert apart(page.pixel(poked(page)), (x, y)) < NEAR
+    fly(page, {"mesh": "t_handle"})
+    x, y = com_pixel(page)
+    page.touch("touchStart", (x, y))
+    for k in (1, 2, 3):
+        page.touch("touchMove", (x - 30.0 * k, y))
+    page.until(lambda: page.flown.live.loop.simulation.string is not None, "string")
+    page.touch("touchEnd")
+    page.until(lambda: page.flown.live.loop.simulation.string is None, "release")
+
+
+@pytest.mark.stress
+def test_from_nearer_by_wheel_or_pinch_a_click_pokes_where_it_points(page) -> None:
+    def turn_the_wheel(x: float, y: float) -> None:
+        page.page.mouse.move(x, y)
+        for _ in range(3):
+            page.page.mouse.wheel(0.0, -100.0)
+
+    def pinch(x: float, y: float) -> None:
+        for k in range(6):
+            page.touch("touchMove" if k else "touchStart", (x - 120.0 - 20.0 * k, y), (x + 120.0 + 20.0 * k, y))
+        page.touch("touchEnd")
+
+    for come_nearer in (turn_the_wheel, pinch):
+        fly(page, {"mesh": "t_handle"})
+        before = np.linalg.norm(page.client.camera.position)
+        come_nearer(*com_pixel(page))
+        page.until(lambda before=before: np.linalg.norm(page.client.camera.position) < 0.9 * before, "nearer view")
+        page.drawn(5)
+        x, y = com_pixel(page)
+        page.click(x, y)
+        assert apart(page.pixel(poked(page)), (x, y)) < NEAR
+
+
+def test_the_space_bar_pauses_resumes_and_goes_on_from_the_past_but_not_from_within_an_input(page) -> None:
+    live, flight, press = page.flown.live, page.flown.page.flight, page.page.keyboard.press
+    page.page.evaluate("document.activeElement.blur()")
+    press("Space")
+    page.until(lambda: live.paused, "pause")
+    press("Space")
+    page.until(lambda: not live.paused and live.state.time_ns > 1e9, "a second of motion")
+    page.flown.server.get_event_loop().call_soon_threadsafe(flight.look_at, 0.5)
+    page.until(lambda: flight.moment_ns is not None and live.paused, "moment of the past")
+    begun = flight.scenes_begun
+    press("Space")
+    page.until(lambda: flight.moment_ns is None and not live.paused, "motion from there")
+    assert flight.scenes_begun == begun + 1
+    page.tab("Forces")
+    field = page.input("Initial spin [rad/s]")
+    field.click()
+    press("Space")
+    field.blur()
+    press("Space")
+    page.until(lambda: live.paused, "pause")
+    assert [c["content"]["data"] for c in commands(page) if c["kind"] == "pause"] == [False, True]
+
+
 def test_a_drag_beside_the_body_turns_the_camera_and_touches_nothing(page) -> None:
     before, logged = np.array(page.client.camera.position), len(commands(page))
     box = page.canvas
