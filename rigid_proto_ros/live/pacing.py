@@ -151,8 +151,8 @@ SLICE_NS = 100_000
 """The shortest that Linux gives."""
 
 
-def ask_for_short_slices() -> bool:
-    """Ask Linux for short time slices of the processor for the calling thread; whether that could be asked.
+def ask_for_short_slices() -> None:
+    """Ask Linux for short time slices of the processor for the calling thread; elsewhere do nothing.
 
     A thread that wakes up on a processor where another one runs waits for the end of that one's slice, 3 ms, unless its
     own would end before (man 2 sched_setattr; Linux 6.12 and later, earlier ones do nothing). A policy or a priority
@@ -160,8 +160,8 @@ def ask_for_short_slices() -> bool:
     """
     call = SCHED_SETATTR.get(platform.machine())
     if call is None or sys.platform != "linux" or os.sched_getscheduler(0) != os.SCHED_OTHER:
-        return False
+        return
     nice = os.getpriority(os.PRIO_PROCESS, 0)
     # struct sched_attr: size, policy, flags, nice, priority, runtime, deadline, period.
     attributes = struct.pack("IIQiIQQQ", 48, os.SCHED_OTHER, 0, nice, 0, SLICE_NS, 0, 0)
-    return bool(ctypes.CDLL(None).syscall(call, 0, attributes, 0) == 0)
+    ctypes.CDLL(None).syscall(call, 0, attributes, 0)

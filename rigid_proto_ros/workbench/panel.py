@@ -32,7 +32,7 @@ SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1"
 PAUSE, PLAY, STEP, RESET = "Pause", "Play", "Step", "Reset"
 
 TIME_S = 0.1
-"""Between two times that are shown while the body moves."""
+"""[s] Between two updates of the time that is shown."""
 
 REWIND_STEP_S = 0.05
 """[s] Step of the rewind slider."""
@@ -105,7 +105,7 @@ class TimeBar:
             self._flight.pause(not self._flight.paused)
 
     def show(self, now_s: float, time_s: float, words: str) -> None:
-        """The time that is shown, which nobody reads faster than it is drawn, and what the body is doing."""
+        """Show the simulated time, ten times a second at most, and what the body is doing; now_s: the wall's time."""
         flight = self._flight
         label = PLAY if flight.paused or flight.moment_ns is not None else PAUSE
         if self._play.options[0] != label:
