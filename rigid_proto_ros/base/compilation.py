@@ -168,7 +168,12 @@ class KernelCache(FunctionCache):
         compiler does that itself, too, when something must be compiled (tested with 0.68).
         """
         if not hasattr(self, "_impl"):
-            super().__init__(self._function)
+            # Locators that a user has named know nothing of the files that a kernel is compiled from.
+            named, _CONFIG.CACHE_LOCATOR_CLASSES = _CONFIG.CACHE_LOCATOR_CLASSES, ""
+            try:
+                super().__init__(self._function)
+            finally:
+                _CONFIG.CACHE_LOCATOR_CLASSES = named
         rtsys.initialize(target)
         return self._load_overload(signature, target)
 

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import rigid_proto_ros
 from rigid_proto_ros.base import compilation
 
@@ -24,7 +26,9 @@ def called(folder: Path, place: Path) -> list[str]:
     return subprocess.run(command, cwd=folder, env=settings, capture_output=True, text=True, check=True).stdout.split()
 
 
-def test_a_kernel_on_disk_is_that_of_its_file_and_of_all_behind_its_imports(tmp_path):
+@pytest.mark.parametrize("locators", ["", "InTreeCacheLocator"], ids=["", "with other locators named"])
+def test_a_kernel_on_disk_is_that_of_its_file_and_of_all_behind_its_imports(tmp_path, monkeypatch, locators):
+    monkeypatch.setenv("NUMBA_CACHE_LOCATOR_CLASSES", locators)
     said = []
     for checkout, added in (("one", 1), ("two", 1), ("two", 2), ("one", 1)):
         base = tmp_path / checkout / "package" / "base"
