@@ -63,8 +63,9 @@ class CommandReceiver:
         loop.catch_up()
         try:
             sent = command()
-            if isinstance(sent, Change) and sent.kind == "inertia":
+            if isinstance(sent, Change):
                 check_inertia(loop.scenario, sent.content)
+                sent = loop.bound(sent)
             when_ns, counter = self._effective(sent.stamp_ns, loop.stamps.offset_ns)
             self._count(counter, 1)
             loop.simulation.submit(sent, when_ns)

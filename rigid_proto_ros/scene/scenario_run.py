@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -139,7 +141,6 @@ class ScenarioRun:
         self.scenario = scenario
         self.observer = observer or Observer()
         self.simulation = Simulation(scenario.setup, observer)
-        self.simulation.setup_of = self.setup_of
         self.publications = Publications(scenario.parameters.publish_rate)
         self.ghost: Ghost | None = None
 
@@ -171,6 +172,10 @@ class ScenarioRun:
         simulation is given by a command. Raises InputError, and then all stays as it was.
         """
         return self.replace(self.scenario.with_changes(changes, mesh, at_hand))
+
+    def bound(self, change: Change) -> Change:
+        """The change with a setup from this run's parameters (``setup_of``) at the time when it acts."""
+        return replace(change, apply=partial(self.setup_of, change))
 
     def setup_of(self, command: Change) -> Setup:
         """Put in force what a change says that acts now; returns the setup. Raises InputError."""
@@ -229,6 +234,7 @@ class OfflineRun(ScenarioRun):
             try:
                 if isinstance(command, Change):
                     planned = planned.with_changes(command.content)
+                    command = self.bound(command)
                 checked = (check_command(command, planned.setup), planned.setup)
                 self.simulation.submit(command, command.stamp_ns, (0, self._submitted), checked)
             except CommandRefused as refusal:

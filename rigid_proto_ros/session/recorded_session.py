@@ -218,6 +218,7 @@ class Resimulation(ScenarioRun):
                 continue
             if isinstance(command, Change):
                 self._changes_ns = time_ns
+                command = self.bound(command)
             # What acts under a change of its own instant can't be checked before that acts.
             checked = (b"", self.simulation.setup) if self._changes_ns == time_ns else None
             # What acted at one instant acts in the order of the log, whatever rule made it.

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
-from ..base.errors import CommandRefused
+from ..base.errors import CommandRefused, InputError
 from ..base.vectors import Vector
 from ..motion.frames import Frame
 
@@ -134,6 +134,10 @@ class ThrusterCommand(Stamped):
         return {"forces": list(self.forces)}
 
 
+def _no_setup() -> Setup:
+    raise InputError("change", "no setup", "a change with a setup: there are no parameters here")
+
+
 STATE_VALUES = {"position": 3, "orientation_xyzw": 4, "linear_velocity": 3, "angular_velocity": 3}
 """Values that SetState can set, in world axes, and how many numbers each has."""
 
@@ -179,11 +183,11 @@ class Change(Stamped):
     """A change of parameters (kind ``set``) or of the whole inertia by message (``inertia``).
 
     content: as the event log keeps it. apply() returns the new Setup, based on the values in force at that time, or
-    raises InputError; without it the simulation's ``setup_of`` is used.
+    raises InputError; a scenario's run provides it (scene/scenario_run.py) where the command was read without it.
     """
 
     content: Mapping[str, Any]
-    apply: Callable[[], Setup] | None = field(default=None, compare=False)
+    apply: Callable[[], Setup] = field(default=_no_setup, compare=False)
     kind: str = "set"
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 from numba import float64, from_dtype, int64, types
 
 from ..base.compilation import entry_of, njit, place_of
-from ..base.simd import aligned
+from ..base.simd import LINE
 from ..motion.integrators.integrator import METHOD, provide_kernel
 from ..motion.loads import Load, load_of_row
 from ..motion.state import State
@@ -25,7 +25,9 @@ from .setup import Setup
 FIRST_ROWS = 8
 """Initial number of rows of the tables, which grow as needed."""
 
-_ROW_BYTES, _pack = LOAD_ROW.itemsize, struct.Struct("=6q").pack_into
+_pack = struct.Struct("=6q").pack_into
+_ROW_BYTES, _EVENT_BYTES = LOAD_ROW.itemsize, EVENT.itemsize
+_FLIGHT_BYTES, _STATE_AT = FLIGHT.itemsize, place_of(FLIGHT, "row")
 _LOAD_AT = place_of(LOAD_ROW, "load")
 
 
@@ -38,11 +40,6 @@ def _numbers(*names: str) -> list[int]:
 _NOW_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers("now_ns", "acting", "due", "due_end", "events")
 TIMEOUTS, _LOAD_IDS = _numbers("timeouts", "load_ids")
 _REACHED = fl.REACHED
-
-
-def _memory(kind: np.dtype, count: int) -> np.ndarray:
-    """Zeroed memory for ``count`` records as integers, which takes a third of the time of allocating records."""
-    return np.zeros(count * kind.itemsize // 8, np.int64)
 
 
 class ActingLoad(NamedTuple):
@@ -128,16 +125,39 @@ class FlightArrays:
     def __init__(self, setup: Setup) -> None:
         self.first_due = 0
         self._call = _entry()
-        memory = _memory(FLIGHT, 1)
-        self.integers = memory.data
-        self._flights = np.ndarray(1, FLIGHT, memory)
-        self.row = np.ndarray(13, np.float64, memory, place_of(FLIGHT, "row"))
-        self._loads = np.ndarray(0, LOAD_ROW)
-        self._make_tables(FIRST_ROWS)
-        self.room = np.ndarray(0)
-        self._take_methods(setup)
+        self.integrator, self.methods = setup.integrator, setup.flight_start.methods
+        self._allocate(FIRST_ROWS, setup.flight_start.room)
 
-    @functools.cached_property
+    def _allocate(self, rows: int, room: int) -> None:
+        """Memory, all zero, for the flight, tables with this number of rows and a workspace of so many doubles."""
+        # In one piece: allocating five arrays of records takes twice as long.
+        loads_at = _FLIGHT_BYTES
+        events_at = loads_at + rows * _ROW_BYTES
+        room_at = events_at + (events := 4 * rows + 4) * _EVENT_BYTES
+        memory = np.zeros(room_at // 8 + room + LINE, np.int64)
+        # The workspace is aligned to a cache line.
+        unaligned = memory.__array_interface__["data"][0] + room_at
+        room_at += -unaligned % (8 * LINE)
+        self.integers = memory[: _FLIGHT_BYTES // 8].data
+        self._flights = np.ndarray(1, FLIGHT, memory)
+        self.row = np.ndarray(13, np.float64, memory, _STATE_AT)
+        self._loads = np.ndarray(rows, LOAD_ROW, memory, loads_at)
+        self._events = np.ndarray(events, EVENT, memory, events_at)
+        self.room = np.ndarray(room, np.float64, memory, room_at)
+        self._table = memory.data.cast("B")[loads_at:events_at]
+
+    def _grow(self, rows: int, room: int) -> None:
+        """Have at least this number of rows and a workspace of so many doubles, at first zero; the flight and its
+        active loads are kept.
+        """
+        if rows <= len(self._loads) and room <= len(self.room):
+            return
+        numbers, loads, acting = self.integers, self._loads, self.integers[_ACTING]
+        self._allocate(max(rows, len(loads)), max(room, len(self.room)))
+        self.integers[:] = numbers
+        self._loads[:acting] = loads[:acting]
+
+    @property
     def flight(self) -> np.record:
         """The record (simulation/flight.py)."""
         found: np.record = self._flights[0]
@@ -146,15 +166,13 @@ class FlightArrays:
     def _take_methods(self, setup: Setup) -> None:
         start = setup.flight_start
         self.integrator, self.methods = setup.integrator, start.methods
-        if len(self.room) < max(start.room, 1):
-            # The workspace is aligned to a cache line.
-            self.room = aligned((1, max(start.room, 1)))[0]
+        self._grow(0, start.room)
 
     def take(self, setup: Setup) -> None:
         """Use the body, settings and integrator of a setup from now on; the current segment isn't changed."""
-        flight = self.flight
         self._take_methods(setup)
         self.room[:] = 0.0
+        flight = self.flight
         new = setup.flight_start.flight[0]
         flight.body[:], flight.common = new.body, new.common
         flight.accuracy, flight.degree, flight.chooses = new.accuracy, new.degree, new.chooses
@@ -163,9 +181,9 @@ class FlightArrays:
 
     def start_over(self, setup: Setup, tied: StringState | None) -> None:
         """Restart at time 0 in the initial state, with the string ``tied`` and no other load."""
+        self._take_methods(setup)
         numbers = self.integers
         load_ids = numbers[_LOAD_IDS]
-        self._take_methods(setup)
         numbers[:] = setup.flight_start.integers
         numbers[_LOAD_IDS] = load_ids
         if tied is not None:
@@ -184,12 +202,12 @@ class FlightArrays:
 
     def put(self, due: list[Pending]) -> None:
         """Put commands into the table, after the active loads, to be applied next."""
-        numbers = self.integers
-        first = self.first_due = numbers[_ACTING]
+        first = self.first_due = self.integers[_ACTING]
         last = first + len(due)
         if last > len(self._loads):
-            self._make_tables(2 * last)
-        table, at = self._table_bytes, _ROW_BYTES * first
+            self._grow(2 * last, 0)
+        numbers = self.integers
+        table, at = self._table, _ROW_BYTES * first
         for pending in due:
             bytes_of_load = pending.row
             _pack(table, at, pending.time_ns, pending.duration_ns, pending.kind, pending.slot, 0, 0)
@@ -246,12 +264,3 @@ class FlightArrays:
         for row in self._loads[: self.integers[_ACTING]]:
             load = load_of_row(row.load)
             yield ActingLoad(load, int(row.at_ns), int(row.end_ns), int(row.id), int(row.kind), int(row.slot))
-
-    def _make_tables(self, rows: int) -> None:
-        """Allocate tables with this number of rows; active loads are kept."""
-        memory, acting = _memory(LOAD_ROW, rows), self.integers[_ACTING]
-        loads = np.ndarray(rows, LOAD_ROW, memory)
-        if acting:
-            loads[:acting] = self._loads[:acting]
-        self._loads, self._table_bytes = loads, memory.data.cast("B")
-        self._events = np.ndarray(4 * rows + 4, EVENT, _memory(EVENT, 4 * rows + 4))

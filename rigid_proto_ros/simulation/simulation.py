@@ -86,7 +86,7 @@ class Simulation:
     Not thread-safe: a single owner submits and advances. ``time_ns`` and ``state`` are those of the last advance.
     ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: place in
     its list of the command being applied, if it is an entry of one. ``logs_timeouts``: whether the timeout of a held
-    wrench is logged. ``setup_of``: returns the new setup of a change that doesn't provide its own.
+    wrench is logged.
     """
 
     time_ns: int
@@ -99,7 +99,6 @@ class Simulation:
         self._arrivals = 0
         self.listed: Listed | None = None
         self.logs_timeouts = True
-        self.setup_of: Callable[[Change], Setup] = _no_change
         check_start(setup)
         self._arrays = FlightArrays(setup)
         self._told_string: StringState | None = None
@@ -208,8 +207,9 @@ class Simulation:
         """Restart at time 0 in the initial state (of a new setup, if given), without active loads and scheduled
         commands; counters are kept.
         """
-        self._arrays.call(END_ALL)
-        self._notify([])
+        if self._wants_loads:
+            self._arrays.call(END_ALL)
+            self._notify([])
         self.notify_floor(at_end=True)
         self.observer.on(Reset())
         self.events.reset()
@@ -365,7 +365,7 @@ class Simulation:
             check_thrust(command.forces, self.setup)
             self._thrust(self.thrusters.command(command.forces, self.time_ns, self.setup.wrench_timeout_ns))
         elif isinstance(command, Change):
-            self._change(command.apply() if command.apply else self.setup_of(command))
+            self._change(command.apply())
         elif isinstance(command, SetState):
             self._arrays.row[:] = self.state.moved(command.values).row
             self.state = self._arrays.state
@@ -605,7 +605,3 @@ class Simulation:
         """Current acceleration of the COM (3,) [m/s², world] and angular acceleration (3,) [rad/s², body axes]."""
         six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(VARIABLES)))
         return six[:3], six[3:]
-
-
-def _no_change(command: Change) -> Setup:
-    raise InputError(command.kind, command.content, "a change with a setup of its own: there are no parameters here")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 import random
+from dataclasses import replace
 
 import pytest
 from flights import SECOND, EventLines
@@ -13,7 +14,7 @@ from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import Ghost, OfflineRun
 from rigid_proto_ros.scene.script import expand_script
 from rigid_proto_ros.session.recorded_session import decode_event
-from rigid_proto_ros.simulation.commands import Command
+from rigid_proto_ros.simulation.commands import Change, Command
 from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -35,10 +36,13 @@ def kinds(told: EventLines) -> list[str]:
     return [decode_event(line, 1)[1] for line in told.lines]
 
 
-def commands(entries: list[dict], simulation: Simulation) -> list[Command]:
+def commands(entries: list[dict]) -> list[Command]:
     scenario = make_scenario(SCENE)
-    simulation.setup_of = lambda change: scenario.with_changes(change.content).setup
-    return expand_script([{"t": 1.0, **entry} for entry in entries])
+    read = expand_script([{"t": 1.0, **entry} for entry in entries])
+    changes = {k: command for k, command in enumerate(read) if isinstance(command, Change)}
+    for k, change in changes.items():
+        read[k] = replace(change, apply=lambda content=change.content: scenario.with_changes(content).setup)
+    return read
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -56,7 +60,7 @@ def test_lists_act_first_as_they_arrived_then_single_messages_by_kind_whatever_a
     for order in itertools.permutations(range(3)):
         lines = EventLines()
         simulation = Simulation(make_scenario(SCENE).setup, lines)
-        own = commands(DONE, simulation)
+        own = commands(DONE)
         parts = [
             [(own[0], (2, 0)), (own[1], (2, 1))],
             [(own[4], (1, 0)), (own[6], (1, 1)), (own[2], (1, 2))],
