@@ -30,8 +30,8 @@ _HIDDEN = [name for name in ("coverage", "scipy", "cffi") if name not in sys.mod
 sys.modules.update(dict.fromkeys(_HIDDEN, _ABSENT))
 try:
     import numba
-    from numba import config
-    from numba.core import event
+    from numba import config, types
+    from numba.core import cgutils, event
     from numba.core.caching import CompileResultCacheImpl, FunctionCache
     from numba.core.runtime.nrt import rtsys
     from numba.core.typing import cffi_utils  # noqa: F401  # otherwise looks for cffi at the first kernel
@@ -158,8 +158,8 @@ class KernelCache(FunctionCache):
 
     _impl_class = _KernelFiles
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
+    def __init__(self, function: Callable[..., Any], allocates: bool) -> None:
+        self._function, self._allocates = function, allocates
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """The cached kernel for a signature, or None.
@@ -174,7 +174,8 @@ class KernelCache(FunctionCache):
                 super().__init__(self._function)
             finally:
                 _CONFIG.CACHE_LOCATOR_CLASSES = named
-        rtsys.initialize(target)
+        if self._allocates:
+            rtsys.initialize(target)
         return self._load_overload(signature, target)
 
 
@@ -193,7 +194,7 @@ def njit(*, allocates: bool = True, cache: bool = False, **options: Any) -> Call
         options["_nrt"] = allocates
         compiled: Any = numba.njit(**options)(function)
         if cache and not INTERPRETED:
-            compiled._cache = KernelCache(function)  # noqa: SLF001 (where enable_caching puts it)
+            compiled._cache = KernelCache(function, allocates)  # noqa: SLF001 (where enable_caching puts it)
         kernel: _Function = compiled
         return kernel
 
@@ -259,6 +260,26 @@ def place_of(kind: np.dtype[Any], name: str) -> int:
     fields = kind.fields
     assert fields is not None
     return int(fields[name][1])
+
+
+def _assign_fields(of: np.record, to: np.record) -> None:
+    for name in of.dtype.names or ():
+        to[name] = of[name]
+
+
+def _record_copier(_typing_context: Any, of: Any, to: Any) -> Emitted:
+    def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        source, target = arguments
+        cgutils.raw_memcpy(builder, target, source, context.get_constant(types.intp, of.size), itemsize=1)
+        return context.get_dummy_value()
+
+    return types.none(of, to), code
+
+
+copy_record = _assign_fields if INTERPRETED else intrinsic(_record_copier)
+"""copy_record(of, to): copy a record to another one of the same type. An assignment would be compiled to a load and a
+store per byte.
+"""
 
 
 @njit(cache=True, error_model="numpy", allocates=False, forceinline=True)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arithmetic import exact_quotient
-from ..base.compilation import copy_numbers, njit, record_type
+from ..base.compilation import copy_numbers, copy_record, njit, record_type
 from ..base.simd import aligned
 from ..base.vectors import Vector
 from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
@@ -259,7 +259,7 @@ def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.
     for c in range(commands.shape[0]):
         if commands[c].kind < CLEAR and not is_within_magnitude(commands[c].load, body):
             return False
-        loads[c] = commands[c]
+        copy_record(commands[c], loads[c])
     attitude, velocity, spin = own.initial_orientation_xyzw, own.initial_linear_velocity, own.initial_angular_velocity
     if not fill_initial_row(own.initial_position, attitude, velocity, spin, flight.row):
         return False
@@ -286,7 +286,7 @@ def _fly_row(
     context: see simulation/quantities.py; it is filled here. Returns False when the simulation must run the row.
     """
     due = commands[i if commands.shape[0] > 1 else 0]
-    flights[0] = start[0]
+    copy_record(start[0], flights[0])
     flight, (loads, events, room) = flights[0], tables
     if not _begin(rows[i], ballast, flight, due, loads):
         return False

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..base.compilation import copy_numbers, njit, record_type
+from ..base.compilation import copy_numbers, copy_record, njit, record_type
 from ..base.rotation import norm
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
@@ -169,7 +169,7 @@ def begin_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, roo
         for k in range(LOADS_SIZE):
             flight.sums[k] += share[k]
     problem = flight.problem
-    flight.problem = flight.common
+    copy_record(flight.common, flight.problem)
     complete_problem(flight, flight.start, flight.start_ns, problem)
     begin_variables(flight, methods, room)
 
@@ -262,7 +262,7 @@ def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> 
     """Accelerations at now_ns by the equations of motion: of the COM [m/s², world], angular [rad/s², body axes]; six
     numbers. problem (1,) and y (VARIABLES,) are scratch memory.
     """
-    problem[0] = flight.common
+    copy_record(flight.common, problem[0])
     p = problem[0]
     complete_problem(flight, flight.row, flight.now_ns, p)
     to_variables(flight.row, p, y)
@@ -372,7 +372,7 @@ def end_due(flight: np.record, loads: np.ndarray, events: np.ndarray) -> bool:
     for row in range(flight.acting):
         if loads[row].end_ns > flight.now_ns:
             if kept != row:
-                loads[kept] = loads[row]
+                copy_record(loads[row], loads[kept])
             kept += 1
             continue
         if loads[row].kind == HELD_WRENCH:
@@ -391,7 +391,7 @@ def end_slot(flight: np.record, loads: np.ndarray, events: np.ndarray, slot: int
     ended = False
     for row in range(flight.acting):
         if ended:
-            loads[row - 1] = loads[row]
+            copy_record(loads[row], loads[row - 1])
         elif loads[row].slot == slot:
             _write(flight, events, ENDED, loads[row].id, row)
             ended = True
@@ -428,7 +428,7 @@ def _begin(flight: np.record, loads: np.ndarray, row: int, end_ns: int) -> None:
     """Make the load in a row active from now_ns until ``end_ns``, as the last of the active loads."""
     to = flight.acting
     if to != row:
-        loads[to] = loads[row]
+        copy_record(loads[row], loads[to])
     acting = loads[to]
     acting.at_ns, acting.end_ns, acting.id = flight.now_ns, end_ns, flight.load_ids
     accumulate_load(acting.load, flight.body, acting.share)
