@@ -10,6 +10,7 @@ this package is cached under a hash of its file and of all that this imports, di
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import importlib.util
 import os
@@ -28,6 +29,9 @@ _ABSENT: Any = None
 # measurements, scipy for its version and linear algebra, and cffi for C functions; no kernel here uses the last two.
 _HIDDEN = [name for name in ("coverage", "scipy", "cffi") if name not in sys.modules]
 sys.modules.update(dict.fromkeys(_HIDDEN, _ABSENT))
+# numba makes 100,000 objects that stay: the garbage collector would search them again and again.
+_COLLECTED = gc.isenabled()
+gc.disable()
 try:
     import numba
     from numba import config, types
@@ -40,6 +44,8 @@ try:
 finally:
     for _name in _HIDDEN:
         del sys.modules[_name]
+    if _COLLECTED:
+        gc.enable()
 arraymath._HAVE_BLAS = importlib.util.find_spec("scipy") is not None  # noqa: SLF001  # for kernels of others
 
 _CONFIG: Any = config  # its attributes are set at import

@@ -8,6 +8,7 @@ SIGTERM).
 from __future__ import annotations
 
 import argparse
+import gc
 import importlib
 import sys
 
@@ -74,6 +75,8 @@ def _run(args: argparse.Namespace) -> int:
     from ..base.compilation import notify_when_compiling
 
     text = f"rigid_proto {args.command}: compiling kernels, at the first start only; a minute or two if all are missing"
+    # What was imported stays: the garbage collector needn't search it again and again.
+    gc.freeze()
     with notify_when_compiling(lambda: print(text, file=sys.stderr, flush=True)):
         status = args.run(args)
     print(end="", flush=True)  # inside _run, so that an output that can't be written is reported like any file

@@ -198,6 +198,8 @@ class Load(NamedTuple):
 
     def check_magnitude(self, body: Body) -> None:
         """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION."""
+        if _is_light(self.force, self.torque, self.mesh_point or _ORIGIN, body):
+            return
         row = self.row
         if not is_within_magnitude(row, body.row):
             linear, angular = magnitudes(row, body.row)
@@ -229,14 +231,21 @@ def light_row(frame: Frame, force: Numbers, torque: Numbers, body: Body) -> byte
     word, axes = frame.point[0], frame.axes
     if axes == "normal" or word not in ("com", "point"):
         return b""
+    point = frame.point[1] if word == "point" else _ORIGIN
+    if _is_light(force, torque, point, body):
+        return _ROW.pack(_AXES_NUMBERS[axes], word == "point", *point, *force, *torque, *_ORIGIN)
+    return b""
+
+
+def _is_light(force: Numbers, torque: Numbers, point: Numbers, body: Body) -> bool:
+    """Whether a load at a point in mesh coordinates is far below the magnitude limit, at a glance. False for numbers
+    that aren't finite.
+    """
     fx, fy, fz = force
     tx, ty, tz = torque
-    x, y, z = frame.point[1] if word == "point" else _ORIGIN
+    x, y, z = point
     amount = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz)
-    # False for numbers that aren't finite.
-    if amount * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light:
-        return _ROW.pack(_AXES_NUMBERS[axes], word == "point", x, y, z, fx, fy, fz, tx, ty, tz, 0.0, 0.0, 0.0)
-    return b""
+    return amount * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light
 
 
 def resolve_load(

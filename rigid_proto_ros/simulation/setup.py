@@ -109,6 +109,12 @@ class Setup(Environment):
         return FlightStart(start, integers, methods, workspace_size(methods))
 
     @cached_property
+    def needs_of_thrusters(self) -> frozenset[str]:
+        """What thrusters ask of the integrator."""
+        loads = [thruster.load(1.0) for thruster in self.thrusters.values()]
+        return frozenset().union(*map(needs_of_load, loads))
+
+    @cached_property
     def problem(self) -> np.record:
         """What all segments under this setup have in common (motion/problem.py)."""
         problem = new_record(PROBLEM)
@@ -144,7 +150,7 @@ def check_thrust(forces: tuple[float, ...], setup: Setup) -> None:
         raise CommandRefused("nonfinite", "thrusters", list(forces), "finite numbers")
     for thruster, force in zip(thrusters.values(), forces, strict=True):
         thruster.load(thruster.within(force)).check_magnitude(setup.body)
-        check_supported(setup.integrator, needs_of_load(thruster.load(1.0)))
+    check_supported(setup.integrator, setup.needs_of_thrusters)
 
 
 def load_row(command: WrenchCommand, setup: Setup, state: State | None) -> bytes:
