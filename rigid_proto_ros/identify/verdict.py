@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from .fitting import Estimate, residuals_of
 from .initial_estimate import noise_by_differences
@@ -207,4 +207,4 @@ def _whiteness(scaled: np.ndarray) -> float:
     for lag in range(1, lags + 1):
         correlation = (centred[lag:] * centred[:-lag]).sum(axis=0) / power
         total += float((correlation**2).sum()) * n * (n + 2) / (n - lag)
-    return float(chi2.sf(total, 3 * lags))
+    return float(chdtrc(3 * lags, total))
