@@ -58,7 +58,7 @@ COLUMNS = (
 """us: the flight alone. whole_us: set back and, of ours, commands submitted, then flown; nan of a kernel alone."""
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", cache=False)
 def carry_from_start(flights, loads, events, methods, room, what, until_ns):
     """One segment of the flight: its steps, and the look at the end."""
     return fl.advance_segment(flights[0], methods, room, until_ns)

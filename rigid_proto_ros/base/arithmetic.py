@@ -30,7 +30,7 @@ from numba import types
 # arithmetic after Hida, Li and Bailey (QD, 2001).
 
 
-@njit(cache=True)
+@njit()
 def two_sum(a: float, b: float) -> tuple[float, float]:
     """a + b = high + low, exactly."""
     high = a + b
@@ -38,21 +38,21 @@ def two_sum(a: float, b: float) -> tuple[float, float]:
     return high, (a - (high - t)) + (b - t)
 
 
-@njit(cache=True)
+@njit()
 def fast_two_sum(a: float, b: float) -> tuple[float, float]:
     """a + b = high + low, exactly, for |a| ≥ |b| or a = 0."""
     high = a + b
     return high, b - (high - a)
 
 
-@njit(cache=True)
+@njit()
 def two_product(a: float, b: float) -> tuple[float, float]:
     """a b = high + low, exactly, while |a b| > 1e-290 or zero."""
     high = a * b
     return high, fused_multiply_add(a, b, -high)
 
 
-@njit(cache=True)
+@njit()
 def pair_add(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
     """Sum of two pairs, relative error ≤ 3·2⁻¹⁰⁶ even under cancellation (the accurate variant)."""
     s, e = two_sum(a, b)
@@ -61,14 +61,14 @@ def pair_add(a: float, a_low: float, b: float, b_low: float) -> tuple[float, flo
     return fast_two_sum(s, e + f)
 
 
-@njit(cache=True)
+@njit()
 def pair_multiply(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
     """Product of two pairs, relative error ≤ 7·2⁻¹⁰⁶."""
     p, e = two_product(a, b)
     return fast_two_sum(p, e + (a * b_low + a_low * b))
 
 
-@njit(cache=True)
+@njit()
 def pair_divide(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
     """Quotient of two pairs, relative error ≤ 10·2⁻¹⁰⁶; b ≠ 0."""
     q = a / b
@@ -77,7 +77,7 @@ def pair_divide(a: float, a_low: float, b: float, b_low: float) -> tuple[float, 
     return fast_two_sum(q, (r + r_low) / b)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def exact_quotient(product: float, factor: float) -> float:
     """x with x · factor == product in double precision where there is one, else the nearest."""
     x = product / factor
@@ -198,7 +198,7 @@ _ANGLES_LOW = np.array(
 ).reshape(4, 9)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _reduced_in_pairs(x: float) -> tuple[int, float, float]:
     """As ``_reduced``, for |x| < 2⁵¹ with three doubles of π/2. Beyond, neighbours are further apart than an angle is
     of use: then x is taken modulo the double that is nearest to 2π.
@@ -219,7 +219,7 @@ def _reduced_in_pairs(x: float) -> tuple[int, float, float]:
     return int(whole), r, low
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _reduced(x: float) -> tuple[int, float, float]:
     """n, modulo 4 where it is large, and a pair r with x = n π/2 + r, |r| ≤ π/4.
 
@@ -237,7 +237,7 @@ def _reduced(x: float) -> tuple[int, float, float]:
     return _reduced_in_pairs(x)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _sine(r: float, low: float) -> float:
     z = r * r
     c = _SIN
@@ -246,7 +246,7 @@ def _sine(r: float, low: float) -> float:
     return r + (z * r * (c[0] + z * tail) + low * (1.0 - 0.5 * z))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _cosine(r: float, low: float) -> float:
     z = r * r
     c = _COS
@@ -257,7 +257,7 @@ def _cosine(r: float, low: float) -> float:
     return top + (((1.0 - top) - half) + (zz * tail - r * low))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def sine_cosine(x: float) -> tuple[float, float]:
     """sin x and cos x."""
     if abs(x) < _AS_ITSELF:
@@ -271,7 +271,7 @@ def sine_cosine(x: float) -> tuple[float, float]:
     return s, c
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _exponential_parts(x: float) -> tuple[int, float, float, float]:
     """n, r and a pair (t, t_low) with eˣ = 2ⁿ (1 + r + t), |r| ≤ ½ log 2; |x| < 1000."""
     whole = (x * (1.0 / 0.6931471805599453) + _TO_NEAREST) - _TO_NEAREST
@@ -286,7 +286,7 @@ def _exponential_parts(x: float) -> tuple[int, float, float, float]:
     return int(whole), r, t, t_low + 0.5 * square_low
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _scaled(x: float, n: int) -> float:
     """x 2ⁿ, |n| ≤ 1500, rounded once."""
     if -1000 < n < 1000:
@@ -298,7 +298,7 @@ def _scaled(x: float, n: int) -> float:
     return x * first * second
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def exponential_of(x: float) -> float:
     """eˣ."""
     if not -746.0 < x < 710.0:
@@ -309,7 +309,7 @@ def exponential_of(x: float) -> float:
     return _scaled(s + (e + f + t_low), n)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def expm1(x: float) -> float:
     """eˣ − 1, without cancellation for small x."""
     if not -40.0 < x < 709.0:
@@ -326,7 +326,7 @@ def expm1(x: float) -> float:
     return high + (low + _scaled(e + f + t_low, n))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _logarithm(x: float) -> tuple[float, float]:
     """log x as an unevaluated sum of two, for normal x > 0."""
     bits = bits_of(x)
@@ -348,7 +348,7 @@ def _logarithm(x: float) -> tuple[float, float]:
     return high, (low + lost) + rest
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def logarithm(x: float) -> float:
     """log x; −∞ for 0, NaN for less."""
     if not 0.0 < x < math.inf:
@@ -363,7 +363,7 @@ def logarithm(x: float) -> float:
     return high + low
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _angle(less: float, more: float, octant: int) -> float:
     """φ = arctan less/more in octant 0, π/2 − φ in 1, π/2 + φ in 2, π − φ in 3, for 0 ≤ less ≤ more, neither tiny nor
     huge.
@@ -394,7 +394,7 @@ def _angle(less: float, more: float, octant: int) -> float:
     return high + (low + correction)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def inverse_tangent(x: float) -> float:
     """arctan x."""
     size = abs(x)
@@ -407,7 +407,7 @@ def inverse_tangent(x: float) -> float:
     return math.copysign(_angle(size, 1.0, 0) if size <= 1.0 else _angle(1.0, size, 1), x)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def inverse_tangent_of(y: float, x: float) -> float:
     """The angle of (x, y) from the x axis, −π to π; signs of zeros count as in C's atan2."""
     if not (abs(x) < math.inf and abs(y) < math.inf):

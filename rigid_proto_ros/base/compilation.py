@@ -188,11 +188,12 @@ class KernelCache(FunctionCache):
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def njit(*, allocates: bool = True, cache: bool = False, **options: Any) -> Callable[[_Function], _Function]:
+def njit(*, allocates: bool = True, cache: bool = True, **options: Any) -> Callable[[_Function], _Function]:
     """numba's njit, with kernels cached by ``KernelCache``. For a type checker the result is the Python function.
 
     allocates: False for a function that creates no arrays except slices of given ones. References aren't counted then,
-    which saves two atomic operations per slice. numba refuses to compile such a function if it does allocate.
+    which saves two atomic operations per slice. numba refuses to compile such a function if it does allocate. cache:
+    False for a function outside this package.
     """
 
     def decorated(function: _Function) -> _Function:
@@ -288,7 +289,7 @@ store per byte.
 """
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def copy_numbers(of: np.ndarray, to: np.ndarray) -> None:
     """Copy the first numbers of one array to all of another, one by one: numba's assignment of slices first checks
     whether the two share memory, and allocates a copy if they do.

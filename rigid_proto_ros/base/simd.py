@@ -205,13 +205,13 @@ def number(_typing_context: Any, vector: Any, at: Any) -> Emitted:
     )
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def four(a: float, b: float, c: float, d: float) -> Packed:
     """A vector of four numbers. A vector load of numbers just stored one by one would stall until they are written."""
     return joined(filled(a, 1), filled(b, 1), filled(c, 1), filled(d, 1))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def triple(array: np.ndarray, at: int, last: float) -> Packed:
     """A vector of three numbers of an array from index ``at`` on, and ``last``."""
     return four(array[at], array[at + 1], array[at + 2], last)

@@ -131,7 +131,7 @@ def _compiled() -> tuple[Callable[..., int], np.ndarray, int]:
     signature = int64(flat, types.int64[::1], table, flat, int64, tables, cube, types.int64[::1])
     degree = degree_for(ACCURACY)
     methods = method_table(AUTO, degree)
-    return entry_of(njit(cache=True, nogil=True, error_model="numpy")(_fly_all), signature), methods, degree
+    return entry_of(njit(nogil=True, error_model="numpy")(_fly_all), signature), methods, degree
 
 
 def fly_rows(flown: np.ndarray, times_ns: np.ndarray, wrenches: Wrenches) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ Principal = tuple[np.ndarray, np.ndarray]
 """Principal moments (3,) and axes (3, 3) of a tensor, as the kernel in mass/tensor.py gives them."""
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def loaded(
     mass: float, center: np.ndarray, second: np.ndarray, stretch: np.ndarray, reference: np.ndarray, points: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray, Principal]:
@@ -56,7 +56,7 @@ def loaded(
     return total, moved, inertia, principal_axes_kernel(inertia)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def spread_mass(
     mass: float,
     measure: float,
@@ -88,7 +88,7 @@ def spread_mass(
     return total, com, inertia, principal
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def given_mass(
     mass: float, center: np.ndarray, inertia: np.ndarray, scale: np.ndarray, points: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray, Principal]:
@@ -106,7 +106,7 @@ def given_mass(
     return total, base + moved, gathered, principal
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def is_plainly_good(principal: np.ndarray) -> bool:
     """Whether ``check_tensor`` has nothing to report about principal moments (3,)."""
     a, b, c = principal[0], principal[1], principal[2]

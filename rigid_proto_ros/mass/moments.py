@@ -90,7 +90,7 @@ class Moments(NamedTuple):
         return Moments(np.concatenate([-self.numbers[:1], self.numbers[1:10], -self.second]))
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
     """Lower and upper corner, and whether all coordinates are finite; otherwise the corners are meaningless."""
     x0 = y0 = z0 = np.inf
@@ -104,7 +104,7 @@ def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
     return (x0, y0, z0), (x1, y1, z1), zero == 0.0
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _leads_outside(triangles: np.ndarray, count: int) -> bool:
     """Whether a triangle uses a vertex number outside 0 to ``count`` − 1."""
     signs, last = 0, count - 1
@@ -132,7 +132,7 @@ def _refuse(flaw: int, count: int) -> None:
         raise MeshError("mesh", "all vertices lie in one point")
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _exact_reference(vertices: np.ndarray) -> tuple[int, np.ndarray, float, float]:
     """A point near the bounding box's centre from which the differences of all vertices are exact in double precision.
 
@@ -153,7 +153,7 @@ def _exact_reference(vertices: np.ndarray) -> tuple[int, np.ndarray, float, floa
     return 0, reference, math.ldexp(1.0, -math.frexp(size)[1]), size
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _central(
     sums: np.ndarray,
     reference: np.ndarray,
@@ -194,7 +194,7 @@ def _moments(numbers: np.ndarray, no_measure: str) -> Moments:
     return Moments(numbers)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _gather(vertices: np.ndarray, triangles: np.ndarray, start: int, corners: np.ndarray) -> int:
     """Copy the corners a, b, c of the triangles from ``start`` on into the columns of ``corners`` (9, n).
 
@@ -211,7 +211,7 @@ def _gather(vertices: np.ndarray, triangles: np.ndarray, start: int, corners: np
     return whole
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _corner(corners: np.ndarray, corner: int, t: int, reference: np.ndarray, factor: float) -> tuple[Packed, ...]:
     """x, y and z of one corner of _LANES triangles, relative to the reference in units of 1/factor."""
     zero, first = filled(0.0, _LANES), 3 * corner * corners.shape[1] + t
@@ -221,14 +221,14 @@ def _corner(corners: np.ndarray, corner: int, t: int, reference: np.ndarray, fac
     return (x - reference[0]) * factor, (y - reference[1]) * factor, (z - reference[2]) * factor
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _across(lanes: Packed) -> float:
     """The sum of eight numbers, by halves (pairwise)."""
     even = (number(lanes, 0) + number(lanes, 4)) + (number(lanes, 2) + number(lanes, 6))
     return even + ((number(lanes, 1) + number(lanes, 5)) + (number(lanes, 3) + number(lanes, 7)))
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _blocked_sums(
     vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float
 ) -> tuple[np.ndarray, float]:
@@ -270,35 +270,35 @@ def _blocked_sums(
     return sums, edges
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _plus(p: _Pair, q: _Pair) -> _Pair:
     return pair_add(p[0], p[1], q[0], q[1])
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _times(p: _Pair, q: _Pair) -> _Pair:
     return pair_multiply(p[0], p[1], q[0], q[1])
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _minor(p: _Pair, q: _Pair, r: _Pair, s: _Pair) -> _Pair:
     """p q − r s."""
     moved, moved_low = _times(r, s)
     return _plus(_times(p, q), (-moved, -moved_low))
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _sum(a: tuple[Packed, ...], b: tuple[Packed, ...], sign: float) -> tuple[_Pair, ...]:
     """a + sign·b, exactly."""
     return two_sum(a[0], sign * b[0]), two_sum(a[1], sign * b[1]), two_sum(a[2], sign * b[2])
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _scalar_product(a: tuple[_Pair, ...], b: tuple[_Pair, ...]) -> _Pair:
     return _plus(_plus(_times(a[0], b[0]), _times(a[1], b[1])), _times(a[2], b[2]))
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _add(sums: np.ndarray, slot: int, p: _Pair) -> None:
     """Add p to one sum of ``sums`` (10, 2, _LANES)."""
     high = 2 * slot * _LANES
@@ -308,7 +308,7 @@ def _add(sums: np.ndarray, slot: int, p: _Pair) -> None:
     store(sums, high + _LANES, total[1])
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _compensated_sums(vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float) -> np.ndarray:
     """The solid's ten sums (10, 2) in pairs (about 104 bits), for bodies so thin that products of doubles round too
     much; relative to the reference every corner is exact."""
@@ -344,7 +344,7 @@ def _compensated_sums(vertices: np.ndarray, triangles: np.ndarray, reference: np
     return sums
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _solid(vertices: np.ndarray, triangles: np.ndarray, path: int, numbers: np.ndarray) -> int:
     """Compute the solid's ``numbers`` as in ``_central``, with the summation of that number in PATHS; returns the flaw
     of the mesh, or 0.
@@ -394,12 +394,12 @@ def _reference(vertices: np.ndarray) -> tuple[np.ndarray, float]:
     return reference, factor
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _point(points: np.ndarray, i: int) -> _Point:
     return points[i, 0], points[i, 1], points[i, 2]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _normal(points: np.ndarray, triangle: np.ndarray) -> _Point:
     """The triangle's normal; its length is twice the area."""
     a, b, c = _point(points, triangle[0]), _point(points, triangle[1]), _point(points, triangle[2])
@@ -408,7 +408,7 @@ def _normal(points: np.ndarray, triangle: np.ndarray) -> _Point:
     return uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _shell_sums(points: np.ndarray, triangles: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """The ten sums (10, 2) over polygons; polygon k consists of the triangles starts[k] to starts[k + 1] − 1, a fan."""
     sums = np.zeros((10, 2))
@@ -459,7 +459,7 @@ def referenced_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarr
     return vertices if used.all() else vertices[used]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _point_sums(points: np.ndarray) -> np.ndarray:
     sums = np.zeros((10, 2))
     sums[0, 0] = points.shape[0]

@@ -73,7 +73,7 @@ def _drop_copies(surface: RepairedSurface) -> list[str]:
 _SWEEP = np.array([0.8163, 0.3719, 0.4421])  # oblique, so that few points project to the same place
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _near_pairs(points: np.ndarray, order: np.ndarray, tolerance: float, target: np.ndarray) -> None:
     """Set target (k,) of points (k, 3) to the first point within ``tolerance``, in their order along _SWEEP."""
     rounding = 0.0

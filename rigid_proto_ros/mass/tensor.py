@@ -20,7 +20,7 @@ MAX_MOMENT_RATIO = 1e12
 _EQUAL_COMPONENT = 1e-9  # components closer than this count as equal; the first one then decides the column's sign
 
 
-@njit(cache=True)
+@njit()
 def _rotate(a: np.ndarray, v: np.ndarray, p: int, q: int) -> bool:
     """Jacobi rotation of a (3, 3) to a[p, q] = 0, and of v (3, 3), in place; False if it is below rounding already."""
     g = a[p, q]
@@ -49,7 +49,7 @@ def _rotate(a: np.ndarray, v: np.ndarray, p: int, q: int) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit()
 def _sign_columns(axes: np.ndarray) -> None:
     """Fix the signs of axes (3, 3), columns, in place: largest component of the first two positive, right-handed."""
     for column in range(2):
@@ -70,7 +70,7 @@ def _sign_columns(axes: np.ndarray) -> None:
             axes[row, 2] = -axes[row, 2]
 
 
-@njit(cache=True)
+@njit()
 def principal_axes_kernel(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Principal moments (3,) ascending and axes (3, 3), columns, of a symmetric ``inertia`` (3, 3).
 

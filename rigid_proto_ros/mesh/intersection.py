@@ -51,32 +51,32 @@ _Vector = tuple[float, float, float]
 _Triangle = tuple[_Vector, _Vector, _Vector]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _corner(vertices: np.ndarray, i: int) -> _Vector:
     return vertices[i, 0], vertices[i, 1], vertices[i, 2]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _triangle(vertices: np.ndarray, corners: np.ndarray, i: int) -> _Triangle:
     return _corner(vertices, corners[i, 0]), _corner(vertices, corners[i, 1]), _corner(vertices, corners[i, 2])
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _minus(a: _Vector, b: _Vector) -> _Vector:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _cross(a: _Vector, b: _Vector) -> _Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _dot(a: _Vector, b: _Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _largest(a: _Vector) -> float:
     return max(abs(a[0]), abs(a[1]), abs(a[2]))
 
@@ -105,7 +105,7 @@ def hierarchy(vertices: np.ndarray, corners: np.ndarray) -> Hierarchy:
     return order, own, boxes
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _boxes_meet(boxes: np.ndarray, i: int, others: np.ndarray, j: int) -> bool:
     """Whether box i and box j of ``others`` have a point in common."""
     x = (boxes[i, 0] <= others[j, 3]) & (others[j, 0] <= boxes[i, 3])
@@ -113,7 +113,7 @@ def _boxes_meet(boxes: np.ndarray, i: int, others: np.ndarray, j: int) -> bool:
     return bool(x & y & (boxes[i, 2] <= others[j, 5]) & (others[j, 2] <= boxes[i, 5]))
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _heights(triangle: _Triangle, other: _Triangle) -> tuple[_Vector, _Vector]:
     """Normal of a triangle, with a length of twice its area, and its scalar products with the corners of the other one
     relative to its first corner; 0 for corners in its plane to rounding.
@@ -126,7 +126,7 @@ def _heights(triangle: _Triangle, other: _Triangle) -> tuple[_Vector, _Vector]:
     return normal, (d if abs(d) > margin else 0.0, e if abs(e) > margin else 0.0, f if abs(f) > margin else 0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _piece(triangle: _Triangle, heights: _Vector, axis: int, origin: float) -> tuple[float, float]:
     """Interval along ``axis``, from ``origin``, in which a triangle meets the plane above which its corners have
     ``heights``."""
@@ -141,7 +141,7 @@ def _piece(triangle: _Triangle, heights: _Vector, axis: int, origin: float) -> t
     return low, high
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def triangles_cross(vertices: np.ndarray, corners: np.ndarray, i: int, j: int) -> bool:
     """Whether triangles i and j of ``corners`` (m, 3) over vertices (n, 3) properly intersect."""
     one, other = _triangle(vertices, corners, i), _triangle(vertices, corners, j)
@@ -159,7 +159,7 @@ def triangles_cross(vertices: np.ndarray, corners: np.ndarray, i: int, j: int) -
     return min(high, higher) - max(low, lower) > TOUCHING * (max(high, higher) - min(low, lower))
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _share_a_corner(corners: np.ndarray, i: int, j: int) -> bool:
     for k in range(3):
         if corners[i, k] == corners[j, 0] or corners[i, k] == corners[j, 1] or corners[i, k] == corners[j, 2]:
@@ -167,7 +167,7 @@ def _share_a_corner(corners: np.ndarray, i: int, j: int) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def crossings(
     vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, count: int, tree: Hierarchy, limit: int
 ) -> tuple[int, np.ndarray, bool]:
@@ -207,7 +207,7 @@ def crossings(
     return within, crossing, True
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _hit(triangle: _Triangle, origin: _Vector, direction: _Vector, reach: float) -> tuple[int, bool]:
     """(sign, sure): +1 where the ray leaves through the triangle, −1 where it enters, 0 for a miss; sure: neither near
     an edge nor within ``reach`` of the origin.
@@ -231,7 +231,7 @@ def _hit(triangle: _Triangle, origin: _Vector, direction: _Vector, reach: float)
     return (1 if u + v + w > 0.0 else -1), True
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _shoot(
     vertices: np.ndarray,
     corners: np.ndarray,
@@ -277,7 +277,7 @@ def _shoot(
     return visits
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _sides(
     vertices: np.ndarray,
     corners: np.ndarray,

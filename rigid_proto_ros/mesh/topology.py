@@ -15,7 +15,7 @@ import numpy as np
 from ..base.compilation import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def first_equal_rows(rows: np.ndarray) -> np.ndarray:
     """For each row of ``rows`` (n, 3) int64 the index of the first row equal to it, (n,), by open addressing."""
     n = rows.shape[0]
@@ -48,7 +48,7 @@ def weld_equal(vertices: np.ndarray) -> np.ndarray:
     return first_equal_rows((vertices + 0.0).view(np.int64))
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _root(parent: np.ndarray, i: int) -> int:
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -56,7 +56,7 @@ def _root(parent: np.ndarray, i: int) -> int:
     return i
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray:
     """Union-find: the smallest member of the set of each of 0 to count − 1, if first[k] and second[k] share a set."""
     parent = np.arange(count)
@@ -156,7 +156,7 @@ def surplus_copies(topology: Topology) -> np.ndarray:
     return topology.duplicates & (excess[1] <= excess[0])[topology.component]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _component_sums(
     vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, count: int, middle: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -35,7 +35,7 @@ leave no significant digits of the motion.
 """
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def angular_acceleration(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """I⁻¹ τ of a torque x, y, z, in body axes."""
     P, m = AXES, MOMENTS
@@ -49,14 +49,14 @@ def angular_acceleration(body: np.ndarray, x: float, y: float, z: float) -> tupl
     )
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def arm(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Mesh coordinates x, y, z to metres from the COM, body axes."""
     s, c = BODY_SCALE, COM
     return x * body[s] - body[c], y * body[s + 1] - body[c + 1], z * body[s + 2] - body[c + 2]
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def normal(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A unit normal x, y, z of the unscaled mesh as a unit vector in body axes: normals transform by scale⁻¹."""
     x, y, z = x / body[BODY_SCALE], y / body[BODY_SCALE + 1], z / body[BODY_SCALE + 2]
@@ -64,7 +64,7 @@ def normal(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float
     return x / size, y / size, z / size
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def fill_body(
     mass: float, com: np.ndarray, inertia: np.ndarray, principal: Principal, scale: np.ndarray, body: np.ndarray
 ) -> None:

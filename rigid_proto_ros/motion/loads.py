@@ -51,7 +51,7 @@ _ROW = struct.Struct("=14d")
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def arm_of(load: np.ndarray, body: np.ndarray) -> Vector:
     """Vector from the COM to the point of application [m, body axes]: three numbers."""
     if load[HAS_POINT] == 0.0:
@@ -59,7 +59,7 @@ def arm_of(load: np.ndarray, body: np.ndarray) -> Vector:
     return of_body.arm(body, load[POINT], load[POINT + 1], load[POINT + 2])
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def own_force(load: np.ndarray, body: np.ndarray) -> Vector:
     """The force, in body axes, of a load whose axes rotate with the body: three numbers."""
     f = load[FORCE]
@@ -69,13 +69,13 @@ def own_force(load: np.ndarray, body: np.ndarray) -> Vector:
     return f, load[FORCE + 1], load[FORCE + 2]
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _bound(x: float, y: float, z: float) -> float:
     """√3 times the largest component: an upper bound of the length without overflow of squares."""
     return 1.7320508075688772 * max(abs(x), abs(y), abs(z))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def magnitudes(load: np.ndarray, body: np.ndarray) -> tuple[float, float]:
     """Upper bounds of the linear [m/s²] and angular [rad/s²] acceleration over all attitudes, computed from |r||F| and
     the smallest principal moment.
@@ -88,20 +88,20 @@ def magnitudes(load: np.ndarray, body: np.ndarray) -> tuple[float, float]:
     return force / body[of_body.MASS], torque / body[of_body.MOMENTS]
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def is_within_magnitude(load: np.ndarray, body: np.ndarray) -> bool:
     """Whether both accelerations are within MAX_ACCELERATION; False if they overflow to NaN."""
     linear, angular = magnitudes(load, body)
     return linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def is_zero(load: np.ndarray) -> bool:
     """Whether the load has neither force nor torque."""
     return not load[FORCE : FORCE + 6].any()
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def accumulate_load(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> None:
     """Write the load's contribution to the sums into share (LOADS_SIZE,): forces and torques by axes, and the moment r
     Fᵀ of a world force.
@@ -124,7 +124,7 @@ def accumulate_load(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> No
     share[TORQUE_BODY], share[TORQUE_BODY + 1], share[TORQUE_BODY + 2] = tx, ty, tz
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def apply_impulse(load: np.ndarray, body: np.ndarray, row: np.ndarray) -> None:
     """Apply impulse J and angular impulse H to a state row: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
     a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])

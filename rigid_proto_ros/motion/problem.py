@@ -110,7 +110,7 @@ K, C, REST, PUSHES = 9, 10, 11, 12
 STRING = 13
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def begin_body(p: np.record, body: np.ndarray, environment: np.record, gyroscopic: float) -> None:
     """Fill p, a record of zeros, with what is the same in every segment of a body (BODY,): all but loads, string and
     start. environment: a record with the fields of ENVIRONMENT, and others.
@@ -130,7 +130,7 @@ def begin_body(p: np.record, body: np.ndarray, environment: np.record, gyroscopi
     p.length = body[of_body.LENGTH]
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def begin_problem(p: np.record, loads: np.ndarray, row: np.ndarray) -> None:
     """Complete the body's part p with loads and the start, as far as they go without a string."""
     P, mass = p.principal_axes, p.mass
@@ -157,7 +157,7 @@ def begin_problem(p: np.record, loads: np.ndarray, row: np.ndarray) -> None:
     p.translates = pushes
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def begin_string(
     p: np.record, body: np.ndarray, string: np.ndarray, begin_ns: int, end_ns: int, row: np.ndarray, now_ns: int
 ) -> None:
@@ -188,7 +188,7 @@ def begin_string(
 # principal axes, u is the added velocity in world axes.
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def undamped_torque(q: Quaternion, p: np.record) -> Vector:
     """Torque of the loads about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R)."""
     tx, ty, tz = p.torque_body[0], p.torque_body[1], p.torque_body[2]
@@ -205,7 +205,7 @@ def undamped_torque(q: Quaternion, p: np.record) -> Vector:
     return tx, ty, tz
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def torque(q: Quaternion, w: Vector, p: np.record) -> Vector:
     """Torque of loads and damping about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R) − c_ω ω."""
     tx, ty, tz = undamped_torque(q, p)
@@ -213,7 +213,7 @@ def torque(q: Quaternion, w: Vector, p: np.record) -> Vector:
     return tx - c * w[0], ty - c * w[1], tz - c * w[2]
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def acceleration(q: Quaternion, u: Vector, p: np.record) -> Vector:
     """u' without the string's part (world axes): its constant part, R g_b and −c_v u."""
     own, added, c = p.acceleration_body, p.acceleration_added, p.damping_linear
@@ -234,7 +234,7 @@ MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def is_good(y: np.ndarray) -> bool:
     """Whether variables y are finite and no runaway."""
     size = 0.0
@@ -244,7 +244,7 @@ def is_good(y: np.ndarray) -> bool:
     return size <= MAX_SPEED and math.isfinite(y[0] + y[1] + y[2] + y[3])
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def damping_functions(z: float) -> tuple[float, float]:
     """φ₁(z) = (1 − e⁻ᶻ)/z and φ₂(z) = (z − 1 + e⁻ᶻ)/z², z ≥ 0, to rounding."""
     if z == 0.0:
@@ -259,7 +259,7 @@ def damping_functions(z: float) -> tuple[float, float]:
     return phi1, (1.0 - phi1) / z
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def to_variables(row: np.ndarray, p: np.record, y: np.ndarray) -> None:
     """State row (13,) to variables y (≥ 15,) at the start of the segment with problem p."""
     P, Q = p.principal_axes, p.principal_quaternion
@@ -272,7 +272,7 @@ def to_variables(row: np.ndarray, p: np.record, y: np.ndarray) -> None:
     y[HEAT] = 0.0
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def to_row(y: np.ndarray, p: np.record, elapsed: float, row: np.ndarray) -> None:
     """Variables y (≥ 15,), ``elapsed`` seconds after the segment's start, to a state row (13,)."""
     P, Q = p.principal_axes, p.principal_quaternion
@@ -287,7 +287,7 @@ def to_row(y: np.ndarray, p: np.record, elapsed: float, row: np.ndarray) -> None
     row[3], row[4], row[5], row[6] = multiply(y[0], y[1], y[2], y[3], -Q[0], -Q[1], -Q[2], Q[3])
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def to_good_row(y: np.ndarray, p: np.record, elapsed: float, row: np.ndarray, limit: float) -> bool:
     """``to_row``; returns whether no number of the row is beyond ``limit`` or no number at all."""
     to_row(y, p, elapsed, row)
@@ -302,13 +302,13 @@ def to_good_row(y: np.ndarray, p: np.record, elapsed: float, row: np.ndarray, li
 # where it changes is found by integrators/string_law.py.
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def parts_of(y: np.ndarray) -> tuple[Quaternion, Vector, Vector, Vector]:
     """q, ω, d and u of the variables y."""
     return (y[0], y[1], y[2], y[3]), (y[4], y[5], y[6]), (y[7], y[8], y[9]), (y[10], y[11], y[12])
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def angular_acceleration(w: Vector, t: Vector, p: np.record) -> Vector:
     """Euler's equations in principal axes: ω' = I⁻¹(τ − ω × Iω); without the gyroscopic term I⁻¹τ."""
     A, B, C, g = p.moments[0], p.moments[1], p.moments[2], p.gyroscopic
@@ -319,7 +319,7 @@ def angular_acceleration(w: Vector, t: Vector, p: np.record) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def knot(q: Quaternion, w: Vector, d: Vector, u: Vector, p: np.record) -> tuple[Vector, Vector]:
     """From the free end to the knot, a, and its rate a', world axes."""
     r, start = p.attach, p.string_start
@@ -329,7 +329,7 @@ def knot(q: Quaternion, w: Vector, d: Vector, u: Vector, p: np.record) -> tuple[
     return a, (u[0] + vx, u[1] + vy, u[2] + vz)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def string_pull(
     q: Quaternion, w: Vector, d: Vector, u: Vector, p: np.record, taut: bool
 ) -> tuple[Vector, Vector, float, float]:
@@ -356,7 +356,7 @@ def string_pull(
     return (fx, fy, fz), about_com, fx * hand[0] + fy * hand[1] + fz * hand[2], heat
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def accelerations(
     q: Quaternion, w: Vector, d: Vector, u: Vector, p: np.record, taut: bool
 ) -> tuple[Vector, Vector, float, float]:
@@ -376,14 +376,14 @@ def accelerations(
     return angular_acceleration(w, (tx, ty, tz), p), (ax, ay, az), work, heat
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def knot_of(y: np.ndarray, p: np.record) -> tuple[Vector, Vector]:
     """``knot`` at variables y."""
     q, w, d, u = parts_of(y)
     return knot(q, w, d, u, p)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def stretch(y: np.ndarray, p: np.record) -> tuple[float, float]:
     """x = l − rest length, and its rate, of variables y; (1, 0) for a string whose law never changes."""
     if p.bilateral or not p.has_string:
@@ -395,7 +395,7 @@ def stretch(y: np.ndarray, p: np.record) -> tuple[float, float]:
     return length - p.rest_length, (a[0] * v[0] + a[1] * v[1] + a[2] * v[2]) / length
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def tension_margin(y: np.ndarray, p: np.record) -> float:
     """min(k x, k x + c x'): positive exactly while the string pulls."""
     x, rate = stretch(y, p)

@@ -36,7 +36,7 @@ ROUNDINGS = 4.0
 """Largest computed length of a span of zero, in units of ε (|position| + |arm|)."""
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def most_yielding(mass: float, i1: float, i2: float, i3: float, x: float, y: float, z: float) -> float:
     """Upper bound of 1/m_eff [1/kg] over all directions for a knot at x, y, z [m] from the COM, in principal axes with
     moments i1 ≤ i2 ≤ i3: 1/m and the largest eigenvalue of [r]×ᵀ I⁻¹ [r]×, bounded by its trace or by |r|²/i1.
@@ -46,7 +46,7 @@ def most_yielding(mass: float, i1: float, i2: float, i3: float, x: float, y: flo
     return 1.0 / mass + min(trace, (xx + yy + zz) / i1)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def length_of(x: float, y: float, z: float) -> float:
     """|v| without overflow or underflow of squares."""
     largest = max(abs(x), abs(y), abs(z))
@@ -55,7 +55,7 @@ def length_of(x: float, y: float, z: float) -> float:
     return largest * norm(x / largest, y / largest, z / largest)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def free_end_at(
     now_ns: int, origin: np.ndarray, target: np.ndarray, begin_ns: int, end_ns: int
 ) -> tuple[Vector, Vector]:
@@ -69,7 +69,7 @@ def free_end_at(
     return (origin[0] + elapsed * x, origin[1] + elapsed * y, origin[2] + elapsed * z), (x, y, z)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def span_of(rx: float, ry: float, rz: float, row: np.ndarray, ex: float, ey: float, ez: float) -> Vector:
     """Vector from the free end at e [m, world] to the knot at r [m from the COM, body axes] for a state row (13,):
     three numbers [m, world].
@@ -82,7 +82,7 @@ def span_of(rx: float, ry: float, rz: float, row: np.ndarray, ex: float, ey: flo
     )
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _turning(body: np.ndarray, rx: float, ry: float, rz: float, x: float, y: float, z: float) -> float:
     """(r × n)ᵀ I⁻¹ (r × n) for a unit vector n, body axes."""
     lx, ly, lz = ry * z - rz * y, rz * x - rx * z, rx * y - ry * x
@@ -90,7 +90,7 @@ def _turning(body: np.ndarray, rx: float, ry: float, rz: float, x: float, y: flo
     return lx * ax + ly * ay + lz * az
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def effective_mass(
     body: np.ndarray, rx: float, ry: float, rz: float, row: np.ndarray, span: Vector, rest_length: float
 ) -> float:
@@ -113,14 +113,14 @@ def effective_mass(
     return float(1.0 / (1.0 / body[MASS] + turning))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def spring_of(mass: float, stiffness: float, frequency: float, damping_ratio: float) -> tuple[float, float]:
     """k [N/m] and c [N s/m] for this effective mass; a frequency [rad/s] > 0 overrides the stiffness."""
     k = mass * (frequency * frequency) if frequency > 0.0 else stiffness
     return k, 2.0 * damping_ratio * math.sqrt(k * mass)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def energy_of(span: Vector, stiffness: float, rest_length: float, bilateral: bool) -> float:
     """½ k x² [J]; 0 while a pull-only string is slack."""
     stretch = length_of(*span) - rest_length

@@ -58,7 +58,7 @@ class Surface:
         return -outward / size if size > 1e-12 else np.zeros(3)
 
 
-@njit(cache=True)
+@njit()
 def _first_hit(
     vertices: np.ndarray, triangles: np.ndarray, origin: np.ndarray, direction: np.ndarray
 ) -> tuple[float, int]:
@@ -102,7 +102,7 @@ def _first_hit(
     return best, best_triangle
 
 
-@njit(cache=True)
+@njit()
 def _nearest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, float, float]:
     """Nearest point of a triangle, squared distance, and the angle of the triangle at that point: the corner's angle, π
     on an edge, 2π inside. After Ericson, Real-Time Collision Detection (2005), section 5.1.5.
@@ -153,18 +153,18 @@ def _nearest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndar
     return nearest, (gap * gap).sum(), angle
 
 
-@njit(cache=True)
+@njit()
 def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@njit()
 def _angle(a: np.ndarray, b: np.ndarray) -> float:
     x, y, z = _cross(a, b)
     return inverse_tangent_of(norm(x, y, z), (a * b).sum())
 
 
-@njit(cache=True)
+@njit()
 def _nearest(vertices: np.ndarray, triangles: np.ndarray, point: np.ndarray) -> tuple[tuple[float, ...], float, int]:
     best = math.inf
     best_point = (0.0, 0.0, 0.0)
@@ -180,7 +180,7 @@ def _nearest(vertices: np.ndarray, triangles: np.ndarray, point: np.ndarray) -> 
     return best_point, best, best_triangle
 
 
-@njit(cache=True)
+@njit()
 def _pseudo_normal(
     vertices: np.ndarray, triangles: np.ndarray, point: np.ndarray, tolerance: float
 ) -> tuple[float, float, float]:

@@ -137,7 +137,7 @@ def new_results(rows: int, measures: int) -> Results:
 _Made = tuple[float, np.ndarray, np.ndarray, Principal, bool]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _explicit(own: np.record, ballast: np.ndarray) -> _Made:
     """Mass, COM (3,), inertia (3, 3), its principal moments and axes, and whether the numbers are certainly valid."""
     given = own.explicit_inertia_tensor
@@ -156,7 +156,7 @@ def _explicit(own: np.record, ballast: np.ndarray) -> _Made:
     return total, com, gathered, principal, good and is_plainly_good(principal[0])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _spread(own: np.record, ballast: np.ndarray) -> _Made:
     """The same for a model whose mass is distributed over a mesh."""
     s, mass = own.scale, own.mass
@@ -174,7 +174,7 @@ def _spread(own: np.record, ballast: np.ndarray) -> _Made:
     return total, com, inertia, principal, uniform and 1e-300 < mass < math.inf and is_plainly_good(principal[0])
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(error_model="numpy", forceinline=True)
 def _make_body(own: np.record, ballast: np.ndarray, body: np.ndarray) -> bool:
     """Fill ``body`` (BODY,) from a row and ballast (k, 4); returns False when the simulation must check it."""
     s = own.scale
@@ -198,7 +198,7 @@ def _make_body(own: np.record, ballast: np.ndarray, body: np.ndarray) -> bool:
 # A row's string
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _span(flight: np.record) -> Vector:
     """Vector from the string's free end, which is at rest at its target, to the knot: three numbers [m, world]."""
     string = flight.string
@@ -206,7 +206,7 @@ def _span(flight: np.record) -> Vector:
     return span_of(rx, ry, rz, flight.row, string[TARGET], string[TARGET + 1], string[TARGET + 2])
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _string_energy(flight: np.record) -> float:
     """Current energy of the string [J]; 0 without a string."""
     if not flight.tied:
@@ -215,7 +215,7 @@ def _string_energy(flight: np.record) -> float:
     return energy_of(_span(flight), string[K], string[REST], string[PUSHES] != 0.0)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _tie(own: np.record, flight: np.record) -> bool:
     """Tie the string of a row; returns False when its rates may exceed the integrator's limit."""
     string, body = flight.string, flight.body
@@ -246,7 +246,7 @@ def _tie(own: np.record, flight: np.record) -> bool:
 # A row's flight
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.ndarray, loads: np.ndarray) -> bool:
     """Initialize a row's flight, a copy of its setup's, and loads; returns False when the simulation must run it."""
     body = flight.body
@@ -267,7 +267,7 @@ def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.
     return not own.string_attached or _tie(own, flight)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(error_model="numpy", forceinline=True)
 def _fly_row(
     i: int,
     rows: np.ndarray,
@@ -305,7 +305,7 @@ def _fly_row(
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", allocates=False)
+@njit(nogil=True, error_model="numpy", allocates=False)
 def _fly_rows(
     own: _Side,
     references: _Side,

@@ -144,7 +144,7 @@ REACHED, FAILED, NO_KERNEL = range(3)
 """Result of a call. NO_KERNEL: the segment's method must be compiled first."""
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def begin_flight(flight: np.record) -> None:
     """Reset time, counters and work of a flight to time 0, before its first segment."""
     flight.now_ns, flight.start_ns, flight.committed_ns = 0, 0, 0
@@ -156,7 +156,7 @@ def begin_flight(flight: np.record) -> None:
     flight.acting, flight.due, flight.due_end, flight.load_ids, flight.events, flight.timeouts = 0, 0, 0, 0, 0, 0
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def begin_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
     """Begin a segment at ``start``: sum the active loads anew, in the order in which they began, and select the method.
 
@@ -174,7 +174,7 @@ def begin_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, roo
     begin_variables(flight, methods, room)
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def complete_problem(flight: np.record, row: np.ndarray, time_ns: int, p: np.record) -> None:
     """Complete p, a copy of ``common``, to the problem of a segment with the initial state ``row``, the loads ``sums``
     and the string.
@@ -184,7 +184,7 @@ def complete_problem(flight: np.record, row: np.ndarray, time_ns: int, p: np.rec
         begin_string(p, flight.body, flight.string, flight.string_begin_ns, flight.string_end_ns, row, time_ns)
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def begin_variables(flight: np.record, methods: np.ndarray, room: np.ndarray) -> None:
     """Set the initial variables and select the method of a segment whose problem is complete."""
     p, y = flight.problem, flight.variables
@@ -206,7 +206,7 @@ def begin_variables(flight: np.record, methods: np.ndarray, room: np.ndarray) ->
     flight.segments += 1
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def commit_until(flight: np.record, methods: np.ndarray, room: np.ndarray, until_ns: int) -> bool:
     """Commit every full step of the segment that ends at or before ``until_ns``; returns whether all were good."""
     span_ns = until_ns - flight.committed_ns
@@ -222,7 +222,7 @@ def commit_until(flight: np.record, methods: np.ndarray, room: np.ndarray, until
     return good
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def sample(flight: np.record, methods: np.ndarray, room: np.ndarray, at_ns: int, row: np.ndarray) -> bool:
     """Write the state at ``at_ns``, less than one step after the last committed step, into row and commit nothing.
     Returns whether the state is good.
@@ -244,7 +244,7 @@ def sample(flight: np.record, methods: np.ndarray, room: np.ndarray, at_ns: int,
     return True
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def advance_segment(flight: np.record, methods: np.ndarray, room: np.ndarray, until_ns: int) -> int:
     """Advance within the segment to ``until_ns``: full steps, then one shorter step on a copy, which ends there."""
     flight.waits = not is_provided(methods[flight.method])
@@ -257,7 +257,7 @@ def advance_segment(flight: np.record, methods: np.ndarray, room: np.ndarray, un
     return REACHED
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> tuple[float, ...]:
     """Accelerations at now_ns by the equations of motion: of the COM [m/s², world], angular [rad/s², body axes]; six
     numbers. problem (1,) and y (VARIABLES,) are scratch memory.
@@ -277,7 +277,7 @@ def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> 
     )
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def stop_in_last_good_state(flight: np.record) -> None:
     """Set the state to the end of the last good step, or leave it at now_ns if that is later."""
     row = flight.trial
@@ -293,13 +293,13 @@ def stop_in_last_good_state(flight: np.record) -> None:
         flight.now_ns = flight.committed_ns
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def steps_of_segment(flight: np.record) -> int:
     """Steps committed in the segment."""
     return int(flight.taken + flight.control.steps)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def evaluations_of_segment(flight: np.record, methods: np.ndarray) -> int:
     """Evaluations of the equations of motion in the segment's committed steps."""
     # The shorter step that ends a segment uses the series of the pending step.
@@ -307,7 +307,7 @@ def evaluations_of_segment(flight: np.record, methods: np.ndarray) -> int:
     return int(flight.taken * methods[flight.method].evaluations + counted)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> None:
     """Update ``floors`` (FLOOR_KINDS,) with limits of double precision in the segment up to now_ns, which no method can
     improve. Rounding ω to ε causes an attitude error of ε|ω|t. A position is rounded to half a unit in its last place.
@@ -337,7 +337,7 @@ def floor_text(floors: Iterable[float]) -> str:
     return "; ".join(text.format(floor) for text, floor in zip(FLOORS, floors, strict=True) if floor)
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def finish_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
     """Add the segment's counts to the totals and begin another segment at the state at now_ns."""
     note_floors(flight, methods, flight.floors)
@@ -350,7 +350,7 @@ def finish_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, ro
     begin_segment(flight, loads, methods, room)
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def cut_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
     """End the segment at now_ns, counting the shorter step that was taken to that time, and begin another."""
     if flight.now_ns > flight.committed_ns and not methods[flight.method].sleeps:
@@ -358,14 +358,14 @@ def cut_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room:
     finish_segment(flight, loads, methods, room)
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def _write(flight: np.record, events: np.ndarray, what: int, load_id: int, row: int) -> None:
     event = events[flight.events]
     event.time_ns, event.what, event.load_id, event.row = flight.now_ns, what, load_id, row
     flight.events += 1
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def end_due(flight: np.record, loads: np.ndarray, events: np.ndarray) -> bool:
     """End the loads whose end is at or before now_ns; returns whether any ended."""
     kept = 0
@@ -385,7 +385,7 @@ def end_due(flight: np.record, loads: np.ndarray, events: np.ndarray) -> bool:
     return bool(ended)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def end_slot(flight: np.record, loads: np.ndarray, events: np.ndarray, slot: int) -> None:
     """End the active load in a slot, if there is one."""
     ended = False
@@ -399,7 +399,7 @@ def end_slot(flight: np.record, loads: np.ndarray, events: np.ndarray, slot: int
         flight.acting -= 1
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def end_all(flight: np.record, loads: np.ndarray, events: np.ndarray) -> None:
     """End all active loads."""
     for row in range(flight.acting):
@@ -407,13 +407,13 @@ def end_all(flight: np.record, loads: np.ndarray, events: np.ndarray) -> None:
     flight.acting = 0
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def end_of_held(flight: np.record, begin_ns: int) -> int:
     """End time [ns] of a held wrench that began at ``begin_ns``."""
     return max(begin_ns + flight.timeout_ns, flight.now_ns) if flight.timeout_ns != 0 else NEVER
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def take_body(flight: np.record, loads: np.ndarray) -> None:
     """Recompute the contributions and end times of the active loads for another body and other settings."""
     for row in range(flight.acting):
@@ -423,7 +423,7 @@ def take_body(flight: np.record, loads: np.ndarray) -> None:
             acting.end_ns = end_of_held(flight, acting.at_ns)
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def _begin(flight: np.record, loads: np.ndarray, row: int, end_ns: int) -> None:
     """Make the load in a row active from now_ns until ``end_ns``, as the last of the active loads."""
     to = flight.acting
@@ -435,7 +435,7 @@ def _begin(flight: np.record, loads: np.ndarray, row: int, end_ns: int) -> None:
     flight.acting += 1
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def apply(flight: np.record, loads: np.ndarray, events: np.ndarray, row: int) -> None:
     """Apply the command in a row at now_ns. Active loads may be written to the rows before it."""
     kind, load = loads[row].kind, loads[row].load
@@ -463,7 +463,7 @@ def apply(flight: np.record, loads: np.ndarray, events: np.ndarray, row: int) ->
     _write(flight, events, DONE, load_id, row)
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def next_event_ns(flight: np.record, loads: np.ndarray) -> int:
     """Time of the next event: a load ends, a command is due, or the string's free end arrives at its target."""
     event_ns = loads[flight.due].at_ns if flight.due < flight.due_end else NEVER
@@ -474,7 +474,7 @@ def next_event_ns(flight: np.record, loads: np.ndarray) -> int:
     return event_ns
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def fly(
     flight: np.record,
     loads: np.ndarray,

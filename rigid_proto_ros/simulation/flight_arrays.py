@@ -70,7 +70,7 @@ one now. END_DUE: end the loads whose end is due. END_ALL: end all active loads.
 """
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _call(
     flights: np.ndarray,
     loads: np.ndarray,

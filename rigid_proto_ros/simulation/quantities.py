@@ -58,24 +58,24 @@ STATE = 14
 MASS, INERTIA, GRAVITY, START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 1, 10, 13, 27, 28, 31
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _momentum(row: np.ndarray, context: np.ndarray) -> tuple[float, float, float]:
     return angular_momentum(row, context[INERTIA : INERTIA + 9])
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _kinetic(row: np.ndarray, context: np.ndarray) -> float:
     return kinetic_energy(row, context[MASS], context[INERTIA : INERTIA + 9])
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _potential(row: np.ndarray, context: np.ndarray) -> float:
     g = GRAVITY
     fallen = context[g] * row[0] + context[g + 1] * row[1] + context[g + 2] * row[2]
     return float(row[13] - context[MASS] * fallen)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def attitude_angle(a: np.ndarray, b: np.ndarray) -> float:
     """Angle of the rotation from attitude a (4,) to b (4,), xyzw [rad, 0 to π]."""
     w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -85,7 +85,7 @@ def attitude_angle(a: np.ndarray, b: np.ndarray) -> float:
     return 2.0 * inverse_tangent_of(norm(x, y, z), abs(w))
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def begin(mass: float, inertia: np.ndarray, gravity: np.ndarray, row: np.ndarray, context: np.ndarray) -> None:
     """Fill the context (CONTEXT,) from mass, tensor (9,), gravity (3,) and the state row (STATE,) at time 0."""
     context[MASS] = mass
@@ -97,7 +97,7 @@ def begin(mass: float, inertia: np.ndarray, gravity: np.ndarray, row: np.ndarray
     context[START_MOMENTUM], context[START_MOMENTUM + 1], context[START_MOMENTUM + 2] = lx, ly, lz
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
     """The quantity NAMES[code] of a state row (STATE,)."""
     if code < 13:
@@ -127,7 +127,7 @@ def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
     return inverse_tangent_of(across, lx * ax + ly * ay + lz * az)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def difference(code: int, a: np.ndarray, b: np.ndarray) -> float:
     """The difference number ``code`` of DIFFERENCES between two state rows."""
     if code == 0:
@@ -150,7 +150,7 @@ to D the axis in the body; all zero for the axis of the initial spin.
 """
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def count_flips(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> float:
     """Number of flips of a body axis: the cosine to its initial direction falls below −margin, then exceeds margin, ...
 
@@ -174,7 +174,7 @@ def count_flips(measure: np.ndarray, states: np.ndarray, context: np.ndarray) ->
     return float(flips)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _extreme(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> float:
     sign = 1.0 if measure[KIND] == LARGEST else -1.0
     found = -math.inf
@@ -183,7 +183,7 @@ def _extreme(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> fl
     return sign * found
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _first(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> int:
     """Index of the first sample at which the condition of a measure holds, or −1."""
     for k in range(states.shape[0]):
@@ -192,7 +192,7 @@ def _first(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> int:
     return -1
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def measure_flight(
     measures: np.ndarray,
     states: np.ndarray,

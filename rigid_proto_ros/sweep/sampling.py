@@ -175,7 +175,7 @@ def row_uniforms(seed: int, rows: np.ndarray, dimensions: int) -> np.ndarray:
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _shape(kind: int, a: float, b: float, u: np.ndarray, out: np.ndarray) -> None:
     """Fill out (n, k) from uniforms u (n, j), as ``Draw`` has them.
 

@@ -46,7 +46,7 @@ per second, each of 2 to 3 µs.
 """
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def steady_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Closed form for a body without spin, or with a constant spin because the gyroscopic term is left out."""
     for done in range(n):
@@ -70,13 +70,13 @@ ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, SLACK_AT_REST, ON_STRI
 """Kinds of segments, as in the table above; each has its own method of auto."""
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _any(v: np.ndarray, at: int = 0) -> bool:
     """Whether any of three numbers isn't zero."""
     return bool(v[at] != 0.0 or v[at + 1] != 0.0 or v[at + 2] != 0.0)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def kind_of_segment(p: np.record, y: np.ndarray) -> int:
     """Kind of a segment with problem p and initial variables y."""
     spins = _any(y, 4)

@@ -54,7 +54,7 @@ would underflow.
 """
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def free_step(q: Quaternion, w: Vector, moments: Vector, h: float) -> tuple[Quaternion, Vector]:
     """Attitude q and ω = w (principal axes, moments ascending) after h seconds without torque."""
     wx, wy, wz = w
@@ -96,7 +96,7 @@ def free_step(q: Quaternion, w: Vector, moments: Vector, h: float) -> tuple[Quat
     return turned, (math.ldexp(wx, e), math.ldexp(wy, e), math.ldexp(wz, e))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector]:
     """The rotation r xyzw (not normalized) over h, and w after it; notation of the module's docstring."""
     A, B, C = moments
@@ -164,7 +164,7 @@ def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector
     return multiply(*turned, B * v2, -A * v1, 0.0, L + C * v3), (v1, v2, v3)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _gauss_phase(cn: float, sn: float, dn: float, k1: float) -> tuple[float, float]:
     """sn and cn of Gauss's transformed modulus."""
     s = sn * (1.0 + k1) / (1.0 + dn)
@@ -173,7 +173,7 @@ def _gauss_phase(cn: float, sn: float, dn: float, k1: float) -> tuple[float, flo
     return s / size, c / size
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _side_of_separatrix(A: float, B: float, C: float, w1: float, w3: float) -> float:
     """C(C−B) w₃² − A(B−A) w₁² in pairs of doubles: near the separatrix the motion depends on its last digits."""
     g, g_low = two_sum(C, -B)
@@ -188,7 +188,7 @@ def _side_of_separatrix(A: float, B: float, C: float, w1: float, w3: float) -> f
     return distance
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def free_body_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     q, w, _, _ = parts_of(y)
@@ -226,7 +226,7 @@ _DUPLICATION = 3e-3
 """Relative spread of the arguments at which the error of Carlson's fifth-order series (sixth power) is about 1e-16."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def complete_quarter_period(m1: float) -> float:
     """K(m) by the arithmetic-geometric mean, m₁ > 0."""
     a, b = 1.0, math.sqrt(m1)
@@ -236,7 +236,7 @@ def complete_quarter_period(m1: float) -> float:
     return math.pi / (a + b)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def sn_cn_dn(u: float, m: float, m1: float) -> tuple[float, float, float]:
     """sn, cn, dn (u | m) for |u| ≤ K, m₁ > 0; cn and dn keep their relative accuracy where they are small."""
     if abs(u) < 1.0:
@@ -246,7 +246,7 @@ def sn_cn_dn(u: float, m: float, m1: float) -> tuple[float, float, float]:
     return _by_landen(u, m1)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _by_series(u: float, m: float) -> tuple[float, float, float]:
     """Maclaurin series, after halving u until it is small; then duplication (A&S 16.18)."""
     doublings = 0
@@ -282,7 +282,7 @@ def _by_series(u: float, m: float) -> tuple[float, float, float]:
     return s, c, d
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _by_landen(u: float, m1: float) -> tuple[float, float, float]:
     """Bulirsch's sncndn: descending Landen transformations of cot am, which keeps small cn and dn accurate."""
     squeeze = m1
@@ -313,7 +313,7 @@ def _by_landen(u: float, m1: float) -> tuple[float, float, float]:
     return sn, c * sn, d
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _set(values: tuple[float, ...], index: int, value: float) -> tuple[float, ...]:
     """A tuple of 14 with one entry replaced: tuples stay in registers, an array would be allocated at each call."""
     return (
@@ -334,7 +334,7 @@ def _set(values: tuple[float, ...], index: int, value: float) -> tuple[float, ..
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _rc_of_one(e: float) -> float:
     """R_C(1, 1 + e), e ≥ 0."""
     if e < 1e-3:
@@ -344,7 +344,7 @@ def _rc_of_one(e: float) -> float:
     return inverse_tangent(root) / root
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def carlson_rj(x: float, y: float, z: float, p: float) -> float:
     """R_J(x, y, z, p), 0 ≤ x, y, z ≤ p with at most one of them 0."""
     delta = (p - x) * (p - y) * (p - z)
@@ -384,7 +384,7 @@ def carlson_rj(x: float, y: float, z: float, p: float) -> float:
 # Strang, SIAM J. Numer. Anal. 5 (1968) 506; for rigid bodies McLachlan and Quispel, Acta Numerica 11 (2002) 341.
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _push(y: np.ndarray, p: np.record) -> tuple[float, ...]:
     """Torque (principal axes) and acceleration (world axes) at the attitude of y: six numbers."""
     tx, ty, tz = undamped_torque((y[0], y[1], y[2], y[3]), p)
@@ -395,7 +395,7 @@ def _push(y: np.ndarray, p: np.record) -> tuple[float, ...]:
     return tx, ty, tz, ax + added[0], ay + added[1], az + added[2]
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _kick(y: np.ndarray, p: np.record, h: float, pushed: tuple[float, ...]) -> None:
     """Apply the rates of ``_push`` to ω and the added velocity for h seconds, in place; damping in closed form."""
     angular, linear = p.damping_angular, p.damping_linear
@@ -411,7 +411,7 @@ def _kick(y: np.ndarray, p: np.record, h: float, pushed: tuple[float, ...]) -> N
             y[10 + k] += h * damping_functions(linear * h)[0] * (pushed[3 + k] - linear * y[10 + k])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def free_body_strang_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     moments = p.moments[0], p.moments[1], p.moments[2]

@@ -227,13 +227,13 @@ def provide_kernel(integrator: Integrator, table: np.ndarray, number: int) -> No
         method["address"] = address_of(kernel, ADAPTIVE_STEPS if method["way"] == ADAPTIVE else STEPS)
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def is_provided(method: np.record) -> bool:
     """Whether the method's kernel can be called."""
     return bool(method.way == NOTHING or method.address != 0)
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def commit(
     method: np.record,
     y: np.ndarray,
@@ -260,7 +260,7 @@ def commit(
     return 0, 0, True
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def reach(
     method: np.record,
     y: np.ndarray,

@@ -52,7 +52,7 @@ _RESOLUTION = 2.0**-49
 """Fraction of a step to which the time of a change of law is determined."""
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(error_model="numpy", forceinline=True)
 def _rates(z: Packed, p: np.record, pulls: bool) -> Packed:
     """Time derivatives of the variables z, four by four: q; ω and the hand's work; d and the damper's heat; u."""
     qx, qy, qz, qw = number(z, 0), number(z, 1), number(z, 2), number(z, 3)
@@ -71,7 +71,7 @@ def _rates(z: Packed, p: np.record, pulls: bool) -> Packed:
     return joined(turned, four(*turning, work), four(*u, heat), four(*moving, 0.0))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(error_model="numpy", forceinline=True)
 def tableau_step(
     y: np.ndarray, p: np.record, h: float, pulls: bool, tableau: np.ndarray, k: np.ndarray, out: np.ndarray
 ) -> None:
@@ -165,7 +165,7 @@ def _step_on_string(
 def explicit(tableau: np.ndarray) -> Kernel:
     """The kernel of the explicit method with this tableau (s + 1, s)."""
 
-    @njit(cache=True, error_model="numpy")
+    @njit(error_model="numpy")
     def steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
         return repeated(tableau_step, tableau, y, p, h, n)
 
@@ -271,7 +271,7 @@ DOP853 = Integrator(
 )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _semi_implicit_step(
     y: np.ndarray, p: np.record, h: float, pulls: bool, _tableau: np.ndarray, _k: np.ndarray, out: np.ndarray
 ) -> None:
@@ -287,7 +287,7 @@ def _semi_implicit_step(
     out[HAND_WORK], out[HEAT] = y[HAND_WORK] + h * work, y[HEAT] + h * heat
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def semi_implicit_euler_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     return repeated(_semi_implicit_step, ONE_STAGE, y, p, h, n)

@@ -40,19 +40,19 @@ from ..string import NO_DIRECTION
 from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _spread(v: Packed) -> tuple[Packed, Packed, Packed]:
     """The first three numbers of v, each repeated four times."""
     return arranged(v, (0, 0, 0, 0)), arranged(v, (1, 1, 1, 1)), arranged(v, (2, 2, 2, 2))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _axes(q: Packed) -> tuple[Packed, Packed, Packed]:
     """q ⊗ x, q ⊗ y, q ⊗ z, whose sum weighted by the components of v is q ⊗ v."""
     return arranged(q, (3, 2, 5, 4)), arranged(q, (6, 3, 0, 5)), arranged(q, (1, 4, 3, 6))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def power_sum(c: np.ndarray, at: int, columns: int, degree: int, h: float, like: Packed) -> Packed:
     """Σ cₖ hᵏ up to k = degree ≥ 4 of the numbers at ``at`` in rows of ``columns``: four independent Horner schemes,
     each over every fourth power, which the processor overlaps; the largest term is added last.
@@ -94,7 +94,7 @@ VARIABLES_AT = _Q
 """Offset of q, ω, d and u, which are contiguous."""
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def spin_series(y: np.ndarray, p: np.record, degree: int, c: np.ndarray) -> None:
     """Coefficients c (degree + 1, SPIN_COLUMNS) of the motion from variables y: q, ω, d, u."""
     translates = p.translates
@@ -175,7 +175,7 @@ def spin_series(y: np.ndarray, p: np.record, degree: int, c: np.ndarray) -> None
     store(c, row + _D, paired(d, u))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def spin_at(c: np.ndarray, degree: int, h: float, y: np.ndarray) -> None:
     """Write the variables after h seconds into y (≥ 13,), with a unit quaternion; degree: 4 or more."""
     sums = power_sum(c, _Q, SPIN_COLUMNS, degree, h, filled(0.0, 16))
@@ -193,7 +193,7 @@ of convergence (|ω|h of about 1 to 3) the best method for that; beyond it the s
 """
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def taylor_steps_of_degree(y: np.ndarray, p: np.record, h: float, n: int, degree: int) -> int:
     """Up to n steps of h seconds in place by series of this degree; returns the number of good ones."""
     c, new = np.zeros((degree + 1, SPIN_COLUMNS)), y.copy()
@@ -206,7 +206,7 @@ def taylor_steps_of_degree(y: np.ndarray, p: np.record, h: float, n: int, degree
     return n
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def taylor_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     return taylor_steps_of_degree(y, p, h, n, TAYLOR_DEGREE)
@@ -241,19 +241,19 @@ Knot = tuple[float, float, float, float, float]
 """Vector from the free end to the knot (3,) [m, world], its length l, and l − rest length [m]."""
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _dot(a: Packed, b: Packed) -> float:
     """Scalar product of the first three components."""
     ab = a * b
     return float(number(ab, 0) + number(ab, 1) + number(ab, 2))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _cross(a: Packed, b: Packed) -> Packed:
     return arranged(a, (1, 2, 0, 3)) * arranged(b, (2, 0, 1, 3)) - arranged(a, (2, 0, 1, 3)) * arranged(b, (1, 2, 0, 3))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _columns(xs: Packed, ys: Packed, zs: Packed, one: float) -> tuple[Packed, Packed, Packed]:
     """Columns of R, or of a coefficient of it, from the products x q, y q and z q; one: 1 for R itself, 0 for higher
     coefficients.
@@ -270,7 +270,7 @@ def _columns(xs: Packed, ys: Packed, zs: Packed, one: float) -> tuple[Packed, Pa
     return x + four(one, 0.0, 0.0, 0.0), y + four(0.0, one, 0.0, 0.0), z + four(0.0, 0.0, one, 0.0)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _put_variables(c: np.ndarray, k: int, q: Packed, w: Packed, d: Packed, u: Packed) -> None:
     """Store coefficient k of the variables; each vector's fourth number is overwritten by the next one's first."""
     at = k * MOTION_COLUMNS
@@ -281,7 +281,7 @@ def _put_variables(c: np.ndarray, k: int, q: Packed, w: Packed, d: Packed, u: Pa
     c[k, HEAT] = 0.0
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _put_factors(c: np.ndarray, k: int, q: Packed, w: Packed, span: Packed) -> None:
     """Store the factors of products from coefficient k of q, ω and (a, l)."""
     at = k * MOTION_COLUMNS
@@ -294,7 +294,7 @@ def _put_factors(c: np.ndarray, k: int, q: Packed, w: Packed, span: Packed) -> N
     store(c, at + _REPEATED, joined(q, q, q, span))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def distance_series(c: np.ndarray, degree: int) -> None:
     """Compute the series of the knot's distance for a string that doesn't pull, whose motion doesn't need it."""
     for k in range(1, degree + 1):
@@ -306,7 +306,7 @@ def distance_series(c: np.ndarray, degree: int) -> None:
         c[k, DISTANCE] = (0.5 * square + ends) / c[0, DISTANCE]
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _heat_at_the_end(c: np.ndarray, k: int) -> float:
     """Coefficient k of |a'|², for a string of rest length 0."""
     heat = 0.0
@@ -316,7 +316,7 @@ def _heat_at_the_end(c: np.ndarray, k: int) -> float:
     return heat
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _turned_by_the_world(p: np.record, x: Packed, y: Packed, z: Packed) -> Packed:
     """Rᵀ τ_w + vee(M R) from R's columns."""
     torque = triple(p.torque_world, 0, 0.0)
@@ -330,7 +330,7 @@ def _turned_by_the_world(p: np.record, x: Packed, y: Packed, z: Packed) -> Packe
     )
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _turned_over(x: Packed, y: Packed, z: Packed) -> tuple[Packed, Packed, Packed]:
     """Rows of the matrix with these columns."""
     return (
@@ -340,14 +340,14 @@ def _turned_over(x: Packed, y: Packed, z: Packed) -> tuple[Packed, Packed, Packe
     )
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _weighed(x: Packed, y: Packed, z: Packed, v: Packed) -> Packed:
     """The sum of x, y, z, weighted by the components of v."""
     v1, v2, v3 = _spread(v)
     return x * v1 + y * v2 + z * v3
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def motion_series(  # noqa: C901 - the recurrences of one order, in their order; a call in between costs more than they do
     y: np.ndarray, p: np.record, knot: Knot, degree: int, taut: bool, c: np.ndarray
 ) -> None:
@@ -463,7 +463,7 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
         r1, r2, r3 = _columns(xs, ys, zs, 0.0)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def motion_at(c: np.ndarray, p: np.record, degree: int, h: float, y: np.ndarray) -> None:
     """Advance the variables y, about which c is the series, by h seconds."""
     columns = 15 if p.has_string else 13 if p.translates else 7
@@ -476,7 +476,7 @@ def motion_at(c: np.ndarray, p: np.record, degree: int, h: float, y: np.ndarray)
     y[0], y[1], y[2], y[3] = normalize(y[0], y[1], y[2], y[3])
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def stretch_at(c: np.ndarray, p: np.record, degree: int, h: float) -> tuple[float, float]:
     """x = l − rest length, and its rate, after h seconds."""
     a, b = filled(0.0, 4), filled(0.0, 4)

@@ -89,7 +89,7 @@ Weights = tuple[float, float, float, float]
 """Weights of attitude (as quaternion difference), ω, x and v in the error norm."""
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def scales(y: np.ndarray, p: np.record, elapsed: float) -> Weights:
     """The weights at variables y, ``elapsed`` seconds into the segment."""
     spin = norm(y[4], y[5], y[6])
@@ -106,7 +106,7 @@ def scales(y: np.ndarray, p: np.record, elapsed: float) -> Weights:
     return 2.0, 1.0 / max(spin, 1.0), 1.0 / length, 1.0 / max(math.sqrt(speed), length)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def heavier(ending: Weights, weights: Weights) -> tuple[Weights, bool]:
     """The larger of the weights at a step's end and start, and whether they exceed those at the start by more than a
     quarter.
@@ -115,14 +115,14 @@ def heavier(ending: Weights, weights: Weights) -> tuple[Weights, bool]:
     return (weights[0], spin, weights[2], speed), spin > 1.25 * weights[1] or speed > 1.25 * weights[3]
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def response_at_knot(p: np.record, spin: float, speed: float) -> float:
     """Largest weighted velocity change by an impulse of 1 N s at the string's knot, for these weights of ω and v."""
     arm = norm(p.attach[0], p.attach[1], p.attach[2])
     return float(max(speed / p.mass, spin * arm / p.moments[0]))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def jump_of_displacement(p: np.record, spin: float, speed: float) -> float:
     """Weighted velocity error per unit of displacement error, which makes a damped string become taut too early or too
     late.
@@ -130,7 +130,7 @@ def jump_of_displacement(p: np.record, spin: float, speed: float) -> float:
     return float(p.string_damping * p.length * response_at_knot(p, spin, speed)) if p.has_string else 0.0
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def fastest_swing(p: np.record) -> float:
     """Upper bound of the angular frequency [rad/s] of the body on the string, over all directions."""
     arm, I = p.attach, p.moments
@@ -138,7 +138,7 @@ def fastest_swing(p: np.record) -> float:
     return math.sqrt(p.stiffness * yields)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def floor_of_step(y: np.ndarray, p: np.record, weights: Weights, pulls: bool, h: float) -> float:
     """Rounding error, in the error norm, of a step of h seconds from y: 32 ε and, for a string that pulls, the effect
     of a force known only to the rounding of its knot's position. The span from free end to knot errs by ε times itself
@@ -170,7 +170,7 @@ _LOG2_MOST = -0.15200309344504997
 # log₂ and 2ˣ to two digits from the exponent of a double: ten times faster than libm, with the same bits everywhere.
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def fast_log2(x: float) -> float:
     """log₂ x for x > 0 with an error below 0.006; −1023 for subnormal x."""
     bits = bits_of(x)
@@ -180,7 +180,7 @@ def fast_log2(x: float) -> float:
     return float((bits >> MANTISSA_BITS) - BIAS) + f + f * (1.0 - f) * (0.4427 - 0.164 * f)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def fast_exp2(x: float) -> float:
     """2ˣ with a relative error below 0.001, for x clamped to ±1000."""
     whole = math.floor(min(max(x, -1000.0), 1000.0))
@@ -197,13 +197,13 @@ def degree_for(accuracy: float) -> int:
     return min(max(round(8.5 - 1.15 * logarithm(accuracy) / logarithm(10.0)), 6), MAX_DEGREE)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def degree_of_motion(degree: int) -> int:
     """Degree of a series of the whole motion, if ``degree`` is that of the spin alone."""
     return min(degree + _HIGHER, MAX_DEGREE)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _length_for(
     c: np.ndarray, at: int, columns: int, degree: int, weights: Packed, accuracy: float, part: float
 ) -> float:
@@ -225,7 +225,7 @@ def _length_for(
     return min(fast_exp2(min(x, _LOG2_MOST) - growth), LONGEST)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _allowed_length(c: np.ndarray, degree: int, weights: Weights, accuracy: float, part: float) -> float:
     """h [s] at which the error of a series of the motion is this part of the accuracy times h."""
     attitude, spin, place, speed = weights
@@ -238,7 +238,7 @@ def _allowed_length(c: np.ndarray, degree: int, weights: Weights, accuracy: floa
     return _length_for(c, ATTITUDE, MOTION_COLUMNS, degree, of_row, accuracy, part)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _known_length(c: np.ndarray, degree: int, place: float, accuracy: float, part: float) -> float:
     """h [s] at which the series of the knot's position has the same error. The position rotates by the full angle, the
     quaternion by half of it: the remainder after degree N is up to 2ᴺ times that of the attitude.
@@ -250,7 +250,7 @@ def _known_length(c: np.ndarray, degree: int, place: float, accuracy: float, par
 # The pending step
 
 
-@njit(cache=True, error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def begin_control(control: np.record, accuracy: float, degree: int) -> None:
     """Initialize the control record of a segment."""
     control.accuracy, control.degree = accuracy, degree
@@ -261,7 +261,7 @@ def begin_control(control: np.record, accuracy: float, degree: int) -> None:
     control.law, control.switch, control.last_start, control.last_law = 0.0, 0.0, 0.0, 0.0
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _note_floor(y: np.ndarray, p: np.record, control: np.record, weights: Weights, h: float) -> None:
     """Record the error floor of a step of h seconds from y if it exceeds what the accuracy allows."""
     pulls = p.has_string and (control.law == PULLS or control.switch < math.inf)
@@ -274,7 +274,7 @@ def _note_floor(y: np.ndarray, p: np.record, control: np.record, weights: Weight
         control.floor_rate = max(control.floor_rate, floor / h)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _count(control: np.record) -> None:
     """Count the pending step as committed."""
     control.elapsed_ns += control.accepted_ns
@@ -292,13 +292,13 @@ def series_workspace(degree: int) -> np.ndarray:
     return aligned((2 * (degree_of_motion(degree) + 2) + 1, MOTION_COLUMNS))
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _is_spin(p: np.record) -> bool:
     """Whether all loads rotate with the body."""
     return not (p.has_string or p.has_world_torque)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _spin_length(y: np.ndarray, p: np.record, control: np.record, weights: Weights, c: np.ndarray) -> int:
     """Compute the series of the spin from y into c; returns the step's length [ns]."""
     if not control.series:
@@ -309,7 +309,7 @@ def _spin_length(y: np.ndarray, p: np.record, control: np.record, weights: Weigh
     return int(_length_for(c, VARIABLES_AT, SPIN_COLUMNS, control.degree, of_row, control.accuracy, PART) * 1e9)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, c: np.ndarray) -> int:
     """Compute the series of one step from y into c and control; returns its length [ns], 0 if no step is possible.
     weights: of errors.
@@ -364,7 +364,7 @@ def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, 
     return length_ns if length_ns * 1e-9 > gone else length_ns + 1
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _reach(p: np.record, control: np.record, c: np.ndarray, time_ns: int, out: np.ndarray) -> None:
     """Advance out, the variables at the start of the planned step, by ``time_ns`` within this step."""
     degree, t = degree_of_motion(control.degree), time_ns * 1e-9
@@ -377,14 +377,14 @@ def _reach(p: np.record, control: np.record, c: np.ndarray, time_ns: int, out: n
         _move(c[degree + 2 : 2 * (degree + 2)], p, degree, t - control.last_start, control.last_law, out)
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _move(c: np.ndarray, p: np.record, degree: int, h: float, law: float, out: np.ndarray) -> None:
     motion_at(c, p, degree, h, out)
     if law == SHORTENS:
         out[HEAT] += shortening_heat(p, stretch_at(c, p, degree, 0.0)[0], stretch_at(c, p, degree, h)[0])
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def _accept(y: np.ndarray, p: np.record, control: np.record, following: np.ndarray, c: np.ndarray) -> bool:
     """Plan the next step and write its end into ``following``; returns whether there is one."""
     elapsed = control.elapsed_ns
@@ -406,7 +406,7 @@ def _accept(y: np.ndarray, p: np.record, control: np.record, following: np.ndarr
     return good
 
 
-@njit(cache=True, error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False)
 def series_steps(
     y: np.ndarray,
     p: np.record,

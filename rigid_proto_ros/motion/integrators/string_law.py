@@ -43,13 +43,13 @@ _APPROACH = 0.75
 """Largest motion of the knot of a string that pushes in one step, as a fraction of its distance from the free end."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def is_one_sided(p: np.record) -> bool:
     """Whether a string is tied whose law can change, that is, a pull-only one."""
     return p.has_string and not p.bilateral
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def knot_at(y: np.ndarray, p: np.record) -> Knot:
     """The knot of the string at variables y; zeros without a string."""
     if not p.has_string:
@@ -59,7 +59,7 @@ def knot_at(y: np.ndarray, p: np.record) -> Knot:
     return *a, length, length - p.rest_length
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def law_of(y: np.ndarray, p: np.record) -> float:
     """The law at variables y: SLACK, PULLS or SHORTENS."""
     if not is_one_sided(p):
@@ -70,7 +70,7 @@ def law_of(y: np.ndarray, p: np.record) -> float:
     return PULLS if p.stiffness * x + p.string_damping * rate > 0.0 else SHORTENS
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def shortening_heat(p: np.record, before: float, after: float) -> float:
     """Energy that the damper dissipates while the string doesn't pull [J]: the loss of ½ k x² between two stretches."""
     before, after = max(before, 0.0), max(after, 0.0)
@@ -97,7 +97,7 @@ _MOST_TRIALS = 1200
 NONE = -1.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def first_rise(g: np.ndarray, degree: int) -> float:
     """First s in [0, 1] after which Σ gₖ sᵏ is positive, for a polynomial that isn't at 0; NONE if it never is."""
     while degree > 0 and g[degree] == 0.0:
@@ -134,7 +134,7 @@ def first_rise(g: np.ndarray, degree: int) -> float:
     return NONE
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _bernstein(g: np.ndarray, degree: int, b: np.ndarray) -> None:
     """Bernstein coefficients b on [0, 1]: bᵢ = Σ C(i, k)/C(n, k) gₖ."""
     scale = 1.0
@@ -146,7 +146,7 @@ def _bernstein(g: np.ndarray, degree: int, b: np.ndarray) -> None:
             b[i] += b[i - 1]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _signs(b: np.ndarray, degree: int) -> tuple[int, int]:
     """Sign of the first coefficient that isn't zero, and how often the sign changes."""
     first, before, changes = 0, 0, 0
@@ -162,7 +162,7 @@ def _signs(b: np.ndarray, degree: int) -> tuple[int, int]:
     return first, changes
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _halve(b: np.ndarray, left: np.ndarray, degree: int) -> None:
     """Bisection: coefficients of the left half into ``left``, those of the right one into b."""
     left[0] = b[0]
@@ -172,7 +172,7 @@ def _halve(b: np.ndarray, left: np.ndarray, degree: int) -> None:
         left[j] = b[0]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _root(g: np.ndarray, degree: int, low: float, high: float) -> float:
     """The only root in an interval over which the polynomial rises: Newton's method, safeguarded by bisection."""
     t = 0.5 * (low + high)
@@ -197,7 +197,7 @@ def _root(g: np.ndarray, degree: int, low: float, high: float) -> float:
 # Along a series
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def next_law(
     c: np.ndarray, p: np.record, degree: int, h: float, law: float, accuracy: float
 ) -> tuple[float, float, float]:
@@ -227,7 +227,7 @@ def next_law(
         h = 0.5 * told
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _square_less_rest(a: np.ndarray, x: float, rest: float) -> np.ndarray:
     """Coefficients of |a|² − rest² from those of a (n, 3); x: the stretch at 0."""
     last = a.shape[0] - 1
@@ -239,7 +239,7 @@ def _square_less_rest(a: np.ndarray, x: float, rest: float) -> np.ndarray:
     return g
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _tautens(c: np.ndarray, p: np.record, degree: int, h: float) -> float:
     """Time at which |a|² first rises above the square of the rest length; NONE if it doesn't within h seconds."""
     rest = p.rest_length
@@ -269,7 +269,7 @@ def _tautens(c: np.ndarray, p: np.record, degree: int, h: float) -> float:
     return time if time == NONE else time * h
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _stops_shortening(c: np.ndarray, p: np.record, degree: int, h: float, g: np.ndarray) -> tuple[float, float]:
     """Fraction of h at which the string's stretch is zero or it begins to pull, whichever is first, and the law after
     that.
@@ -294,7 +294,7 @@ def _stops_shortening(c: np.ndarray, p: np.record, degree: int, h: float, g: np.
     return pulls * end / h, PULLS
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: float) -> bool:
     """Whether the series of the knot's distance gives the same tension as the motion's series."""
     stiffness, damping = p.stiffness, p.string_damping
@@ -311,7 +311,7 @@ def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: fl
     return bool(wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE] + 2e-15 * damping * speed)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def clear_of_the_end(c: np.ndarray, p: np.record, degree: int, distance: float, h: float) -> float:
     """h, reduced so that along the series c the knot of a string that pushes, which starts at this distance from the
     free end, stays clear of it.
@@ -322,7 +322,7 @@ def clear_of_the_end(c: np.ndarray, p: np.record, degree: int, distance: float, 
     return h
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _moves(c: np.ndarray, degree: int, h: float) -> float:
     """Upper bound of the knot's displacement within h seconds [m]."""
     reach = 0.0
