@@ -97,8 +97,9 @@ def _string(problem: Problem) -> StringSettings:
     )
 
 
-def submit(simulation: Simulation, wrenches: tuple[Wrench, ...]) -> None:
-    """The problem's wrenches as poke commands, each for its exact time; one without an end is held."""
+def commands_of(wrenches: tuple[Wrench, ...]) -> list[tuple[WrenchCommand, int]]:
+    """The problem's wrenches as commands and their exact times [ns]; one without an end is held."""
+    commands = []
     for w in wrenches:
         frame = f"{w.axes}@point/{','.join(repr(float(c)) for c in w.point)}"
         if w.impulse:
@@ -107,14 +108,16 @@ def submit(simulation: Simulation, wrenches: tuple[Wrench, ...]) -> None:
             frame += f";duration={(round(w.end * 1e9) - round(w.begin * 1e9)) / 1e9!r}"
         held = w.end is None and not w.impulse
         command = WrenchCommand(held, parse_frame(frame), w.force, w.torque, frame)
-        simulation.submit(command, round(w.begin * 1e9))
+        commands.append((command, round(w.begin * 1e9)))
+    return commands
 
 
 def simulation_of(problem: Problem, integrator: str, step: float, accuracy: float = 1e-9) -> Simulation | None:
     """A Simulation at time 0 with the problem's commands submitted, or None when the integrator can't carry it."""
     try:
         simulation = Simulation(setup_of(problem, integrator, step, accuracy))
-        submit(simulation, problem.wrenches)
+        for command in commands_of(problem.wrenches):
+            simulation.submit(*command)
         simulation.advance(0)
     except InputError:
         return None
@@ -131,12 +134,13 @@ def prepare_simulation(problem: Problem, step: float, integrator: str) -> Run | 
     begin = time.perf_counter()
     simulation.advance(round(min(problem.duration, 10 * arguments[0]) * 1e9))
     compile_s = time.perf_counter() - begin
+    commands = commands_of(problem.wrenches)
 
     def restart():
         # The same object from its start, as a peer's integrator is set back.
         simulation.reset()
-        submit(simulation, problem.wrenches)
-        simulation.advance(0)
+        for command in commands:
+            simulation.submit(*command)
 
     def advance(until: float):
         simulation.advance(round(until * 1e9))

@@ -227,7 +227,7 @@ class FlightArrays:
 
     def call(self, what: int, until_ns: int = 0) -> int:
         """Perform an operation; returns its result: for END_DUE, whether any load ended."""
-        return self._call(*self.arrays, what, until_ns)
+        return self._call(self._flights, self._loads, self._events, self.methods, self.room, what, until_ns)
 
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; returns False when the motion failed."""
