@@ -7,14 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import rigid_proto_ros
 from rigid_proto_ros.base import compilation
 
 PACKAGE = Path(rigid_proto_ros.__file__).parent
-INNER = "from .compilation import njit\n\n\n@njit(cache=True)\ndef inner(x):\n    return x + {}\n"
-OUTER = "from .compilation import njit\nfrom .between import (\n    inner,\n)\n\n\n@njit(cache=True)\ndef outer(x):\n    return inner(x)\n"
+INNER = "from .compilation import njit\n\n\n@njit()\ndef inner(x):\n    return x + {}\n"
+OUTER = "from .compilation import njit\nfrom .between import (\n    inner,\n)\n\n\n@njit()\ndef outer(x):\n    return inner(x)\n"
 BROKEN = "numba no longer keeps kernels by Dispatcher._cache: base/compilation.py needs another way"
 CALL = "from package.base.outer import outer; print(outer(1), sum(outer.stats.cache_hits.values()))"
 
@@ -51,3 +52,28 @@ def test_every_kernel_of_the_package_is_kept_that_way():
         if line.startswith("from numba import") and "njit" in line or "numba.njit" in line
     ]
     assert direct == []
+
+
+PAIR = compilation.record_type([("count", np.int32), ("numbers", np.float64, 3)])
+NESTED = compilation.record_type([("inner", PAIR), ("last", np.float64)])
+
+
+@compilation.njit(cache=False)
+def copied_by_a_kernel(records):
+    compilation.copy_record(records[0], records[1])
+    compilation.copy_record(records[0].inner, records[2].inner)
+
+
+def copied_in_python(records):
+    compilation._assign_fields(records[0], records[1])
+    compilation._assign_fields(records[0].inner, records[2].inner)
+
+
+@pytest.mark.parametrize("copied", [copied_by_a_kernel, copied_in_python])
+def test_a_record_and_a_record_within_one_are_copied_whole_and_nothing_beside_them(copied):
+    records = np.zeros(4, NESTED)
+    records[0] = ((7, (1.0, -0.0, np.inf)), 5.0)
+    copied(records)
+    assert records[1] == records[0] and np.signbit(records[1]["inner"]["numbers"][1])
+    assert records[2]["inner"] == records[0]["inner"] and records[2]["last"] == 0.0
+    assert records[3] == np.zeros(1, NESTED)[0]
