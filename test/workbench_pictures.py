@@ -48,6 +48,7 @@ def main() -> None:
             page.page.screenshot(path=args.folder / "true_against_box.png")
             begin(page, lesson("t_handle"))
             answer(page)
+            flown.live.set_parameters({"string.frequency": 3.0})
             play(page, 3.4)
             pull(page, steps=3)
             page.page.screenshot(path=args.folder / "workbench.png")
