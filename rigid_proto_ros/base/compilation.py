@@ -215,9 +215,16 @@ def entry_of(kernel: Callable[..., Any], signature: Any) -> Callable[..., Any]:
     """
     if INTERPRETED:
         return kernel
-    kernel.compile(signature)  # type: ignore[attr-defined]  # numba's
-    entry: Callable[..., Any] = kernel.get_compile_result(signature).entry_point  # type: ignore[attr-defined]  # numba's
+    entry: Callable[..., Any] = compiled_for(kernel, signature).entry_point
     return entry
+
+
+def compiled_for(kernel: Any, signature: Any) -> Any:
+    """numba's result of compiling a kernel for this signature, or of loading it from the cache."""
+    # By the types of its arguments, as a call does: numba caches what is compiled for a signature apart.
+    result = kernel.get_compile_result(signature)
+    assert result.signature.return_type == signature.return_type, result.signature
+    return result
 
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from numba import boolean, float64, from_dtype, int64, types
 from numba.core import cgutils
 from numba.core.types.function_type import CompileResultWAP
 
-from ...base.compilation import INTERPRETED, Emitted, intrinsic, njit, record_type
+from ...base.compilation import INTERPRETED, Emitted, compiled_for, intrinsic, njit, record_type
 from ..loads import Load
 from ..problem import ENVIRONMENT_NEEDS, PROBLEM
 
@@ -157,8 +157,7 @@ def address_of(kernel: Callable[..., Any], taken_as: types.FunctionType) -> int:
     if INTERPRETED:
         found, address = kernel, id(kernel)
     else:
-        kernel.compile(taken_as.signature)  # type: ignore[attr-defined]  # numba's
-        found = CompileResultWAP(kernel.get_compile_result(taken_as.signature))  # type: ignore[attr-defined]  # numba's
+        found = CompileResultWAP(compiled_for(kernel, taken_as.signature))
         address = found.__wrapper_address__()
     _kept[address] = found
     return address
