@@ -147,15 +147,14 @@ class FlightArrays:
         self._table = memory.data.cast("B")[loads_at:events_at]
 
     def _grow(self, rows: int, room: int) -> None:
-        """Have at least this number of rows and a workspace of so many doubles, at first zero; the flight and its
-        active loads are kept.
-        """
+        """Have at least this number of rows and a workspace of so many doubles; what is there is kept."""
         if rows <= len(self._loads) and room <= len(self.room):
             return
-        numbers, loads, acting = self.integers, self._loads, self.integers[_ACTING]
-        self._allocate(max(rows, len(loads)), max(room, len(self.room)))
+        numbers, loads, before = self.integers, self._loads, self.room
+        self._allocate(max(rows, len(loads)), max(room, len(before)))
         self.integers[:] = numbers
-        self._loads[:acting] = loads[:acting]
+        self._loads[: len(loads)] = loads
+        self.room[: len(before)] = before
 
     @property
     def flight(self) -> np.record:
