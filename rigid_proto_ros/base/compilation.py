@@ -164,8 +164,8 @@ class KernelCache(FunctionCache):
 
     _impl_class = _KernelFiles
 
-    def __init__(self, function: Callable[..., Any], allocates: bool) -> None:
-        self._function, self._allocates = function, allocates
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """The cached kernel for a signature, or None.
@@ -180,8 +180,8 @@ class KernelCache(FunctionCache):
                 super().__init__(self._function)
             finally:
                 _CONFIG.CACHE_LOCATOR_CLASSES = named
-        if self._allocates:
-            rtsys.initialize(target)
+        # Also for a kernel that doesn't allocate: it may have been compiled from functions that count references.
+        rtsys.initialize(target)
         return self._load_overload(signature, target)
 
 
@@ -201,7 +201,7 @@ def njit(*, allocates: bool = True, cache: bool = True, **options: Any) -> Calla
         options["_nrt"] = allocates
         compiled: Any = numba.njit(**options)(function)
         if cache and not INTERPRETED:
-            compiled._cache = KernelCache(function, allocates)  # noqa: SLF001 (where enable_caching puts it)
+            compiled._cache = KernelCache(function)  # noqa: SLF001 (where enable_caching puts it)
         kernel: _Function = compiled
         return kernel
 
