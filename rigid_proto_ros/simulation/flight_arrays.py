@@ -12,7 +12,7 @@ import numpy as np
 from numba import float64, from_dtype, int64, types
 
 from ..base.compilation import entry_of, njit, place_of
-from ..base.simd import LINE
+from ..base.simd import aligned
 from ..motion.integrators.integrator import METHOD, provide_kernel
 from ..motion.loads import Load, load_of_row
 from ..motion.state import State
@@ -131,13 +131,11 @@ class FlightArrays:
     def _allocate(self, rows: int, room: int) -> None:
         """Memory, all zero, for the flight, tables with this number of rows and a workspace of so many doubles."""
         # In one piece: allocating five arrays of records takes twice as long.
+        events = 4 * rows + 4
         loads_at = _FLIGHT_BYTES
         events_at = loads_at + rows * _ROW_BYTES
-        room_at = events_at + (events := 4 * rows + 4) * _EVENT_BYTES
-        memory = np.zeros(room_at // 8 + room + LINE, np.int64)
-        # The workspace is aligned to a cache line.
-        unaligned = memory.__array_interface__["data"][0] + room_at
-        room_at += -unaligned % (8 * LINE)
+        room_at = events_at + events * _EVENT_BYTES
+        memory = aligned((1, room_at // 8 + room), before=room_at // 8)[0].view(np.int64)
         self.integers = memory[: _FLIGHT_BYTES // 8].data
         self._flights = np.ndarray(1, FLIGHT, memory)
         self.row = np.ndarray(13, np.float64, memory, _STATE_AT)
@@ -226,7 +224,7 @@ class FlightArrays:
 
     def call(self, what: int, until_ns: int = 0) -> int:
         """Perform an operation; returns its result: for END_DUE, whether any load ended."""
-        return self._call(self._flights, self._loads, self._events, self.methods, self.room, what, until_ns)
+        return self._call(*self.arrays, what, until_ns)
 
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; returns False when the motion failed."""

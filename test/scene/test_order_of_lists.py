@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import itertools
 import random
-from dataclasses import replace
 
 import pytest
 from flights import SECOND, EventLines
@@ -37,12 +36,9 @@ def kinds(told: EventLines) -> list[str]:
 
 
 def commands(entries: list[dict]) -> list[Command]:
-    scenario = make_scenario(SCENE)
+    run = OfflineRun(make_scenario(SCENE))
     read = expand_script([{"t": 1.0, **entry} for entry in entries])
-    changes = {k: command for k, command in enumerate(read) if isinstance(command, Change)}
-    for k, change in changes.items():
-        read[k] = replace(change, apply=lambda content=change.content: scenario.with_changes(content).setup)
-    return read
+    return [run.bound(command) if isinstance(command, Change) else command for command in read]
 
 
 @pytest.mark.parametrize("seed", range(5))
