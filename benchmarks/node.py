@@ -3,7 +3,7 @@
 
     python benchmarks/node.py [--short] [--only start_up,processor,...] [--out FOLDER]
 
-Writes node.csv and node_skips.csv, with the machine's load beside each figure; benchmarks/node_figure.py draws from them.
+Writes node.csv and node_skips.csv, with the machine's load beside each figure; docs/benchmarks.md shows them.
 """
 
 from __future__ import annotations
@@ -99,22 +99,22 @@ def start_up(note, seconds: float) -> None:
 def processor(note, seconds: float) -> None:
     """CPU of our node as listeners and motion come and go: what isn't needed isn't done."""
     with node(KILOHERTZ, SPIN) as process:
-        note("1 kHz, nobody listens", "cpu", process.cpu_share(seconds), "%")
-        listened_to(note, "1 kHz, pose and twist listened to", process, seconds)
+        note("1 kHz, no subscriber", "cpu", process.cpu_share(seconds), "%")
+        listened_to(note, "1 kHz, one subscriber each to pose and twist", process, seconds)
         note("1 kHz, memory after that", "rss", process.memory_mb(), "MB")
     with node(KILOHERTZ) as process:
-        note("1 kHz, at rest, nobody listens", "cpu", process.cpu_share(seconds), "%")
-        listened_to(note, "1 kHz, at rest, pose and twist listened to", process, seconds)
+        note("1 kHz, at rest, no subscriber", "cpu", process.cpu_share(seconds), "%")
+        listened_to(note, "1 kHz, at rest, one subscriber each to pose and twist", process, seconds)
     with node(SPIN) as process:
-        note("100 Hz, nobody listens", "cpu", process.cpu_share(seconds), "%")
-        listened_to(note, "100 Hz, pose and twist listened to", process, seconds)
+        note("100 Hz, no subscriber", "cpu", process.cpu_share(seconds), "%")
+        listened_to(note, "100 Hz, one subscriber each to pose and twist", process, seconds)
 
 
 def baselines(note, seconds: float) -> None:
     """The same job as a plain rclpy node does it."""
-    for engine in ("ours", "mujoco"):
+    for engine, tool in (("ours", "rigid_proto"), ("mujoco", "MuJoCo")):
         with client("plain", engine, "1000") as process:
-            listened_to(note, f"plain rclpy timer and messages, {engine} stepping, 1 kHz", process, seconds)
+            listened_to(note, f"a plain rclpy node that steps {tool}, 1 kHz", process, seconds)
 
 
 def rate(note, seconds: float) -> None:
@@ -141,7 +141,7 @@ def result_of(process: Process) -> dict:
 def recording(note, seconds: float) -> None:
     """What a recording at 1 kHz costs."""
     with node(KILOHERTZ, SPIN, f"record:={_recording()}") as process:
-        note("1 kHz, recording, nobody listens", "cpu", process.cpu_share(seconds), "%")
+        note("1 kHz, recording, no subscriber", "cpu", process.cpu_share(seconds), "%")
 
 
 def viewers(note, seconds: float) -> None:
@@ -168,7 +168,7 @@ def _recording() -> str:
 def flood(note, seconds: float) -> None:
     """10 000 wrenches a second for a minute: rate, memory, and every message accounted for."""
     seconds = 60.0 if seconds > 10.0 else 5.0
-    what = "flood of 10 000 wrenches/s"
+    what = "10 000 wrenches per second"
     with node(KILOHERTZ, SPIN) as process, client("subscribe", "twist", str(seconds + 4)) as listener:
         time.sleep(2.0)
         with client("flood", "10000", str(seconds)) as flooder:

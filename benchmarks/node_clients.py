@@ -13,11 +13,13 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, TwistStamped, WrenchStamped
+from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import Imu
 from std_srvs.srv import Trigger
 
 from rigid_proto_ros.scene import cdr
@@ -26,12 +28,12 @@ SPIN = (0.05, 0.1, 12.0)
 
 
 def subscribe(topic: str, seconds: str = "0") -> None:
-    """Count messages of ~/pose or ~/twist without reading them: says ``hearing`` at the first, and at the end, or ``seconds``
+    """Count messages of a topic of states without reading them: says ``hearing`` at the first, and at the end, or ``seconds``
     later, the intervals of their times of publication.
     """
     node = Node("listener_" + topic)
     times: list[int] = []
-    message_type = {"pose": PoseStamped, "twist": TwistStamped}[topic]
+    message_type = {"pose": PoseStamped, "twist": TwistStamped, "odom": Odometry, "imu": Imu}[topic]
     subscription = node.create_subscription(message_type, f"/rigid_body/{topic}", lambda m: None, 100, raw=True)
     end = float("inf")
     while time.monotonic() < end and not STOP.is_set():

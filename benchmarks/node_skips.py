@@ -41,13 +41,13 @@ def median_us(function: Callable[[], object], count: int = 200) -> float:
 
 def in_process() -> Iterator[tuple[str, str, float, float]]:
     """Single calls, timed in this process."""
-    yield ("steps of a free body: 100 s as rk4 takes them, and in one", "us", flown("rk4"), flown("auto"))
-    yield ("steps of a body at rest: 100 s as rk4 takes them, and none", "us", flown("rk4", 0.0), flown("auto", 0.0))
-    yield ("message objects: a pose and a twist filled and serialized, and packed", "us", *packing())
-    yield ("mesh in every frame: logged each time, and a row of a column instead", "us", *frames())
+    yield ("free body, 100 s: steps of rk4, or one step", "us", flown("rk4"), flown("auto"))
+    yield ("body at rest, 100 s: steps of rk4, or none", "us", flown("rk4", 0.0), flown("auto", 0.0))
+    yield ("a pose and a twist: message objects serialized, or bytes packed", "us", *packing())
+    yield ("a frame for Rerun: the mesh, or a row of a column", "us", *frames())
     vertices, rotation = body("teapot").surface.vertices, np.eye(3)
-    yield ("vertices turned on the CPU: once a frame, and never", "us", median_us(lambda: vertices @ rotation.T), 0.0)
-    yield ("mass properties after a change of scale: over the mesh, and in closed form", "us", *rescaling())
+    yield ("vertices rotated on the CPU in each frame, or never", "us", median_us(lambda: vertices @ rotation.T), 0.0)
+    yield ("mass properties at another scale: from the mesh, or from its moments", "us", *rescaling())
 
 
 def setup(integrator: str, spin: float = 12.0, **values):
@@ -133,15 +133,20 @@ def at_start() -> Iterator[tuple[str, str, float, float]]:
     """From the start of the process to its flight."""
     node().end()
     usual = start_up_s()
-    yield ("Rerun: a start with a recording, and without a sink", "s", start_up_s(recording()), usual)
+    yield ("start of the node: with a recording, or without Rerun", "s", start_up_s(recording()), usual)
     yield (
-        "mesh judged and summed at every start: no cache, and cached",
+        "start of the node: mesh checked, or its verdict cached",
         "s",
         start_up_s(RIGID_PROTO_CACHE="off"),
         usual,
     )
     with tempfile.TemporaryDirectory() as folder:
-        yield ("kernels compiled: a first start, and cached", "s", start_up_s(count=1, NUMBA_CACHE_DIR=folder), usual)
+        yield (
+            "start of the node: kernels compiled, or cached",
+            "s",
+            start_up_s(count=1, NUMBA_CACHE_DIR=folder),
+            usual,
+        )
 
 
 def recording() -> str:
@@ -175,8 +180,8 @@ def in_flight(seconds: float) -> Iterator[tuple[str, str, float, float]]:
             with client("subscribe", "odom"), client("subscribe", "imu"):
                 time.sleep(2.0)
                 four = process.cpu_share(seconds)
-    yield ("pose and twist at 1 kHz: listened to, and not", "% of a core", two, alone)
-    yield ("odom and imu beside them: listened to, and not", "% of a core", four, two)
+    yield ("pose and twist at 1 kHz: with subscribers, or without", "% of a core", two, alone)
+    yield ("odom and imu too: with subscribers, or without", "% of a core", four, two)
     with (
         node(KILOHERTZ, SPIN, "publish_clock:=true") as process,
         client("subscribe", "pose"),
@@ -184,8 +189,13 @@ def in_flight(seconds: float) -> Iterator[tuple[str, str, float, float]]:
     ):
         time.sleep(2.0)
         # /clock is published on request; nobody need listen for its publisher to look.
-        yield ("/clock: asked for, and not", "% of a core", process.cpu_share(seconds), two)
+        yield ("/clock: published, or not", "% of a core", process.cpu_share(seconds), two)
     with node(KILOHERTZ, "integrator:=rk4") as process:
         stepped = process.cpu_share(seconds)
     with node(KILOHERTZ) as process:
-        yield ("a body at rest: stepped by rk4, and asleep", "% of a core", stepped, process.cpu_share(seconds))
+        yield (
+            "a body at rest at 1 kHz: stepped by rk4, or not stepped",
+            "% of a core",
+            stepped,
+            process.cpu_share(seconds),
+        )

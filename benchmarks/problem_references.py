@@ -25,7 +25,7 @@ import itertools
 from reference_motion import free_motion, rotation_of
 from reference_taylor import ReferenceProblem, ReferenceString, reference_motion
 
-from problems import PROBLEMS, Problem
+from problems import PROBLEMS, VARIANTS, Problem
 
 FOLDER = HERE / "references"
 
@@ -178,10 +178,11 @@ def cache(problem: Problem, digits: int = 25) -> dict:
 
 
 def main() -> None:
-    wanted = [p.name for p in PROBLEMS.values() if p.has_reference and not (FOLDER / f"{p.name}.json").exists()]
+    known = PROBLEMS | VARIANTS
+    wanted = [p.name for p in known.values() if p.has_reference and not (FOLDER / f"{p.name}.json").exists()]
     names = sys.argv[1:] or wanted
     for name in names:
-        cache(PROBLEMS[name])
+        cache(known[name])
 
 
 if __name__ == "__main__":

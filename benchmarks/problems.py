@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -293,3 +293,25 @@ POKES = Problem(
 )
 
 PROBLEMS = {p.name: p for p in (P1, P1B, P2, P2_FAST, *P3, P4_ROD, P4_PLATE, HEAVY, DAMPED, POKES)}
+
+STARTS = ((0.0, 0.0, 0.0), (0.1, -0.05, 0.2), (-0.2, 0.1, 0.05))
+"""Added to a problem's spin [rad/s, body axes]."""
+ENDS = (1.0, 0.8)
+"""Parts of a problem's duration."""
+
+
+def variants(problem: Problem) -> list[Problem]:
+    """The problem, and the same from other starts and to another end: an error that happens to pass zero at one of them
+    says nothing about an integrator.
+    """
+    found = []
+    for number, spin in enumerate(STARTS):
+        row = (*problem.row[:10], *(a + b for a, b in zip(problem.row[10:], spin, strict=True)))
+        for part in ENDS:
+            name = f"{problem.name}_start{number}_end{part:g}"
+            found.append(replace(problem, name=name, row=row, duration=part * problem.duration))
+    return [problem, *found[1:]]
+
+
+JUDGED_BY_VARIANTS = ("P2", "P2x100", "damped", "heavy", "pokes")
+VARIANTS = {p.name: p for name in JUDGED_BY_VARIANTS for p in variants(PROBLEMS[name])[1:]}

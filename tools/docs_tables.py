@@ -38,8 +38,10 @@ from rigid_proto_ros.scene.lessons import lesson, lessons
 from rigid_proto_ros.scene.parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
 
 ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "benchmarks" / "results"
 sys.path.append(str(ROOT / "benchmarks"))
 
+from result_table import read_rows
 from work_precision_ratios import time_at_error
 
 _MARKED = re.compile(r"(<!-- (?P<kind>table|lesson): (?P<name>[a-z_]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
@@ -89,7 +91,7 @@ def integrators() -> str:
 
 def _measured_masses() -> dict[tuple[str, str, str], dict[str, str]]:
     """Rows of the last benchmark by tool, mesh and place."""
-    with (ROOT / "benchmarks" / "results" / "mass_properties.csv").open(encoding="utf-8", newline="") as file:
+    with (RESULTS / "mass_properties.csv").open(encoding="utf-8", newline="") as file:
         measured = [row for row in csv.DictReader(file) if row["what"] == "mass properties"]
     return {
         (row["tool"], row["mesh"].split(",")[0], row["place"]): row for row in measured if "shuffled" not in row["mesh"]
@@ -129,7 +131,7 @@ _INERTIA_ERRORS = (
 
 def readers() -> str:
     """Our own readers of mesh files and trimesh's, from the last benchmark's own numbers."""
-    with (ROOT / "benchmarks" / "results" / "mesh_readers.csv").open(encoding="utf-8", newline="") as file:
+    with (RESULTS / "mesh_readers.csv").open(encoding="utf-8", newline="") as file:
         measured = list(csv.DictReader(file))
     found = {(row["what"], row["format"], row["file"], row["tool"]): row for row in measured}
     rows = []
@@ -158,7 +160,7 @@ def _error(text: str) -> str:
 
 
 def _measured_motions() -> list[dict[str, str]]:
-    with (ROOT / "benchmarks" / "results" / "work_precision.csv").open(encoding="utf-8", newline="") as file:
+    with (RESULTS / "work_precision.csv").open(encoding="utf-8", newline="") as file:
         return [row for row in csv.DictReader(file) if row["problem"] in _MOTIONS]
 
 
@@ -231,7 +233,7 @@ _MOTIONS = {
     "P2": "10 s under a thruster and gravity",
     "P4rod": "10 s of a rod at 1000 rad/s",
 }
-"""Problems of benchmarks/WORK_PRECISION.md that are shown."""
+"""Problems of benchmarks/problems.py that are shown."""
 
 _TOOLS = {
     "mujoco": "MuJoCo",
@@ -261,6 +263,32 @@ def _milliseconds(seconds: float) -> str:
 def _attitude_error(row: dict[str, str]) -> float:
     error = float(row["attitude_error_rad"] or "nan")
     return math.inf if math.isnan(error) else error
+
+
+def node_load() -> str:
+    """Share of a core of the node and of plain rclpy nodes, from the last benchmark's own numbers."""
+    measured = read_rows(RESULTS / "node.csv")
+    found = {(row["what"], row["figure"]): row["value"] for row in measured}
+    rows = []
+    for what, figure in found:
+        if figure == "cpu":
+            rate = found.get((what, "rate"))
+            rows.append((what, f"{found[what, figure]:.1f} %", "" if rate is None else f"{rate:.0f}"))
+    latency = "wrench to first twist showing it, 1 kHz"
+    median, late = (f"{found[latency, figure]:.1f} ms" for figure in ("p50", "p99"))
+    sentence = _measured_on(measured[0]) + f" From a wrench to the first twist that shows it: {median}, at 99 % {late}."
+    return f"{sentence}\n\n{_table(('node', 'share of a core', 'publications per second'), rows)}"
+
+
+def skipped_work() -> str:
+    """Work that is left out, and what it would cost, from the last benchmark's own numbers."""
+    measured = read_rows(RESULTS / "node_skips.csv")
+    rows = [(row["skipped"], *(f"{row[cost]:.3g} {row['unit']}" for cost in ("done", "as_it_is"))) for row in measured]
+    return f"{_measured_on(measured[0])}\n\n{_table(('work', 'if done', 'as it is'), rows)}"
+
+
+def _measured_on(row: dict) -> str:
+    return f"Measured {row['date'][:10]} on one {row['cpu']}."
 
 
 def lesson_table() -> str:
@@ -309,6 +337,8 @@ TABLES = {
     "lessons": lesson_table,
     "gallery": gallery,
     "motions": motions,
+    "node": node_load,
+    "skipped": skipped_work,
     "figures": figures,
 }
 
