@@ -83,7 +83,6 @@ def packing() -> tuple[float, float]:
     from rigid_proto_ros.scene import cdr
 
     row = setup("auto").initial.tolist()
-    pose_template, twist_template = cdr.StampedTemplate("world", 7), cdr.StampedTemplate("world", 6)
 
     def objects():
         pose, twist = PoseStamped(), TwistStamped()
@@ -95,7 +94,7 @@ def packing() -> tuple[float, float]:
         return serialize_message(pose), serialize_message(twist)
 
     def packed():
-        return bytes(pose_template.pack(1, row[:7])), bytes(twist_template.pack(1, row[7:]))
+        return cdr.stamped_doubles(1, "world", row[:7]), cdr.stamped_doubles(1, "world", row[7:])
 
     return median_us(objects), median_us(packed)
 

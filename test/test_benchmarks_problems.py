@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The benchmark's problems, their cached references and what is read from its table."""
 
+import ast
+import importlib
 import math
+import types
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +19,7 @@ from result_table import ResultTable, read_rows
 from work_precision_ours import simulation_of
 from work_precision_ratios import time_at_error
 
+BENCHMARKS = Path(importlib.import_module("problems").__file__).parent
 HARDEST = 1e4
 """rad/s: stiffer strings take seconds each, and the benchmark runs them."""
 
@@ -48,6 +53,24 @@ def test_auto_solves_every_problem(name):
     # Measured up to 5e-9 (P2x100), mostly 1e-12.
     assert angle_between(state.orientation_xyzw, rotation_of(reference[3:7])) <= 1e-7
     assert np.array([float(c) for c in reference[:3]]) == pytest.approx(state.position, abs=1e-6)
+
+
+@pytest.mark.parametrize("path", sorted(BENCHMARKS.glob("*.py")), ids=lambda path: path.name)
+def test_every_name_that_a_benchmark_takes_from_the_package_is_there(path):
+    """Most benchmarks run for minutes and beside other tools, so that only `make bench` runs them."""
+    tree, modules = ast.parse(path.read_text("utf-8")), {}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("rigid_proto_ros"):
+            continue
+        module = importlib.import_module(node.module)
+        for alias in node.names:
+            if not hasattr(module, alias.name):
+                importlib.import_module(f"{node.module}.{alias.name}")
+            if isinstance(getattr(module, alias.name), types.ModuleType):
+                modules[alias.asname or alias.name] = getattr(module, alias.name)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in modules:
+            assert hasattr(modules[node.value.id], node.attr), f"{node.value.id}.{node.attr}"
 
 
 def test_result_table_reads_back_what_it_wrote(tmp_path):
