@@ -29,7 +29,7 @@ def contestants() -> list[Contestant]:
 def prepare(problem: Problem, tolerance: float) -> Run | None:
     """None for ropes that go slack while the problem lasts, P3p; the heavy crate's stays taut."""
     spring = problem.spring
-    if spring is not None and not spring.bilateral and problem.name != "heavy":
+    if spring is not None and not spring.bilateral and not problem.name.startswith("heavy"):
         return None
     axes, start = start_of(problem)
     begin = time.perf_counter()
