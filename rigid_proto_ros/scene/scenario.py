@@ -215,7 +215,7 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
         **environment,
         integrator=integrator_named(parameters.integrator),
         step_ns=max(1, nanoseconds(parameters.step)),
-        wrench_timeout_ns=nanoseconds(parameters.wrench_timeout),
+        wrench_timeout_ns=_timeout_ns(parameters.wrench_timeout),
         poke_duration_ns=max(1, nanoseconds(parameters.poke_duration)),
         string=StringSettings(
             attached=string.attached,
@@ -226,7 +226,7 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
             damping_ratio=string.damping_ratio,
             rest_length=string.rest_length,
             bilateral=string.bilateral,
-            timeout_ns=nanoseconds(string.timeout),
+            timeout_ns=_timeout_ns(string.timeout),
         ),
         accuracy=parameters.accuracy,
         initial=row,
@@ -239,6 +239,11 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
         },
     )
     return setup, tuple(properties.warnings)
+
+
+def _timeout_ns(seconds: float) -> int:
+    """0, which means never, for 0 s alone."""
+    return max(1, nanoseconds(seconds)) if seconds else 0
 
 
 def _mass_properties(parameters: Parameters, body_mesh: BodyMesh | None, scale: np.ndarray) -> MassProperties:

@@ -79,7 +79,9 @@ class StringControl:
         if after.timeout_ns != before.timeout_ns and tied.release_ns is not None:
             release_ns = max(tied.last_target_ns + after.timeout_ns, state.time_ns)
             tied = replace(tied, release_ns=release_ns if after.timeout_ns else None)
-        if after != before or new.body is not old.body:
+        # Each change of parameters makes a new body, mostly with the same numbers.
+        same_spring = replace(after, target=before.target, timeout_ns=before.timeout_ns) == before
+        if not (same_spring and np.array_equal(new.body.row, old.body.row)):
             tied = tied.with_spring(after, new.body, state)
         self.tied = tied
 

@@ -21,6 +21,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
+from numbers import Real
 from pathlib import Path
 from typing import TypeVar
 
@@ -28,7 +29,7 @@ from ..base.errors import CommandRefused, InputError
 from ..motion.state import State
 from ..scene.scenario import Scenario, read_scene
 from ..scene.scenario_run import OfflineRun
-from ..scene.script import expand_script
+from ..scene.script import MAX_TIME_S, expand_script
 from ..simulation.commands import nanoseconds
 from ..simulation.observer import Observer
 from .table import cores
@@ -70,14 +71,19 @@ class Flight:
         """Let an entry of a poke script act now, after those given before; with ``t`` at that time [s, simulated] or
         later. Raises InputError for one that can't be taken.
         """
+        if not isinstance(entry, Mapping):
+            raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
         # Counted from now, in whole nanoseconds; seconds don't hold them all.
         start_ns = 0 if "t" in entry else self._run.simulation.time_ns
         self._run.submit(expand_script([{"t": 0.0, **entry}], "command", start_ns=start_ns))
 
     def step(self, seconds: float) -> State:
-        """Simulate so long, and return the state at the end. Raises InputError when the motion fails, or a command is
-        refused as it comes to act.
+        """Simulate so long, and return the state at the end. Raises InputError for no such time, when the motion fails,
+        or when a command is refused as it comes to act.
         """
+        # A difference of two times may be a rounding below 0.
+        if not (isinstance(seconds, Real) and abs(seconds) <= MAX_TIME_S and nanoseconds(seconds) >= 0):
+            raise InputError("step", seconds, f"a number of seconds from 0 to {MAX_TIME_S:g}")
         simulation = self._run.simulation
         refused = simulation.refused.total()
         if not self._run.advance(simulation.time_ns + nanoseconds(seconds)):

@@ -65,6 +65,8 @@ SCENES = {
 SCRIPTS = {
     "not_yaml": ("- {t: 1", "line"),
     "mapping": ("script: [{t: 1, force: [0, 0, 1]}]\n", "a list"),
+    "twice": ("- {t: 1, t: 2, force: [0, 0, 1]}\n", "line 1: got 't twice"),
+    "twice_in_json": ('[{"t": 1, "t": 2, "force": [0, 0, 1]}]', "line 1: got 't twice"),
     "text_entry": ("- hello\n", "entry 1"),
     "no_time": ("- {force: [0, 0, 1]}\n", "entry 1, t"),
     "negative_time": ("- {t: -1, force: [0, 0, 1]}\n", "entry 1, t"),

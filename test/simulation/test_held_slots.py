@@ -96,3 +96,12 @@ def test_a_wrench_with_a_duration_holds_that_long_unless_replaced_whatever_the_t
     assert [json.loads(line)["kind"] for line in told.lines] == ["wrench", "wrench"]
     apart, _ = flown(both.replace("duration: 3", "duration: 3, slot: x"), mass=0.0, **one)
     assert apart.simulation.state.linear_velocity == pytest.approx([0.3, 0.2, 0.0], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("timeout", "velocity"), [(0.0, 2.0), (1e-300, 1e-9), (4e-10, 1e-9), (1.4e-9, 1e-9), (0.5, 0.5)]
+)
+def test_a_timeout_below_a_nanosecond_is_one_and_only_zero_means_for_ever(timeout: float, velocity: float) -> None:
+    one = {"mesh": "", "inertia_model": "explicit", "explicit_inertia.mass": 1.0, "wrench_timeout": timeout}
+    run, _ = flown("[{t: 0, wrench: {force: [1, 0, 0]}}]", 2.0, mass=0.0, **one)
+    assert run.simulation.state.linear_velocity[0] == pytest.approx(velocity, rel=1e-9)

@@ -180,6 +180,30 @@ def test_stiffness_or_frequency_with_the_damping_ratio_give_k_and_c_from_the_eff
     assert [simulation.string.stiffness, simulation.string.damping] == pytest.approx(expected(then), rel=1e-12)
 
 
+UNTOUCHED = (
+    *({"publish_rate": 50.0}, {"gravity": [0.0, 0.0, -9.81]}, {"wrench_timeout": 2.0}, {"density": SCENE["density"]}),
+    *({"string.timeout": 7.0}, {"string.target": [0.1, 0.0, 1.0]}),
+)
+"""Changes that leave body and spring as they are."""
+
+
+@pytest.mark.parametrize(
+    ("change", "anew"),
+    [(change, False) for change in UNTOUCHED]
+    + [({"density": 7000.0}, True), ({"scale": [1.0, 1.0, 2.0]}, True), ({"string.attach": [0.01, 0.0, 0.0]}, True)]
+    + [({f"string.{name}": value}, True) for name, value in {"damping_ratio": 0.2, "frequency": 8.0}.items()],
+)
+def test_the_effective_mass_is_computed_anew_when_body_or_string_changes_and_not_with_other_parameters(change, anew):
+    simulation, scenario = simulated(string__attached=True, string__attach=[0.0, 0.05, 0.0], string__damping_ratio=0.7)
+    simulation.advance(SECOND)
+    before = simulation.string
+    simulation.submit(Change({}, lambda: scenario.with_changes(change).setup))
+    simulation.advance(SECOND + 1)
+    after = simulation.string
+    assert (after.effective_mass != before.effective_mass) is anew
+    assert anew or (after.stiffness, after.damping) == (before.stiffness, before.damping)
+
+
 def test_with_a_frequency_a_nut_and_a_satellite_are_pulled_alike():
     """The same relative motion for bodies of 1e-3 and 1e6 kg of one shape: 1e-9."""
     ends = []

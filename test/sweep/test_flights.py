@@ -52,6 +52,20 @@ def final_height(spin: float) -> float:
     return float(flight.step(1.0).position[2])
 
 
+@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), 1e300, -1.0, "1", None])
+def test_a_step_that_is_no_time_is_refused(seconds) -> None:
+    flight = Flight(load_scene("t_handle"))
+    with pytest.raises(InputError, match=r"step: .*seconds from 0"):
+        flight.step(seconds)
+    assert flight.step(-1e-17).time_ns == 0 and flight.step(0.1).time_ns == 100_000_000
+
+
+@pytest.mark.parametrize("entry", ["hello", None, [{"force": [0.0, 0.0, 1.0]}]])
+def test_a_command_that_is_no_entry_is_refused(entry) -> None:
+    with pytest.raises(InputError, match="command: .*a mapping such as"):
+        Flight(load_scene("t_handle")).command(entry)
+
+
 def test_many_flights_come_back_in_the_order_of_their_values() -> None:
     heights = list(fly_all(final_height, [float(k) for k in range(5)], workers=2))
     assert heights == pytest.approx([k - 4.905 for k in range(5)])
