@@ -73,7 +73,7 @@ class FlightRecord(Observer):
 
     def setups(self, kind: type[BodyChanged | GhostChanged]) -> list[Setup]:
         """Of the body, or the ghost, at the start and after each change."""
-        return [event.setup for event in self.changes if isinstance(event, kind)]
+        return [event.setup for event in self.changes if isinstance(event, kind) and event.setup is not None]
 
 
 def frames(record: FlightRecord, source: Source | None, fps: float) -> tuple[FlightRecord, str]:

@@ -203,9 +203,7 @@ class SimulationLoop(ScenarioRun):
         """Time 0 and the initial state; paused or running stays."""
         # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
         self.simulation.reset(self.scenario.setup)
-        if self.ghost is not None:
-            self.ghost.reset(self.scenario)
-        elif Published in self.observer.takes:
+        if self.ghost is not None or Published in self.observer.takes:
             self.begin_ghost()
         self.publications.restart()
         self._steps_left = self._steps_requested = 0

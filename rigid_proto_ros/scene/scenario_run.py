@@ -56,7 +56,8 @@ class Ghost(Observer):
 
     def announce(self) -> None:
         """Tell the observer what the ghost is."""
-        self._observer.on(GhostChanged(self.simulation.time_ns, self.simulation.setup))
+        setup = self.simulation.setup if self._shown else None
+        self._observer.on(GhostChanged(self.simulation.time_ns, setup))
 
     def watch(self, observer: Observer) -> None:
         """Tell another observer from now on."""
@@ -89,13 +90,7 @@ class Ghost(Observer):
         self._shown = setup is not None
         if setup is not None:
             self.simulation.submit(Change({}, lambda: setup), max(time_ns, self.simulation.time_ns), listed)
-            self._observer.on(GhostChanged(time_ns, setup))
-
-    def reset(self, scenario: Scenario) -> None:
-        """Time 0 and the initial state."""
-        self.simulation.reset(scenario.ghost)
-        self.refusal = ""
-        self.announce()
+        self._observer.on(GhostChanged(time_ns, setup))
 
     def advance(self, until_ns: int) -> None:
         """Advance the ghost and tell the observer where it is."""
@@ -150,9 +145,10 @@ class ScenarioRun:
         self.simulation.announce()
 
     def begin_ghost(self) -> None:
-        """Begin the ghost that the scenario asks for; it gets all commands that are submitted from now on."""
-        self.ghost = Ghost(self.scenario.ghost, self.observer) if self.scenario.ghost is not None else None
-        if self.ghost is not None:
+        """Begin the ghost that the scenario asks for, if any; it gets all commands that are submitted from now on."""
+        self.ghost, self.simulation.follower = None, None
+        if self.scenario.ghost is not None:
+            self.ghost = Ghost(self.scenario.ghost, self.observer)
             self.simulation.follower = self.ghost.submit
             self.ghost.announce()
 

@@ -162,10 +162,12 @@ class AccuracyFloor(NamedTuple):
 
 
 class GhostChanged(NamedTuple):
-    """A second body that gets the same commands is the one of this setup from ``time_ns`` on."""
+    """A second body that gets the same commands is the one of this setup from ``time_ns`` on; None: it is no longer
+    shown.
+    """
 
     time_ns: int
-    setup: Setup
+    setup: Setup | None
 
 
 class GhostPublished(NamedTuple):

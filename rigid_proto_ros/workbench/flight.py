@@ -27,7 +27,8 @@ from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
 from ..scene.scene_file import read_scene_text
 from ..session.as_script import branch_at
 from ..session.recorded_session import RecordedSession
-from ..simulation.observer import Event, Logged, Observer, Published, Reset, SceneChanged
+from ..simulation.observer import BodyChanged, Event, Logged, Observer, Published, Reset, SceneChanged
+from ..simulation.setup import Setup
 
 KEPT_S = 300.0
 """[s, simulated] How far back one can go."""
@@ -57,15 +58,17 @@ Result = TypeVar("Result")
 class RunMemory(Observer):
     """The run since the last reset, kept as a session. Told on the physics thread, read from any."""
 
-    takes = frozenset({Published, Logged, SceneChanged, Reset})
+    takes = frozenset({BodyChanged, Published, Logged, SceneChanged, Reset})
 
     def __init__(self, name: str) -> None:
         self._name = name
         self._lock = threading.Lock()
         self._text = ""
+        self._bodies: list[BodyChanged] = []
         self._begin()
 
     def _begin(self) -> None:
+        self._bodies = [body._replace(time_ns=0) for body in self._bodies[-1:]]
         self._scene = self._text
         self._scenes = [self._text]
         self._events: list[tuple[int, str]] = []
@@ -85,6 +88,8 @@ class RunMemory(Observer):
                         self._events.append((time_ns, line))
                 case SceneChanged(time_ns, scene):
                     self._scene_changed(time_ns, scene)
+                case BodyChanged() if self._whole:
+                    self._bodies.append(event)
                 case Reset():
                     self._begin()
 
@@ -94,6 +99,11 @@ class RunMemory(Observer):
             self._begin()
         elif mesh_sha256_of(scene) != mesh_sha256_of(self._scenes[-1]):
             self._scenes.append(scene)
+
+    def setup_at(self, time_ns: int) -> Setup:
+        """The setup in force at a time of the run."""
+        with self._lock:
+            return next(body.setup for body in reversed(self._bodies) if body.time_ns <= time_ns)
 
     def session(self) -> RecordedSession:
         """The run so far. Raises InputError when more has happened in it than is kept."""
@@ -118,7 +128,7 @@ class Flight:
     on, "" when it is over.
 
     scenario: the one in force; scenes_begun: how many others began since the start. moment_ns: the time of the past
-    that is looked at, None while the present is.
+    that is looked at, None while the present is. before_jump() is called before time jumps.
     """
 
     def __init__(self, live: LiveSimulation, say: Callable[[str], None]) -> None:
@@ -126,6 +136,7 @@ class Flight:
         self.memory = RunMemory(live.name)
         self.say = say
         self.refused: Callable[[], None] = lambda: None
+        self.before_jump: Callable[[], None] = lambda: None
         self._doing, self._since_s = "", 0.0
         self._worker = ThreadPoolExecutor(1, "page")
         self.scenes_begun = 0
@@ -184,12 +195,24 @@ class Flight:
 
     def do(self, *entries: Entry) -> None:
         """Do this by hand, in this order: entries of a poke script without their time, which is now."""
+        if self.refuses_in_past():
+            return
         text = json.dumps([{"t": 0, **entry} for entry in entries])
         self._soon(self._ask("", functools.partial(self.live.schedule, text)))
 
     def set(self, changes: Mapping[str, object]) -> None:
         """Set parameters, all or none."""
+        if not changes.keys() <= LOOKS and self.refuses_in_past():
+            return
         self._soon(self._ask("setting parameters", functools.partial(self.live.set_parameters, dict(changes))))
+
+    def refuses_in_past(self) -> bool:
+        """Whether the past is shown, in which nothing can be done; if so, it says so."""
+        if self.moment_ns is None:
+            return False
+        self.say("The past is shown: go on from here (space), or return to the present first.")
+        self.refused()
+        return True
 
     def pause(self, paused: bool) -> None:
         """Stop simulated time, or let it go on."""
@@ -220,7 +243,8 @@ class Flight:
         """Begin a scene (parameter-file text, or its parameters) and a poke script (YAML text) at time 0; paused: or as
         it was; speed: simulated seconds per second, or as they were. Returns whether it was taken.
         """
-        goes_on = self._leave_past()
+        self.before_jump()
+        goes_on = self.leave_past()
 
         def begin() -> bool:
             values: dict[str, object] = {}
@@ -255,6 +279,7 @@ class Flight:
 
     def reset(self) -> None:
         """Time 0 of the scene, or of the branch."""
+        self.before_jump()
         self.look_at_present()
         self._soon(self._ask("", self.live.reset))
 
@@ -278,6 +303,7 @@ class Flight:
                 return
             if not len(past.times):
                 return
+            self.before_jump()
             self._past, self._ran_before = past, not self.paused
             self.pause(True)
         k = int(np.searchsorted(self._past.times, round(time_s * 1e9), side="right")) - 1
@@ -285,11 +311,11 @@ class Flight:
 
     def look_at_present(self) -> None:
         """Show the present again, which goes on if it did."""
-        if self._leave_past():
+        if self.leave_past():
             self.pause(False)
 
-    def _leave_past(self) -> bool:
-        """Show the present again; returns whether it went on until the past was looked at."""
+    def leave_past(self) -> bool:
+        """Show the present again, where time stands; returns whether it went on until the past was looked at."""
         goes_on = self._past is not None and self._ran_before
         self._past = self.moment_ns = None
         return goes_on

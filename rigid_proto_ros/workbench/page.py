@@ -139,6 +139,7 @@ class Page:
         self.poses, self.tools = DrawnPoses(), Tools()
         self.pointer = Pointer(self.flight, self.poses, self.tools)
         self.pointer.attach_com(self._com)
+        self.flight.before_jump = self.pointer.let_go
         # What is known of the motion.
         self.state = live.state
         self._scenario = live.scenario
@@ -298,7 +299,7 @@ class Page:
                 self.backend.is_new = False
                 self._body_changed()
             case GhostChanged(time_ns, setup):
-                self.picture.set_ghost(time_ns, setup if self.live.scenario.ghost is not None else None)
+                self.picture.set_ghost(time_ns, setup)
                 self._ghost_row = None
             case SceneChanged():
                 self._scene_changed()
@@ -319,12 +320,12 @@ class Page:
         scenario = self.live.scenario
         if self._new_scene:
             self._new_scene = False
-            self._furnish(scenario)
+            self._furnish(scenario.setup)
             size = self.picture.shape.size if self.picture.shape else 1.0
             self.tools.usual_force = self.tools.force = suggested_force(scenario, size)
             self.forces_tab.show_force()
         elif self.backend.unit != self._unit:
-            self._furnish(scenario)
+            self._furnish(scenario.setup)
         self._unit = self.backend.unit
 
     def _load_changed(self, event: LoadBegan | LoadEnded) -> None:
@@ -362,6 +363,7 @@ class Page:
         self.picture.restart()
         self.backend.forget()
         self.poses.forget()
+        self.pointer.forget()
         self.readings.restart()
         self._loads.clear()
         self._strings.clear()
@@ -371,7 +373,8 @@ class Page:
     # Drawing
 
     def _draw(self, times: list[int], rows: list[np.ndarray]) -> None:
-        if not times:
+        setup = self.picture.setup
+        if not times or setup is None:
             return
         last = rows[-1]
         self._undrawn = False
@@ -381,18 +384,18 @@ class Page:
         held = self._string_energies(np.array(times), np.array(rows))
         picture.draw(np.array(times), np.array(rows))
         ghost = self._ghost_state()
-        if ghost is not None and picture.ghost is not None:
+        if ghost is not None:
             picture.draw_ghost(np.array(times[-1:]), ghost[np.newaxis])
         for time_ns, row, energy in zip(times[:-1], rows[:-1], held[:-1], strict=True):
             if self.readings.is_due(time_ns):
-                self.readings.take(self._scenario, State(time_ns, row), energy, None)
-        self.readings.take(self._scenario, self.state, held[-1], ghost)
+                self.readings.take(setup, State(time_ns, row), energy, None)
+        self.readings.take(setup, self.state, held[-1], ghost)
         self.lessons.watched(times)
 
     def _ghost_state(self) -> np.ndarray | None:
         """The ghost's state (13,): as it was published last, or where it begins."""
         ghost = self.live.loop.ghost
-        if self.live.scenario.ghost is None or ghost is None:
+        if self.picture.ghost is None or ghost is None:
             return None
         return ghost.simulation.state.row if self._ghost_row is None else self._ghost_row
 
@@ -412,6 +415,8 @@ class Page:
             self._hidden_ghost = self.picture.ghost
             self.picture.set_ghost(moment_ns, None)
         self._drawn_moment_ns = moment_ns
+        setup = self.flight.memory.setup_at(moment_ns)
+        self._draw_body(moment_ns, setup)
         times, rows = self.flight.past_rows(TRAIL_NS)
         self.picture.restart()
         self.backend.forget()
@@ -422,10 +427,24 @@ class Page:
                 self.picture.on(change)
         held = self._string_energies(times, rows)
         self.picture.draw(times, rows)
-        self.readings.take(self._scenario, self.state, held[-1], None)
+        self.readings.take(setup, self.state, held[-1], None)
+
+    def _draw_body(self, time_ns: int, setup: Setup) -> None:
+        """Draw the body of this setup from now on, as it was at ``time_ns``."""
+        drawn, surface = self.picture.setup, setup.surface
+        if drawn is setup:
+            return
+        if drawn is None or drawn.surface is not surface:
+            vertices, triangles = (None, None) if surface is None else (surface.vertices, surface.triangles)
+            self.picture.on(MeshChanged(time_ns, vertices, triangles, ""))
+        self.picture.on(BodyChanged(time_ns, setup))
+        if self.backend.unit != self._unit:
+            self._furnish(setup)
+            self._unit = self.backend.unit
 
     def _return_to_present(self) -> None:
         self._drawn_moment_ns = None
+        self._draw_body(self.live.state.time_ns, self.live.scenario.setup)
         self.picture.restart()
         self.backend.forget()
         if self._hidden_ghost is not None:
@@ -444,11 +463,10 @@ class Page:
             self.backend.origin = self.room.follow(position, self.backend.origin, self.backend.unit)
         self.room.place(self.backend.origin, self.backend.unit)
 
-    def _furnish(self, scenario: Scenario) -> None:
+    def _furnish(self, setup: Setup) -> None:
         """Make room for what is going to be seen, and look at it."""
         shape = self.picture.shape
         size = shape.size if shape is not None else 1.0
-        setup = scenario.setup
         start = setup.initial[0:3]
         points = [start]
         falls, held = bool(setup.gravity.any()), setup.string.attached

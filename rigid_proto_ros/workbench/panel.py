@@ -79,7 +79,8 @@ class TimeBar:
             if play.value == RESET:
                 flight.reset()
             elif play.value == STEP:
-                flight.look_at_present()
+                if flight.leave_past():
+                    return  # Time stands in the present, as after a pause.
                 if flight.paused:
                     flight.step()
                 else:

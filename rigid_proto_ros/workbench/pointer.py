@@ -173,7 +173,7 @@ class Pointer:
     def grab(self, client_id: int, start: Iterable[float], end: Iterable[float]) -> None:
         """Tie the string where the body was grabbed, and take its free end to the pointer."""
         scenario = self._flight.scenario
-        if self.dragging:
+        if self.dragging or self._flight.refuses_in_past():
             return
         body, surface = scenario.setup.body, scenario.setup.surface
         now = time.monotonic()
@@ -209,6 +209,10 @@ class Pointer:
         if self._drag is not None:
             self._drag = None
             self._flight.do({"string": "release"})
+
+    def forget(self) -> None:
+        """The string is no longer there: a hand that still drags holds nothing."""
+        self._drag = None
 
     def left(self, client_id: int) -> None:
         """A page has gone, perhaps without a word: a string that it held would be held for ever."""

@@ -17,8 +17,8 @@ from ..mass.tensor import principal_axes
 from ..motion.state import State
 from ..picture import style
 from ..picture.picture import angle_to
-from ..scene.scenario import Scenario
 from ..simulation.quantities import attitude_angle
+from ..simulation.setup import Setup
 
 SPEED, SPIN, SPINS, COM_PLACE = "speed of the COM", "|ω|", "ω₁ ω₂ ω₃", "COM x y z"
 ENERGY, TRANSLATIONAL, ROTATIONAL = "energy", "translational energy", "rotational energy"
@@ -170,7 +170,7 @@ class Readings:
     """What can be read off a flight. ``restart`` at every reset."""
 
     def __init__(self) -> None:
-        self._last: tuple[Scenario, State, float, np.ndarray | None] | None = None
+        self._last: tuple[Setup, State, float, np.ndarray | None] | None = None
         self._samples: deque[tuple[float, ...]] = deque()
         self._start: np.ndarray | None = None
 
@@ -190,18 +190,18 @@ class Readings:
         """Whether a point of the plots belongs to this time."""
         return not self._samples or time_ns * 1e-9 >= self._samples[-1][0] + SAMPLE_S
 
-    def take(self, scenario: Scenario, state: State, string_energy: float, ghost: np.ndarray | None) -> None:
+    def take(self, setup: Setup, state: State, string_energy: float, ghost: np.ndarray | None) -> None:
         """A state, what the string holds [J], and the ghost's state (13,)."""
-        self._last = (scenario, state, string_energy, ghost)
+        self._last = (setup, state, string_energy, ghost)
         time_s = state.time_ns * 1e-9
         if self._samples and time_s < self._samples[-1][0]:
             self._samples.clear()
         if self.is_due(state.time_ns):
-            body = scenario.setup.body
+            body = setup.body
             momentum = state.angular_momentum(body.inertia)
             if self._start is None and momentum.any():
                 self._start = momentum
-            energies = _energies(scenario, state, string_energy)
+            energies = _energies(setup, state, string_energy)
             spins = principal_axes(body.inertia)[1].T @ state.angular_velocity_body
             self._samples.append((time_s, *energies, *spins.tolist(), self._turned(momentum)))
         while self._samples[0][0] < time_s - PLOTTED_S:
@@ -216,13 +216,13 @@ class Readings:
         """The last state in words, by name."""
         if self._last is None:
             return {}
-        scenario, state, string_energy, ghost = self._last
-        body = scenario.setup.body
+        setup, state, string_energy, ghost = self._last
+        body = setup.body
         momentum = state.angular_momentum(body.inertia)
         w = principal_axes(body.inertia)[1].T @ state.angular_velocity_body
         spin = float(np.linalg.norm(w))
         spins = " ".join(f"{style.without_rounding(x, spin):.3g}" for x in w)
-        translational, rotational, _, total, _ = _energies(scenario, state, string_energy)
+        translational, rotational, _, total, _ = _energies(setup, state, string_energy)
         values = {
             SPEED: f"{style.without_rounding(float(np.linalg.norm(state.linear_velocity))):.4g} m/s",
             SPIN: f"{style.without_rounding(spin):.4g} {style.OMEGA_UNIT}",
@@ -240,12 +240,12 @@ class Readings:
         return values
 
 
-def _energies(scenario: Scenario, state: State, string_energy: float) -> tuple[float, ...]:
+def _energies(setup: Setup, state: State, string_energy: float) -> tuple[float, ...]:
     """Energies [J]: translational, rotational, of gravity, total, of the string."""
-    body = scenario.setup.body
+    body = setup.body
     kinetic = state.kinetic_energy(body.mass, body.inertia)
     translational = 0.5 * body.mass * float(state.linear_velocity @ state.linear_velocity)
-    gravity = -body.mass * float(scenario.setup.gravity @ state.position)
+    gravity = -body.mass * float(setup.gravity @ state.position)
     return translational, kinetic - translational, gravity, kinetic + gravity + string_energy, string_energy
 
 

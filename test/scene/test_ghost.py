@@ -21,10 +21,11 @@ MOVING = {
 
 
 class Watcher(Observer):
-    """Notes when ghosts begin, and where body and ghost are."""
+    """Notes when ghosts begin and end, and where body and ghost are."""
 
     def __init__(self) -> None:
         self.began: list[int] = []
+        self.ended: list[int] = []
         self.body: dict[int, list[float]] = {}
         self.ghost: dict[int, list[float]] = {}
         self.refusals: list[tuple[str, str]] = []
@@ -35,6 +36,8 @@ class Watcher(Observer):
         match event:
             case Refused(_, reason, message):
                 self.refusals.append((reason, message))
+            case GhostChanged(time_ns, None):
+                self.ended.append(time_ns)
             case GhostChanged(time_ns, _):
                 self.began.append(time_ns)
             case Published(time_ns, row):
@@ -56,7 +59,7 @@ def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset
     scenario = make_scenario({"ghost.integrator": "free_body"})
     run = ScenarioRun(scenario, watcher)
     run.begin_ghost()
-    simulation, ghost = run.simulation, run.ghost
+    simulation = run.simulation
     push = WrenchCommand(False, parse_frame("world@com"), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "")
 
     def fly() -> None:
@@ -64,7 +67,7 @@ def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset
         simulation.submit(push, simulation.time_ns + 1_000_000)
         end_ns = simulation.time_ns + SECOND // 10
         simulation.advance(end_ns)
-        ghost.advance(end_ns)
+        run.ghost.advance(end_ns)
 
     fly()
     fly()
@@ -72,7 +75,7 @@ def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset
     assert reason == "ghost" and "the ghost continues without" in text and "free_body" in text
     assert not simulation.refused  # the body itself carries it
     simulation.reset()
-    ghost.reset(scenario)
+    run.begin_ghost()
     fly()
     assert len(watcher.refusals) == 2
 
@@ -98,3 +101,30 @@ def test_a_ghost_asked_for_in_flight_begins_at_the_next_reset():
     # No force acts, so the COMs stay together; the tensors part the attitudes.
     last = max(watcher.body)
     assert watcher.ghost[last][:3] == watcher.body[last][:3] and watcher.ghost[last][3:7] != watcher.body[last][3:7]
+
+
+def test_a_ghost_switched_off_is_gone_at_once_and_begins_again_at_a_reset():
+    from rigid_proto_ros.live.simulation_loop import SimulationLoop
+
+    watcher = Watcher()
+    flight = SimulationLoop(make_scenario({**MOVING, "ghost.inertia_model": "bounding_box"}), watcher)
+
+    def fly_to(time_ns: int) -> None:
+        while flight.simulation.time_ns < time_ns:
+            flight.tick()
+
+    flight.start()
+    fly_to(SECOND)
+    flight.change({"ghost.inertia_model": ""})
+    off_ns = flight.simulation.time_ns
+    fly_to(2 * SECOND)
+    assert watcher.began == [0] and watcher.ended == [off_ns] and max(watcher.ghost) <= off_ns
+    flight.reset()
+    watcher.ghost.clear()
+    fly_to(SECOND)
+    flight.change({"ghost.inertia_model": "bounding_box"})
+    fly_to(2 * SECOND)
+    assert watcher.began == [0] and not watcher.ghost
+    flight.reset()
+    fly_to(SECOND)
+    assert watcher.began == [0, 0] and watcher.ghost

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+"""Looking back on the page at what the body did, and jumps of time while somebody has a hand in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+pytest.importorskip("viser")
+from flown_page import FlownPage
+
+from rigid_proto_ros.workbench.readouts import ENERGY, MOMENTUM
+
+
+@pytest.fixture
+def flown() -> Iterator[FlownPage]:
+    page = FlownPage()
+    yield page
+    page.end()
+
+
+def look_back(flown: FlownPage, seconds: float) -> None:
+    flown._update(flown.widget("Seconds back"), seconds)
+    flown.until(lambda: flown.page._drawn_moment_ns is not None, "moment of the past")
+
+
+def look_at_present(flown: FlownPage) -> None:
+    flown._update(flown.widget("Seconds back"), 0.0)
+    flown.until(lambda: flown.page._drawn_moment_ns is None, "present")
+
+
+def set_parameters(flown: FlownPage, **values) -> None:
+    flown.do(lambda: flown.page.flight.set({name.replace("__", "."): value for name, value in values.items()}))
+    flown.fly(0.0)
+
+
+def readings(flown: FlownPage) -> list[str]:
+    return [flown.page.readings.values[name] for name in (ENERGY, MOMENTUM)]
+
+
+def test_the_past_is_shown_with_the_body_that_moved_then(flown: FlownPage) -> None:
+    flown.fly(1.0)
+    numbers, picture, first = readings(flown), flown.page.picture, flown.scenario.setup
+    set_parameters(flown, mass=10.0 * first.body.mass, scale=[2.0, 2.0, 2.0])
+    flown.fly(0.5)
+    set_parameters(flown, mesh="hammer")
+    flown.fly(0.5)
+    last = flown.scenario.setup
+    assert readings(flown) != numbers and picture.setup is last
+    look_back(flown, 1.5)
+    assert readings(flown) == numbers and picture.setup is first
+    assert len(picture._vertices) == len(first.surface.vertices)
+    assert picture.shape.size * flown.page.backend.unit > 0.0 and flown.page._unit == flown.page.backend.unit
+    look_at_present(flown)
+    assert picture.setup is last and len(picture._vertices) == len(last.surface.vertices)
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        lambda flown: flown.click((0.0, 0.045, 0.0), (1.0, 0.0, 0.0)),
+        lambda flown: flown.grab((0.0, 0.045, 0.0)),
+        lambda flown: flown.do(lambda: flown.page.flight.set({"mass": 1.0})),
+    ],
+    ids=["click", "drag", "parameter"],
+)
+def test_what_is_done_while_the_past_is_shown_is_refused_with_what_to_do(flown: FlownPage, act) -> None:
+    flown.fly(1.0)
+    look_back(flown, 0.5)
+    session = flown.page.flight.memory.session
+    before, mass = len(session().events), flown.scenario.setup.body.mass
+    act(flown)
+    flown.wait_until_asked()
+    assert flown.said == ["The past is shown: go on from here (space), or return to the present first."]
+    assert len(session().events) == before and flown.scenario.setup.body.mass == mass
+    assert not flown.page.pointer.dragging
+    # How one looks at the motion can be changed.
+    set_parameters(flown, real_time_factor=2.0)
+    assert flown.scenario.parameters.real_time_factor == 2.0 and len(flown.said) == 1
+    look_at_present(flown)
+    flown.fly(0.1)
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_a_step_returns_from_the_past_to_the_present_and_time_stands_there(flown: FlownPage, paused: bool) -> None:
+    flown.do(lambda: flown.page.flight.pause(paused))
+    flown.fly(1.0)
+    before_ns = flown.live.state.time_ns
+    look_back(flown, 0.5)
+    flown.press("Step", of="Simulation")
+    flown.wait_until_asked()
+    flown.until(lambda: flown.page._drawn_moment_ns is None, "present")
+    assert flown.live.paused and not flown.said
+    assert flown.live.loop.simulation.time_ns - before_ns == (10_000_000 if paused else 0)
+
+
+@pytest.mark.parametrize("by_the_page", [True, False])
+def test_a_reset_ends_a_drag(flown: FlownPage, by_the_page: bool) -> None:
+    place = flown.grab((0.0, 0.045, 0.0))
+    flown.fly(0.2)
+    assert flown.live.loop.simulation.string is not None
+    if by_the_page:
+        flown.reset()
+    else:
+        flown.do(lambda: flown.page.flight._worker.submit(flown.live.reset))
+        flown.fly(0.0)
+    assert not flown.page.pointer.dragging
+    flown.pull(place + [0.0, 0.0, 0.1])
+    flown.fly(0.1)
+    assert flown.live.loop.simulation.string is None
+
+
+def test_a_ghost_that_is_switched_off_is_gone_from_the_picture() -> None:
+    flown = FlownPage("true_or_box_tensor")
+    try:
+        flown.fly(0.2)
+        assert flown.page.picture.ghost is not None
+        set_parameters(flown, ghost__inertia_model="")
+        flown.fly(0.1)
+        assert flown.page.picture.ghost is None and flown.page._ghost_state() is None
+    finally:
+        flown.end()
