@@ -151,12 +151,14 @@ class Picture:
         self._describe_body(self.backend)
 
     def set_ghost(self, time_ns: int, ghost: Setup | None) -> None:
-        """The ghost is the body of this setup from ``time_ns`` on."""
+        """The ghost is the body of this setup from ``time_ns`` on, or there is none."""
         first = self.ghost is None
         self.ghost = ghost
         self.backend.begin(np.array([time_ns]))
         if first or ghost is None:
             self.backend.mesh(style.GHOST_MESH, None if ghost is None else self._mesh)
+        if ghost is None:
+            self.backend.lines(style.GHOST_BOX, np.array([0]), [])
         self._describe_ghost(self.backend)
 
     def describe(self, backend: Backend) -> None:

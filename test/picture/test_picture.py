@@ -282,6 +282,14 @@ def test_the_ghost_is_compared_with_the_body_at_equal_times():
     assert np.allclose(np.radians(np.ravel(list(found.values()))), apart, rtol=1e-14)
 
 
+def test_a_ghost_that_ended_leaves_nothing_and_may_come_back():
+    picture, drawn = pictured()
+    for time_ns, setup in enumerate((flight.setup_of(inertia=np.eye(3)), None, flight.setup_of(inertia=np.eye(3)))):
+        picture.on(GhostChanged(time_ns, setup))
+        assert (drawn.meshes[style.GHOST_MESH] is not None) == (setup is not None)
+        assert len(drawn.rows(style.GHOST_BOX)[time_ns]) == (12 if setup else 0)
+
+
 def test_a_mesh_far_from_its_origin_is_drawn_to_single_precision_of_its_size():
     far = flight.VERTICES + 1e7
     drawn = Drawn()
