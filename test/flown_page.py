@@ -4,10 +4,14 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import re
 import time
+import zipfile
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import chdir
+from pathlib import Path
 
 import numpy as np
 from viser._messages import GuiUpdateMessage
@@ -16,6 +20,9 @@ from workbench_page import bare_page
 from rigid_proto_ros.base.rotation import rotate
 from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
 from rigid_proto_ros.scene.scenario import Scenario, nanoseconds, read_scene
+from rigid_proto_ros.scene.scenario_run import OfflineRun
+from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.simulation.commands import Command
 from rigid_proto_ros.simulation.observer import Event, Observer, Published, Reset
 from rigid_proto_ros.workbench.main import Workbench
 from rigid_proto_ros.workbench.pointer import DrawnPose
@@ -219,6 +226,21 @@ class FlownPage:
     def reset(self) -> None:
         self.press("Reset", of="Simulation")
         self.fly(0.0)
+
+
+def flies_again(flown: FlownPage, folder: Path) -> tuple[dict, list[Command]]:
+    """What is saved of the run since the last reset, parameters and commands, which give the same motion by `simulate`
+    in the folder in which it is unpacked."""
+    packed, note = flown.do(lambda: flown.page.session_tab._take())
+    assert "simulate scene.yaml --script script.yaml" in note
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        archive.extractall(folder)
+    with chdir(folder):
+        scenario, script = read_scene("scene.yaml"), parse_script(Path("script.yaml").read_text("utf-8"))
+        again = OfflineRun(scenario, script)
+        again.advance(flown.live.state.time_ns)
+    assert again.simulation.state.row.tobytes() == flown.live.state.row.tobytes()
+    return scenario.parameters.named(), script
 
 
 def numbers(text: str) -> list[float]:

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import InputError, did_you_mean
@@ -44,9 +45,9 @@ def output_file(option: str, file: str | Path) -> Path:
     ones is likelier a slip. Raises InputError, which names ``option``.
     """
     path = Path(file)
-    if path.is_dir():
-        raise InputError(option, str(file), "the name of a file; this is a folder")
     try:
+        if path.is_dir():
+            raise InputError(option, str(file), "the name of a file; this is a folder")
         path.absolute().parent.mkdir(exist_ok=True)
     except FileNotFoundError:
         raise InputError(option, str(file), f"a folder that exists: {path.absolute().parent.parent} doesn't") from None
@@ -55,20 +56,48 @@ def output_file(option: str, file: str | Path) -> Path:
     return path
 
 
+def check_writable(option: str, file: str | Path) -> None:
+    """Check before long work that ``file`` can be written, and leave what stands there as it is. Raises InputError,
+    which names ``option``.
+    """
+    path = output_file(option, file).resolve()
+    try:
+        if not path.exists():
+            path.touch()
+            path.unlink()
+        elif not os.access(path, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise InputError(option, str(file), f"a file that can be written ({error.strerror})") from None
+
+
+def check_whole_file(option: str, file: str | Path) -> None:
+    """The same for what ``whole_file`` is to write, which takes the place of what stands there."""
+    with _beside(option, file):
+        pass
+
+
 @contextmanager
 def whole_file(option: str, file: str | Path) -> Iterator[Path]:
     """A path beside ``file``, with its ending, to write to: renamed to ``file`` when the block ends, and removed when
     it fails or is interrupted, so that no half of a file is left. Raises InputError, which names ``option``, for a
     place that can't be written to.
     """
+    with _beside(option, file) as beside:
+        yield beside
+        os.replace(beside, file)
+
+
+@contextmanager
+def _beside(option: str, file: str | Path) -> Iterator[Path]:
+    """A new file beside ``file``; removed when the block ends, if it is still there."""
     path = output_file(option, file)
     beside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         beside.touch()
         yield beside
-        os.replace(beside, path)
     except OSError as error:
         raise InputError(option, str(file), f"a file that can be written ({error.strerror or error})") from None
     finally:
-        if beside.exists():
+        with suppress(OSError):  # it took its place, or was never made
             beside.unlink()

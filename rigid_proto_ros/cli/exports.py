@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..base.command_line import Progress, number_from
 from ..base.errors import InputError
-from ..base.files import output_file
+from ..base.files import check_whole_file
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord, Source
@@ -54,7 +54,7 @@ def check_exports(args: argparse.Namespace) -> None:
         endings, _ = EXPORTS[name]
         if not file.lower().endswith(endings):
             raise InputError(f"--{name}", file, f"a file that ends in {' or '.join(endings)}")
-        output_file(f"--{name}", file)
+        check_whole_file(f"--{name}", file)
     if args.fps is not None and not set(ANIMATIONS) & set(files):
         raise InputError("--fps", "needs --gltf or --usd")
     from ..export import check_library

@@ -21,6 +21,14 @@ DENSITY = 1000.0
 VERIFIED = 1e-13
 """Largest error against rational arithmetic that ``--verify`` accepts."""
 
+NEEDS = {
+    "fix": "--compare ROBOT",
+    "all": "--compare ROBOT --fix OUT",
+    "tolerance": "--compare ROBOT",
+    "package-path": "--compare ROBOT or --lump ROBOT",
+    "as-scene": "--lump ROBOT",
+}
+"""Options that are for robots alone, and what they go with."""
 
 EXAMPLES = (
     ("rigid_proto inspect hammer --density 7850", "mass, COM, inertia and problems of the mesh"),
@@ -83,9 +91,10 @@ def run(args: argparse.Namespace) -> int:
         return lump(args)
     if args.compare is not None:
         return compare(args)
-    for name in ("fix", "tolerance", "package_path", "as_scene"):
-        if getattr(args, name):
-            raise InputError(f"--{name.replace('_', '-')}", "needs --compare ROBOT or --lump ROBOT")
+    for name, needed in NEEDS.items():
+        given = getattr(args, name.replace("-", "_"))
+        if given is not None and given is not False:
+            raise InputError(f"--{name}", f"needs {needed}")
     if not args.mesh:
         raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
     for name, value in (("mass", args.mass), ("density", args.density)):

@@ -138,8 +138,11 @@ def _fix(args: argparse.Namespace) -> int:
 
     if args.mesh or args.tolerance:
         raise InputError("--fix", args.fix, "the whole robot: --compare ROBOT without a MESH or a tolerance")
+    robot = Path(args.compare[0])
+    if robot.exists() and Path(args.fix).exists() and robot.samefile(args.fix):
+        raise InputError("--fix", args.fix, "another file than the robot's")
     folders = tuple(args.package_path or ())
-    data, links = fix_robot(Path(args.compare[0]), folders=folders, accept_open=args.accept_open, everything=args.all)
+    data, links = fix_robot(robot, folders=folders, accept_open=args.accept_open, everything=args.all)
     with whole_file("--fix", args.fix) as path:
         path.write_bytes(data)
     if args.json:

@@ -8,7 +8,7 @@ import sys
 
 from ..base.command_line import number_from
 from ..base.errors import InputError, is_missing
-from ..base.files import output_file, whole_file
+from ..base.files import check_whole_file, whole_file
 
 FPS = 30.0
 
@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.html.lower().endswith((".html", ".htm")):
         raise InputError("--html", args.html, "a file that ends in .html")
     shown = lesson(args.name)
-    output_file("--html", args.html)
+    check_whole_file("--html", args.html)
     script = read_script(example_path(shown.script)) if shown.script else []
     last_ns = max((command.stamp_ns for command in script), default=0)
     duration_ns = max(nanoseconds(10.0), last_ns + nanoseconds(1.0))

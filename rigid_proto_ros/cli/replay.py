@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..base.command_line import Progress, number_from
 from ..base.errors import InputError
-from ..base.files import output_file
+from ..base.files import check_whole_file, check_writable, whole_file
 from .exports import add_exports, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
@@ -72,6 +72,10 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--speed", "needs --publish states; a running node has real_time_factor")
     if args.record and Path(args.record).exists() and Path(args.record).samefile(args.session):
         raise InputError("--record", args.record, "another file than the session")
+    if args.record:
+        check_writable("--record", args.record)
+    if args.as_scene:
+        check_whole_file("--as-scene", args.as_scene)
     check_exports(args)
     if args.repair:
         repair(args.session, args.repair)
@@ -185,10 +189,11 @@ def _branch(session: RecordedSession, args: argparse.Namespace, given: Scenario 
     else:
         branch, state_ns = recorded_branch(session, given, nanoseconds(args.at))
         print(f"  the state is that recorded at {state_ns / 1e9:.9g} s; what acts then isn't recorded")
-    scene = output_file("--as-scene", args.as_scene)
-    scene.write_text(branch.scene, encoding="utf-8")
+    scene = Path(args.as_scene)
     script = scene.with_name(f"{scene.stem}_script.yaml")
-    script.write_text(branch.script, encoding="utf-8")
+    for file, text in ((scene, branch.scene), (script, branch.script)):
+        with whole_file("--as-scene", file) as path:
+            path.write_text(text, encoding="utf-8")
     words = ["rigid_proto", "simulate", str(scene), "--script", str(script)]
     print(f"  scene at {args.at:g} s: {shlex.join(words)}")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from ..base.command_line import Parser, number_from
 from ..base.errors import InputError
-from ..base.files import output_file
+from ..base.files import check_writable
 from .exports import add_exports, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     if files:
         # Check everything that can be refused now, before a recording of an earlier run is overwritten.
         OfflineRun(scenario, script)
-        _check_places(files, args.bag)
+        _check_places(files, args)
     check_exports(args)
     record: FlightRecord | None = None
     if asked(args):
@@ -134,13 +135,13 @@ def _setting(text: str) -> tuple[str, object]:
     return name.strip(), scalar(value.strip())
 
 
-def _check_places(files: list[str], bag: str | None) -> None:
+def _check_places(files: list[str], args: argparse.Namespace) -> None:
     from ..rerun_view.session_files import is_mcap
 
-    if bag and not is_mcap(bag):
-        raise InputError("--bag", bag, "a file that ends in .mcap")
+    if args.bag and not is_mcap(args.bag):
+        raise InputError("--bag", args.bag, "a file that ends in .mcap")
     for file in files:
-        output_file("record", file)
+        check_writable("--bag" if file == args.bag else "--record" if args.record else "record", file)
     if len({Path(file).resolve() for file in files}) < len(files):
         raise InputError("--bag", files[-1], "another file than that of --record")
 
@@ -174,6 +175,7 @@ def _print_summary(result: dict, recordings: list[str]) -> None:
     for name, value in rows.items():
         print(f"{name:16s} {value}")
     for file in recordings:
-        bag = Path(file).suffix == ".mcap"
-        show = f"rigid_proto replay {file} --record {Path(file).with_suffix('.rrd')}" if bag else f"rerun {file}"
-        print(f"recorded {file}; show it with: {show}")
+        show = ["rerun", file]
+        if Path(file).suffix == ".mcap":
+            show = ["rigid_proto", "replay", file, "--record", str(Path(file).with_suffix(".rrd"))]
+        print(f"recorded {file}; show it with: {shlex.join(show)}")

@@ -141,7 +141,7 @@ def whole_bytes(path: Path) -> tuple[int, bool]:
     size = path.stat().st_size
     with open(path, "rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
-            raise InputError("session", str(path), "an .rrd or .mcap recording")
+            raise InputError("session", f"the content of {str(path)!r} is that of no .rrd or .mcap recording")
         at = HEADER_BYTES
         while at + FRAME_HEAD.size <= size:
             file.seek(at)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -214,7 +215,7 @@ def read_robot(path: Path) -> Robot:
 def robot_of(root: Element, path: Path) -> Robot:
     """The robot below the root of a file; raises InputError for what is none, or holds what are no numbers."""
     if path.suffix == ".xacro" or any("xacro" in str(element.tag) for element in root.iter()):
-        raise InputError("robot file", path.name, f"plain URDF: xacro {path} > EXPANDED.urdf")
+        raise InputError("robot file", path.name, f"plain URDF: xacro {shlex.quote(str(path))} > EXPANDED.urdf")
     if root.tag == "robot":
         return Robot([_urdf_link(link) for link in root.iter("link")], lambda: _urdf_poses(root))
     if root.tag == "sdf":

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import yaml
 
 from ..base.bundled import scene_names, scene_path
-from ..base.errors import InputError, did_you_mean
+from ..base.errors import InputError, MeshError, did_you_mean
+from ..mesh.locate import resolve_mesh
 from .parameters import is_ros_parameter, parameter_named
 from .yaml_text import compose_yaml, key_of, read_text, refused, typed
 
@@ -93,10 +95,12 @@ def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body
 def scene_values(
     path: str | Path, warn: Callable[[str], None] = print, node_name: str = "rigid_body"
 ) -> dict[str, object]:
-    """The parameters that a scene file gives a node; unknown names as ``read_scene`` has it."""
+    """The parameters that a scene file gives a node; unknown names as ``read_scene`` has it. A relative mesh that isn't
+    found from the current folder is looked for beside the file.
+    """
     scene = read_scene_file(path, node_name)
-    if scene.unused and not scene.has_section:
-        there = ", ".join(scene.unused[:5])
+    if not scene.has_section:
+        there = ", ".join(scene.unused[:5]) or "none"
         warn(f"{path}: there is no section for /{node_name.lstrip('/')} (it has {there}); /** is for every node")
     values: dict[str, object] = {}
     for parameter, value in scene.values.items():
@@ -110,7 +114,18 @@ def scene_values(
             warn(f"{path}: {parameter} under /** is not a parameter of this node; ignored")
             continue
         values[parameter] = value
+    if isinstance(mesh := values.get("mesh"), str):
+        values["mesh"] = _found_from(mesh, Path(path).parent)
     return values
+
+
+def _found_from(mesh: str, folder: Path) -> str:
+    """The mesh by the name that a scene file in ``folder`` gives it, or beside that file if it's only there."""
+    for name in (mesh, str(folder / mesh)):
+        with suppress(MeshError):
+            resolve_mesh(name)
+            return name
+    return mesh
 
 
 def _sections(path: str, tree: yaml.Node, namespace: str) -> Iterator[tuple[str, yaml.Node]]:

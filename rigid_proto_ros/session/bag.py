@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from mcap import records
 from mcap.stream_reader import StreamReader
-from mcap.writer import Writer
+from mcap.writer import MCAP0_MAGIC, Writer
 
 from ..base.errors import InputError
 from ..base.rotation import rotate, rotate_inverse
@@ -109,7 +109,11 @@ def _whole_records(path: Path) -> Iterator[records.McapRecord]:
     except OSError as error:
         raise InputError("session", str(path), f"a recording that can be read ({error.strerror})") from None
     with stream:
-        end, footer = 0, None
+        if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            remedy = "ros2 bag convert rewrites other or compressed files"
+            raise InputError("session", f"the content of {str(path)!r} is that of no .mcap recording; {remedy}")
+        end, footer = stream.tell(), None
+        stream.seek(0)
         try:
             for record in StreamReader(stream, validate_crcs=True).records:
                 end = stream.tell()
@@ -128,8 +132,9 @@ def _whole_records(path: Path) -> Iterator[records.McapRecord]:
             stream.seek(end)
             head = stream.read(_RECORD_HEAD.size)
             cut = len(head) < _RECORD_HEAD.size or end + len(head) + _RECORD_HEAD.unpack(head)[1] > path.stat().st_size
-            if not cut or end == 0:
-                accepted = f"an undamaged .mcap, as ros2 bag record or ros2 bag convert writes it ({error})"
+            if not cut:
+                reason = str(error) or type(error).__name__
+                accepted = f"an undamaged .mcap, as ros2 bag record or ros2 bag convert writes it ({reason})"
                 raise InputError("session", str(path), accepted) from None
 
 

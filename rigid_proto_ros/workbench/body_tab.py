@@ -2,7 +2,8 @@
 """The body's tab: size, mass and tensor, the true tensor next to an approximate one, and its mesh.
 
 Uploaded meshes are checked as by ``inspect``; the user gives the unit, then they are simulated. A body reads its mesh
-by path, so the file is kept in a temporary folder for as long as the body is simulated; a saved recording contains it.
+by path, and so does a run that is looked back at, so the files are kept in temporary folders until the page ends; a
+saved recording contains those it needs.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class BodyTab:
                 controls.factor("Size ×", "Factor on all three scales (scale)", 1.0, self._size_factor, self._set_size)
                 hint = "Factor on the original mass, without ballast (mass)"
                 controls.factor("Mass ×", hint, 2.0, self._mass_factor, self._set_mass)
-                controls.numbers("density", "Density [kg/m³]")
+                controls.numbers("density", "Density [kg/m³]", check=self._check_density)
             with gui.add_folder("Inertia"):
                 controls.choice("inertia_model", "Model")
                 self._table = gui.add_markdown("")
@@ -73,8 +74,7 @@ class BodyTab:
             return values["mesh"] if values["mesh"] in body_names() else OWN_FILE
 
         controls.bind(mesh, named, lambda name: None if name == OWN_FILE else {"mesh": name})
-        accepted = "six numbers: ixx ixy ixz iyy iyz izz"
-        controls.bind(tensor, self._tensor_text, self._set_tensor, TYPING_S, accepted)
+        controls.bind(tensor, self._tensor_text, self._set_tensor, TYPING_S)
 
     @property
     def table(self) -> str:
@@ -109,16 +109,21 @@ class BodyTab:
         explicit = self._flight.scenario.parameters.inertia_model == "explicit"
         return {"explicit_inertia.mass" if explicit else "mass": factor * self._base_mass}
 
+    def _check_density(self) -> None:
+        if self._flight.scenario.parameters.inertia_model == "explicit":
+            why = "with the model explicit, as after a tensor was typed, the mass doesn't follow from the density"
+            raise InputError("Density", f"{why}; set Mass ×, or choose another Model first")
+
     def _tensor_text(self, _: Mapping[str, Any]) -> str:
         inertia = self._flight.scenario.setup.body.inertia
         largest = float(np.abs(inertia).max())
         return " ".join(f"{without_rounding(x, largest):.9g}" for x in six_from_tensor(inertia))
 
-    def _set_tensor(self, text: str) -> dict[str, object] | None:
+    def _set_tensor(self, text: str) -> dict[str, object]:
         """The present body with another tensor."""
         scenario, numbers = self._flight.scenario, parse_numbers(text, 6)
         if numbers is None:
-            return None
+            raise InputError("Tensor", text, "six numbers: ixx ixy ixz iyy iyz izz")
         body = scenario.setup.body
         changes: dict[str, object] = {
             "inertia_model": "explicit",
@@ -313,8 +318,8 @@ def shown_name(file_name: str) -> tuple[str, str]:
 
 class UploadFolder:
     """viser's upload button, and the inputs that are needed before a file is simulated. fly(values) starts a scene with
-    these parameters; show_verdict(lines) shows the remarks on a file. Files stay on the disk for as long as they may be
-    simulated; ``close`` removes all of them.
+    these parameters; show_verdict(lines) shows the remarks on a file. Files stay on the disk until ``close`` removes
+    all of them: the run or its past may need any.
     """
 
     def __init__(
@@ -360,16 +365,14 @@ class UploadFolder:
             repaired = self._stand_in.value == "it repaired"
             await self._fly({"mesh_repair": True} if repaired else {"mesh_fallback": "hull"})
 
-    def close(self, kept: str = "") -> None:
-        """Remove all files except this one."""
+    def close(self) -> None:
+        """Remove all files."""
         for path in self._taken:
-            if path != kept:
-                shutil.rmtree(Path(path).parent, ignore_errors=True)
-        self._taken = [path for path in self._taken if path == kept]
+            shutil.rmtree(Path(path).parent, ignore_errors=True)
+        self._taken.clear()
 
     async def take(self, name: str, content: bytes) -> None:
         """Check a file and show the remarks."""
-        self.close(self._flight.scenario.parameters.mesh)
         try:
             upload = await asyncio.to_thread(take_upload, name, content)
         except InputError as error:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from ..base.errors import InputError
 from ..scene.parameters import parameter_named
 from ..scene.yaml_text import scalar
 from .flight import Flight
@@ -38,12 +39,11 @@ NEW_WEIGHT = "ballast.weight"
 @dataclass
 class _Control:
     """handle: the input. shown(values) gives what it shows of parameters; changes(input) what an input means for them,
-    None where it can't be read, as ``accepted`` says."""
+    None for nothing; it raises InputError for one that can't be read or would have no effect."""
 
     handle: Any
     shown: Callable[[Values], object]
     changes: Callable[[Any], Changes | None]
-    accepted: str = ""
     touched_s: float = -1e9
 
 
@@ -82,20 +82,23 @@ class Controls:
         handle = self._gui.add_dropdown(label, parameter_named(name).choices, hint=_hint(name))
         return self.bind(handle, lambda values: values[name], lambda value: {name: value})
 
-    def numbers(self, name: str, label: str, length: int = 1) -> Handle:
-        """Numbers of any size, as text with blanks between them."""
+    def numbers(self, name: str, label: str, length: int = 1, check: Callable[[], None] = lambda: None) -> Handle:
+        """Numbers of any size, as text with blanks between them. check() raises InputError while they would have no
+        effect.
+        """
         handle = self._gui.add_text(label, "", hint=_hint(name))
 
-        def changes(text: object) -> Changes | None:
+        def changes(text: object) -> Changes:
             numbers = parse_numbers(text, length)
             if numbers is None:
-                return None
+                raise InputError(label, text, parameter_named(name).accepted)
+            check()
             return {name: numbers[0] if parameter_named(name).type == "double" else numbers}
 
         def shown(values: Values) -> object:
             return " ".join(f"{x:.9g}" for x in np.broadcast_to(values[name], length))
 
-        return self.bind(handle, shown, changes, TYPING_S, parameter_named(name).accepted)
+        return self.bind(handle, shown, changes, TYPING_S)
 
     def any_parameter(self) -> None:
         """One that is chosen by name, as text."""
@@ -103,7 +106,9 @@ class Controls:
         text: Any = self._gui.add_text("Value", "", hint="Numbers separated by blanks; true or false; a name")
 
         def shown(values: Values) -> object:
-            options = tuple(name for name in (*values, NEW_WEIGHT) if parameter_named(name).changes != "read-only")
+            # Each once: a page with two equal options stays blank.
+            names = dict.fromkeys((*values, NEW_WEIGHT))
+            options = tuple(name for name in names if parameter_named(name).changes != "read-only")
             if chosen.options != options:
                 weights = [name for name in options if name.startswith("ballast.")]
                 name = weights[0] if len(weights) > 1 or chosen.value not in options else chosen.value
@@ -147,10 +152,9 @@ class Controls:
         shown: Callable[[Values], object],
         changes: Callable[[Any], Changes | None],
         wait_s: float = 0.0,
-        accepted: str = "",
     ) -> Handle:
         """An input of any kind; see _Control. wait_s: after the last touch, until it is taken as meant."""
-        control = _Control(handle, shown, changes, accepted)
+        control = _Control(handle, shown, changes)
         self._controls.append(control)
 
         @handle.on_update
@@ -168,11 +172,13 @@ class Controls:
     def _take(self, control: _Control, touched_s: float) -> None:
         if control.touched_s != touched_s:
             return  # touched again since
-        changes = control.changes(control.handle.value)
+        try:
+            changes = control.changes(control.handle.value)
+        except InputError as error:
+            self._flight.say(str(error))
+            changes = None
         if changes is None:
             control.touched_s = -1e9
-            if control.accepted:
-                self._flight.say(f"{control.handle.label}: got {control.handle.value!r}; accepted: {control.accepted}")
             self.update(self._values)
         else:
             self._flight.set(changes)

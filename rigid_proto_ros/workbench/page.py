@@ -20,7 +20,6 @@ from ..live.live_simulation import LiveSimulation
 from ..motion.state import State
 from ..picture import style
 from ..picture.picture import Picture
-from ..scene.scenario import Scenario
 from ..simulation.observer import (
     BodyChanged,
     Event,

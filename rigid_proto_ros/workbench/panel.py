@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import asyncio
+import copy
+import hashlib
 import io
 import tempfile
 import zipfile
@@ -13,15 +15,21 @@ from typing import Any
 
 import viser
 
+from ..base.bundled import body_names
 from ..base.errors import InputError
+from ..base.files import read_bounded
 from ..export.flight_record import FlightRecord, frames, source_of_session
 from ..export.gltf import write_gltf
 from ..export.tracks import tracks_of
+from ..mesh.locate import resolve_mesh
+from ..mesh.reading import MAX_BYTES, read_mesh
 from ..picture import style
-from ..scene.scenario import Scenario
-from ..session.as_script import script_of_session
+from ..scene.scenario import Scenario, mesh_sha256_of, scene_text
+from ..scene.scene_file import read_scene_text
+from ..session.as_script import SceneAndScript, script_of_session
 from ..session.recorded_session import play
-from .controls import Controls, log_slider, on_slider
+from .body_tab import shown_name
+from .controls import Changes, Controls, log_slider, on_slider
 from .flight import Flight
 from .pointer import Tools
 from .server import MARK
@@ -69,7 +77,7 @@ class TimeBar:
         with gui.add_folder("Time"):
             self._line = gui.add_html("")
             play = gui.add_button_group("Simulation", (PAUSE, STEP, RESET))
-            self.speed = gui.add_dropdown(
+            self.speed: Any = gui.add_dropdown(
                 "Speed", tuple(SPEEDS), initial_value="1", hint="Simulated seconds per second (real_time_factor)"
             )
         self._play: Any = play
@@ -89,9 +97,17 @@ class TimeBar:
                 await self.play_or_pause()
 
         def shown(values: Any) -> str:
-            return next((name for name, f in SPEEDS.items() if f == values["real_time_factor"]), self.speed.value)
+            factor = values["real_time_factor"]
+            name = next((name for name, f in SPEEDS.items() if f == factor), repr(factor).removesuffix(".0"))
+            options = tuple(dict.fromkeys((*SPEEDS, name)))
+            if self.speed.options != options:
+                self.speed.options = options
+            return name
 
-        controls.bind(self.speed, shown, lambda name: {"real_time_factor": SPEEDS[name]})
+        def changes(name: str) -> Changes:
+            return {"real_time_factor": SPEEDS[name] if name in SPEEDS else float(name)}
+
+        controls.bind(self.speed, shown, changes)
 
         # Browsers send no key that is typed into an input.
         @gui.add_command("Pause or resume; after rewinding, continue from there", hotkey="space").on_trigger
@@ -243,22 +259,18 @@ class SessionTab:
         try:
             content, note = await asyncio.to_thread(make)
         except InputError as error:
-            self._flight.say(str(error))
+            self._flight.say(f"Not saved: {error}")
             return
         client.send_file_download(name, content, save_immediately=True)
         self._saved.content = note
 
     def _take(self) -> tuple[bytes, str]:
-        saved = script_of_session(self._flight.memory.session())
-        scene, packed = saved.scene, io.BytesIO()
-        mesh = self._flight.scenario.body_mesh
+        saved, meshes = with_meshes(script_of_session(self._flight.memory.session()))
+        packed = io.BytesIO()
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-            if mesh is not None and mesh.mesh.path == self._flight.scenario.parameters.mesh:
-                # In the folder of the scene, which refers to it: the original file may no longer exist later.
-                name = Path(mesh.mesh.path).name
-                archive.writestr(name, Path(mesh.mesh.path).read_bytes())
-                scene = scene.replace(mesh.mesh.path, name)
-            archive.writestr("scene.yaml", scene)
+            for name, content in meshes.items():
+                archive.writestr(name, content)
+            archive.writestr("scene.yaml", saved.scene)
             archive.writestr("script.yaml", saved.script)
         note = f"{len(saved.entries)} commands. Unpack, then:\n\n`rigid_proto simulate scene.yaml --script script.yaml`"
         return packed.getvalue(), note
@@ -272,6 +284,36 @@ class SessionTab:
             file = Path(folder) / "take.glb"
             write_gltf(str(file), made, tracks_of(made))
             return file.read_bytes(), report
+
+
+def with_meshes(saved: SceneAndScript) -> tuple[SceneAndScript, dict[str, bytes]]:
+    """A run whose scene and script name meshes in their own folder, and these files by name: the original ones may no
+    longer exist later. Bundled meshes stay as they are.
+
+    Raises InputError for a mesh that can't be read, or isn't in one file.
+    """
+    values: dict[str, Any] = dict(read_scene_text(saved.scene).values)
+    entries: list[dict[str, Any]] = copy.deepcopy(saved.entries)
+    names: dict[str, str] = {}
+    files: dict[str, bytes] = {}
+    for changes in (values, *(entry["set"] for entry in entries if "set" in entry)):
+        mesh = changes.get("mesh", "")
+        if mesh in ("", *body_names()):
+            continue
+        if mesh not in names:
+            path = resolve_mesh(mesh)
+            content = read_bounded(path, MAX_BYTES, "mesh", "a mesh file")
+            if read_mesh(content, path).sha256 != hashlib.sha256(content).hexdigest():
+                accepted = "a file that holds the whole mesh, such as a .glb: others that it reads aren't saved with it"
+                raise InputError("mesh", mesh, accepted)
+            name, suffix = shown_name(path.name)
+            stem, number = name.removesuffix(f".{suffix}"), 1
+            while name in files:
+                number += 1
+                name = f"{stem}_{number}.{suffix}"
+            names[mesh], files[name] = name, content
+        changes["mesh"] = names[mesh]
+    return SceneAndScript(scene_text(values, mesh_sha256_of(saved.scene)), entries), files
 
 
 class ShowTab:

@@ -224,7 +224,9 @@ STYLE = f"""<style>
 CLASS_STYLE = f"""<style>
 :root {{ --mantine-scale: 1.25; }}
 [role="tablist"] {{ display: none !important; }}
+.{MARK} {{ white-space: normal; }}
 .{MARK} b {{ font-size: 1.7em; }}
+{_BAR} .mantine-Button-root {{ padding-inline: 0.2em; }}
 </style>"""
 
 

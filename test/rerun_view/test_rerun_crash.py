@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import random
 import signal
 from pathlib import Path
 
@@ -88,6 +89,7 @@ def test_what_is_no_recording_is_refused_in_one_line(recording, tmp_path):
     for name, content in {
         "empty.rrd": b"",
         "text.rrd": b"not a recording at all",
+        "noise.rrd": random.Random(4).randbytes(3000),
         "head.rrd": data[: HEADER_BYTES + 5],
         "damaged.rrd": bytes(damaged),
     }.items():
@@ -95,6 +97,7 @@ def test_what_is_no_recording_is_refused_in_one_line(recording, tmp_path):
         with pytest.raises(InputError) as refusal:
             read_session(tmp_path / name)
         assert "\n" not in str(refusal.value) and name in str(refusal.value)
+        assert ("content" in str(refusal.value)) == (name in ("empty.rrd", "text.rrd", "noise.rrd"))
     with pytest.raises(InputError, match="No such file"):
         read_session(tmp_path / "nowhere.rrd")
 

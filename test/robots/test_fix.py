@@ -127,7 +127,7 @@ def test_the_command_writes_tells_and_leaves(parts, capsys):
     assert "arm: impossible for its shape -> uniform" in told and "open: unknown; left: open" in told
     assert "2 of 4 inertials rewritten, 2 left" in told
     assert path.read_bytes() == URDF.encode()
-    assert main(["inspect", "--compare", str(out), "--fix", str(out), "--json"]) == 0
+    assert main(["inspect", "--compare", str(out), "--fix", str(parts / "again.urdf"), "--json"]) == 0
     links = json.loads(capsys.readouterr().out)["links"]
     assert [link["status"] for link in links] == ["uniform", "unknown", "unknown", "uniform"]
     assert not any(link["written"] for link in links)
@@ -137,6 +137,19 @@ def test_the_command_writes_tells_and_leaves(parts, capsys):
     out.write_text(text.replace(ixx, repr(1.004 * float(ixx))))
     check = ["inspect", "--compare", str(out)]
     assert [main(check), main([*check, "--tolerance", "0.01"]), main([*check, "--tolerance", "0.001"])] == [0, 0, 1]
+
+
+@pytest.mark.parametrize("spelling", ["robot.urdf", "./robot.urdf", "link.urdf", "ABSOLUTE"])
+def test_the_robots_own_file_is_not_overwritten(spelling, parts, capsys, monkeypatch):
+    monkeypatch.chdir(parts)
+    (parts / "robot.urdf").write_bytes(URDF.encode())
+    (parts / "link.urdf").symlink_to("robot.urdf")
+    out = str(parts / "robot.urdf") if spelling == "ABSOLUTE" else spelling
+    assert main(["inspect", "--compare", "robot.urdf", "--fix", out]) == 2
+    assert (
+        capsys.readouterr().err == f"rigid_proto inspect: --fix: got {out!r}; accepted: another file than the robot's\n"
+    )
+    assert (parts / "robot.urdf").read_bytes() == URDF.encode()
 
 
 def test_what_a_body_of_the_shapes_can_have_stays_unless_all_is_asked_for(parts):
@@ -151,10 +164,10 @@ def test_what_a_body_of_the_shapes_can_have_stays_unless_all_is_asked_for(parts)
 
 
 def test_xacro_is_refused_with_the_command_that_expands_it_and_wide_characters_too(parts):
-    path = parts / "arm.urdf.xacro"
+    path = parts / "an arm.urdf.xacro"
     path.write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>')
     for use in (fixed, read_robot):
-        with pytest.raises(InputError, match=r"xacro \S*arm\.urdf\.xacro > EXPANDED"):
+        with pytest.raises(InputError, match=r"xacro '\S*an arm\.urdf\.xacro' > EXPANDED"):
             use(path)
     path = parts / "wide.urdf"
     path.write_bytes(URDF.replace("\ufeff", "").replace('<?xml version="1.0"?>', "").encode("utf-16"))

@@ -2,13 +2,16 @@
 """A scene file is typed as rcl types it: one file through both readers."""
 
 import os
+import shutil
+from pathlib import Path
 
 import pytest
 
 from rigid_proto_ros.base.bundled import scene_names, scene_path
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.ros.arguments import given_arguments
-from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text, scene_values
 from rigid_proto_ros.scene.yaml_text import scalar
 
@@ -102,6 +105,30 @@ def test_a_file_without_a_section_for_the_node_is_warned_of(tmp_path):
     path.write_text("drone: {ros__parameters: {mass: 1.0}}\n")
     assert scene_values(path, told.append) == {}
     assert len(told) == 2 and "/rigid_body" in told[1]
+    for text in ("", "# only a remark\n", "{}\n"):
+        path.write_text(text)
+        assert scene_values(path, told.append) == {}
+        assert told.pop() == f"{path}: there is no section for /rigid_body (it has none); /** is for every node"
+
+
+@pytest.mark.parametrize("mesh", ["body.obj", "parts/body.obj", "book"])
+def test_a_relative_mesh_lies_in_the_current_folder_or_else_beside_the_scene_file(mesh, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scene = Path("w/scene.yaml")
+    (scene.parent / mesh).parent.mkdir(parents=True)
+    scene.write_text(f"/**: {{ros__parameters: {{mesh: {mesh}}}}}\n")
+    beside = str(scene.parent / mesh)
+    assert scene_values(scene)["mesh"] == mesh  # found nowhere: the refusal names it as it stands there
+    shutil.copy(resolve_mesh("t_handle"), beside)
+    if mesh == "book":
+        assert scene_values(scene)["mesh"] == mesh
+        return
+    scenario = read_scene(str(scene))
+    assert scenario.parameters.mesh == beside
+    assert make_scenario(read_scene_text(scenario.text).values).setup.geometry == scenario.setup.geometry
+    Path(mesh).parent.mkdir(exist_ok=True)
+    shutil.copy(resolve_mesh("book"), mesh)
+    assert scene_values(scene)["mesh"] == mesh
 
 
 @pytest.mark.parametrize("name", scene_names())

@@ -179,6 +179,15 @@ def test_what_acts_ends_in_a_branch_when_it_would_have_ended():
     assert not branch.acting
 
 
+@pytest.mark.parametrize("option", ["--as-scene", "--record"])
+def test_a_place_that_cannot_be_written_is_named_with_its_option_before_the_work(session, option, capsys):
+    place = "/proc/x.yaml" if option == "--as-scene" else "/proc/x.mcap"
+    at = ["--at", "1"] if option == "--as-scene" else []
+    assert main(["replay", str(session), *at, option, place]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith(f"rigid_proto replay: {option}: got '{place}'; accepted: a file that can be")
+
+
 @pytest.mark.parametrize(
     "arguments",
     [["--at", "9"], ["--at", "-1"], ["--at", "nan"], ["--at", "1"], ["--as-scene", "x.yaml"]],

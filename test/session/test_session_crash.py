@@ -138,6 +138,23 @@ def test_damage_inside_is_refused_in_one_line(recording, tmp_path, capsys):
         assert len(error.splitlines()) == 1 and "damaged.mcap" in error
 
 
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "the content"),
+        (b"\x89MCAP", "the content"),
+        (random.Random(4).randbytes(3000), "the content"),
+        (b"\x89MCAP0\r\n", "ends before its first chunk"),
+    ],
+)
+def test_a_file_whose_content_is_no_recording_is_said_to_be_none(content, words, tmp_path, capsys):
+    path = tmp_path / "noise.mcap"
+    path.write_bytes(content)
+    assert main(["replay", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert len(error.splitlines()) == 1 and "noise.mcap" in error and words in error and "()" not in error
+
+
 def test_random_bytes_never_end_in_a_traceback(recording, tmp_path, capsys):
     data, rng = recording.read_bytes(), random.Random(6)
     path = tmp_path / "random.mcap"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import errno
 import json
+import shlex
 import subprocess
 import sys
 import time
@@ -189,6 +190,28 @@ def test_a_path_that_cannot_be_written_is_refused(tmp_path, capsys):
             McapObserver(path)
     assert main(["simulate", "book", "--duration", "0.1", "--bag", str(tmp_path / "s.bag")]) == 2
     assert ".mcap" in capsys.readouterr().err
+    for option, place in (
+        ("--bag", "/proc/s.mcap"),
+        ("--record", "/proc/s.mcap"),
+        ("--bag", f"{tmp_path}/{'x' * 300}.mcap"),
+    ):
+        assert main(["simulate", "book", "--duration", "0.1", option, place]) == 2
+        out, err = capsys.readouterr()
+        assert out == "" and err.startswith(f"rigid_proto simulate: {option}: got '{place}'")
+    assert list(tmp_path.iterdir()) == [full]
+
+
+@pytest.mark.parametrize("ending", ["rrd", "mcap"])
+def test_the_command_that_shows_a_recording_can_be_pasted(ending, tmp_path, capsys):
+    if ending == "rrd":
+        pytest.importorskip("rerun")
+    path = tmp_path / "Ünï dir" / f"f ö.{ending}"
+    option = "--bag" if ending == "mcap" else "--record"
+    assert main(["simulate", "book", "--duration", "0.1", option, str(path)]) == 0
+    recorded, told = capsys.readouterr().out.splitlines()[-1].split("; show it with: ")
+    seen = ["rigid_proto", "replay", str(path), "--record", str(path.with_suffix(".rrd"))]
+    assert recorded == f"recorded {path}"
+    assert shlex.split(told) == (seen if ending == "mcap" else ["rerun", str(path)])
 
 
 def _written(path: Path) -> list:

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import io
 import json
 import threading
-import zipfile
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
@@ -18,16 +16,12 @@ import pytest
 
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
-from flown_page import PATIENCE_S, FlownPage, numbers
+from flown_page import PATIENCE_S, FlownPage, flies_again, numbers
 
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
-from rigid_proto_ros.scene.scenario_run import OfflineRun
-from rigid_proto_ros.scene.scene_file import read_scene_text
-from rigid_proto_ros.scene.script import parse_script
-from rigid_proto_ros.simulation.commands import Command
 from rigid_proto_ros.simulation.observer import Published, SceneChanged
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench import controls
@@ -122,21 +116,6 @@ def test_nothing_of_the_body_before_stays_when_another_scene_begins(flown: Flown
     flown.do(lambda: flown.page.flight.fly({"mesh": "", "inertia_model": "explicit"}))
     flown.fly(0.0)
     assert not drawn()
-
-
-def flies_again(flown: FlownPage, folder: Path) -> tuple[dict, list[Command]]:
-    """What is saved of the run since the last reset, parameters and commands, which give the same motion."""
-    packed, note = flown.page.session_tab._take()
-    assert "simulate scene.yaml --script script.yaml" in note
-    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
-        archive.extractall(folder)
-    values = dict(read_scene_text((folder / "scene.yaml").read_text()).values)
-    script = parse_script((folder / "script.yaml").read_text())
-    beside = folder / values["mesh"]
-    again = OfflineRun(make_scenario({**values, "mesh": str(beside)} if beside.exists() else values), script)
-    again.advance(flown.live.state.time_ns)
-    assert again.simulation.state.row.tobytes() == flown.live.state.row.tobytes()
-    return values, script
 
 
 def test_an_upload_flies_alone_and_its_take_holds_it(flown: FlownPage, tmp_path) -> None:

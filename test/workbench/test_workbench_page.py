@@ -292,6 +292,13 @@ def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_button
     page.until(lambda: not page.page.get_by_role("tab", name="Body").is_visible(), "page without tabs")
     buttons = [b.inner_text() for b in page.page.locator(".mantine-Button-root").all() if b.is_visible()]
     assert set(buttons) == {"Pause", "Step", "Reset"}
+    # On a telephone that is held across, too, they are in one line, and the state of the motion is read whole.
+    page.page.set_viewport_size({"width": 844, "height": 390})
+    page.drawn(3)
+    places = [page.page.locator("button:visible", has_text=name).first.bounding_box()["y"] for name in buttons]
+    assert len(set(map(round, places))) == 1
+    assert page.page.locator(".rp-bar").first.evaluate("bar => bar.scrollWidth - bar.clientWidth") <= 0
+    page.page.set_viewport_size({"width": 1000, "height": 420})
     page.page.get_by_label("Class mode", exact=True).first.click(force=True)
     page.until(lambda: page.page.get_by_role("tab", name="Body").is_visible(), "tabs again")
 

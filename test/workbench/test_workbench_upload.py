@@ -146,14 +146,12 @@ def test_a_name_leads_nowhere(place: Path, name: str) -> None:
     assert re.fullmatch(r"[A-Za-z0-9_-]{1,40}\.obj", path.name)
 
 
-def test_an_upload_that_flies_no_more_is_removed_and_nothing_of_it_is_cached(place: Path) -> None:
-    scenario = SimpleNamespace(parameters=SimpleNamespace(mesh=""))
+def test_uploads_are_kept_until_the_page_ends_and_nothing_of_them_is_cached(place: Path) -> None:
     server = viser.ViserServer(host="127.0.0.1", verbose=False)
-    folder = UploadFolder(server.gui, SimpleNamespace(scenario=scenario), None, lambda _: None)
+    folder = UploadFolder(server.gui, SimpleNamespace(), None, lambda _: None)
     for k in range(3):
         asyncio.run(folder.take(f"part {k}.obj", OPEN))
-        scenario.parameters.mesh = folder.present.path if k == 0 else scenario.parameters.mesh
-    assert {path.name for path in files(place)} == {"part_0.obj", "part_2.obj"}
+    assert {path.name for path in files(place)} == {"part_0.obj", "part_1.obj", "part_2.obj"}
     folder.close()
     server.stop()
     assert not files(place)

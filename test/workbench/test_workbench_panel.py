@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: MIT
+"""Inputs show what is in force and say why they do nothing; what is saved holds all its meshes."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="viser is not installed: no interactive page")
+
+from flown_page import FlownPage, flies_again
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.mesh.locate import resolve_mesh
+from rigid_proto_ros.scene.lessons import lesson
+from rigid_proto_ros.workbench import controls
+from rigid_proto_ros.workbench import page as page_module
+from rigid_proto_ros.workbench.controls import NEW_WEIGHT
+from rigid_proto_ros.workbench.lessons import FREE
+from rigid_proto_ros.workbench.panel import SPEEDS
+
+
+@pytest.fixture(scope="module")
+def flown() -> Iterator[FlownPage]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page_module, "GRACE_S", 0.0)
+        patch.setattr(controls, "TYPING_S", 0.0)
+        patch.setattr(controls, "TOUCHED_S", 0.0)
+        page = FlownPage()
+        yield page
+        page.end()
+
+
+@pytest.fixture(autouse=True)
+def at_the_start(flown: FlownPage) -> None:
+    flown.set("Lesson", FREE)
+    flown.pick(lesson("t_handle").title)
+    flown.said.clear()
+
+
+def every_option_is_there_once(flown: FlownPage) -> None:
+    """A page with two equal options in one list stays blank."""
+    lists = [widget.options for widget in flown._widgets() if hasattr(widget, "options")]
+    assert len(lists) > 5
+    for options in lists:
+        assert len(set(options)) == len(options), options
+
+
+def test_a_weight_that_is_added_is_an_option_once_as_is_one_of_the_scene(flown: FlownPage) -> None:
+    every_option_is_there_once(flown)
+    flown.set("Parameter", NEW_WEIGHT)
+    flown.set("Value", "0.05 0 0 0.05")
+    assert flown.scenario.parameters.ballast == {"weight": (0.05, 0.0, 0.0, 0.05)}
+    flown.set("Parameter", "mass")
+    every_option_is_there_once(flown)
+    flown.do(lambda: flown.page.flight.fly({"mesh": "hammer", NEW_WEIGHT: [0.1, 0.0, 0.0, 0.0]}))
+    flown.fly(0.0)
+    every_option_is_there_once(flown)
+
+
+def test_any_speed_that_is_in_force_is_shown_and_another_can_be_chosen(flown: FlownPage) -> None:
+    speed = flown.widget("Speed")
+    for factor, shown in ((100.0, "100"), (0.3, "0.3"), (1.0 + 1e-9, "1.000000001"), (0.25, "1/4"), (0.0, "0")):
+        flown.set("Parameter", "real_time_factor")
+        flown.set("Value", repr(factor))
+        assert (speed.value, flown.scenario.parameters.real_time_factor) == (shown, factor)
+        assert tuple(speed.options) == tuple(dict.fromkeys((*SPEEDS, shown)))
+        every_option_is_there_once(flown)
+    flown.set("Speed", "1")
+    assert flown.scenario.parameters.real_time_factor == 1.0
+    assert (speed.value, tuple(speed.options)) == ("1", tuple(SPEEDS))
+
+
+def test_a_density_is_refused_while_a_tensor_is_in_force(flown: FlownPage) -> None:
+    flown.set("Tensor", "1e-3 0 0 2e-3 0 2.5e-3")
+    flown.until(lambda: flown.scenario.parameters.inertia_model == "explicit", "tensor")
+    flown.wait_until_still()
+    before = flown.scenario
+    flown.set("Density [kg/m³]", "1000")
+    assert flown.scenario is before and flown.widget("Density [kg/m³]").value == f"{before.parameters.density:g}"
+    (said,) = flown.said
+    assert said.startswith("Density: ") and "explicit" in said and "Mass ×" in said and "Model" in said
+    flown.set("Model", "solid")
+    flown.set("Density [kg/m³]", "1000")
+    assert flown.scenario.parameters.density == 1000.0 and len(flown.said) == 1
+
+
+# What is saved
+
+
+def save_and_fly_elsewhere(flown: FlownPage, folder: Path) -> tuple[dict, list, list[str]]:
+    folder.mkdir()
+    values, script = flies_again(flown, folder)
+    return values, script, sorted(path.name for path in folder.iterdir() if path.suffix != ".yaml")
+
+
+@pytest.mark.parametrize("name", ["part.obj", "größe.obj", 'a "b".obj', "~x.obj"])
+def test_a_mesh_of_any_path_is_saved_with_its_run(
+    flown: FlownPage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    here = tmp_path / "here"
+    here.mkdir()
+    shutil.copy(resolve_mesh("hammer"), here / name)
+    monkeypatch.chdir(here)
+    mesh = name if name == "part.obj" else str(here / name)
+    assert flown.do(lambda: flown.page.flight.fly({"mesh": mesh, "initial.angular_velocity": [1.0, 2.0, 3.0]}))
+    flown.fly(0.3)
+    values, _, files = save_and_fly_elsewhere(flown, tmp_path / "elsewhere")
+    assert [values["mesh"]] == files
+
+
+def test_the_mesh_of_the_start_and_those_of_later_changes_are_saved(flown: FlownPage, tmp_path: Path) -> None:
+    folder = flown.page.body_tab.upload
+    flown.do(lambda: folder.take("x.obj", b"# z up\n" + resolve_mesh("hammer").read_bytes()))
+    flown.press("Simulate it")
+    flown.fly(0.2)
+    flown.set("Body", "book")
+    flown.fly(0.2)
+    # Another file of the same name, given in flight.
+    flown.do(lambda: folder.take("x.obj", b"# z up\n" + resolve_mesh("tennis_racket").read_bytes()))
+    second = folder.present.path
+    flown.do(lambda: flown.page.flight.set({"mesh": second}))
+    flown.fly(0.2)
+    values, script, files = save_and_fly_elsewhere(flown, tmp_path / "elsewhere")
+    assert values["mesh"] == "x.obj" and files == ["x.obj", "x_2.obj"]
+    assert [command.content["mesh"] for command in script] == ["book", "x_2.obj"]
+
+
+def test_a_bundled_mesh_stays_a_name(flown: FlownPage, tmp_path: Path) -> None:
+    flown.set("Body", "hammer")
+    flown.fly(0.2)
+    values, _, files = save_and_fly_elsewhere(flown, tmp_path / "elsewhere")
+    assert resolve_mesh(values["mesh"]) == resolve_mesh("t_handle") and not files
+
+
+def test_nothing_is_saved_without_a_mesh_that_is_gone_or_that_reads_other_files(
+    flown: FlownPage, tmp_path: Path
+) -> None:
+    gone = tmp_path / "gone.obj"
+    shutil.copy(resolve_mesh("hammer"), gone)
+    assert flown.do(lambda: flown.page.flight.fly({"mesh": str(gone)}))
+    flown.set("Body", "book")
+    flown.fly(0.1)
+    gone.unlink()
+    with pytest.raises(InputError, match=r"gone\.obj"):
+        flown.page.session_tab._take()
+    flown.do(lambda: flown.page.flight.fly({"mesh": str(in_two_files(tmp_path))}))
+    flown.fly(0.1)
+    with pytest.raises(InputError, match=r"two\.gltf.*\.glb"):
+        flown.page.session_tab._take()
+
+
+def in_two_files(folder: Path) -> Path:
+    """A tetrahedron as .gltf, whose numbers are in a .bin."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+    triangles = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.uint16)
+    (folder / "two.bin").write_bytes(corners.tobytes() + triangles.tobytes())
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"uri": "two.bin", "byteLength": 72}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 24},
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
+            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
+        ],
+    }
+    path = folder / "two.gltf"
+    path.write_text(json.dumps(document))
+    return path
+
+
+def test_one_can_go_on_from_the_past_of_an_upload_when_another_file_was_uploaded(flown: FlownPage) -> None:
+    folder = flown.page.body_tab.upload
+    flown.do(lambda: folder.take("first.obj", b"# z up\n" + resolve_mesh("hammer").read_bytes()))
+    first = folder.present.path
+    flown.press("Simulate it")
+    flown.fly(1.0)
+    flown.set("Body", "hammer")
+    flown.fly(1.0)
+    flown.do(lambda: folder.take("second.obj", b"# z up\n" + resolve_mesh("book").read_bytes()))
+    flown._update(flown.widget("Seconds back"), 1.5)
+    flown.until(lambda: not flown.widget("Go on from here").disabled, "button")
+    flown.press("Go on from here")
+    flown.fly(0.3)
+    assert not flown.said and flown.scenario.parameters.mesh == first
