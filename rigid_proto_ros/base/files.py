@@ -56,6 +56,11 @@ def output_file(option: str, file: str | Path) -> Path:
     return path
 
 
+def is_same_file(one: str | Path, other: str | Path) -> bool:
+    """Whether both paths lead to one file that is there."""
+    return Path(one).exists() and Path(other).exists() and Path(one).samefile(other)
+
+
 def check_writable(option: str, file: str | Path) -> None:
     """Check before long work that ``file`` can be written, and leave what stands there as it is. Raises InputError,
     which names ``option``.

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
-from ..base.files import whole_file
+from ..base.files import is_same_file, whole_file
 from ..mass.properties import scale_vector
 from ..mass.tensor import principal_axes, six_from_tensor
 from .inspect_report import print_inertial, row_of, table, tensor_rows
@@ -139,7 +139,7 @@ def _fix(args: argparse.Namespace) -> int:
     if args.mesh or args.tolerance:
         raise InputError("--fix", args.fix, "the whole robot: --compare ROBOT without a MESH or a tolerance")
     robot = Path(args.compare[0])
-    if robot.exists() and Path(args.fix).exists() and robot.samefile(args.fix):
+    if is_same_file(robot, args.fix):
         raise InputError("--fix", args.fix, "another file than the robot's")
     folders = tuple(args.package_path or ())
     data, links = fix_robot(robot, folders=folders, accept_open=args.accept_open, everything=args.all)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..base.command_line import Progress, number_from
 from ..base.errors import InputError
-from ..base.files import check_whole_file, check_writable, whole_file
+from ..base.files import check_whole_file, check_writable, is_same_file, whole_file
 from .exports import add_exports, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--at", "needs --as-scene FILE.yaml, and --as-scene needs --at T")
     if args.speed is not None and args.publish != "states":
         raise InputError("--speed", "needs --publish states; a running node has real_time_factor")
-    if args.record and Path(args.record).exists() and Path(args.record).samefile(args.session):
+    if args.record and is_same_file(args.record, args.session):
         raise InputError("--record", args.record, "another file than the session")
     if args.record:
         check_writable("--record", args.record)

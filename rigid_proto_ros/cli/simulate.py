@@ -174,8 +174,12 @@ def _print_summary(result: dict, recordings: list[str]) -> None:
     }
     for name, value in rows.items():
         print(f"{name:16s} {value}")
+    from ..rerun_view.session_files import is_mcap
+
     for file in recordings:
         show = ["rerun", file]
-        if Path(file).suffix == ".mcap":
-            show = ["rigid_proto", "replay", file, "--record", str(Path(file).with_suffix(".rrd"))]
+        if is_mcap(file):
+            show = ["rigid_proto", "replay", file]
+            converted = str(Path(file).with_suffix(".rrd"))
+            show += ["--record", converted] if converted not in recordings else ["--verify"]
         print(f"recorded {file}; show it with: {shlex.join(show)}")

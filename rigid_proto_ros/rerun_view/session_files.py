@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError, is_missing
-from ..base.files import output_file
+from ..base.files import is_same_file, output_file
 from ..scene.parameters import Parameters
 from ..scene.scenario import Scenario
 from ..simulation.observer import Reset
@@ -93,7 +93,7 @@ def repair(path: str | Path, repaired: str | Path) -> None:
     ending = ".mcap" if bag else ".rrd"
     if repaired.suffix != ending:
         raise InputError("--repair", str(repaired), f"a file that ends in {ending}, like the session")
-    if repaired.exists() and path.exists() and repaired.samefile(path):
+    if is_same_file(repaired, path):
         raise InputError("--repair", str(repaired), "another file than the one that is repaired")
     output_file("--repair", repaired)
     if not bag:
