@@ -68,15 +68,17 @@ class CommandReceiver:
                 sent = loop.bound(sent)
             when_ns, counter = self._effective(sent.stamp_ns, loop.stamps.offset_ns)
             self._count(counter, 1)
-            loop.simulation.submit(sent, when_ns)
+            # In the scene that parameters have made, though they may not have acted yet.
+            setup = loop.scenario.setup
+            loop.simulation.submit(sent, when_ns, checked=(check_command(sent, setup), setup))
         except CommandRefused as refusal:
             loop.simulation.refuse(refusal)
             raise
         finally:
             # Last: a command that counts as received counts as late or refused too, if it is.
             self.received[topic] += 1
-        if sent.kind in ("wrench", "thrusters"):
-            loop.request_step()
+            if topic in ("wrench", "thrusters"):
+                loop.request_step()
 
     def receive_schedule(self, text: Callable[[], str]) -> None:
         """Take an entry of a script, or a list of entries whole or not at all, as YAML; raises CommandRefused, counted

@@ -253,6 +253,8 @@ class LiveSimulation:
         self._warm_up_change(planned)
         if changes.get("record", "") == present.parameters.record:
             changes = {name: value for name, value in changes.items() if name != "record"}
+        if not changes:
+            return
 
         def check() -> Scenario:
             scenario = loop.scenario.with_changes(changes, at_hand=planned.body_mesh)
@@ -264,8 +266,7 @@ class LiveSimulation:
             return scenario
 
         def change() -> None:
-            setup = loop.replace(check())
-            loop.simulation.submit(Change(dict(changes), lambda: setup))
+            self._put_in_force(check(), Change(dict(changes)))
 
         recorder = None
         if "record" in changes:
@@ -282,6 +283,25 @@ class LiveSimulation:
             finished = self.call(lambda: self._switch_recording(recorder))
             if finished is not None:
                 finished.close()
+
+    def _put_in_force(self, scenario: Scenario, change: Change) -> None:
+        """On the physics thread: a checked scenario, and the change that has made it of the present one."""
+        loop, before = self.loop, self.loop.scenario.parameters.named()
+
+        def apply() -> Setup:
+            """When it acts: after commands of the same time that change parameters too, or make it impossible."""
+            try:
+                if loop.scenario is not scenario:
+                    return loop.setup_of(change, scenario.body_mesh)
+                loop.check_change(scenario)
+                return scenario.setup
+            except InputError:
+                loop.change({name: value for name, value in before.items() if name in change.content})
+                self.endpoints.parameters_changed()
+                raise
+
+        loop.replace(scenario)
+        loop.simulation.submit(replace(change, apply=apply))
 
     def _warm_up_change(self, planned: Scenario) -> None:
         """Compile the kernels of another integrator."""

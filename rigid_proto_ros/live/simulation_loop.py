@@ -190,7 +190,7 @@ class SimulationLoop(ScenarioRun):
             yield
 
     def request_step(self) -> None:
-        """A wrench was taken: paused and in lockstep it is followed by a step."""
+        """A wrench or thruster command has come: paused and in lockstep it is followed by a step."""
         if self.paused and self.scenario.parameters.lockstep:
             self._steps_requested += 1
 

@@ -80,6 +80,7 @@ class NodeProcess(threading.Thread):
     def _begin(self, given: Mapping[str, object], until_s: float | None) -> None:
         """Make the node, which may compile for minutes, and let it run. Raises InputError."""
         import rclpy
+        from rclpy.exceptions import ParameterException
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.signals import SignalHandlerOptions
 
@@ -94,7 +95,13 @@ class NodeProcess(threading.Thread):
         except Exception as error:  # rclpy's own error types differ between versions
             raise InputError("ROS arguments", " ".join(self._argv[1:]), " ".join(str(error).split())) from None
         with notify_when_compiling(lambda: _tell("compiling kernels, at the first start only; a minute or two ...")):
-            node = self._node = RigidBodyNode(given, make_viewer)
+            try:
+                node = self._node = RigidBodyNode(given, make_viewer)
+            except (ParameterException, RuntimeError) as error:
+                # rclpy's own parameters: its text says which, and what is accepted.
+                if isinstance(error, RuntimeError) and "QoS override" not in str(error):
+                    raise
+                raise InputError("ROS arguments", " ".join(str(error).split())) from None
             node.states.pack_all(warm_up(node.live.scenario.setup))
         self._close_page = open_page(node)
         if until_s is not None:

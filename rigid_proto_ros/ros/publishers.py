@@ -53,7 +53,6 @@ class StatePublisher:
         self._stamps = stamps
         self._run = run
         self._frames = frames
-        self._imu_frame = frames[1]
         self._topics: Topics = [
             (_publisher(node, PoseStamped, "pose", qos.STATE), partial(self._in_world, PROJECTIONS["pose"])),
             (_publisher(node, TwistStamped, "twist", qos.STATE), partial(self._in_world, PROJECTIONS["twist"])),
@@ -65,13 +64,12 @@ class StatePublisher:
         self._tf_message: Any = None
         self._silent: tuple[Publisher | None, ...] = ()
         self._wanted: Topics = []
+        self._imu_of: Parameters | None = None
+        self._imu_frame = ""
         self._noise: ImuNoise | None = None
 
     def configure(self, parameters: Parameters) -> None:
-        """Switch /clock, /tf and noise on and off, and put the IMU where it is mounted; on the executor's thread."""
-        contact = parameters.imu_contact
-        self._imu_frame = f"{self._frames[1]}/{contact}" if contact else self._frames[1]
-        self._noise = imu_noise(parameters)
+        """Switch /clock and /tf on and off; on the executor's thread."""
         if parameters.publish_clock and self._clock is None:
             self._clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
             self._topics = [(self._clock, lambda time_ns, _: cdr.time(time_ns)), *self._topics]
@@ -122,23 +120,28 @@ class StatePublisher:
         # An Odometry's twist is in the child frame: body axes.
         return cdr.odometry(time_ns + self._stamps.offset_ns, self._frames, PROJECTIONS["odom"](row))
 
-    def _specific_force(self) -> np.ndarray:
+    def _specific_force(self, contact: str) -> np.ndarray:
         """At the contact that ~/imu is mounted at, or the COM; on the physics thread."""
-        contact, simulation = self._run.scenario.parameters.imu_contact, self._run.simulation
+        simulation = self._run.simulation
         body = simulation.setup.body
         point = body.point(simulation.setup.contacts[contact]).tolist() if contact else (0.0, 0.0, 0.0)
         return simulation.specific_force(point)
 
     def _imu_message(self, time_ns: int, row: list[float]) -> Imu:
         """Attitude, angular velocity and specific force, both in body axes, at the contact that was chosen."""
+        parameters = self._run.scenario.parameters
+        contact = parameters.imu_contact
+        if parameters is not self._imu_of:
+            self._imu_of, self._noise = parameters, imu_noise(parameters)
+            self._imu_frame = f"{self._frames[1]}/{contact}" if contact else self._frames[1]
         message = Imu()
         message.header.stamp.sec, message.header.stamp.nanosec = self._stamps.of(time_ns)
         message.header.frame_id = self._imu_frame
         o, rate, felt = message.orientation, message.angular_velocity, message.linear_acceleration
         o.x, o.y, o.z, o.w = row[3:7]
-        noise, turns, force = self._noise, row[10:13], self._specific_force().tolist()
+        noise, turns, force = self._noise, row[10:13], self._specific_force(contact).tolist()
         if noise is not None:
-            turns, force = noise.measured(time_ns, turns, force)
+            turns, force = noise.measured(time_ns + self._stamps.offset_ns, turns, force)
             covariances = (message.angular_velocity_covariance, message.linear_acceleration_covariance)
             for covariance, sigma in zip(covariances, noise.sigma.tolist(), strict=True):
                 covariance[[0, 4, 8]] = sigma * sigma

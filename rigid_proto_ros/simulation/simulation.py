@@ -581,6 +581,11 @@ class Simulation:
         return length(moved) / size if size > 0.0 else 0.0
 
     @property
+    def has_pending(self) -> bool:
+        """Whether commands wait for their time."""
+        return bool(self._pending)
+
+    @property
     def at_rest(self) -> bool:
         """Whether nothing moves, no load acts and no command is pending."""
         still = not (self.state.row[7:].any() or self.setup.gravity.any())

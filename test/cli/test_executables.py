@@ -96,6 +96,21 @@ def test_an_output_that_nobody_reads_or_that_takes_nothing_is_told_in_a_line_at_
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.parametrize(
+    "argument",
+    [
+        *("use_sim_time:=1", "start_type_description_service:=3"),
+        "qos_overrides./rigid_body/pose.publisher.reliability:=bestfort",
+    ],
+)
+def test_a_wrong_value_of_a_parameter_of_every_ros_node_is_told_in_one_line(argument, ros_environment):
+    pytest.importorskip("rclpy")
+    words = command("rigid_body_node", "--ros-args", "-p", argument)
+    done = subprocess.run(words, env=ros_environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
+    assert done.stderr.startswith("rigid_body_node: ROS arguments: ")
+
+
 FULL_BYTES = 2_000_000
 """Larger than any kernel that may be compiled and kept on the way."""
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import platform
 import struct
 import subprocess
@@ -20,7 +21,7 @@ from rigid_proto_ros.live.pacing import SLICE_NS
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.parameters import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.simulation.commands import WrenchCommand
+from rigid_proto_ros.simulation.commands import ThrusterCommand, WrenchCommand
 from rigid_proto_ros.simulation.observer import Logged, Observer, Published
 
 PERIOD_NS = 10_000_000
@@ -99,6 +100,61 @@ def test_commands_act_and_are_counted_and_a_refusal_is_raised(live):
         live.schedule("{t: 0, state: {orientation_xyzw: [0, 0, 0, 0]}}")
     counted = {"frame": 1, "schedule": 1, "thrusters": 1, "state": 1}
     assert live.call(lambda: dict(live.loop.simulation.refused)) == counted
+
+
+@pytest.mark.parametrize("late", [False, True], ids=["list first", "list last"])
+@pytest.mark.parametrize("changed", [{"mass": 5.0}, {"gravity": [0.0, 0.0, -7.0]}], ids=["another", "the same"])
+def test_parameters_set_while_a_list_waits_act_after_it_and_undo_nothing(live, watcher, changed, late):
+    scheduled = json.dumps([{"t": 0, "set": changed}])
+    given = {"gravity": [0.0, 0.0, -3.0]}
+    for act in (lambda: live.schedule(scheduled), lambda: live.set_parameters(given))[:: -1 if late else 1]:
+        act()
+    live.step()
+    setup, parameters = live.loop.simulation.setup, live.scenario.parameters
+    assert setup is live.scenario.setup
+    assert setup.gravity.tolist() == [0.0, 0.0, -3.0] and list(parameters.gravity) == [0.0, 0.0, -3.0]
+    if "mass" in changed:
+        assert setup.body.mass == 5.0
+    kinds = [json.loads(line)["content"] for line in watcher.lines if json.loads(line)["kind"] == "set"]
+    assert kinds == [changed, given], "the order in which they acted, which a replay follows"
+
+
+def test_parameters_refused_when_they_act_are_again_what_they_were(live):
+    live.schedule("[{t: 0, wrench: {at: tip, force: [0.01, 0, 0]}}]")
+    live.set_parameters({"integrator": "taylor", "linear_damping": 0.5})
+    assert live.scenario.parameters.integrator == "taylor"
+    live.step()
+    assert live.call(lambda: dict(live.loop.simulation.refused)) == {"integrator": 1}
+    assert live.scenario.parameters.integrator == "auto" and live.scenario.parameters.linear_damping == 0.0
+    assert live.loop.simulation.setup.integrator.name == "auto"
+    live.set_parameters({"linear_damping": 0.5})
+    live.step()
+    assert live.loop.simulation.setup.linear_damping == 0.5
+
+
+def test_commands_are_checked_in_the_scene_that_parameters_have_made(live):
+    live.set_parameters({"integrator": "taylor", "mass": 1e-12})
+    live.step()
+    live.set_parameters({"integrator": "auto", "mass": 1.0})
+    live.submit(WrenchCommand(False, parse_frame("world@tip"), (0.0, 0.0, 0.01), ZERO))
+    live.submit(WrenchCommand(False, parse_frame("world;impulse"), (1e4, 0.0, 0.0), ZERO))
+    live.step()
+    assert not live.loop.simulation.refused and live.state.linear_velocity[0] == pytest.approx(1e4, rel=1e-9)
+
+
+def test_in_lockstep_a_refused_message_steps_too(live):
+    live.set_parameters({"lockstep": True})
+    for command in (
+        WrenchCommand(True, parse_frame("world@nowhere"), (1.0, 0.0, 0.0), ZERO),
+        ThrusterCommand((1.0, 2.0, 3.0)),
+    ):
+        reached_ns = live.state.time_ns
+        with pytest.raises(CommandRefused):
+            live.submit(command)
+        deadline = time.monotonic() + 20.0
+        while live.state.time_ns < reached_ns + PERIOD_NS:
+            assert time.monotonic() < deadline, "no step within 20 s"
+            time.sleep(0.01)
 
 
 def test_two_simulations_in_one_process_have_nothing_in_common(live):

@@ -37,6 +37,16 @@ def test_paused_the_last_wrench_acts_at_the_step(kilogram, forces):
     assert twist["twist"]["linear"]["x"] == pytest.approx(1e-2 * forces[-1][0], rel=1e-12)
 
 
+def test_paused_a_parameter_set_to_its_present_value_holds_after_a_list_that_waits(kilogram):
+    kilogram.start_over(paused=True)
+    kilogram.schedule("[{t: 0, set: {gravity: [0, 0, -5]}}]")
+    kilogram.until_received(1)
+    kilogram.set(gravity=[0.0, 0.0, 0.0])
+    assert kilogram.trigger("step")["success"]
+    _, twist = kilogram.state_at(10 * MS)
+    assert twist["twist"]["linear"]["z"] == 0.0 and list(kilogram.get("gravity")["gravity"]) == [0.0, 0.0, 0.0]
+
+
 def test_running_the_last_message_acts_however_fast_it_follows(kilogram):
     """Of two back to back, of a controller's at 1 kHz that ends with zero, and of thrusters on and off at once."""
     for forces in ((PUSH, ZERO), (PUSH, LESS)):
