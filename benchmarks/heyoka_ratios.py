@@ -40,7 +40,7 @@ from work_precision_ratios import time_at_error
 
 TARGETS = (1e-6, 1e-8, 1e-10)
 KNOBS = [10.0 ** (-k / 2) for k in range(4, 29)]
-FLIGHTS, ROWS, IN_A_ROW, LEAST_ROUNDS = 8, 1024, 10, 5
+FLIGHTS, ROWS, IN_A_ROW, LEAST_ROUNDS = 8, 256, 10, 3
 SHARES = {"heyoka batch": FLIGHTS, "sweep": ROWS}
 """Flights in a run."""
 COLUMNS = (
