@@ -112,12 +112,14 @@ def _assignment(text: str, node_name: str) -> dict[str, object]:
 
 
 def remapped_node_name(argv: list[str], name: str = NODE_NAME) -> str:
-    """The node's name, after its namespace if there is one, by ``-r __node:=name`` and ``-r __ns:=/namespace``."""
-    namespace = ""
+    """The node's name, after its namespace if there is one, by ``-r __node:=name`` and ``-r __ns:=/namespace``. As in
+    rcl, the first such rule counts, and one that begins with a node's name is for that node.
+    """
+    new: dict[str, str] = {}
     for option, text in _ros_options(argv):
         left, _, right = text.partition(":=")
-        if option in ("-r", "--remap") and left in ("__node", "__name"):
-            name = right
-        elif option in ("-r", "--remap") and left == "__ns":
-            namespace = right.strip("/")
+        node, _, rule = left.rpartition(":")
+        if option in ("-r", "--remap") and node in ("", name) and rule in ("__node", "__name", "__ns"):
+            new.setdefault("namespace" if rule == "__ns" else "name", right)
+    namespace, name = new.get("namespace", "").strip("/"), new.get("name", name)
     return f"{namespace}/{name}" if namespace else name
