@@ -172,13 +172,13 @@ def test_a_scene_that_a_node_tells_works_for_a_node_of_any_name(tmp_path) -> Non
         *(["rigid_body:__node:=zz"], ["other:__node:=zz"], ["__node:=zz", "__node:=b"], ["__ns:=/a", "__ns:=/b"]),
     ],
 )
-def test_the_name_that_scene_files_are_read_for_is_the_one_that_rcl_gives_the_node(rules):
+def test_the_name_that_scene_files_are_read_for_is_the_one_that_rcl_gives_the_node(rules, ros_environment):
     rclpy = pytest.importorskip("rclpy")
     from rigid_proto_ros.ros.arguments import remapped_node_name
 
     arguments = ["rigid_body_node", "--ros-args", *(word for rule in rules for word in ("-r", rule))]
     context = rclpy.Context()
-    rclpy.init(args=arguments, context=context)
+    rclpy.init(args=arguments, context=context, domain_id=int(ros_environment["ROS_DOMAIN_ID"]))
     try:
         node = rclpy.create_node("rigid_body", context=context, start_parameter_services=False)
         name = node.get_fully_qualified_name()
