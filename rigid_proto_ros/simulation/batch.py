@@ -32,7 +32,7 @@ from ..motion.state import fill_initial_row
 from ..motion.string import effective_mass, energy_of, most_yielding, span_of, spring_of
 from . import flight as fl
 from .commands import CLEAR
-from .quantities import CONTEXT, STATE, begin, measure_flight
+from .quantities import CONTEXT, STATE, begin, fill_state, measure_flight
 from .setup import Setup
 
 _NUMBERS: list[tuple[Any, ...]] = [
@@ -290,18 +290,17 @@ def _fly_row(
     flight, (loads, events, room) = flights[0], tables
     if not _begin(rows[i], ballast, flight, due, loads):
         return False
-    copy_numbers(flight.row, states[0, :13])
-    states[0, 13] = _string_energy(flight)
-    body = flight.body
-    begin(body[MASS], body[INERTIA : INERTIA + 9], rows[i].gravity, states[0], context)
+    body, gravity = flight.body, rows[i].gravity
+    fill_state(flight.row, _string_energy(flight), body[MASS], body[INERTIA : INERTIA + 9], gravity, states[0])
+    begin(states[0], context)
     fl.begin_segment(flight, loads, methods, room)
     for sample in range(sample_ns.shape[0]):
         while flight.due_end < due.shape[0] and due[flight.due_end].at_ns < sample_ns[sample]:
             flight.due_end += 1
         if fl.fly(flight, loads, events, methods, room, sample_ns[sample]) != fl.REACHED:
             return False
-        copy_numbers(flight.row, states[sample, :13])
-        states[sample, 13] = _string_energy(flight)
+        energy, inertia = _string_energy(flight), body[INERTIA : INERTIA + 9]
+        fill_state(flight.row, energy, body[MASS], inertia, gravity, states[sample])
     return True
 
 

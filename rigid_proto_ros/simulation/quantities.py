@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Scalar quantities of a flight by name, and measures of a flight.
 
-A quantity is a function of the current state and of a context row (CONTEXT,): mass, tensor, gravity, and the state row,
-energy and angular momentum at time 0. A measure is a row (MEASURE,): a kind, the number of a quantity or difference,
-and the kind's parameters. It reduces the states at the sample times to one number.
+A quantity is a function of a state row (STATE,) and of a context row (CONTEXT,). A state row holds the state, the
+string's energy, and the mass, tensor and gravity of that moment, since a script may change them in flight. The context
+is the state, energy and angular momentum at time 0. A measure is a row (MEASURE,): a kind, the number of a quantity or
+difference, and the kind's parameters. It reduces the states at the sample times to one number.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ QUANTITIES = {
     "momentum_turned": "rad",
 }
 """Units by name; ``spin.x`` is in body axes, the rest of a state in world axes. ``distance`` and ``turned`` are
-relative to the initial state, ``energy_drift`` is |E − E₀|/|E₀|, ``momentum_turned`` the angle between L and L₀.
+relative to the initial state, ``energy_drift`` is |E − E₀|/|E₀|, ``momentum_turned`` the angle between L and L₀;
+E₀ and L₀ stay those of the initial body and gravity.
 """
 
 NAMES = tuple(QUANTITIES)
@@ -52,27 +54,29 @@ SPEED, SPIN, DISTANCE, TURNED, KINETIC, POTENTIAL, ENERGY, DRIFT, MOMENTUM, MOME
 DIFFERENCES = {"attitude": "rad", "position": "m", "velocity": "m/s", "spin": "rad/s"}
 """Differences between two states; velocities and spins are compared in world axes."""
 
-STATE = 14
-"""Length of a state row (13,) with the string's energy [J]."""
+STRING_ENERGY, MASS, INERTIA, GRAVITY, STATE = 13, 14, 15, 24, 27
+"""Where a state row has, after the state (13,), the string's energy [J], the mass [kg], the tensor (9,) about the
+centre of mass in body axes [kg m²] and gravity (3,) [m/s², world]; and its length.
+"""
 
-MASS, INERTIA, GRAVITY, START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 1, 10, 13, 27, 28, 31
-
-
-@njit(error_model="numpy", allocates=False)
-def _momentum(row: np.ndarray, context: np.ndarray) -> tuple[float, float, float]:
-    return angular_momentum(row, context[INERTIA : INERTIA + 9])
+START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 13, 14, 17
 
 
 @njit(error_model="numpy", allocates=False)
-def _kinetic(row: np.ndarray, context: np.ndarray) -> float:
-    return kinetic_energy(row, context[MASS], context[INERTIA : INERTIA + 9])
+def _momentum(row: np.ndarray) -> tuple[float, float, float]:
+    return angular_momentum(row, row[INERTIA : INERTIA + 9])
 
 
 @njit(error_model="numpy", allocates=False)
-def _potential(row: np.ndarray, context: np.ndarray) -> float:
+def _kinetic(row: np.ndarray) -> float:
+    return kinetic_energy(row, row[MASS], row[INERTIA : INERTIA + 9])
+
+
+@njit(error_model="numpy", allocates=False)
+def _potential(row: np.ndarray) -> float:
     g = GRAVITY
-    fallen = context[g] * row[0] + context[g + 1] * row[1] + context[g + 2] * row[2]
-    return float(row[13] - context[MASS] * fallen)
+    fallen = row[g] * row[0] + row[g + 1] * row[1] + row[g + 2] * row[2]
+    return float(row[STRING_ENERGY] - row[MASS] * fallen)
 
 
 @njit(error_model="numpy", allocates=False)
@@ -86,14 +90,22 @@ def attitude_angle(a: np.ndarray, b: np.ndarray) -> float:
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def begin(mass: float, inertia: np.ndarray, gravity: np.ndarray, row: np.ndarray, context: np.ndarray) -> None:
-    """Fill the context (CONTEXT,) from mass, tensor (9,), gravity (3,) and the state row (STATE,) at time 0."""
-    context[MASS] = mass
-    copy_numbers(inertia, context[INERTIA : INERTIA + 9])
-    copy_numbers(gravity, context[GRAVITY : GRAVITY + 3])
-    copy_numbers(row, context[START : START + STATE])
-    context[START_ENERGY] = _kinetic(row, context) + _potential(row, context)
-    lx, ly, lz = _momentum(row, context)
+def fill_state(
+    state: np.ndarray, string_energy: float, mass: float, inertia: np.ndarray, gravity: np.ndarray, row: np.ndarray
+) -> None:
+    """Fill a state row (STATE,) from the state (13,) and what is in force with it: tensor (9,), gravity (3,)."""
+    copy_numbers(state, row[:13])
+    row[STRING_ENERGY], row[MASS] = string_energy, mass
+    copy_numbers(inertia, row[INERTIA : INERTIA + 9])
+    copy_numbers(gravity, row[GRAVITY : GRAVITY + 3])
+
+
+@njit(error_model="numpy", allocates=False, forceinline=True)
+def begin(row: np.ndarray, context: np.ndarray) -> None:
+    """Fill the context (CONTEXT,) from the state row (STATE,) at time 0."""
+    copy_numbers(row[:13], context[START : START + 13])
+    context[START_ENERGY] = _kinetic(row) + _potential(row)
+    lx, ly, lz = _momentum(row)
     context[START_MOMENTUM], context[START_MOMENTUM + 1], context[START_MOMENTUM + 2] = lx, ly, lz
 
 
@@ -111,15 +123,15 @@ def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
     if code == TURNED:
         return attitude_angle(context[START + 3 : START + 7], row[3:7])
     if code == KINETIC:
-        return _kinetic(row, context)
+        return _kinetic(row)
     if code == POTENTIAL:
-        return _potential(row, context)
+        return _potential(row)
     if code == ENERGY:
-        return _kinetic(row, context) + _potential(row, context)
+        return _kinetic(row) + _potential(row)
     if code == DRIFT:
         start = context[START_ENERGY]
-        return float(abs(_kinetic(row, context) + _potential(row, context) - start) / abs(start))
-    lx, ly, lz = _momentum(row, context)
+        return float(abs(_kinetic(row) + _potential(row) - start) / abs(start))
+    lx, ly, lz = _momentum(row)
     if code == MOMENTUM:
         return norm(lx, ly, lz)
     ax, ay, az = context[START_MOMENTUM], context[START_MOMENTUM + 1], context[START_MOMENTUM + 2]

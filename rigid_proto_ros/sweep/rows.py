@@ -31,7 +31,7 @@ from ..scene.yaml_text import dump_yaml
 from ..simulation import batch
 from ..simulation import flight as fl
 from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand
-from ..simulation.quantities import CONTEXT, STATE, begin, measure_flight
+from ..simulation.quantities import CONTEXT, STATE, begin, fill_state, measure_flight
 from ..simulation.setup import Setup, check_command, check_start
 from ..simulation.simulation import Simulation
 from .sampling import Draw, as_text
@@ -272,13 +272,13 @@ def _simulate(
 ) -> Simulation:
     """Fill ``states`` at the sample times, and the context; the simulation at their end."""
     simulation = OfflineRun(scenario, commands).simulation
-    body = simulation.setup.body
-    begin(body.mass, body.inertia.ravel(), simulation.setup.gravity, _state(simulation), context)
+    _fill(simulation, states[0])
+    begin(states[0], context)
     for state, time_ns in zip(states, sample_ns.tolist(), strict=True):
         simulation.advance(time_ns)
         if simulation.failure:
             raise FailedFlight(simulation.failure)
-        state[:] = _state(simulation)
+        _fill(simulation, state)
     if simulation.refused:
         # A row whose commands were refused in flight isn't the row that was asked for.
         counts = (f"{count} commands refused: {reason}" for reason, count in simulation.refused.items())
@@ -286,11 +286,11 @@ def _simulate(
     return simulation
 
 
-def _state(simulation: Simulation) -> np.ndarray:
-    """State row and the string's energy (STATE,)."""
-    string = simulation.string
-    energy = string.potential_energy(simulation.setup.body, simulation.state) if string else 0.0
-    return np.array([*simulation.state.row, energy])
+def _fill(simulation: Simulation, row: np.ndarray) -> None:
+    """Fill a state row (STATE,) with the present state, and with the body and gravity that are now in force."""
+    setup, string, state = simulation.setup, simulation.string, simulation.state
+    energy = string.potential_energy(setup.body, state) if string else 0.0
+    fill_state(state.row, energy, setup.body.mass, setup.body.inertia.ravel(), setup.gravity, row)
 
 
 def _table(

@@ -11,7 +11,7 @@ import copy
 import math
 from collections import ChainMap
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -251,9 +251,8 @@ def _settings(spec: Any, field: str) -> dict[str, Any]:
         if isinstance(value, dict):
             found.update(_settings({f"{key}.{k}": v for k, v in value.items()}, field))
             continue
-        parameter = parameter_named(str(key))
         try:
-            found[str(key)] = parameter.convert(value)
+            found[str(key)] = parameter_named(str(key)).convert(value)
         except InputError as error:
             raise InputError(f"{field}.{key}", error.received, error.accepted) from None
     return found
@@ -285,8 +284,13 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list[Any]) -> t
         if target.is_vertex and isinstance(form, Draw):
             whole_point = target.name.removesuffix(".vertex")
             raise InputError(field, how, f"a grid or list of whole numbers, or {whole_point}: random_vertex")
-        for probe in form.probes:
-            _check_value(target, probe, field, values, entries)
+        # Numbers alone need no conversion, and there may be a million of them.
+        if target.parameter and isinstance(form, Points) and not {type(v) for v in form.values} <= {int, float}:
+            given = [_checked(target, value, field, values, entries) for value in form.values]
+            form = replace(form, values=tuple(_of_one_length(given)))
+        else:
+            for probe in form.probes:
+                _checked(target, probe, field, values, entries)
         found.append(Vary(target, form))
     lengths = {len(v.form.values) for v in found if isinstance(v.form, Points) and v.form.kind == LIST}
     if len(lengths) > 1:
@@ -294,9 +298,20 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list[Any]) -> t
     return tuple(found)
 
 
-def _check_value(target: Target, value: Any, field: str, values: Mapping[str, Value], entries: list[Any]) -> None:
-    """Put a value where it will stand, and see whether that is accepted there."""
-    changed, copied = dict(values), copy.deepcopy(entries)
+def _of_one_length(given: list[Any]) -> list[Any]:
+    """The same values of a parameter, vectors all of one length: a single number stands for each component. Where every
+    vector is a single number, the numbers themselves.
+    """
+    longest = max((len(value) for value in given if isinstance(value, list)), default=0)
+    if longest == 1:
+        return [value[0] for value in given]
+    return [value * longest if isinstance(value, list) and len(value) == 1 else value for value in given]
+
+
+def _checked(target: Target, value: Any, field: str, values: Mapping[str, Value], entries: list[Any]) -> Any:
+    """Put a value where it will stand, and see whether that is accepted there; returns a parameter's as converted."""
+    changed: dict[str, Value] = {target.parameter: values[target.parameter]} if target.parameter else {}
+    copied = copy.deepcopy(entries) if target.entry else []
     try:
         target.put(changed, copied, value)
         if target.entry:
@@ -306,6 +321,8 @@ def _check_value(target: Target, value: Any, field: str, values: Mapping[str, Va
         raise InputError(where, error.received, error.accepted) from None
     except (TypeError, AttributeError, IndexError, KeyError):
         raise InputError(field, value, f"a value that fits {target.name}") from None
+    whole: Any = changed.get(target.parameter)
+    return whole[target.path[0]] if target.parameter and target.path else whole
 
 
 def _reference(spec: Any, field: str) -> dict[str, Any] | None:
@@ -315,7 +332,7 @@ def _reference(spec: Any, field: str) -> dict[str, Any] | None:
     if not changes:
         raise InputError(field, spec, "{parameter: value, ...}, at least one")
     for parameter in changes:
-        if parameter_named(parameter).changes == READ_ONLY:
+        if parameter == "record" or parameter_named(parameter).changes == READ_ONLY:
             raise InputError(f"{field}.{parameter}", changes[parameter], "a parameter that changes the motion")
     return changes
 

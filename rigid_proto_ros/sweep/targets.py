@@ -94,6 +94,10 @@ def read_target(name: str, field: str, values: Mapping[str, Value], entries: lis
             raise InputError(field, error.received, error.accepted) from None
     if declared.changes == READ_ONLY:
         raise InputError(field, name, "a parameter that varies; this one is fixed for the node")
+    if parameter == "record":
+        raise InputError(
+            field, name, "a parameter of the motion; a row is recorded by --as-scene and simulate --record"
+        )
     if parameter not in values:
         raise InputError(field, name, f"a parameter that the scene has: add {parameter} to `set`")
     path = (_component(declared, component, field),) if component else ()
@@ -120,6 +124,9 @@ def _script_target(name: str, field: str, entries: list[Any]) -> Target:
     if keys[0] == "set":
         # A parameter's name has dots of its own.
         keys = ["set", ".".join(keys[1:])]
-        parameter_named(keys[1])
+        try:
+            parameter_named(keys[1])
+        except InputError as error:
+            raise InputError(field, error.received, error.accepted) from None
     path = tuple("xyz".index(key) if key in ("x", "y", "z") else key for key in keys)
     return Target(name, "", int(number), path)

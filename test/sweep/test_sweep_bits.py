@@ -8,6 +8,7 @@ from sweep_studies import HUNG, POKES, PULLED, STRUCTURE, study
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.scene.parameters import PARAMETERS
+from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.simulation import batch
 from rigid_proto_ros.simulation.batch import new_results
 from rigid_proto_ros.simulation.flight import floor_text
@@ -56,6 +57,62 @@ def test_rows_have_the_bits_of_the_simulation_whatever_chunk_they_are_in(spec, i
         # A ballast below zero is a row with its reason.
         reasons = [reason for reason in whole.columns["failure"].tolist() if reason]
         assert 0 < len(reasons) < own.rows / 2 and any("ballast" in reason for reason in reasons)
+
+
+def test_energies_and_momentum_are_those_of_the_body_and_gravity_in_force() -> None:
+    changed = {"density": 15700.0, "gravity": [0.0, 0.0, -9.81]}
+    own = study(
+        {
+            "scene": "t_handle",
+            "script": [{"t": 0.5, "set": changed}],
+            "duration": 1.0,
+            "set": {"initial.position": [0.0, 0.0, 2.0]},
+            "vary": {"script.1.set.density": {"grid": [1000.0, 15700.0]}},
+            "measure": {
+                "final": ["position", "kinetic_energy", "potential_energy", "angular_momentum", "energy_drift"],
+                "min": ["angular_momentum"],
+                "max": ["angular_momentum"],
+            },
+        }
+    )
+    columns = run_chunk(own, 0, own.rows).columns
+    for row in range(own.rows):
+        found = {name: column[row] for name, column in columns.items()}
+        run = OfflineRun(own.variation(row).scenario, own.variation(row).commands)
+        simulation = run.simulation
+        energy, momentum = simulation.kinetic_energy, np.linalg.norm(simulation.angular_momentum)
+        run.advance(own.duration_ns)
+        assert found["kinetic_energy"] == simulation.kinetic_energy
+        assert found["potential_energy"] == pytest.approx(simulation.potential_energy, rel=1e-15, abs=0.0)
+        now = found["kinetic_energy"] + found["potential_energy"]
+        assert found["energy_drift"] == pytest.approx(abs(now / energy - 1.0), rel=1e-14, abs=0.0)
+        # Momentum is constant before and after the change: the samples before are of the body before.
+        after = np.linalg.norm(simulation.angular_momentum)
+        assert found["angular_momentum"] == pytest.approx(after, rel=1e-14, abs=0.0)
+        extremes = [found["min.angular_momentum"], found["max.angular_momentum"]]
+        assert extremes == pytest.approx(sorted([momentum, after]), rel=1e-12, abs=0.0)
+        assert extremes[1] > 1.5 * extremes[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "written", "plain"),
+    [
+        ("scale", [1, [1, 2, 1]], [[1, 1, 1], [1, 2, 1]]),
+        ("scale", [1, "2"], [1, 2]),
+        ("scale.z", ["1", 2], [1, 2]),
+        ("mass", [0.1, "0.2"], [0.1, 0.2]),
+        ("initial.angular_velocity", [[1, 2, 3], ["1e-3", 0, 1]], [[1, 2, 3], [1e-3, 0, 1]]),
+        ("initial.orientation_xyzw", ["0 0 0 1", [1, 0, 0, 0]], [[0, 0, 0, 1], [1, 0, 0, 0]]),
+    ],
+)
+def test_values_make_the_same_rows_however_their_numbers_are_written(name: str, written: list, plain: list) -> None:
+    spec = {"scene": "t_handle", "duration": 0.1, "vary": {}}
+    own, other = (study(spec, vary={name: {"grid": values}}) for values in (written, plain))
+    chunk = run_chunk(own, 0, own.rows)
+    assert chunk.simulated == 0 and differing_rows(own, chunk) == []
+    expected = run_chunk(other, 0, other.rows).columns
+    assert chunk.columns.keys() == expected.keys()
+    assert all(same(column, expected[key]) for key, column in chunk.columns.items())
 
 
 OFTEN = ("free_body", "rk4", "semi_implicit_euler")

@@ -15,6 +15,7 @@ from rigid_proto_ros.sweep.study import read_study
 
 PLAIN = {"scene": "t_handle", "duration": 1.0, "vary": {"mass": {"grid": [1.0, 2.0]}}}
 NUDGE = {"script": [{"t": 0.1, "at": {"vertex": 0}, "impulse": [0.1, 0.0, 0.0]}]}
+CHANGED = {"script": [{"t": 0.1, "set": {"mass": 2.0}}]}
 TWELVE = {"from": 1, "to": 2, "count": 10**6}
 
 
@@ -44,7 +45,14 @@ TWELVE = {"from": 1, "to": 2, "count": 10**6}
         ({"measure": {"first": {"far": {"quantity": "distance"}}}}, "measure.first.far", "one of above, below"),
         ({"watch": 1e6, "measure": {"max": ["spin"]}}, "watch", "samples"),
         ({"set": {"mass": "heavy"}}, "set.mass", "a finite number"),
-        ({"reference": {"publish_clok": True}}, "parameter", "did you mean publish_clock"),
+        ({"set": {"mas": 1.0}}, "study, set.mas", "there is no parameter 'mas'; did you mean mass?"),
+        ({"set": {"initial": {"orientatoin_xyzw": [0, 0, 0, 1]}}}, "study, set.initial.", "initial.orientation_xyzw?"),
+        ({"reference": {"publish_clok": True}}, "study, reference.publish_clok", "did you mean publish_clock"),
+        ({"reference": {"record": "a.mcap"}}, "reference.record", "a parameter that changes the motion"),
+        ({"vary": {"record": {"grid": ["a.mcap", "b.mcap"]}}}, "study, vary", "a parameter of the motion"),
+        ({**CHANGED, "vary": {"script.1.set.mas": {"grid": [1.0]}}}, "study, vary", "did you mean mass"),
+        ({"vary": {"mass": {"grid": [1.0, True]}}}, "vary.mass", "a finite number"),
+        ({"vary": {"scale": {"grid": [1, [1, 2]]}}}, "vary.scale", "1 or 3 finite numbers"),
         ({"script": [{"t": 0.1, "at": "tipp", "force": [0, 0, 1]}]}, "script, command 1", "tip"),
         ({"script": [{"t": 0.1, "at": "tip", "froce": [0, 0, 1]}]}, "entry 1", "force"),
         ({**NUDGE, "vary": {"script.1.at.vertex": {"grid": [0, 0.5]}}}, "vary.script.1.at.vertex", "{vertex: i}"),
