@@ -88,7 +88,8 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
         verdict.findings.insert(0, Finding("open_accepted", WARNING, message))
     stand_in: Callable[[], Surface] | None = None
     if verdict.united:
-        stand_in = functools.cache(lambda: united_surface(vertices, triangles))
+        outward = triangles[:, [0, 2, 1]] if verdict.inward else triangles
+        stand_in = functools.cache(lambda: united_surface(vertices, outward)[:2])
     elif fallback and verdict.usable and not verdict.closed:
         points = referenced_vertices(vertices, triangles)
         shape, made = ("convex hull", convex_hull) if fallback == "hull" else ("bounding box", box_surface)
@@ -96,6 +97,8 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
         message = f"fallback: the mass properties are those of its {shape}"
         verdict.findings.append(Finding("fallback", WARNING, message))
     remedies = ("" if repair else "--repair (mesh_repair), ") + "--fallback hull|box (mesh_fallback)"
+    if verdict.usable and np.ptp(referenced_vertices(vertices, triangles), axis=0).min() == 0.0:
+        remedies = "a mesh that isn't flat"
     no_solid = "" if verdict.closed else f"{verdict.reason}; use {remedies}"
     moments = MeshMoments(vertices, triangles, polygon_starts, no_solid=no_solid, name=mesh.name, stand_in=stand_in)
     return MeshBody(mesh, verdict, moments)

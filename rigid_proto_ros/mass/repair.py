@@ -15,7 +15,7 @@ from ..base.compilation import njit
 from ..base.rotation import length, times
 from ..mesh.intersection import component_nesting
 from ..mesh.topology import Topology, component_sums, fan, joined_sets, mesh_topology, rims, surplus_copies
-from .verdict import MAX_NESTED_COMPONENTS, counted
+from .verdict import MAX_NESTED_COMPONENTS, counted, wound_wrong
 
 WELD = 1e-5
 """Rim vertices closer than this fraction of the diagonal are welded: the rounding of files with six digits."""
@@ -171,7 +171,7 @@ def _cap_holes(surface: RepairedSurface) -> list[str]:
 
 
 def _turn_outward(surface: RepairedSurface) -> list[str]:
-    """Orient outermost components outward, those inside one of them inward, and so on by parity."""
+    """Orient outermost components outward, those inside one of them inward, and so on; parts that cross stay parts."""
     topology = surface.topology()
     if len(topology.unbalanced) or not 0 < topology.components <= MAX_NESTED_COMPONENTS:
         return []
@@ -180,7 +180,7 @@ def _turn_outward(surface: RepairedSurface) -> list[str]:
     if topology.components > 1:
         nesting = component_nesting(surface.vertices, topology, sums)
         # Components stay as they are if their nesting is unknown.
-        wrong = (np.sign(sums.volume) == np.where(nesting.depth % 2 == 0, -1.0, 1.0)) & nesting.complete
+        wrong = wound_wrong(nesting, sums.volume) & nesting.complete
     if not wrong.any():
         return []
     surface.turn(wrong[topology.component])

@@ -147,11 +147,13 @@ def _check_components(verdict: Verdict, topology: Topology, sums: Components, ve
     elif count > 1 or len(topology.corners) <= MAX_SELF_CROSSING:
         nesting = component_nesting(vertices, topology, sums)
         if nesting.complete:
-            _check_nesting(verdict, nesting, volume)
+            _check_winding(verdict, nesting, volume)
         else:
             verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
         if nesting.crossing:
             _check_overlap(verdict, nesting, whole, vertices, topology.corners)
+        if nesting.complete and not verdict.inward and not verdict.united:
+            _check_nesting(verdict, nesting, volume)
         if nesting.within:
             message = f"the surface passes through itself ({counted(nesting.within, 'pair')} of triangles)"
             verdict.add("self_crossing", WARNING, f"{message}; a volume that it encloses twice counts twice")
@@ -159,46 +161,76 @@ def _check_components(verdict: Verdict, topology: Topology, sums: Components, ve
         verdict.add("inward", WARNING, "all faces were wound inward and have been turned outward")
 
 
-def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> None:
-    """Find the components, of signed volume (k,), that count with the wrong sign."""
-    expected = np.where(nesting.depth % 2 == 0, 1.0, -1.0)
-    matters = volume != 0.0
-    wrong = matters & (np.sign(volume) != expected)
-    verdict.inward = bool(np.all(wrong[matters]) and matters.any())
-    if not verdict.inward:
-        disjoint = int(np.count_nonzero(wrong & (expected > 0.0)))
-        nested = int(np.count_nonzero(wrong & (expected < 0.0)))
-        if disjoint:
-            verdict.winding_consistent = False
-            subtract = f"{disjoint} of {len(volume)} components wound inward, so that they would subtract"
-            message = f"inconsistent winding: {subtract}"
-            verdict.add("component_inward", ERROR, message, "--repair (mesh_repair) turns them")
-        if nested:
-            message = f"{counted(nested, 'component')} inside another and wound outward: their volume counts twice"
-            verdict.add(NESTED, WARNING, message, "--repair (mesh_repair) makes cavities of them")
-    cavities = int(np.count_nonzero((expected < 0.0) & (~wrong | verdict.inward)))
+def wound_wrong(nesting: Nesting, volume: np.ndarray) -> np.ndarray:
+    """Which components (k,), of signed volume (k,), count with the wrong sign: inward in no solid, or outward in one.
+
+    Outermost first, so that those around a component count as they should. One wound outward that crosses others is a
+    part that overlaps them, also where it lies inside another one: a pin that enters the walls around a cavity.
+    """
+    sign, crosses = np.sign(volume), nesting.crosses
+    for c in np.argsort(nesting.depth, kind="stable").tolist():
+        if sign[c] != 0.0 and not (sign[c] > 0.0 and crosses[c]):
+            sign[c] = -1.0 if np.sum(sign[nesting.inside[c]]) > 0.0 else 1.0
+    wrong: np.ndarray = sign != np.sign(volume)
+    return wrong
+
+
+def _check_winding(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> None:
+    """Find components, of signed volume (k,), that subtract: cavities, and those that are no cavities."""
+    verdict.inward = bool(volume.any() and not wound_wrong(nesting, -volume).any())
+    if verdict.inward:
+        volume = -volume
+    subtracts = volume < 0.0
+    wrong = subtracts & wound_wrong(nesting, volume)
+    if wrong.any():
+        verdict.winding_consistent = False
+        subtract = f"{np.count_nonzero(wrong)} of {len(volume)} components wound inward, so that they would subtract"
+        message = f"inconsistent winding: {subtract}"
+        verdict.add("component_inward", ERROR, message, "--repair (mesh_repair) turns them")
+    cavities = int(np.count_nonzero(subtracts & ~wrong))
     if cavities:
         verdict.add("cavities", INFO, f"{counted(cavities, 'closed inner surface')} wound inward, taken as cavities")
+
+
+def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> None:
+    """Find components, of signed volume (k,), that lie inside others and add to them in the sum of all."""
+    nested = int(np.count_nonzero(wound_wrong(nesting, volume) & (volume > 0.0)))
+    if nested:
+        message = f"{counted(nested, 'component')} inside another and wound outward: their volume counts twice"
+        verdict.add(NESTED, WARNING, message, "--repair (mesh_repair) makes cavities of them")
+    around = nesting.inside @ np.sign(volume)
+    parts = int(np.count_nonzero(nesting.crosses & (volume > 0.0) & (around > 0.0)))
+    if parts:  # repair would be wrong: they are parts
+        inside = f"{counted(parts, 'component')} inside another, wound outward and crossing others"
+        verdict.add(NESTED, WARNING, f"{inside}: what they share counts twice")
 
 
 def _check_overlap(
     verdict: Verdict, nesting: Nesting, volume: float, vertices: np.ndarray, triangles: np.ndarray
 ) -> None:
-    """For components that intersect: how much the sum of volumes exceeds that of the union, if it can be computed."""
-    overlap, whole = f"{counted(len(nesting.crossing), 'pair')} of components overlap", 0.0
-    if verdict.closed and not verdict.inward:
+    """For components that intersect: how much the sum of volumes differs from that of the union, if it can be computed.
+
+    Parts that overlap count twice in the sum, what cavities share is missing in it: the two may cancel in the volume
+    and not in the tensor.
+    """
+    overlap, whole, parts = f"{counted(len(nesting.crossing), 'pair')} of components overlap", 0.0, 0.0
+    if verdict.inward:
+        volume, triangles = -volume, triangles[:, [0, 2, 1]]
+    if verdict.closed:
         with contextlib.suppress(MeshError):
-            whole = solid_moments(*united_surface(vertices, triangles, nesting)).measure
+            *surface, parts = united_surface(vertices, triangles, nesting)
+            whole = solid_moments(*surface).measure
     if not whole > 0.0:
         measure = "" if can_unite() else " (the extra [meshes] measures by how much)"
         verdict.add("overlapping_components", WARNING, f"{overlap}; what they share counts twice{measure}")
         return
-    over = abs(volume) / whole - 1.0
-    verdict.united = over > NO_OVERLAP
+    differences = {"overcount": (parts - whole) / whole, "undercount": (parts - volume) / whole}
+    told = [f"{what} {100.0 * part:.3g} %" for what, part in differences.items() if part > NO_OVERLAP]
+    verdict.united = bool(told)
     if not verdict.united:
         verdict.add("overlapping_components", INFO, f"{overlap}, by less than {NO_OVERLAP:g} of the volume")
         return
-    sum_of_parts = f"their volumes' sum of {abs(volume):.4g} would overcount {100.0 * over:.3g} %"
+    sum_of_parts = f"their volumes' sum of {volume:.4g} would {' and '.join(told)}"
     message = f"{overlap}; the solid is their union of {whole:.4g}: {sum_of_parts}"
     verdict.add("overlapping_components", WARNING, message)
 

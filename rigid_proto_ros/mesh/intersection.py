@@ -330,6 +330,13 @@ class Nesting:
         """Number of other components in which each one lies, (k,)."""
         return np.count_nonzero(self.inside, axis=1)
 
+    @property
+    def crosses(self) -> np.ndarray:
+        """Which components intersect another one, (k,) bool."""
+        crosses = np.zeros(len(self.inside), dtype=bool)
+        crosses[np.array(self.crossing, dtype=np.int64).ravel()] = True
+        return crosses
+
 
 def component_nesting(vertices: np.ndarray, topology: Topology, sums: Components) -> Nesting:
     """Nesting, intersections and self-intersections of closed components."""

@@ -26,12 +26,12 @@ def can_unite() -> bool:
 
 def united_surface(
     vertices: np.ndarray, triangles: np.ndarray, nesting: Nesting | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and triangles (m, 3) of the union of closed components that overlap; nesting: theirs, if it is
-    known.
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Vertices (n, 3) and triangles (m, 3) of the union of closed components that overlap, and the sum of the volumes
+    of its parts; nesting: theirs, if it is known.
 
-    Outermost first, components wound outward are added and those wound inward subtracted. Raises MeshError if that
-    isn't possible, or would take too long.
+    Each component wound outward is a part. One wound inward is a cavity of the smallest part around it, and of no other
+    one: what enters a cavity stays. Raises MeshError if that isn't possible, or would take too long.
     """
     refusal = MeshError("mesh", "components that overlap can't be united")
     if not can_unite() or len(triangles) > MAX_UNITED:
@@ -43,19 +43,27 @@ def united_surface(
     nesting = nesting or component_nesting(vertices, topology, sums)
     points = vertices[topology.corners.ravel()]
     middle = 0.5 * points.min(axis=0) + 0.5 * points.max(axis=0)
-    result = manifold3d.Manifold()
-    for c in np.argsort(nesting.depth, kind="stable").tolist():
-        part = topology.corners[topology.component == c]
-        if sums.volume[c] < 0.0:
-            part = part[:, [0, 2, 1]]
-        used, local = np.unique(part, return_inverse=True)
+    cavity = sums.volume < 0.0
+    around = np.where(nesting.inside & (sums.volume > 0.0), sums.volume, np.inf)  # volumes of the parts around each
+    if cavity.any() and not (nesting.complete and np.isfinite(around[cavity].min(axis=1)).all()):
+        raise refusal
+    parts: dict[int, manifold3d.Manifold] = {}
+    for c in np.argsort(cavity, kind="stable").tolist():
+        faces = topology.corners[topology.component == c]
+        if cavity[c]:
+            faces = faces[:, [0, 2, 1]]
+        used, local = np.unique(faces, return_inverse=True)
         local = local.reshape(-1, 3).astype(np.uint64)
         solid = manifold3d.Manifold(manifold3d.Mesh64(vert_properties=vertices[used] - middle, tri_verts=local))
         if solid.status() != manifold3d.Error.NoError:
             raise refusal
-        result = result - solid if sums.volume[c] < 0.0 else result + solid
-    mesh = result.to_mesh64()
-    return np.asarray(mesh.vert_properties)[:, :3] + middle, np.asarray(mesh.tri_verts).astype(np.int64)
+        if cavity[c]:
+            parts[int(np.argmin(around[c]))] -= solid
+        else:
+            parts[c] = solid
+    mesh = sum(parts.values(), manifold3d.Manifold()).to_mesh64()
+    volume = float(sum(part.volume() for part in parts.values()))
+    return np.asarray(mesh.vert_properties)[:, :3] + middle, np.asarray(mesh.tri_verts).astype(np.int64), volume
 
 
 def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -68,7 +76,8 @@ def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         from scipy.spatial import ConvexHull, QhullError
     except ImportError:
         raise MeshError("mesh_fallback", f"hull: {is_missing('scipy', 'meshes')}; box needs no package") from None
-    flat = MeshError("mesh_fallback", "the points lie in one plane and have no hull with a volume; use box instead")
+    remedy = "; use box instead" if np.ptp(points, axis=0).min() > 0.0 else ""
+    flat = MeshError("mesh_fallback", f"the points lie in one plane and have no hull with a volume{remedy}")
     # Scaled to the same extent in all directions, which leaves the hull's faces as they are: Qhull would treat a thin
     # slab at an angle as flat.
     shape = points - 0.5 * (points.min(axis=0) + points.max(axis=0))

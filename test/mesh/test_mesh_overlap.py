@@ -46,6 +46,108 @@ def test_the_union_keeps_a_cavity_and_what_lies_in_it():
     assert volume(body(crossing)) == pytest.approx(64.0 - 8.0 + 1.0 + 0.5, rel=1e-12)
 
 
+CUBE, HOLE, UNIT = (4.0, 4.0, 4.0), (2.0, 2.0, 2.0), (1.0, 1.0, 1.0)
+
+
+def assembly(*parts) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes of (sign, sides, centre), those of sign -1 wound inward, as one mesh."""
+    return together(*(at if sign > 0 else inward(at) for sign, sides, c in parts for at in [moved(box(sides), c)]))
+
+
+def boxes_moments(*boxes) -> tuple[float, np.ndarray, np.ndarray]:
+    """Volume, centroid and tensor at unit density about it of boxes of (sign, sides, centre), added with that sign."""
+    volumes = np.array([sign * np.prod(sides) for sign, sides, _ in boxes])
+    sides, centres = (np.array([part[k] for part in boxes]) for k in (1, 2))
+    centroid = volumes @ centres / volumes.sum()
+    arms = centres - centroid
+    second = (arms.T * volumes) @ arms + np.diag(volumes @ sides**2 / 12.0)
+    return float(volumes.sum()), centroid, np.trace(second) * np.eye(3) - second
+
+
+HOLLOW = (1, CUBE, (0, 0, 0)), (-1, HOLE, (0, 0, 0))
+TWO_HOLES = (1, CUBE, (0, 0, 0)), (-1, UNIT, (0, 0, 0)), (-1, UNIT, (0.5, 0, 0))
+SHARED = (1, (0.5, 1.0, 1.0), (0.25, 0, 0))
+KNOB, KNOB_OUTSIDE = (1, (2.0, 1.0, 1.0), (2.5, 0, 0)), (1, (1.5, 1.0, 1.0), (2.75, 0, 0))
+PIN, PIN_HOLE = (1, (3.0, 1.0, 1.0), (0, 0, 0)), (-1, (2.5, 0.5, 0.5), (0, 0, 0))
+LIDDED = (1, HOLE, (0, 0, 0)), (-1, UNIT, (0.2, 0.1, 0.0)), (1, HOLE, (1.5, 0, 0))
+ISLAND = (1, HOLE, (0, 0, 0)), (-1, UNIT, (0.3, 0, 0))
+UNIONS = {
+    "cavities that overlap": (TWO_HOLES, (*TWO_HOLES, SHARED), "would undercount 0.8 %"),
+    "cavities and parts that overlap by the same": (
+        (*TWO_HOLES, KNOB),
+        (*TWO_HOLES, SHARED, KNOB_OUTSIDE),
+        "sum of 64 would overcount 0.781 % and undercount 0.781 %",
+    ),
+    "a rod that ends in a cavity": (
+        (*HOLLOW, (1, (4.0, 0.5, 0.5), (2, 0, 0))),
+        (*HOLLOW, (1, (1.0, 0.5, 0.5), (0.5, 0, 0)), (1, (2.0, 0.5, 0.5), (3, 0, 0))),
+        "would overcount 0.441 %",
+    ),
+    "a part that fills some of another one's cavity": (
+        LIDDED,
+        (LIDDED[0], (-1, (0.8, 1.0, 1.0), (0.1, 0.1, 0)), (1, (1.5, 2.0, 2.0), (1.75, 0, 0))),
+        "would overcount 13.6 %",
+    ),
+    "a pin from wall to wall of a cavity": ((*HOLLOW, PIN), (*HOLLOW, (1, (2.0, 1.0, 1.0), (0, 0, 0))), "1.72 %"),
+    "a hollow pin from wall to wall": (
+        (*HOLLOW, PIN, PIN_HOLE),
+        (*HOLLOW, (1, (2.0, 1.0, 1.0), (0, 0, 0)), (-1, (2.0, 0.5, 0.5), (0, 0, 0))),
+        "1.52 %",
+    ),
+    "a part in another one that a third one enters": (
+        (HOLLOW[0], (1, UNIT, (0, 0, 0)), KNOB),
+        (HOLLOW[0], KNOB_OUTSIDE),
+        "sum of 67 would overcount 2.29 %",
+    ),
+    "a hollow island in a cavity, and a knob": (
+        (HOLLOW[0], (-1, (3.0, 3.0, 3.0), (0, 0, 0)), *ISLAND, KNOB),
+        (HOLLOW[0], (-1, (3.0, 3.0, 3.0), (0, 0, 0)), *ISLAND, KNOB_OUTSIDE),
+        "1.1 %",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", UNIONS)
+def test_each_cavity_is_cut_out_of_its_own_part_and_what_enters_it_stays(name):
+    pytest.importorskip("manifold3d")
+    parts, union, told = UNIONS[name]
+    expected, surface = boxes_moments(*union), assembly(*parts)
+    for made in (body(surface), body(surface, repair=True)):
+        assert told in message(made, "overlapping_components")
+        assert set(codes(made)) <= {"overlapping_components", "cavities"}  # nothing counts twice, nothing was turned
+        unit = made.moments.mass_properties(density=1.0)
+        assert unit.mass == pytest.approx(expected[0], rel=1e-13)
+        assert unit.center_of_mass == pytest.approx(expected[1], abs=1e-13)
+        assert unit.inertia == pytest.approx(expected[2], rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("parts", [(KNOB, HOLLOW[0]), (*HOLLOW, PIN)])
+def test_parts_that_overlap_have_the_same_union_if_all_are_wound_inward(parts):
+    pytest.importorskip("manifold3d")
+    made = body(inward(assembly(*parts)))
+    assert codes(made)["inward"] == "warning"
+    assert volume(made) == pytest.approx(volume(body(assembly(*parts))), rel=1e-13)
+
+
+def test_repair_makes_no_cavity_of_a_part_that_crosses_others():
+    """A lid's missing face is capped; the pin in the cavity stays a part, with manifold3d or without."""
+    vertices, triangles = assembly(*HOLLOW, PIN)
+    for broken in (triangles[:-1], np.vstack([triangles, triangles[:1]])):
+        repaired = body((vertices, broken), repair=True)
+        assert "turned" not in message(repaired, "repaired")
+        assert np.array_equal(np.sort(repaired.triangles, axis=None), np.sort(triangles, axis=None))
+
+
+def test_without_manifold3d_parts_in_others_are_told_and_only_those_that_cross_none_may_be_turned(monkeypatch):
+    monkeypatch.setattr(solids, "can_unite", lambda: False)
+    monkeypatch.setattr("rigid_proto_ros.mass.verdict.can_unite", lambda: False)
+    inner = body(assembly(HOLLOW[0], (1, UNIT, (0, 0, 0)), KNOB))
+    assert "--repair" in message(inner, "nested_components") and volume(inner) == pytest.approx(67.0)
+    for made in (body(assembly(*HOLLOW, PIN)), body(assembly(*HOLLOW, PIN), repair=True)):
+        assert message(made, "nested_components").endswith("what they share counts twice")
+        assert volume(made) == pytest.approx(59.0)
+
+
 def test_without_manifold3d_the_overlap_is_told_and_the_sum_is_taken(monkeypatch):
     monkeypatch.setattr(solids, "can_unite", lambda: False)
     monkeypatch.setattr("rigid_proto_ros.mass.verdict.can_unite", lambda: False)

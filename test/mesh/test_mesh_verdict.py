@@ -213,6 +213,18 @@ def test_the_fallbacks_are_named_and_stand_in():
         body(opened, fallback="sphere")
 
 
+def test_a_flat_mesh_is_told_no_remedy_that_does_not_help():
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    for options in ({}, {"repair": True}, {"fallback": "hull"}, {"fallback": "box"}):
+        with pytest.raises(MeshError) as refused:
+            volume(body(square, **options))
+        assert not any(word in str(refused.value) for word in ("--repair", "--fallback", "use box"))
+    tilted = square[0] @ rotation(1).T, square[1]
+    with pytest.raises(MeshError, match="use box instead"):
+        volume(body(tilted, fallback="hull"))
+    assert volume(body(tilted, fallback="box")) > 0.0
+
+
 @given(st.integers(0, 2**31), st.integers(4, 60), st.sampled_from(["normal", "sphere", "grid"]), st.floats(-8, 0))
 @settings(deadline=None, max_examples=25)
 def test_the_hull_is_closed_convex_and_holds_every_point(seed, count, kind, exponent):
