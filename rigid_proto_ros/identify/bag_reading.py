@@ -113,7 +113,7 @@ def _chosen_topics(path: Path, choice: Choice) -> dict[str, _Topic]:
 
 
 def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str, tuple[str, str]]:
-    """(topic, frame) by option: those given, else the only one of its types."""
+    """(topic, frame) by option: the given one, else the only one of its types."""
     found = {}
     for kind, text in given.items():
         topic, _, frame = text.partition("@")
@@ -121,8 +121,8 @@ def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str
         if types.get(topic) not in KINDS[kind]:
             raise InputError(f"--{kind}", topic, f"a topic of the bag: {fitting or 'it has no topic of such a type'}")
         found[kind] = (topic, frame)
-    for kind, accepted in KINDS.items() if not given else ():
-        topics = sorted(topic for topic, its_type in types.items() if its_type in accepted)
+    for kind in [kind for kind in KINDS if kind not in given]:
+        topics = sorted(topic for topic, its_type in types.items() if its_type in KINDS[kind])
         if len(topics) > 1:
             several = f"{path} has several {kind} topics, {', '.join(topics)}"
             raise InputError("session", f"{several}; say which with --{kind}")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..mass.export import urdf_inertial
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
 from .fitting import USUAL, Estimate, fit_flights
-from .measurements import ACCELERATION, MeasuredFlight, topics_of
+from .measurements import ACCELERATION, RATE, MeasuredFlight, topics_of
 from .unknowns import DEFAULT_FIT, Values, make_unknowns, possible_tensor
 from .verdict import Identifiability, Quantity, ResidualCheck, Unidentified, check_residuals
 
@@ -157,8 +157,13 @@ def identify(
         if count < FEWEST:
             raise InputError("session", f"{flight.name} has {count} samples", f"at least {FEWEST} poses")
     fit = [group for group in fit if not (group == "mass" and known.mass is not None)]
+    kinds = {series.kind for flight in flights for series in flight.series}
+    for group, kind in {"gyro_bias": RATE, "accel_bias": ACCELERATION, "imu_place": ACCELERATION}.items():
+        if group in fit and kind not in kinds:
+            raise InputError("--fit", f"{group} needs an Imu that measures {kind}: record one, or name it with --imu")
     unknowns = make_unknowns(fit, topics_of(flights))
-    estimate = fit_flights(flights, unknowns, _first_values(flights[0], known))
+    by_flight = frozenset({"gravity", "damping"} - set(fit))
+    estimate = fit_flights(flights, unknowns, replace(_first_values(flights[0], known), by_flight=by_flight))
     given = {"mass": known.mass is not None or known.body is not None}
     guessed = frozenset(name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.body is not None))
     checks = check_residuals(flights, estimate)
@@ -178,14 +183,17 @@ def _first_values(first: MeasuredFlight, known: Known) -> Values:
 
 def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]) -> list[str]:
     """What was taken as given, in words."""
-    first = flights[0]
     lines = []
     if known.mass is not None:
         lines.append(f"mass {known.mass:g} kg, given")
-    if "gravity" not in fit:
-        lines.append(f"gravity {' '.join(f'{g:g}' for g in first.gravity)} m/s², {first.gravity_from}")
-    if "damping" not in fit:
-        lines.append(f"damping {first.linear_damping:g} N s/m, {first.angular_damping:g} N m s")
+    told = {
+        "gravity": [f"gravity {' '.join(f'{g:g}' for g in one.gravity)} m/s², {one.gravity_from}" for one in flights],
+        "damping": [f"damping {one.linear_damping:g} N s/m, {one.angular_damping:g} N m s" for one in flights],
+    }
+    for group, words in told.items():
+        if group not in fit:
+            named = [f"{text}, in {one.name}" for text, one in zip(words, flights, strict=True)]
+            lines += words[:1] if len(set(words)) == 1 else named
     if "imu_place" not in fit and any(s.kind == ACCELERATION for flight in flights for s in flight.series):
         lines.append("the IMU is assumed to be at the tracked frame's origin, with the axes of that frame")
     for topic in dict.fromkeys(f.load_history.topic for f in flights if len(f.load_history.changes)):

@@ -44,8 +44,6 @@ THIN = 1e-2
 """Least second moment of the first body, of the largest."""
 LOOSE = 3.0
 """Standard deviation of what is assumed of shape and, in sizes of the body, of the centre of mass."""
-MOST_LEFT_OUT = 0.3
-"""Part of the rates that may be left out because a load begins or ends within them."""
 POINTS = 8
 """Impulses that stand for a load between two samples, and at least for each load."""
 MOST_POINTS = 200
@@ -147,6 +145,7 @@ class Impulses:
 class _Poses:
     """Of a flight, seconds (n,) from its begin, positions (n, 3) [m], attitudes (n, 4) xyzw, and its loads."""
 
+    flight: ms.MeasuredFlight
     seconds: np.ndarray
     positions: np.ndarray
     attitudes: np.ndarray
@@ -162,8 +161,9 @@ def initial_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, val
         position, attitude = flight.pose
         seconds = 1e-9 * (attitude.times_ns - flight.begin_ns)
         impulses = _impulses_of(flight.load_history, flight.begin_ns, seconds, attitude.values)
-        poses.append(_Poses(seconds, position.values, attitude.values, impulses))
-    for _ in range(2 if values.damping[0] > 0.0 or "damping" in unknowns else 1):
+        poses.append(_Poses(flight, seconds, position.values, attitude.values, impulses))
+    is_slowed = any(flight.own(values).damping[0] > 0.0 for flight in flights)
+    for _ in range(2 if is_slowed or "damping" in unknowns else 1):
         # Drag is that of the centre of mass, whose path has to be known for it.
         values = _from_path(poses, unknowns, values)
     return _from_turns(poses, unknowns, values)
@@ -204,23 +204,23 @@ def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: np.ndarray, at
 
 def _from_path(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> Values:
     """With centre of mass, mass and linear damping from how the centre of mass moves."""
-    is_damped, drag, rows = "damping" in unknowns, float(values.damping[0]), []
-    for one in poses:
+    is_damped, drags, rows = "damping" in unknowns, [one.flight.own(values).damping[0] for one in poses], []
+    for one, drag in zip(poses, drags, strict=True):
         t = one.seconds[:, None]
         # Columns of the attitude's matrix are its turned axes.
         turns = rot.turned(one.attitudes[:, None], np.eye(3)[None]).transpose(0, 2, 1)
-        right = 0.5 * t * t * values.gravity - one.positions
+        right = 0.5 * t * t * one.flight.own(values).gravity - one.positions
         moved = -_integral(one.seconds, one.positions + turns @ values.center_of_mass - one.positions[0])
         pushed = one.impulses.path(one.seconds) + (0.0 if is_damped else drag) * moved
         columns = [turns, -pushed[:, :, None], -moved[:, :, None], right[:, :, None]]
         rows.append(_without(np.hstack([np.ones_like(t), t]), np.concatenate(columns, axis=2)))
-    is_pushed = drag > 0.0 or any(len(one.impulses.seconds) for one in poses)
+    is_pushed = any(drag > 0.0 for drag in drags) or any(len(one.impulses.seconds) for one in poses)
     free = np.array(["com" in unknowns] * 3 + ["mass" in unknowns and is_pushed, is_damped])
     known = np.array([*values.center_of_mass, 1.0 / values.mass, 0.0])
     found, sds = _solved(np.concatenate(rows), free, known, np.array([LOOSE * values.size] * 3 + [np.inf] * 2))
     mass = 1.0 / float(found[3]) if free[3] and found[3] > TOLD * sds[3] else values.mass
     inertia = values.inertia * (mass / values.mass)
-    damping = np.array([max(float(found[4]) * mass, 0.0) if is_damped else drag, values.damping[1]])
+    damping = np.array([max(float(found[4]) * mass, 0.0) if is_damped else values.damping[0], values.damping[1]])
     return replace(values, mass=mass, inertia=inertia, center_of_mass=found[:3], damping=damping)
 
 
@@ -228,17 +228,20 @@ def _from_turns(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> 
     """With tensor and angular damping from how the body turns."""
     if "inertia" not in unknowns:
         return values
-    is_damped, drag, rows = "damping" in unknowns, float(values.damping[1]), []
-    for one in poses:
-        seconds, attitudes, rates = _rates(one)
+    is_damped, drags, rows = "damping" in unknowns, [one.flight.own(values).damping[1] for one in poses], []
+    for one, drag in zip(poses, drags, strict=True):
+        begin, end, attitudes, rates = _rates(one)
+        seconds = 0.5 * (begin + end)
         shape = np.stack([rot.turned(attitudes, rates @ basis) for basis in _SHAPES], axis=2)
-        pushed = one.impulses.momentum(seconds, one.impulses.about(values.center_of_mass))
+        angular = replace(one.impulses, impulses=one.impulses.about(values.center_of_mass))
+        # A rate is the mean over its time, so the momentum is too: a load may begin, end or act at once within it.
+        pushed = (angular.path(end) - angular.path(begin)) / (end - begin)[:, None]
         turned = rot.turned(attitudes, rates)
         slowed = -_integral(seconds, turned)
         pushed = pushed + (0.0 if is_damped else drag) * slowed
         columns = [shape, -pushed[:, :, None], -slowed[:, :, None], -turned[:, :, None] / 3.0]
         rows.append(_without(np.ones((len(seconds), 1)), np.concatenate(columns, axis=2)))
-    is_pushed = drag > 0.0 or any(len(one.impulses.seconds) for one in poses)
+    is_pushed = any(drag > 0.0 for drag in drags) or any(len(one.impulses.seconds) for one in poses)
     trace = float(np.trace(values.inertia))
     before = [np.sum(basis * values.inertia) / trace / np.sum(basis * basis) for basis in _SHAPES]
     free, known = np.array([True] * 5 + [is_pushed, is_damped]), np.array([*before, 1.0 / trace, 0.0])
@@ -246,12 +249,14 @@ def _from_turns(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> 
     tensor = possible_tensor(np.eye(3) / 3.0 + np.tensordot(found[:5], _SHAPES, 1), THIN)
     if is_pushed and found[5] > TOLD * sds[5]:
         trace = 1.0 / float(found[5])
-    damping = np.array([values.damping[0], max(float(found[6]) * trace, 0.0) if is_damped else drag])
+    damping = np.array([values.damping[0], max(float(found[6]) * trace, 0.0) if is_damped else values.damping[1]])
     return replace(values, inertia=trace * tensor, damping=damping)
 
 
-def _rates(poses: _Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Seconds (m,), attitudes (m, 4) and angular velocities (m, 3) [rad/s, body axes] midway between two attitudes."""
+def _rates(poses: _Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Between two attitudes each: begin and end (m,) [s], attitudes midway (m, 4), and mean angular velocities (m, 3)
+    [rad/s, body axes].
+    """
     step = float(np.median(np.linalg.norm(rot.turns(poses.attitudes), axis=1)))
     apart = int(np.clip(TURN / max(step, 1e-9), 1, max(len(poses.seconds) // 8, 1)))
     begin, end = poses.seconds[:-apart], poses.seconds[apart:]
@@ -259,11 +264,7 @@ def _rates(poses: _Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     middle = rot.product(poses.attitudes[:-apart], rot.exponential(0.5 * turn))
     # Over a gap the body may have turned by any number of times.
     kept = end - begin < 3.0 * float(np.median(end - begin))
-    pushed = poses.impulses.seconds
-    acts = np.searchsorted(pushed, begin) < np.searchsorted(pushed, end, side="right")
-    if np.sum(kept & acts) < MOST_LEFT_OUT * np.sum(kept):
-        kept &= ~acts
-    return (0.5 * (begin + end))[kept], middle[kept], (turn / (end - begin)[:, None])[kept]
+    return begin[kept], end[kept], middle[kept], (turn / (end - begin)[:, None])[kept]
 
 
 def _without(basis: np.ndarray, columns: np.ndarray) -> np.ndarray:

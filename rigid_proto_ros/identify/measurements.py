@@ -14,6 +14,7 @@ from ..motion.loads import LOAD
 from ..simulation.flight import IMPULSE, PULSE
 from . import rotations as rot
 from .trajectories import Wrenches
+from .unknowns import Values
 
 POSITION, ATTITUDE, RATE, ACCELERATION = "position", "attitude", "rate", "acceleration"
 UNITS = {POSITION: "m", ATTITUDE: "rad", RATE: "rad/s", ACCELERATION: "m/s²"}
@@ -140,6 +141,15 @@ class MeasuredFlight:
                 if (attitude.kind, position.kind, position.topic) == (ATTITUDE, POSITION, attitude.topic):
                     return position, attitude
         raise InputError("session", f"{self.name} has no poses", "poses, transforms or odometry")
+
+    def own(self, values: Values) -> Values:
+        """``values`` with the gravity and damping of this flight, where each has its own."""
+        gravity, damping = values.gravity, values.damping
+        if "gravity" in values.by_flight:
+            gravity = np.array(self.gravity, float)
+        if "damping" in values.by_flight:
+            damping = np.array([self.linear_damping, self.angular_damping])
+        return replace(values, gravity=gravity, damping=damping)
 
     @cached_property
     def high_rate(self) -> float:

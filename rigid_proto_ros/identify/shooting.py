@@ -156,7 +156,8 @@ def difference(series: ms.Series, one: np.ndarray, other: np.ndarray) -> np.ndar
 def segment_residuals(segment: Segment, start: np.ndarray, values: Values) -> list[np.ndarray] | None:
     """Measured minus shown of each series (m, 3), in its own unit; None where the flight failed."""
     times, where = _times(segment, values)
-    samples, good = tr.fly_rows(flown_rows(start[None], [values]), times, segment.wrenches(start, values))
+    rows = flown_rows(start[None], [segment.flight.own(values)])
+    samples, good = tr.fly_rows(rows, times, segment.wrenches(start, values))
     if not good.all():
         return None
     sensor = sensor_numbers(values)
@@ -205,10 +206,10 @@ class Variations:
         self._changes = np.zeros((len(self._flown), START))
         self._changes[1 : 1 + START] = np.diag(start_steps)
 
-    def rows(self, start: np.ndarray) -> np.ndarray:
-        """Flights from about ``start`` as ``trajectories.fly_rows`` takes them (f, FLOWN)."""
+    def rows(self, flight: ms.MeasuredFlight, start: np.ndarray) -> np.ndarray:
+        """Variations of a flight from about ``start`` as ``trajectories.fly_rows`` takes them (f, FLOWN)."""
         starts = moved_starts(np.repeat(start[None, :STATE], len(self._flown), axis=0), self._changes)
-        return flown_rows(starts, self._flown)
+        return flown_rows(starts, [flight.own(values) for values in self._flown])
 
 
 def linearized(
@@ -222,7 +223,7 @@ def linearized(
     values, unknowns = variations.values, variations.unknowns
     extra = len(segment.change_sds_s)
     times, where = _times(segment, values)
-    samples, good = tr.fly_rows(variations.rows(start), times, segment.wrenches(start, values))
+    samples, good = tr.fly_rows(variations.rows(segment.flight, start), times, segment.wrenches(start, values))
     if not good.all():
         return None
     columns = np.zeros((START + extra + len(unknowns) + 1, 3 * segment.samples))

@@ -31,7 +31,7 @@ class Values:
     frame]; damping (2,): linear [N s/m], angular [N m s]; gravity (3,) [m/s²].
 
     offsets [s] by topic: what is stamped t happened at t + offset. gyro_bias (3,) [rad/s], accel_bias (3,) [m/s²], and
-    imu_place (3,) [m, tracked frame] of the IMU.
+    imu_place (3,) [m, tracked frame] of the IMU. by_flight: ``gravity`` or ``damping``, where each flight has its own.
     """
 
     mass: float
@@ -43,6 +43,7 @@ class Values:
     gyro_bias: np.ndarray
     accel_bias: np.ndarray
     imu_place: np.ndarray
+    by_flight: frozenset[str] = frozenset()
 
     @property
     def size(self) -> float:

@@ -84,6 +84,27 @@ def test_two_sessions_of_one_body_are_fitted_together(flight: tuple, capsys: pyt
     assert two["mass"]["sd"] == pytest.approx(one["mass"]["sd"] / 2.0**0.5, rel=0.05)
 
 
+def test_sessions_of_two_gravities_count_each_with_its_own(flight: tuple, capsys: pytest.CaptureFixture) -> None:
+    folder = flight[1]["folder"]
+    fall = ["--script", str(folder / "pokes.yaml"), "--duration", "1", "--set", "gravity=[0, 0, -9.81]"]
+    assert main(["simulate", "t_handle", *fall, "--bag", str(folder / "fall.mcap")]) == 0
+    truth, found = _inspected(capsys), _json(capsys, str(folder / "fall.mcap"), str(flight[0]))
+    assert found["fits"]
+    assert found["mass"]["value"] == pytest.approx(truth["mass"], rel=1e-5)
+
+
+@pytest.mark.parametrize("first", ["0.5", "0.7"])
+def test_a_session_from_the_middle_of_a_long_push_on_tells_the_body(
+    first: str, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    script, bag = tmp_path / "push.yaml", tmp_path / "push.mcap"
+    script.write_text("- {t: 0.2, at: tip, force: [0.05, 0.02, 0], duration: 1}\n")
+    assert main(["simulate", "t_handle", "--script", str(script), "--duration", "3", "--bag", str(bag)]) == 0
+    truth, found = _inspected(capsys), _json(capsys, str(bag), "--from", first)
+    assert found["fits"]
+    assert found["inertia"]["iyy"]["value"] == pytest.approx(truth["inertia"][1][1], rel=1e-4)
+
+
 def test_before_the_poke_its_mass_is_no_number(flight: tuple, capsys: pytest.CaptureFixture) -> None:
     found = _json(capsys, str(flight[0]), "--to", "0.5")
     assert found["mass"] is None
@@ -107,6 +128,8 @@ def test_its_urdf_is_an_inertial(flight: tuple, capsys: pytest.CaptureFixture) -
         (["FLIGHT", "--fit", "mass,colour"], "--fit"),
         (["FLIGHT", "--to", "0.5", "--urdf"], "--urdf"),
         (["FLIGHT", "--pose", "/elsewhere"], "--pose"),
+        (["FLIGHT", "--fit", "mass,gyro_bias"], "gyro_bias needs an Imu that measures rate"),
+        (["FLIGHT", "--fit", "imu_place"], "imu_place needs an Imu that measures acceleration"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(

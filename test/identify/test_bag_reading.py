@@ -201,3 +201,17 @@ LATE = [(t, fb.imu(t, (0, 0, 0), (0, 0, 0))) for t in range(100 * 10**9, 101 * 1
 def test_a_topic_that_cannot_be_used_is_named(tmp_path: Path, others: dict, topics: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
         bag_flight(_poses(tmp_path, **others), Choice(topics))
+
+
+def test_naming_one_topic_leaves_the_others_to_be_found(tmp_path: Path) -> None:
+    pushes = [(t, fb.wrench(t, FORCE, TORQUE, "base")) for t in (0, 10**8)]
+    bag = _poses(tmp_path, **{"/w": (WRENCH, pushes)})
+    for topics in ({"wrench": "/w@body"}, {"pose": "/pose", "wrench": "/w@body"}):
+        flight = bag_flight(bag, Choice(topics))
+        assert flight.pose[0].topic == "/pose"
+        assert len(flight.load_history.loads)
+    with pytest.raises(InputError, match="/w in frame 'base'"):
+        bag_flight(bag, Choice({"pose": "/pose"}))
+    several = _poses(tmp_path, **{"/w": (WRENCH, pushes), "/v": (WRENCH, pushes)})
+    with pytest.raises(InputError, match="several wrench topics, /v, /w; say which with --wrench"):
+        bag_flight(several, Choice({"pose": "/pose"}))

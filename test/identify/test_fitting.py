@@ -12,8 +12,10 @@ import pytest
 
 from rigid_proto_ros.identify import shooting as sh
 from rigid_proto_ros.identify.identification import as_text, identify
+from rigid_proto_ros.identify.initial_estimate import initial_values
 from rigid_proto_ros.identify.measurements import SampledChanges, topics_of
 from rigid_proto_ros.identify.unknowns import (
+    DEFAULT_FIT,
     GROUPS,
     make_unknowns,
     second_moments,
@@ -70,6 +72,34 @@ def test_a_poked_throw_tells_all_ten_parameters() -> None:
     assert found.mass.sd < 0.01 * found.mass.value
     assert all(check.is_white for check in found.checks)
     assert not found.remarks
+
+
+@pytest.mark.parametrize("damping", [(0.0, 0.0), (0.2, 2e-3)])
+def test_flights_with_gravity_and_damping_of_their_own_give_one_body(damping: tuple[float, float]) -> None:
+    still = _body(damping)
+    fallen = dataclasses.replace(_body(), gravity=np.array([0.0, 1.62, 0.0]))
+    flights = []
+    for seed, (truth, poke) in enumerate(((_body(), POKE), (still, (1.0, *POKE[1:])), (fallen, (0.2, *POKE[1:])))):
+        flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(seed), 2.0, load=mf.load_history(poke))
+        linear, angular = truth.damping
+        own = {"linear_damping": linear, "angular_damping": angular, "name": f"flight {seed}"}
+        flights.append(dataclasses.replace(flight, **own))
+    found = identify(flights)
+    assert found.fits
+    assert np.mean(study.normalised_errors(found, _body()) ** 2) < 2.5  # .49, .59
+    assert "gravity 0 1.62 0 m/s², from the scene, in flight 2" in found.assumed
+
+
+@pytest.mark.parametrize("push", [(-0.3, 0.7), (0.3, 0.7), (0.5, 0.05), (0.5, 0.0)])
+def test_the_first_body_is_near_for_long_and_short_pushes(push: tuple[float, float]) -> None:
+    begin, duration = push
+    truth = _body()
+    strength = 0.1 / (duration or 1.0)
+    load = mf.load_history((begin, duration, "world", (0.05, 0.02, 0.0), (0.0, strength, 3.0 * strength), (0, 0, 0)))
+    flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 2.0, load=load)
+    ball = mf.values_of(1.0, (0, 0, 0), 4e-3 * np.eye(3), study.EARTH)
+    first = initial_values([flight], make_unknowns(DEFAULT_FIT, topics_of([flight])), ball)
+    assert np.linalg.norm(first.inertia - truth.inertia) < 0.1 * np.linalg.norm(truth.inertia)  # .006 to .012
 
 
 def test_a_weak_poke_late_in_a_long_fall_tells_the_mass_too() -> None:

@@ -37,11 +37,15 @@ def test_paused_the_last_wrench_acts_at_the_step(kilogram, forces):
     assert twist["twist"]["linear"]["x"] == pytest.approx(1e-2 * forces[-1][0], rel=1e-12)
 
 
-def test_paused_a_parameter_set_to_its_present_value_holds_after_a_list_that_waits(kilogram):
+@pytest.mark.parametrize("list_first", [True, False])
+def test_paused_a_parameter_set_to_its_present_value_holds_after_a_list_that_waits(kilogram, list_first):
     kilogram.start_over(paused=True)
+    if not list_first:
+        kilogram.set(gravity=[0.0, 0.0, 0.0])
     kilogram.schedule("[{t: 0, set: {gravity: [0, 0, -5]}}]")
-    kilogram.until_received(1)
-    kilogram.set(gravity=[0.0, 0.0, 0.0])
+    kilogram.until_received(kilogram.sent)
+    if list_first:
+        kilogram.set(gravity=[0.0, 0.0, 0.0])
     assert kilogram.trigger("step")["success"]
     _, twist = kilogram.state_at(10 * MS)
     assert twist["twist"]["linear"]["z"] == 0.0 and list(kilogram.get("gravity")["gravity"]) == [0.0, 0.0, 0.0]
