@@ -277,6 +277,9 @@ def node_load() -> str:
     latency = "wrench to first twist showing it, 1 kHz"
     median, late = (f"{found[latency, figure]:.1f} ms" for figure in ("p50", "p99"))
     sentence = _measured_on(measured[0]) + f" From a wrench to the first twist that shows it: {median}, at 99 % {late}."
+    flood = "10 000 wrenches per second"
+    sent, received, lost = (f"{found[flood, figure]:,.0f}" for figure in ("sent", "received", "lost"))
+    sentence += f" Of {sent} wrenches, 10,000 per second, {received} were taken, and {lost} were counted as lost."
     return f"{sentence}\n\n{_table(('node', 'share of a core', 'publications per second'), rows)}"
 
 
