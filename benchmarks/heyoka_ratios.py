@@ -53,7 +53,6 @@ COLUMNS = (
     "heyoka_whole_us",
     "ratio",
     "whole_ratio",
-    "vectors",
 )
 """us: the flight alone. whole_us: set back and, of ours, commands submitted, then flown; nan of a kernel alone."""
 
@@ -201,12 +200,6 @@ def curves(problem: Problem, seconds: float) -> dict[str, list[dict]]:
     return {what: sorted(rows, key=lambda r: r["median_s"]) for what, rows in found.items() if rows}
 
 
-def vector_unit() -> str:
-    """The widest vectors of doubles that this processor has, as Linux names them."""
-    flags = next((line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags")), "")
-    return next((name for name in ("avx512f", "avx2", "sse2") if name in flags.split()), "unknown")
-
-
 def whole_at_error(rows: list[dict], target: float) -> float:
     """``time_at_error`` of all that a flight takes."""
     return time_at_error([{**row, "median_s": row["whole_s"]} for row in rows], target)
@@ -227,7 +220,7 @@ def main() -> None:
                 all_mine = float("nan") if what == "kernel" else whole_at_error(rows, target)
                 row = {"problem": name, "what": what, "error_rad": target, "us": 1e6 * mine, "whole_us": 1e6 * all_mine}
                 row |= {"heyoka_us": 1e6 * theirs, "heyoka_whole_us": 1e6 * all_theirs, "ratio": theirs / mine}
-                table.add({**row, "whole_ratio": all_theirs / all_mine, "vectors": vector_unit()})
+                table.add({**row, "whole_ratio": all_theirs / all_mine})
                 print(
                     f"{name} at {target:g} rad: {what} {1e6 * mine:.2f} us, heyoka {1e6 * theirs:.2f} us: "
                     f"{theirs / mine:.2f}; set back and submitted too {all_theirs / all_mine:.2f}",

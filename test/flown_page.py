@@ -8,22 +8,27 @@ import io
 import re
 import time
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from contextlib import chdir
+from contextlib import chdir, contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 from viser._messages import GuiUpdateMessage
 from workbench_page import bare_page
 
 from rigid_proto_ros.base.rotation import rotate
 from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
+from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.scene.scenario import Scenario, nanoseconds, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.simulation.commands import Command
 from rigid_proto_ros.simulation.observer import Event, Observer, Published, Reset
+from rigid_proto_ros.workbench import controls
+from rigid_proto_ros.workbench import page as page_module
+from rigid_proto_ros.workbench.lessons import FREE
 from rigid_proto_ros.workbench.main import Workbench
 from rigid_proto_ros.workbench.pointer import DrawnPose
 
@@ -44,6 +49,16 @@ class Rows(Observer):
             self.rows.append((event.time_ns, np.array([*row[:10], *rotate(*row[3:7], *row[10:13])])))
         elif isinstance(event, Reset):
             self.rows.clear()
+
+
+@contextmanager
+def without_waiting() -> Iterator[None]:
+    """What a page waits for the sake of people's hands takes no time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page_module, "GRACE_S", 0.0)
+        patch.setattr(controls, "TYPING_S", 0.0)
+        patch.setattr(controls, "TOUCHED_S", 0.0)
+        yield
 
 
 class FlownPage:
@@ -190,6 +205,12 @@ class FlownPage:
         self.until(lambda: self.page.lessons._asked, "question")
         self.do(lambda: self.page.lessons.answer(0))
         self.fly(0.0)
+
+    def start_over(self) -> None:
+        """The first lesson anew; nothing said."""
+        self.set("Lesson", FREE)
+        self.pick(lesson("t_handle").title)
+        self.said.clear()
 
     def click(self, mesh_point, direction=None) -> None:
         """Click on the body, as it is drawn, where it has this point; direction of the view (3,) [world]."""

@@ -107,7 +107,7 @@ def masses() -> str:
         errors = [found[tool, mesh, at]["inertia_error"] for mesh, at in _INERTIA_ERRORS]
         time = f"{float(place['ns_per_triangle']):,.0f}"
         rows.append((tool, place["version"], time, *(_error(error) for error in errors)))
-    sentence = f"Measured {place['date'][:10]} on one {place['cpu']}, in one process, medians."
+    sentence = f"{_measured_on(place)}, in one process, medians."
     head = (
         "tool",
         "version",
@@ -147,7 +147,7 @@ def readers() -> str:
         rows.append((f"`{ending}`", name, *cells))
     row = measured[0]
     versions = {row["tool"]: row["version"] for row in measured}
-    sentence = f"Measured {row['date'][:10]} on one {row['cpu']}, in one process"
+    sentence = f"{_measured_on(row)}, in one process"
     if row["what"] == "time":
         sentence += f", shortest of seven; {int(float(row['triangles'])):,} triangles where a time stands"
     head = ("format", "file", "rigid_proto", f"trimesh {versions['trimesh']}")
@@ -224,7 +224,7 @@ def motions() -> str:
         for tool in versions
     ]
     newest = max(measured, key=lambda row: row["date"])
-    sentence = f"Measured {newest['date'][:10]} on one {newest['cpu']}, in one process, medians of whole runs."
+    sentence = f"{_measured_on(newest)}, in one process, medians of whole runs."
     return f"{sentence}\n\n{_table(('tool', 'version', *_MOTIONS.values()), rows)}"
 
 
@@ -276,7 +276,7 @@ def node_load() -> str:
             rows.append((what, f"{found[what, figure]:.1f} %", "" if rate is None else f"{rate:.0f}"))
     latency = "wrench to first twist showing it, 1 kHz"
     median, late = (f"{found[latency, figure]:.1f} ms" for figure in ("p50", "p99"))
-    sentence = _measured_on(measured[0]) + f" From a wrench to the first twist that shows it: {median}, at 99 % {late}."
+    sentence = f"{_measured_on(measured[0])}. From a wrench to the first twist that shows it: {median}, at 99 % {late}."
     flood = "10 000 wrenches per second"
     sent, received, lost = (f"{found[flood, figure]:,.0f}" for figure in ("sent", "received", "lost"))
     sentence += f" Of {sent} wrenches, 10,000 per second, {received} were taken, and {lost} were counted as lost."
@@ -287,11 +287,11 @@ def skipped_work() -> str:
     """Work that is left out, and what it would cost, from the last benchmark's own numbers."""
     measured = read_rows(RESULTS / "node_skips.csv")
     rows = [(row["skipped"], *(f"{row[cost]:.3g} {row['unit']}" for cost in ("done", "as_it_is"))) for row in measured]
-    return f"{_measured_on(measured[0])}\n\n{_table(('work', 'if done', 'as it is'), rows)}"
+    return f"{_measured_on(measured[0])}.\n\n{_table(('work', 'if done', 'as it is'), rows)}"
 
 
 def _measured_on(row: dict) -> str:
-    return f"Measured {row['date'][:10]} on one {row['cpu']}."
+    return f"Measured {row['date'][:10]} on one {row['cpu']}"
 
 
 def lesson_table() -> str:

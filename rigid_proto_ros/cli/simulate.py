@@ -157,6 +157,8 @@ def _warn(message: str) -> None:
 
 
 def _print_summary(result: dict, recordings: list[str]) -> None:
+    from ..rerun_view.session_files import is_mcap
+
     def vector(name: str, unit: str = "") -> str:
         return f"{' '.join(f'{x: .9g}'.ljust(16) for x in result[name])} {unit}".rstrip()
 
@@ -174,8 +176,6 @@ def _print_summary(result: dict, recordings: list[str]) -> None:
     }
     for name, value in rows.items():
         print(f"{name:16s} {value}")
-    from ..rerun_view.session_files import is_mcap
-
     for file in recordings:
         show = ["rerun", file]
         if is_mcap(file):

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,31 +23,11 @@ from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.simulation.observer import Published, SceneChanged
 from rigid_proto_ros.simulation.simulation import Simulation
-from rigid_proto_ros.workbench import controls
-from rigid_proto_ros.workbench import page as page_module
 from rigid_proto_ros.workbench.flight import COMPILING, RunMemory
 from rigid_proto_ros.workbench.lessons import COURSES, FREE
 from rigid_proto_ros.workbench.page import CLASS_LABELS
 from rigid_proto_ros.workbench.panel import CENTRE_OF_MASS, SEE_INTO, motion_words
 from rigid_proto_ros.workbench.readouts import ENERGY, PLOTTED_S, SPEED
-
-
-@pytest.fixture(scope="module")
-def flown() -> Iterator[FlownPage]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page_module, "GRACE_S", 0.0)
-        patch.setattr(controls, "TYPING_S", 0.0)
-        patch.setattr(controls, "TOUCHED_S", 0.0)
-        page = FlownPage()
-        yield page
-        page.end()
-
-
-@pytest.fixture(autouse=True)
-def at_the_start(flown: FlownPage) -> None:
-    flown.set("Lesson", FREE)
-    flown.pick(lesson("t_handle").title)
-    flown.said.clear()
 
 
 def test_a_lesson_that_asks_begins_at_its_time_0_with_its_ghost_however_fast_time_goes(

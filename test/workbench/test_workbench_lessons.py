@@ -12,13 +12,12 @@ import pytest
 
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
-from flown_page import FlownPage
+from flown_page import FlownPage, without_waiting
 
 from rigid_proto_ros.base.bundled import scene_names
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
-from rigid_proto_ros.workbench import controls, readouts
-from rigid_proto_ros.workbench import page as page_module
+from rigid_proto_ros.workbench import readouts
 from rigid_proto_ros.workbench.lessons import COURSES, FREE, LessonProgress
 from rigid_proto_ros.workbench.panel import PATHS
 
@@ -175,10 +174,7 @@ STEPS: dict[str, tuple[tuple[tuple, ...], ...]] = {
 
 @pytest.fixture(scope="module")
 def user() -> Iterator[User]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page_module, "GRACE_S", 0.0)
-        patch.setattr(controls, "TYPING_S", 0.0)
-        patch.setattr(controls, "TOUCHED_S", 0.0)
+    with without_waiting():
         user = User()
         yield user
         user.end()

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,30 +16,8 @@ from flown_page import FlownPage, flies_again
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.mesh.locate import resolve_mesh
-from rigid_proto_ros.scene.lessons import lesson
-from rigid_proto_ros.workbench import controls
-from rigid_proto_ros.workbench import page as page_module
 from rigid_proto_ros.workbench.controls import NEW_WEIGHT
-from rigid_proto_ros.workbench.lessons import FREE
 from rigid_proto_ros.workbench.panel import SPEEDS
-
-
-@pytest.fixture(scope="module")
-def flown() -> Iterator[FlownPage]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page_module, "GRACE_S", 0.0)
-        patch.setattr(controls, "TYPING_S", 0.0)
-        patch.setattr(controls, "TOUCHED_S", 0.0)
-        page = FlownPage()
-        yield page
-        page.end()
-
-
-@pytest.fixture(autouse=True)
-def at_the_start(flown: FlownPage) -> None:
-    flown.set("Lesson", FREE)
-    flown.pick(lesson("t_handle").title)
-    flown.said.clear()
 
 
 def every_option_is_there_once(flown: FlownPage) -> None:

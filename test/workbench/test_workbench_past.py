@@ -3,21 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 
 pytest.importorskip("viser")
 from flown_page import FlownPage
 
+from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.workbench.readouts import ENERGY, MOMENTUM
-
-
-@pytest.fixture
-def flown() -> Iterator[FlownPage]:
-    page = FlownPage()
-    yield page
-    page.end()
 
 
 def look_back(flown: FlownPage, seconds: float) -> None:
@@ -111,13 +103,10 @@ def test_a_reset_ends_a_drag(flown: FlownPage, by_the_page: bool) -> None:
     assert flown.live.loop.simulation.string is None
 
 
-def test_a_ghost_that_is_switched_off_is_gone_from_the_picture() -> None:
-    flown = FlownPage("true_or_box_tensor")
-    try:
-        flown.fly(0.2)
-        assert flown.page.picture.ghost is not None
-        set_parameters(flown, ghost__inertia_model="")
-        flown.fly(0.1)
-        assert flown.page.picture.ghost is None and flown.page._ghost_state() is None
-    finally:
-        flown.end()
+def test_a_ghost_that_is_switched_off_is_gone_from_the_picture(flown: FlownPage) -> None:
+    flown.pick(lesson("true_or_box_tensor").title)
+    flown.fly(0.2)
+    assert flown.page.picture.ghost is not None
+    set_parameters(flown, ghost__inertia_model="")
+    flown.fly(0.1)
+    assert flown.page.picture.ghost is None and flown.page._ghost_state() is None
