@@ -128,8 +128,10 @@ class LiveParameters:
             named |= {p.name: p for p in _as_ros({name: 0.0})}
         # What is so already is no change: a dump of this very node can be loaded. But a command that acts before may
         # change it: one that waits, or comes while time stands.
-        counts = self._live.paused or self._live.loop.simulation.has_pending
-        changed = [p for p in named.values() if not self._is_in_force(p) or (counts and not is_read_only(p.name))]
+        waiting = named.keys() if self._live.paused else self._live.loop.simulation.waiting_parameters
+        changed = [
+            p for p in named.values() if not self._is_in_force(p) or (p.name in waiting and not is_read_only(p.name))
+        ]
         fixed = [p.name for p in changed if is_read_only(p.name)]
         if fixed:
             return SetParametersResult(successful=False, reason=f"{', '.join(fixed)}: can be set at start only")

@@ -581,9 +581,10 @@ class Simulation:
         return length(moved) / size if size > 0.0 else 0.0
 
     @property
-    def has_pending(self) -> bool:
-        """Whether commands wait for their time."""
-        return bool(self._pending)
+    def waiting_parameters(self) -> set[str]:
+        """Names of the parameters that commands set which wait for their time; from any thread."""
+        waiting = [pending.command for *_, pending in list(self._pending)]
+        return {name for command in waiting if isinstance(command, Change) for name in command.content}
 
     @property
     def at_rest(self) -> bool:

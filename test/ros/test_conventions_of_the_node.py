@@ -160,6 +160,10 @@ def test_a_nodes_own_dump_can_be_loaded_and_what_differs_acts(rig):
     """What ros2 param load sends: one set_parameters request with all of a file, which sets one after another."""
     own = rig.get(*rig.names())
     own["gravity"] = [0.0, 0.0, -1.0]
+    # What waits and sets none of them makes no difference.
+    rig.schedule("[{t: 1000, impulse: [0, 0, 0.001]}, {t: 1000, set: {string.stiffness: 7}}]")
+    rig.until_received(rig.sent)
+    del own["string.stiffness"]
     assert {tuple(result) for result in rig.set_named(own)} == {(True, "")}
     (event,) = rig.wait_event("set")
     assert event["content"] == {"gravity": [0.0, 0.0, -1.0]}
