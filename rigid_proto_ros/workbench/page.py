@@ -145,7 +145,6 @@ class Page:
         self._loads: dict[int, LoadBegan] = {}
         self._strings: list[StringChanged] = []
         self._ghost_row: np.ndarray | None = None
-        self._hidden_ghost: Setup | None = None
         self._drawn_moment_ns: int | None = None
         self._new_scene = True
         self._scenes_seen = 0
@@ -411,7 +410,6 @@ class Page:
             return
         if self._drawn_moment_ns is None:
             # Of the ghost no past is kept.
-            self._hidden_ghost = self.picture.ghost
             self.picture.set_ghost(moment_ns, None)
         self._drawn_moment_ns = moment_ns
         setup = self.flight.memory.setup_at(moment_ns)
@@ -446,13 +444,14 @@ class Page:
         self._draw_body(self.live.state.time_ns, self.live.scenario.setup)
         self.picture.restart()
         self.backend.forget()
-        if self._hidden_ghost is not None:
-            self.picture.set_ghost(self.live.state.time_ns, self._hidden_ghost)
         self._loads.clear()
-        simulation = self.live.loop.simulation
+        loop = self.live.loop
 
         def introduce() -> None:
+            simulation, ghost = loop.simulation, loop.ghost
             simulation.introduce(self._told)
+            if ghost is not None:
+                ghost.announce()
             self._told.on(Published(simulation.time_ns, simulation.state.row))
 
         threading.Thread(target=self.live.call, args=(introduce,), daemon=True).start()

@@ -60,6 +60,13 @@ def test_a_lesson_that_asks_begins_at_its_time_0_with_its_ghost_however_fast_tim
     flown.until(lambda: style.GHOST_MESH not in flown.page.backend._nodes, "past without a ghost")
     flown._update(flown.widget("Seconds back"), 0.0)
     flown.until(lambda: flown.node(style.GHOST_MESH).visible, "ghost")
+    # One that another client switches off meanwhile is gone.
+    flown._update(flown.widget("Seconds back"), 0.5)
+    flown.live.set_parameters({"ghost.inertia_model": ""})
+    flown.wait_until_still()
+    flown._update(flown.widget("Seconds back"), 0.0)
+    flown.until(lambda: flown.page._drawn_moment_ns is None and not flown.page._undrawn, "present")
+    assert style.GHOST_MESH not in flown.page.backend._nodes
 
 
 def test_a_near_miss_of_the_centre_of_mass_ticks_nothing_and_the_speed_is_read_off(flown: FlownPage) -> None:
