@@ -290,6 +290,29 @@ def skipped_work() -> str:
     return f"{_measured_on(measured[0])}.\n\n{_table(('work', 'if done', 'as it is'), rows)}"
 
 
+def identification() -> str:
+    """One throw, its body found by ours and by the peers, from the last benchmark's own numbers."""
+    measured = read_rows(RESULTS / "identification.csv")
+    first = measured[0]
+    begins = {
+        "truth": "the truth, which is unknown in practice",
+        "near": "errors of about 10 %",
+        "ball": "a ball of 1 kg",
+    }
+    rows = []
+    for row in measured:
+        if (row["body"], row["throw"]) == (first["body"], first["throw"]):
+            error = f"{row['error']:.3g}"
+            if not math.isfinite(row["error"]):
+                error = "its rollout is unstable"
+            elif row["error"] > 10.0:
+                error = f"{row['error']:.0f}: another minimum"
+            tool = f"{row['tool']} {row['version']}"
+            rows.append((tool, begins[row["begins_from"]], f"{row['cpu_seconds']:.2g} s", error))
+    head = (f"one throw of the {first['body']}", "initial guess", "processor time", "error / Cramér-Rao bound")
+    return f"{_measured_on(first)}.\n\n{_table(head, rows)}"
+
+
 def _measured_on(row: dict) -> str:
     return f"Measured {row['date'][:10]} on one {row['cpu']}"
 
@@ -342,6 +365,7 @@ TABLES = {
     "motions": motions,
     "node": node_load,
     "skipped": skipped_work,
+    "identification": identification,
     "figures": figures,
 }
 
