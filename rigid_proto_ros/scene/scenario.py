@@ -147,8 +147,7 @@ def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh
     body = mesh_body(mesh or parameters.mesh, repair=parameters.mesh_repair, fallback=parameters.mesh_fallback)
     if not body.verdict.usable:
         raise MeshError(f"mesh {parameters.mesh}", body.verdict.reason or "the surface has no extent")
-    triangles = body.triangles[:, [0, 2, 1]] if body.verdict.inward else body.triangles
-    surface = Surface(body.vertices, np.ascontiguousarray(triangles))
+    surface = Surface(body.vertices, body.triangles)
     return BodyMesh(body.mesh, body.moments, surface, _made_of(parameters))
 
 

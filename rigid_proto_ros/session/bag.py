@@ -188,12 +188,17 @@ def session_runs(path: Path, node: str = "") -> list[RecordedSession]:
         made_with=content.metadata.get(MADE_WITH, {}),
         folder=path.absolute().parent,
     )
-    cuts = {name: _cuts(logs, rows.times, resets) for name, (logs, rows) in states.items()}
+    # Our own recorder logs all topics in the order in which they were told; another one gets each topic by itself.
+    cut = _cuts_by_log if MADE_WITH in content.metadata else _cuts
+    cuts = {name: cut(logs, rows.times, resets) for name, (logs, rows) in states.items()}
     runs = []
     for k, (begin, end) in enumerate(zip([None, *resets], [*resets, None], strict=True)):
-        # The scene in force at a reset; at the recording's own start the first one that it holds.
-        before = [text for log, text in scenes if begin is not None and log <= begin]
-        run = replace(whole, scene=before[-1] if before else scenes[0][1] if scenes else "")
+        # The scene in force at a reset; at the recording's own start the first one that it holds. Logged at simulated
+        # time, a run's first scene comes before those that it is changed to at time 0.
+        before = [text for log, text in scenes if begin is not None and log < begin]
+        at_reset = [text for log, text in scenes if log == begin]
+        in_force = [*at_reset[:1], *before[-1:], *(text for _, text in scenes[:1])]
+        run = replace(whole, scene=in_force[0] if in_force else "")
         run.mesh_sha256 = mesh_sha256_of(run.scene)
         run.accuracy_floor = content.metadata.get(FLOOR.format(k), {}).get("floor", "")
         run.events = [
@@ -245,6 +250,11 @@ def _states(content: BagContent, prefix: str, name: str) -> tuple[np.ndarray, St
     logs = np.array([log for log, _ in messages], dtype=np.int64)
     times = np.array([stamp for stamp, _ in read], dtype=np.int64)
     return logs, StampedRows(times, np.array([row for _, row in read], dtype=float))
+
+
+def _cuts_by_log(logs: np.ndarray, stamps: np.ndarray, resets: list[int]) -> list[int]:
+    """Where a topic's messages of each run begin, and the end: at the resets' places in the log."""
+    return [0, *np.searchsorted(logs, np.array(resets, np.int64)).tolist(), len(stamps)]
 
 
 def _cuts(logs: np.ndarray, stamps: np.ndarray, resets: list[int]) -> list[int]:

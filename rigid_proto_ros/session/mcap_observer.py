@@ -155,6 +155,7 @@ class McapObserver(Observer):
         if isinstance(event, Reset):
             self._run_begins_ns = self._latest_log_ns + 1
             self._run += 1
+            self._scene = ""
             return
         log_time = self._run_begins_ns + event.time_ns if self._simulated_log else wall_ns
         self._latest_log_ns = max(self._latest_log_ns, log_time)

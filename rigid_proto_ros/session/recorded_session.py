@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError, MeshError
+from ..mass.from_mesh import PASSING
 from ..mesh.reading import Mesh, load_mesh
 from ..scene.command_codec import frame_names, of_event
 from ..scene.parameters import Parameters, convert_all
@@ -151,7 +152,8 @@ def session_scenario(session: RecordedSession) -> Scenario:
     except InputError:
         mesh = None
     if mesh is None or mesh.sha256 != session.mesh_sha256:
-        mesh = Mesh(name, name, session.vertices, session.triangles, None, session.mesh_sha256)
+        # Recorded is the surface that was flown, repaired and wound outward: the cached verdict on its file isn't its.
+        mesh = Mesh(name, PASSING + name, session.vertices, session.triangles, None, session.mesh_sha256)
     return make_scenario(values, mesh)
 
 

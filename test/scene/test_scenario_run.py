@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flights import SECOND
+from mass_solids import box, inward
 
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mesh.reading import load_mesh
@@ -86,3 +87,14 @@ def test_a_scene_takes_an_open_mesh_repaired_or_its_hull_or_box(tmp_path: Path) 
     for choice in ({"mesh_repair": True}, {"mesh_fallback": "hull"}, {"mesh_fallback": "box"}):
         body = make_scenario({"mesh": str(box), **choice}).setup.body
         assert body.mass == pytest.approx(6000.0, rel=1e-12), choice
+
+
+def test_a_push_goes_into_a_body_whose_mesh_is_wound_inward(tmp_path: Path) -> None:
+    path = tmp_path / "inward.obj"
+    vertices, triangles = inward(box())
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices.tolist()]
+    path.write_text("\n".join([*lines, *(f"f {i} {j} {k}" for i, j, k in (triangles + 1).tolist())]))
+    script = parse_script("- {t: 0.0, at: {point: [0.0, 0.0, 0.5]}, push: 1.0, duration: 1.0}")
+    run = OfflineRun(make_scenario({"mesh": str(path), "mass": 1.0}), script)
+    assert run.advance(SECOND)
+    np.testing.assert_allclose(run.simulation.state.linear_velocity, [0.0, 0.0, -1.0], atol=1e-12)

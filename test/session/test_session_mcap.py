@@ -23,9 +23,10 @@ from mcap_ros2.decoder import DecoderFactory
 from rigid_proto_ros.base.bundled import example_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.rerun_view.session_files import read_runs
-from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun, notify_start
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import verify
@@ -145,6 +146,46 @@ def test_meshes_come_from_inside_where_their_files_are_gone(tmp_path):
     book.unlink()
     hammer.unlink()
     assert main(["replay", session, "--verify"]) == 0
+
+
+@needs_rerun
+@pytest.mark.parametrize(("faces", "setting"), [(5, "mesh_repair=true"), (6, "mesh_repair=false")])
+def test_a_mesh_that_was_repaired_or_wound_inward_comes_from_inside(faces, setting, tmp_path):
+    mesh, session, script = tmp_path / "box.obj", str(tmp_path / "session.rrd"), tmp_path / "script.yaml"
+    vertices = [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 2)]
+    inward = ["3 4 2 1", "6 8 7 5", "2 6 5 1", "7 8 4 3", "5 7 3 1", "4 8 6 2"]
+    mesh.write_text("\n".join([f"# {tmp_path}", *vertices, *(f"f {face}" for face in inward[:faces])]))
+    script.write_text("- {t: 0.1, at: {point: [0.5, 0.5, 2.0]}, push: 1, duration: 0.1}\n")
+    setup = [item for value in (f"mesh={mesh}", "mass=1", setting) for item in ("--set", value)]
+    assert main(["simulate", "book", *setup, "--script", str(script), "--duration", "0.3", "--record", session]) == 0
+    mesh.unlink()
+    assert main(["replay", session, "--verify"]) == 0
+
+
+def test_runs_in_quick_succession_and_changes_at_their_start_are_told_apart(tmp_path, capsys):
+    session, again = tmp_path / "session.mcap", tmp_path / "again.mcap"
+    values = {
+        "mesh": "hammer",
+        "publish_rate": 100.0,
+        "start_paused": True,
+        "initial.angular_velocity": [1.0, 4.0, 2.0],
+    }
+    live = LiveSimulation(make_scenario({**values, "record": str(session)}))
+    live.announce()
+    live.start()
+    for change, periods in (({"mass": 2.0}, 5), ({}, 0), ({"scale": 2.0}, 3), ({"inertia_model": "shell"}, 4)):
+        if change:
+            live.set_parameters(change)
+        if periods:
+            live.step(periods)
+        live.reset()
+    live.stop()
+    assert [len(run.times) for run in read_runs(session)] == [5, 0, 3, 4, 0]
+    assert main(["replay", str(session), "--verify"]) == 0
+    assert main(["replay", str(session), "--record", str(again)]) == 0
+    assert [len(run.times) for run in read_runs(again)] == [5, 3, 4]
+    assert main(["replay", str(again), "--verify"]) == 0
+    assert capsys.readouterr().out.count("verified") == 2
 
 
 def test_without_rerun_a_session_is_recorded_and_verified(tmp_path):
