@@ -14,7 +14,7 @@ from ..mass.inspection import Inspection, as_json, inspect_mesh, verify_moments
 from ..mass.moments import MODELS
 from ..mass.properties import scale_vector
 from .inspect_report import print_inertial, print_report
-from .inspect_robot import add_robot_arguments, compare, lump
+from .inspect_robot import add_robot_arguments, compare, given, lump
 
 DENSITY = 1000.0
 """kg/m³, that of water, if neither density nor mass is given."""
@@ -92,8 +92,7 @@ def run(args: argparse.Namespace) -> int:
     if args.compare is not None:
         return compare(args)
     for name, needed in NEEDS.items():
-        given = getattr(args, name.replace("-", "_"))
-        if given is not None and given is not False:
+        if given(args, name):
             raise InputError(f"--{name}", f"needs {needed}")
     if not args.mesh:
         raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")

@@ -45,10 +45,16 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--as-scene", metavar="FILE.yaml", help="with --lump: write a scene of this body, and its mesh")
 
 
+def given(args: argparse.Namespace, name: str) -> bool:
+    """Whether an option was given, also as 0."""
+    value = getattr(args, name.replace("-", "_"))
+    return value is not None and value is not False and (name != "accept-open" or value != 0.0)
+
+
 def _refuse(args: argparse.Namespace, use: str, *names: str) -> None:
     """Refuse options that have no meaning for robots."""
     for name in names:
-        if getattr(args, name.replace("-", "_")):
+        if given(args, name):
             raise InputError(f"--{name}", f"can't be used with --{use}, which takes what the robot's file says")
 
 
@@ -164,7 +170,7 @@ def lump(args: argparse.Namespace) -> int:
     _refuse(args, "lump", "mesh", "compare", "fix", "all", "tolerance", "verify", "ballast", "mass", "density", "model")
     _refuse(args, "lump", "scale", "repair", "fallback", "accept-open")
     whole = lump_robot(Path(args.lump), tuple(args.package_path or ()))
-    written = _write_scene(whole, args.as_scene) if args.as_scene else ()
+    written = () if args.as_scene is None else _write_scene(whole, args.as_scene)
     if args.json:
         print(json.dumps(_lump_as_dict(args.lump, whole)))
     elif not print_inertial(args, whole.properties):

@@ -12,7 +12,16 @@ import numpy as np
 from ..base.errors import MeshError
 from ..mesh.intersection import Nesting, component_nesting
 from ..mesh.solids import can_unite, united_surface
-from ..mesh.topology import Components, Topology, component_sums, fan, mesh_topology, rims, surplus_copies
+from ..mesh.topology import (
+    Components,
+    Topology,
+    component_sums,
+    doubled_faces,
+    fan,
+    mesh_topology,
+    rims,
+    surplus_copies,
+)
 from .moments import referenced_vertices, solid_moments
 
 INFO, WARNING, ERROR = "info", "warning", "error"
@@ -84,7 +93,10 @@ def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray) -> 
         verdict.add("duplicate_faces", ERROR, message, "--repair (mesh_repair) removes the copies")
     elif topology.duplicates.any():
         message = f"{counted(int(np.count_nonzero(topology.duplicates)), 'duplicate face')} that close the surface"
-        verdict.add("duplicate_faces", INFO, message)
+        if doubled_faces(topology):
+            verdict.add("duplicate_faces", WARNING, f"{message}; a volume beside them counts twice")
+        else:
+            verdict.add("duplicate_faces", INFO, message)
     verdict.hole_effect = _hole_effect(topology, vertices)
     known = ""
     if verdict.hole_effect is not None and verdict.hole_effect < SMALL_HOLES:
@@ -186,7 +198,12 @@ def _check_winding(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> No
         verdict.winding_consistent = False
         subtract = f"{np.count_nonzero(wrong)} of {len(volume)} components wound inward, so that they would subtract"
         message = f"inconsistent winding: {subtract}"
-        verdict.add("component_inward", ERROR, message, "--repair (mesh_repair) turns them")
+        remedy = "--repair (mesh_repair) turns them"
+        if (wrong & nesting.crosses).any():
+            remedy += (
+                ", which makes a part of a cavity that reaches out of its own: cut that out where the mesh is made"
+            )
+        verdict.add("component_inward", ERROR, message, remedy)
     cavities = int(np.count_nonzero(subtracts & ~wrong))
     if cavities:
         verdict.add("cavities", INFO, f"{counted(cavities, 'closed inner surface')} wound inward, taken as cavities")

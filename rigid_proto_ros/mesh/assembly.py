@@ -47,7 +47,8 @@ class Assembly:
             x, y, z = np.asarray(vertices, dtype=np.float64).T[:, :, None]
             # Summed in a fixed order: that of BLAS depends on the processor.
             self._vertices.append(x * linear[:, 0] + y * linear[:, 1] + z * linear[:, 2] + shift)
-        if np.linalg.det(linear) < 0.0:
+            mirrored = np.linalg.det(linear) < 0.0
+        if mirrored:
             triangles = triangles[:, [0, 2, 1]]
         self._triangles.append(triangles + self._count)
         self._count += len(vertices)
@@ -62,9 +63,10 @@ def tag_of(element: ElementTree.Element) -> str:
     return str(element.tag).rpartition("}")[2]
 
 
-def _geometry_alone(data: bytes, name: str) -> bytes:
-    """The document reduced to its geometry."""
+def _geometry_alone(data: bytes, name: str) -> tuple[bytes, float]:
+    """The document reduced to its geometry, and its unit in metres."""
     root = ElementTree.fromstring(data)
+    unit = root.find("{*}asset/{*}unit")  # pycollada takes 1 for one that is no number
     for parent in list(root.iter()):
         for child in list(parent):
             if tag_of(child) in _UNUSED:
@@ -73,7 +75,7 @@ def _geometry_alone(data: bytes, name: str) -> bytes:
                 raise MeshError(name, f"{child.get('url')} deforms its mesh; apply skin or morph before the export")
             elif tag_of(child) in ("convex_mesh", "spline", "brep", "ph", "skew"):
                 raise MeshError(name, f"it has <{tag_of(child)}>", "triangles and polygons without holes, not skewed")
-    return ElementTree.tostring(root)
+    return ElementTree.tostring(root), 1.0 if unit is None else float(unit.get("meter", "1"))
 
 
 def add_collada(data: bytes, assembly: Assembly) -> float:
@@ -85,7 +87,8 @@ def add_collada(data: bytes, assembly: Assembly) -> float:
         import collada
     except ImportError:
         raise MeshError(assembly.name, is_missing("pycollada", "meshes")) from None
-    document = collada.Collada(io.BytesIO(_geometry_alone(data, assembly.name)))
+    geometry, unit = _geometry_alone(data, assembly.name)
+    document = collada.Collada(io.BytesIO(geometry))
     if document.scene is None:
         raise MeshError(assembly.name, "the file has no scene, which would define the geometry to be used")
     for bound in document.scene.objects("geometry"):
@@ -94,7 +97,7 @@ def add_collada(data: bytes, assembly: Assembly) -> float:
                 primitive = primitive.triangleset()
             if isinstance(primitive, collada.triangleset.TriangleSet) and primitive.vertex is not None:
                 assembly.add(primitive.vertex, primitive.vertex_index, bound.matrix, f"geometry {bound.original.id}")
-    return 1.0 if document.assetInfo.unitmeter is None else float(document.assetInfo.unitmeter)
+    return unit
 
 
 def other_formats() -> tuple[str, ...]:

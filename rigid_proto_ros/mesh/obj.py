@@ -19,7 +19,7 @@ from .ascii_floats import as_numbers, error_at
 
 _VERTEX = "v with three coordinates"
 _FACE = "f with nonzero integer vertex numbers, negative ones counted back from the last vertex"
-_BLANK = rb"[ \t\v\f\r]"
+_BLANK = rb"[ \t\v\f]"
 _INDENTED = re.compile(rb"\n" + _BLANK + rb"+")
 _V = re.compile(rb"\nv" + _BLANK + rb"+(\S+" + _BLANK + rb"+\S+" + _BLANK + rb"+\S+)")
 _F = re.compile(rb"\nf" + _BLANK + rb"([^\n]*)")
@@ -76,13 +76,13 @@ def read_obj(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray
     data = data.removeprefix(codecs.BOM_UTF8)
     if b"\0" in data[:4096]:
         raise MeshError(name, "the content is binary; an .obj file is text")
-    if b"\\\n" in data or b"\\\r\n" in data:
-        data = data.replace(b"\\\r\n", b"   ").replace(b"\\\n", b"  ")
-    if b"\n" not in data and b"\r" in data:
-        data = data.replace(b"\r", b"\n")
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     text = b"\n" + data
     if b"#" in text:
         text = re.sub(rb"#[^\n]*", b"", text)
+    if b"\\\n" in text:  # after the comments: one that ends with a backslash, as paths do, continues nowhere
+        text = text.replace(b"\\\n", b"  ")
     text = _INDENTED.sub(b"\n", text)
     vertices = _vertices(text, name)
     numbers, sizes = _faces(text, name)

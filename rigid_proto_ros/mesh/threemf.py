@@ -91,11 +91,11 @@ class _Package:
             raise self.refusal(f"it places object {number!r}, which isn't in {target}")
         if found.get("type") in SUPPORTS:
             return
-        matrix = above @ _matrix(reference.get("transform"))
+        ratio = self.unit(target) / self.unit(path)
+        matrix = above @ _matrix(reference.get("transform")) @ np.diag([ratio, ratio, ratio, 1.0])
         for child in found:
             if tag_of(child) == "mesh":
-                ratio = self.unit(target) / self.unit(self.root()) if target != path else 1.0
-                self._assembly.add(*self._mesh(child), matrix @ np.diag([ratio, ratio, ratio, 1.0]), f"object {number}")
+                self._assembly.add(*self._mesh(child), matrix, f"object {number}")
             elif tag_of(child) == "components":
                 for component in child:
                     self.place(component, target, matrix, depth + 1)

@@ -70,7 +70,8 @@ def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray
 
 def _edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """Edges (e, 6) of ``corners`` (m, 3) as in Topology, and for each triangle (m,) the first one of its component:
-    triangles that share an edge belong to one.
+    triangles that share an edge belong to one, unless more than two share it and all that meet there are balanced at it
+    by themselves: bodies that touch, or overlap, along an edge stay two.
     """
     tails, heads = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     owner = np.repeat(np.arange(len(corners)), 3)
@@ -85,7 +86,16 @@ def _edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarr
     second = np.where(uses > 1, owner[np.minimum(first + 1, len(key) - 1)], -1)
     low, high = np.divmod(key[first], vertex_count)
     edges = np.stack([low, high, forward, uses - forward, owner[first], second], axis=1)
-    return edges, joined_sets(np.repeat(owner[first], uses), owner, len(corners))
+    start, joins = np.repeat(owner[first], uses), np.repeat(uses <= 2, uses)
+    root = joined_sets(start[joins], owner[joins], len(corners))
+    crowded = ~joins
+    if crowded.any():
+        edge = np.repeat(np.arange(len(first)), uses)[crowded]
+        _, meeting = np.unique(edge * len(corners) + root[owner[crowded]], return_inverse=True)
+        excess = np.bincount(meeting, np.where(upward[crowded], 1.0, -1.0))
+        joins[crowded] = np.isin(edge, edge[excess[meeting] != 0.0])
+        root = joined_sets(start[joins], owner[joins], len(corners))
+    return edges, root
 
 
 @dataclass(frozen=True)
@@ -141,6 +151,18 @@ def mesh_topology(vertices: np.ndarray, triangles: np.ndarray) -> Topology:
     real = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
     duplicates = (first_equal_rows(turned) != np.arange(len(corners))) & real
     return Topology(corners, edges, component, int(component.max(initial=-1)) + 1, duplicates)
+
+
+def doubled_faces(topology: Topology) -> int:
+    """Number of faces that occur with one winding more often than with the other by two or more: a volume beside each
+    counts more than once.
+    """
+    low, middle, high = np.sort(topology.corners, axis=1).T
+    real = (low < middle) & (middle < high)
+    rows, corners = np.stack([low, middle, high], axis=1)[real], topology.corners[real]
+    after_low = np.take_along_axis(corners, (np.argmin(corners, axis=1)[:, None] + 1) % 3, axis=1)[:, 0]
+    copies = np.bincount(first_equal_rows(rows), np.where(after_low == rows[:, 1], 1.0, -1.0))
+    return int(np.count_nonzero(np.abs(copies) > 1.0))
 
 
 def surplus_copies(topology: Topology) -> np.ndarray:

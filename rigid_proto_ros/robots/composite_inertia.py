@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from ..mass.tensor import check_tensor
 from ..mesh.locate import Search
 from ..mesh.reading import load_mesh
 from .link_shapes import Meshes, check_shape, combined, of_mass, placed, placed_surface
-from .reading import COLLISION, VISUAL, Link, Pose, check_finite, check_inertial, read_robot
+from .reading import COLLISION, NO_INERTIAL, VISUAL, Link, Pose, check_finite, check_inertial, read_robot
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,16 @@ def lump_robot(path: Path, folders: tuple[Path, ...] = ()) -> Lump:
     poses = robot.poses()
     for name, pose in poses.items():
         check_finite(f"link {name}", position=pose.position, orientation=pose.rotation)
-    lost = next((link.name for link in links if link.name not in poses), None)
+    names = [link.name for link in links]
+    twice = next((name for name, times in Counter(names).items() if times > 1), None)
+    if twice is not None:
+        raise InputError("lump", f"two links {twice!r}", "links with names of their own")
+    lost = next((name for name in names if name not in poses), None)
     if lost is not None:
         raise InputError("lump", f"link {lost!r} is connected to no other; accepted: one tree of links")
+    for link in links:
+        if link.problem not in ("", NO_INERTIAL):
+            raise InputError(f"link {link.name}", link.problem, "inertials with mass and inertia, or none")
     heavy = [(link, poses[link.name]) for link in links if not link.problem]
     if not heavy:
         raise InputError("lump", path.name, "a file with inertials")

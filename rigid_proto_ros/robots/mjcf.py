@@ -24,19 +24,21 @@ MAX_INCLUDES = 200
 """Of one model, the includes of included files counted."""
 
 
-def _include(parent: Element, path: Path, left: Iterator[int]) -> None:
-    """Put the content of included files, named from the main file's folder, in the place of each <include>: MuJoCo
-    itself takes no file twice. ``left``: how many more may follow.
+def _include(parent: Element, main: Path, path: Path, left: Iterator[int]) -> None:
+    """Put the content of included files, named from the main file's folder or from that of ``path``, the file that
+    includes them, in the place of each <include>: MuJoCo itself takes no file twice. ``left``: how many more may
+    follow.
     """
     for child in list(parent):
         if child.tag != "include":
-            _include(child, path, left)
+            _include(child, main, path, left)
             continue
         if next(left, None) is None:
-            raise InputError("robot file", f"{path.name} includes more files", f"at most {MAX_INCLUDES}")
-        file = path.parent / child.get("file", "")
+            raise InputError("robot file", f"{main.name} includes more files", f"at most {MAX_INCLUDES}")
+        places = [folder / child.get("file", "") for folder in (main.parent, path.parent)]
+        file = next((place for place in places if place.is_file()), places[0])
         content = rd.parse_xml(read_bounded(file, rd.MAX_BYTES, "robot file", "an MJCF file to include"), file)
-        _include(content, path, left)
+        _include(content, main, file, left)
         place = list(parent).index(child)
         parent[place : place + 1] = list(content)
 
@@ -154,7 +156,8 @@ def _poses(model: Any, names: list[str]) -> dict[str, rd.Pose]:
 def _simulated(source: _Source, links: list[rd.Link], names: list[str]) -> list[rd.Link]:
     """The links with the masses that MuJoCo takes: of its <compiler>, and of the geoms where there are no inertials."""
     spec = source.parsed()
-    from_geoms = spec.compiler.inertiafromgeom == source.mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    always = source.mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    from_geoms = any(body.compiler.inertiafromgeom == always for body in spec.bodies)  # attached ones have their own
     if not from_geoms and all(body.explicitinertial or not body.geoms for body in spec.bodies[1:]):
         spec = source.without_files()
     model = source.compiled(spec)
@@ -167,7 +170,7 @@ def _simulated(source: _Source, links: list[rd.Link], names: list[str]) -> list[
             mass=float(model.body_mass[body]),
             center_of_mass=model.body_ipos[body].copy(),
             inertia=rotation @ np.diag(model.body_inertia[body]) @ rotation.T,
-            problem="" if model.body_mass[body] > 0.0 else "no mass",
+            problem="" if model.body_mass[body] > 0.0 else rd.NO_INERTIAL,
         )
         found.append(link)
     return found
@@ -176,7 +179,7 @@ def _simulated(source: _Source, links: list[rd.Link], names: list[str]) -> list[
 def read_mjcf(root: Element, path: Path) -> rd.Robot:
     """The bodies of a <mujoco>; raises InputError for what MuJoCo refuses, and without it."""
     inertials = {body.get("name", ""): body.find("inertial") for body in root.iter("body")}
-    _include(root, path, iter(range(MAX_INCLUDES)))
+    _include(root, path, path, iter(range(MAX_INCLUDES)))
     source = _Source(root, path)
     spec, frames = source.parsed(), source.without_files()
     for body in frames.bodies[1:]:  # what the file says of inertials may be what MuJoCo refuses

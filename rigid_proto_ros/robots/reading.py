@@ -24,6 +24,7 @@ from ..base.rotation import matrix_from_quaternion
 from ..mass.tensor import tensor_from_six
 
 VISUAL, COLLISION = "visual", "collision"
+NO_INERTIAL = "no <inertial>"
 WATER = 1000.0
 """kg/m³ of a shape of which nothing else is said."""
 MAX_BYTES = 50_000_000
@@ -83,7 +84,7 @@ class Link:
 
     name: str
     shapes: tuple[Shape, ...] = ()
-    problem: str = "no <inertial>"
+    problem: str = NO_INERTIAL
     mass: float = math.nan
     center_of_mass: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
     inertia: np.ndarray = field(default_factory=lambda: np.full((3, 3), math.nan))
@@ -96,17 +97,17 @@ class Link:
 
 @dataclass
 class Robot:
-    """``links``: those with an inertial or a shape, in the file's order. ``poses`` gives the pose of each link by name
-    with all joints at 0, in the frame of the root link (URDF), of the model (SDF) or of the world (MJCF), and raises
-    InputError for links that make no tree. ``simulated``: the links with the inertials that the format's own simulator
-    takes, where these aren't the file's."""
+    """``links``: those with an <inertial> or a shape, in the file's order. ``poses`` gives the pose of each link by
+    name with all joints at 0, in the frame of the root link (URDF), of the model (SDF) or of the world (MJCF), and
+    raises InputError for links that make no tree. ``simulated``: the links with the inertials that the format's own
+    simulator takes, where these aren't the file's."""
 
     links: list[Link]
     poses: Callable[[], dict[str, Pose]]
     simulated: Callable[[], list[Link]] | None = None
 
     def __post_init__(self) -> None:
-        self.links = [link for link in self.links if link.shapes or not link.problem]
+        self.links = [link for link in self.links if link.shapes or link.problem != NO_INERTIAL]
 
 
 def parse_xml(data: bytes, path: Path) -> Element:
@@ -217,7 +218,7 @@ def robot_of(root: Element, path: Path) -> Robot:
     if path.suffix == ".xacro" or any("xacro" in str(element.tag) for element in root.iter()):
         raise InputError("robot file", path.name, f"plain URDF: xacro {shlex.quote(str(path))} > EXPANDED.urdf")
     if root.tag == "robot":
-        return Robot([_urdf_link(link) for link in root.iter("link")], lambda: _urdf_poses(root))
+        return Robot([_urdf_link(link) for link in root.findall("link")], lambda: _urdf_poses(root))
     if root.tag == "sdf":
         return Robot([_sdf_link(link) for link in root.iter("link")], lambda: _sdf_poses(root))
     if root.tag == "mujoco":
@@ -307,9 +308,15 @@ def _text(element: Element, tag: str, default: str) -> str:
 
 def _sdf_pose(element: Element, owner: str) -> Pose:
     """Of an element's <pose>, relative to whatever that is."""
-    pose = element.find("pose")
-    values = floats(f"pose of {owner}", _text(element, "pose", f"{ZEROS} {ZEROS}"), 6)
-    if pose is not None and pose.get("degrees", "false") in ("true", "1"):
+    pose, what = element.find("pose"), f"pose of {owner}"
+    words = {} if pose is None else pose.attrib
+    if words.get("rotation_format", "euler_rpy") == "quat_xyzw":
+        values = floats(what, _text(element, "pose", f"{ZEROS} {ZEROS} 1"), 7)
+        if not np.any(values[3:]):
+            raise InputError(what, _text(element, "pose", ""), "a quaternion other than 0")
+        return Pose(rotation_from_wxyz(values[[6, 3, 4, 5]]), values[:3])
+    values = floats(what, _text(element, "pose", f"{ZEROS} {ZEROS}"), 6)
+    if words.get("degrees", "false") in ("true", "1"):
         values[3:] = np.radians(values[3:])
     return Pose(rotation_from_rpy(*values[3:]), values[:3])
 
@@ -331,16 +338,18 @@ def _sdf_link(link: Element) -> Link:
     bare = Link(name, tuple(shapes))
     if inertial is None:
         return bare
-    tensor, mass = inertial.find("inertia"), inertial.findtext("mass")
     if inertial.get("auto", "false") in ("true", "1"):
+        mass = inertial.findtext("mass")
         computed = replace(bare, problem="the simulator computes its inertial (auto='true')", computed=True)
         return computed if mass is None else replace(computed, mass=number(f"mass of {owner}", mass))
-    if tensor is None or mass is None:
-        return replace(bare, problem="an <inertial> without mass or inertia")
-    six = [tensor.findtext(entry, "1" if entry in ("ixx", "iyy", "izz") else "0") for entry in SIX]
+    pose = inertial.find("pose")
+    if pose is not None and pose.get("relative_to", "") not in ("", name):
+        return replace(bare, problem=f"an <inertial> whose pose is relative to {pose.get('relative_to')!r}")
+    # SDF's own defaults, which simulators take: 1 kg, and 1 kg m² about each axis.
+    six = [_text(inertial, f"inertia/{entry}", "1" if entry in ("ixx", "iyy", "izz") else "0") for entry in SIX]
     rotation = _sdf_pose(inertial, f"the inertial of {owner}").rotation
     center = " ".join(_text(inertial, "pose", ZEROS).split()[:3])
-    return printed_link(bare, mass, center, six, rotation, inertial)
+    return printed_link(bare, _text(inertial, "mass", "1"), center, six, rotation, inertial)
 
 
 def _sdf_poses(root: Element) -> dict[str, Pose]:
@@ -351,7 +360,7 @@ def _sdf_poses(root: Element) -> dict[str, Pose]:
     elements = {
         element.get("name", "?"): element for tag in ("link", "joint", "frame") for element in models[0].findall(tag)
     }
-    found = {"": HERE, "__model__": HERE, "world": HERE}
+    found = {"": HERE, "__model__": HERE}
 
     def pose_of(name: str, below: tuple[str, ...] = ()) -> Pose:
         if name not in found:

@@ -69,6 +69,20 @@ def test_obj_corners_with_texture_and_normal_numbers_tabs_and_continued_lines(tm
     assert (volume(mesh), len(mesh.polygon_starts)) == (1.0, 7)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("v 0.0 0.0 0.0\n", "# C:\\models\\\nv 0.0 0.0 0.0\n"),  # a comment continues nowhere
+        ("v 0.0 0.0 0.0\n", "v 0.0 0.0 0.0\r"),
+        ("\n", "\r"),
+        ("v 0.0 0.0 0.0\n", "v 0.0 \\\r0.0 0.0\r"),
+    ],
+)
+def test_obj_lines_end_as_on_any_system_also_within_one_file(tmp_path, old, new):
+    text = obj().decode().replace(old, new)
+    assert volume(load(tmp_path, "lines.obj", text.encode())) == 1.0
+
+
 def test_numbers_behind_the_coordinates_of_an_obj_vertex_are_left_aside(tmp_path):
     text = obj().decode().replace("\nf", " 0.1 0.2 0.3\nf", 1).replace("\nv", " 0.1 0.2 0.3\nv")
     assert volume(load(tmp_path, "colours.obj", text.encode())) == 1.0

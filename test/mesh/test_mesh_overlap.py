@@ -39,6 +39,33 @@ def test_a_part_that_stands_on_another_one_does_not_overlap_it_however_their_hei
         assert body(together(plate, (standing, triangles))).verdict.findings == []
 
 
+def test_parts_that_overlap_and_have_an_edge_in_common_are_two():
+    """The corner of one box fills that of the other: two faces are flush, and one edge is the same."""
+    pytest.importorskip("manifold3d")
+    post, foot = moved(box((1.0, 1.0, 4.0)), (0.5, 0.5, 2.0)), moved(box((3.0, 2.0, 4.0)), (1.5, 1.0, 2.0))
+    made = body(together(post, foot))  # the post lies in the foot
+    assert made.verdict.components == 2 and codes(made) == {"nested_components": "warning"}
+    across = body(together(moved(box((1.0, 4.0, 1.0)), (0.5, 2.0, 0.5)), moved(box((4.0, 3.0, 1.0)), (2.0, 1.5, 0.5)),
+                           moved(box((1.0, 2.0, 3.0)), (3.5, 1.0, 1.0))))  # fmt: skip
+    assert across.verdict.components == 3 and volume(across) == pytest.approx(4.0 + 12.0 - 3.0 + 6.0 - 2.0)
+
+
+def test_a_face_that_two_overlapping_parts_have_in_common_is_a_warning():
+    long, short = moved(box((3.0, 1.0, 1.0)), (1.5, 0.0, 0.0)), moved(box(), (0.5, 0.0, 0.0))
+    made = body(together(long, short))
+    assert volume(made) == 4.0 and codes(made)["duplicate_faces"] == "warning"
+    assert "counts twice" in message(made, "duplicate_faces")
+    beside = body(together(long, moved(box(), (-0.5, 0.0, 0.0))))  # its face there looks the other way
+    assert beside.verdict.findings == []
+
+
+def test_a_cavity_that_reaches_out_of_its_part_is_not_just_told_to_be_turned():
+    out = body(assembly((1, CUBE, (0, 0, 0)), (-1, UNIT, (2.0, 0.1, 0.2))))
+    assert not out.verdict.closed and "cut that out" in message(out, "component_inward")
+    apart = body(assembly((1, CUBE, (0, 0, 0)), (-1, UNIT, (4.0, 0.1, 0.2))))
+    assert message(apart, "component_inward").endswith("turns them")
+
+
 def test_the_union_keeps_a_cavity_and_what_lies_in_it():
     pytest.importorskip("manifold3d")
     cavity, inside = inward(moved(box((2.0, 2.0, 2.0)), (0.5, 0.5, 0.5))), moved(box(), (0.9, 0.9, 0.9))

@@ -68,6 +68,9 @@ def test_gltf_of_which_something_is_not_read_says_what(tmp_path):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_gltf_numbers_that_are_not_finite_are_left_to_the_verdict(tmp_path):
+    turned = Gltf()
+    turned.node["rotation"] = [0, 0, 0, 0]
+    assert codes(mesh_body(load(tmp_path, "a.gltf", turned.gltf()))) == {"nonfinite": "error"}
     signalling = np.frombuffer(np.uint32(0x7F800001).tobytes(), "<f4")[0]
     for number in (np.inf, signalling):
         vertices = CUBE_VERTICES.astype("<f4")
@@ -96,6 +99,14 @@ def test_3mf_parts_in_files_of_their_own_count_once(tmp_path):
     assert volume(load_3mf(tmp_path, root, part=part)) == pytest.approx(1e-6)
     item = model("", 'objectid="2" p:path="/3D/part.model"')
     assert volume(load_3mf(tmp_path, item, part=part)) == pytest.approx(1e-6)
+
+
+def test_3mf_units_and_placements_count_along_the_whole_way_from_file_to_file(tmp_path):
+    inner = model(cube_object(1) + components(2, f'objectid="1" {SHIFT}'), 'objectid="1"').replace("meter", "inch")
+    outer = model(components(1, f'objectid="2" p:path="/3D/inner.model" {SHIFT}'), "").replace("meter", "centimeter")
+    mesh = load_3mf(tmp_path, model("", 'objectid="1" p:path="/3D/outer.model"'), inner=inner, outer=outer)
+    x = 0.05 + 5 * 0.0254
+    assert np.ravel(box_of(mesh)) == pytest.approx([x, 0, 0, x + 0.0254, 0.0254, 0.0254], rel=1e-15)
 
 
 def test_3mf_supports_are_no_part_of_the_body_and_mirrored_items_face_outward(tmp_path):
@@ -149,6 +160,15 @@ def test_dae_instances_count_whatever_becomes_of_their_material_or_texture(tmp_p
     assert volume(load_dae(tmp_path, nodes)) == 2.0
     nodes = f"<node>{BOUND.format('m')}</node><node><scale>2 2 2</scale>{BOUND.format('m')}</node>"
     assert len(load_dae(tmp_path, nodes, libraries=TEXTURED).triangles) == 24
+
+
+def test_a_dae_whose_unit_is_no_number_is_refused(tmp_path):
+    pytest.importorskip("collada")
+    data = collada(f"<node>{INSTANCE}</node>")
+    assert volume(load(tmp_path, "a.dae", data.replace(b'meter="1"', b'meter="0.01"'))) == pytest.approx(1e-6)
+    assert volume(load(tmp_path, "a.dae", data.replace(b'meter="1"', b'name="meter"'))) == 1.0
+    with pytest.raises(MeshError, match="0,01"):
+        load(tmp_path, "a.dae", data.replace(b'meter="1"', b'meter="0,01"'))
 
 
 def test_dae_strips_are_triangles_and_mirrored_nodes_face_outward(tmp_path):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mesh_files import CUBE_VERTICES, stl
 
+from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mesh.reading import Mesh
@@ -113,6 +114,38 @@ def test_an_sdfs_frames_are_followed(tmp_path):
     assert_same(lump_robot(path), (expected.mass, expected.center_of_mass, expected.inertia))
 
 
+def test_a_pose_with_a_quaternion_is_that_with_angles(tmp_path):
+    path = tmp_path / "robot.sdf"
+    place = '<pose degrees="true">1 2 3 0 0 60</pose>'
+    inertia = "<inertia><ixx>0.03</ixx><ixy>0.001</ixy><iyy>0.02</iyy><izz>0.04</izz></inertia>"
+    text = f"""<sdf version="1.9"><model name="m"><link name="a">{place}<inertial>{place}<mass>2</mass>{inertia}
+</inertial></link></model></sdf>"""
+    path.write_text(text)
+    expected = lump_robot(path).properties
+    path.write_text(text.replace(place, f'<pose rotation_format="quat_xyzw">1 2 3 0 0 1 {3.0**0.5}</pose>'))
+    assert_same(lump_robot(path), (expected.mass, expected.center_of_mass, expected.inertia))
+    path.write_text(text.replace(place, '<pose rotation_format="quat_xyzw"/>'))
+    assert lump_robot(path).properties.center_of_mass.tolist() == [0.0, 0.0, 0.0]
+    path.write_text(text.replace(place, '<pose rotation_format="quat_xyzw">1 2 3 0 0 0 0</pose>'))
+    with pytest.raises(InputError, match="a quaternion other than 0"):
+        lump_robot(path)
+
+
+def test_what_an_sdf_leaves_out_of_an_inertial_are_its_defaults(tmp_path):
+    path = tmp_path / "robot.sdf"
+    path.write_text("""<sdf version="1.9"><model name="m"><link name="a"><inertial><mass>5</mass></inertial></link>
+<link name="b"><pose>6 0 0 0 0 0</pose><inertial><inertia><ixx>2</ixx></inertia></inertial></link></model></sdf>""")
+    far = 5.0 / 6.0 * 36.0
+    expected = 6.0, np.array([1.0, 0.0, 0.0]), np.diag([3.0, 2.0 + far, 2.0 + far])
+    assert_same(lump_robot(path), expected)
+
+
+def test_only_the_links_of_the_robot_itself_count(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(URDF.replace("</robot>", f"<gazebo>{link('other', 9.0, '0 0 0')}</gazebo></robot>"))
+    assert lump_robot(path).properties.mass == 5.5
+
+
 @pytest.mark.parametrize(
     ("kind", "attributes", "size"),
     [
@@ -168,6 +201,12 @@ def test_the_command_writes_a_scene_that_flies(tmp_path, capsys, monkeypatch):
         (["--lump", "loop.urdf"], "a tree of links"),
         (["--lump", "empty.urdf"], "inertials"),
         (["--lump", "pose.urdf"], "xyz of joint arms: got 'along'"),
+        (["--lump", "twins.urdf"], "two links 'hand'"),
+        (["--lump", "half.urdf"], "without mass or inertia"),
+        (["--lump", "robot.urdf", "--tolerance", "0"], "--tolerance"),
+        (["--lump", "robot.urdf", "--as-scene", ""], "--as-scene"),
+        (["--lump", "frame.sdf"], "pose is relative to 'mount'"),
+        (["--lump", "world.sdf"], "frame 'world'"),
     ],
 )
 def test_what_is_no_one_body_is_refused_in_one_line(tmp_path, capsys, monkeypatch, arguments, words):
@@ -176,6 +215,11 @@ def test_what_is_no_one_body_is_refused_in_one_line(tmp_path, capsys, monkeypatc
     (tmp_path / "two.urdf").write_text(f'<robot name="r">{link("a", 1, "0 0 0")}{link("b", 1, "0 0 0")}</robot>')
     (tmp_path / "loop.urdf").write_text(URDF.replace("</robot>", f"{joint('fixed', 'base', 'hand')}</robot>"))
     (tmp_path / "pose.urdf").write_text(URDF.replace('xyz="0.3 -0.1 0.2"', 'xyz="along"'))
+    (tmp_path / "twins.urdf").write_text(URDF.replace("</robot>", f"{link('hand', 1, '0 0 0')}</robot>"))
+    half = f'<link name="half"><inertial><mass value="1"/></inertial></link>{joint("fixed", "hand", "half")}'
+    (tmp_path / "half.urdf").write_text(URDF.replace("</robot>", f"{half}</robot>"))
+    (tmp_path / "frame.sdf").write_text(SDF.replace("<pose>0 0.2 0 ", '<pose relative_to="mount">0 0.2 0 '))
+    (tmp_path / "world.sdf").write_text(SDF.replace('relative_to="turn"', 'relative_to="world"'))
     (tmp_path / "empty.urdf").write_text(f'<robot name="r"><link name="a">{BOX}</link></robot>')
     assert main(["inspect", *arguments]) == 2
     refusal = capsys.readouterr().err

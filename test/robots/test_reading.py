@@ -15,7 +15,13 @@ SIX_KG = '<inertial pos="0.1 0 0" mass="6" diaginertia="0.2 0.3 0.4" euler="0 0 
 CHILD = f"""<mujoco model="child"><compiler angle="radian"/><default><geom type="capsule" size="0.1 0.2"/></default>
 <worldbody><body name="c" pos="0 0 1" euler="0 0 0.3">{SIX_KG.replace("30", "0.7")}<joint name="turn" axis="0 1 0"/><geom/></body></worldbody>
 </mujoco>"""
+GEOMS = """<mujoco><compiler inertiafromgeom="true"/><asset><mesh name="m" file="cube.stl"/></asset>
+<worldbody><body name="c"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+INCLUDED = f'<mujoco><body name="c">{SIX_KG}</body></mujoco>'
 MODELS = {
+    "attached from geoms": f"""<mujoco><asset><model name="child" file="geoms.xml"/></asset><worldbody><body name="a">{SIX_KG}
+      <attach model="child" body="c" prefix="x_"/></body></worldbody></mujoco>""",
+    "included by an included file": """<mujoco><worldbody><include file="parts/one.xml"/></worldbody></mujoco>""",
     "attach": f"""<mujoco><asset><model name="child" file="child.xml"/></asset><worldbody><body name="a">{SIX_KG}
       <frame pos="0 1 0" euler="20 0 0"><attach model="child" body="c" prefix="x_"/></frame></body></worldbody></mujoco>""",
     "frame": f"""<mujoco><worldbody><frame pos="0 1 0" euler="20 0 0"><body name="a">{SIX_KG}</body>
@@ -35,6 +41,14 @@ MODELS = {
 def test_an_mjcf_weighs_what_it_weighs_in_mujoco(tmp_path, name, monkeypatch):
     mujoco = pytest.importorskip("mujoco")
     (tmp_path / "child.xml").write_text(CHILD)
+    (tmp_path / "geoms.xml").write_text(GEOMS)
+    (tmp_path / "cube.stl").write_bytes(stl(CUBE_VERTICES))
+    (tmp_path / "parts").mkdir()
+    # Beside the main file, or else beside the one that includes it.
+    (tmp_path / "parts/one.xml").write_text('<mujoco><include file="two.xml"/><include file="three.xml"/></mujoco>')
+    (tmp_path / "parts/two.xml").write_text(INCLUDED)
+    (tmp_path / "parts/three.xml").write_text("<mujoco/>")
+    (tmp_path / "three.xml").write_text(INCLUDED.replace('"c"', '"d"'))
     path = tmp_path / "model.xml"
     path.write_text(MODELS[name])
     monkeypatch.chdir(tmp_path)
