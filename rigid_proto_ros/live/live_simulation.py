@@ -62,6 +62,7 @@ class LiveSimulation:
         self.endpoints = endpoints or Endpoints()
         self.stamps = Stamps(clock)
         self.frames = frame_names(scenario.parameters, name)
+        self._check_contacts(scenario)
         self._observers = tuple(observers)
         self._recording_error = ""
         self._recorder: Observer | None = None
@@ -72,6 +73,14 @@ class LiveSimulation:
         self._wake = threading.Event()
         self._stopping = False
         self._thread: threading.Thread | None = None
+
+    def _check_contacts(self, scenario: Scenario) -> None:
+        """Raises InputError for a contact that no command could name, since its name is that of a frame."""
+        for name in sorted(scenario.parameters.contacts.keys() & set(self.frames)):
+            accepted = (
+                "a name that is neither that of the world's frame nor that of the body's (the node's name by default)"
+            )
+            raise InputError(f"contacts.{name}", name, accepted)
 
     # The physics thread
 
@@ -226,6 +235,7 @@ class LiveSimulation:
             self.loop.replace(scenario)
             self.loop.reset()
 
+        self._check_contacts(scenario)
         self._warm_up_change(scenario)
         self.call(begin)
         self.endpoints.parameters_changed()

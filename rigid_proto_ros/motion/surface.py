@@ -127,7 +127,7 @@ def _nearest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndar
         u, v = 1.0, 0.0
     elif d6 >= 0.0 and d5 <= d6:
         u, v = 0.0, 1.0
-    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+    elif vc <= 0.0 and d1 >= 0.0 >= d3 and d1 > d3:  # not where the corners a and b are one point
         u, v = d1 / (d1 - d3), 0.0
     elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
         u, v = 0.0, d2 / (d2 - d6)

@@ -99,11 +99,6 @@ class Batch:
     commands: NDArray[np.void]
 
     @property
-    def notes_floors(self) -> bool:
-        """Whether the integrator has an accuracy, so that error floors are recorded."""
-        return self.setup.integrator.chooses or self.setup.integrator.name == "free_body"
-
-    @property
     def arrays(self) -> _Side:
         """Arguments of the compiled call."""
         start = self.setup.flight_start
@@ -309,7 +304,6 @@ def _fly_rows(
     own: _Side,
     references: _Side,
     has_references: bool,
-    notes_floors: bool,
     sample_ns: np.ndarray,
     measures: np.ndarray,
     results: tuple[Any, ...],
@@ -329,9 +323,8 @@ def _fly_rows(
         if not came:
             continue
         status[i] = 1
-        if notes_floors:
-            copy_numbers(flights[0].floors, floors[i])
-            fl.note_floors(flights[0], own[3], floors[i])
+        copy_numbers(flights[0].floors, floors[i])
+        fl.note_floors(flights[0], own[3], floors[i])
         measure_flight(measures, states, others, sample_ns, context, measured[i])
 
 
@@ -354,6 +347,6 @@ def fly_rows(
     tables = np.zeros(loads, fl.LOAD_ROW), np.zeros(4 * loads + 4, fl.EVENT), work
     states, others = (np.zeros((len(sample_ns), STATE)) for _ in range(2))
     room = np.zeros(CONTEXT), np.zeros(1, fl.FLIGHT), tables, states, others
-    arrays = batch.arrays, sides[-1].arrays, references is not None, batch.notes_floors
+    arrays = batch.arrays, sides[-1].arrays, references is not None
     _fly_rows(*arrays, sample_ns, measures, filled, room)
     return results

@@ -18,7 +18,7 @@ from ..base.compilation import copy_numbers, copy_record, njit, record_type
 from ..base.rotation import norm
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
-from ..motion.integrators.integrator import ADAPTIVE, CONTROL, NOTHING, ONE_STEP, commit, is_provided, reach
+from ..motion.integrators.integrator import ADAPTIVE, CONTROL, FIXED_STEPS, commit, is_provided, reach
 from ..motion.integrators.series_steps import FLOOR, begin_control
 from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
 from ..motion.problem import (
@@ -312,14 +312,16 @@ def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> N
     """Update ``floors`` (FLOOR_KINDS,) with limits of double precision in the segment up to now_ns, which no method can
     improve. Rounding ω to ε causes an attitude error of ε|ω|t. A position is rounded to half a unit in its last place.
     The tensor of a slender body, unless given in its principal axes, holds its smallest moment and the difference of
-    the others only to ε I₃.
+    the others only to ε I₃. Fixed steps have no accuracy that could be missed.
     """
     accuracy, control, body, row = flight.accuracy, flight.control, flight.body, flight.row
+    method = methods[flight.method]
+    if method.way == FIXED_STEPS or flight.now_ns == flight.start_ns:
+        return
     floors[STEP_FLOOR] = max(floors[STEP_FLOOR], control.floor_rate)
     floors[PULL_FLOOR] = max(floors[PULL_FLOOR], control.pull_floor_rate)
     rate = ROUNDINGS * 2.0**-52 * norm(row[10], row[11], row[12])
-    method = methods[flight.method]
-    if method.way in (NOTHING, ONE_STEP) and not method.sleeps and rate > accuracy:
+    if method.way != ADAPTIVE and not method.sleeps and rate > accuracy:
         floors[SPIN_FLOOR] = max(floors[SPIN_FLOOR], rate)
     I, M = of_body.INERTIA, of_body.MOMENTS
     if body[I + 1] != 0.0 or body[I + 2] != 0.0 or body[I + 5] != 0.0:

@@ -166,10 +166,14 @@ class FlightArrays:
         self._grow(0, start.room)
 
     def take(self, setup: Setup) -> None:
-        """Use the body, settings and integrator of a setup from now on; the current segment isn't changed."""
+        """End the segment, which counts by its own methods and settings, and use those of a setup and its body from now
+        on.
+        """
+        self.call(CUT)
         self._take_methods(setup)
         self.room[:] = 0.0
         flight = self.flight
+        flight.method = 0  # a number in the present table, which may be shorter
         new = setup.flight_start.flight[0]
         flight.body[:], flight.common = new.body, new.common
         flight.accuracy, flight.degree, flight.chooses = new.accuracy, new.degree, new.chooses

@@ -102,11 +102,15 @@ def fill_state(
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def begin(row: np.ndarray, context: np.ndarray) -> None:
-    """Fill the context (CONTEXT,) from the state row (STATE,) at time 0."""
+    """Fill the context (CONTEXT,) from the state row (STATE,) at time 0. Energy and angular momentum of a body that has
+    none are NaN, and so is their drift.
+    """
     copy_numbers(row[:13], context[START : START + 13])
-    context[START_ENERGY] = _kinetic(row) + _potential(row)
-    lx, ly, lz = _momentum(row)
-    context[START_MOMENTUM], context[START_MOMENTUM + 1], context[START_MOMENTUM + 2] = lx, ly, lz
+    energy, (lx, ly, lz) = _kinetic(row) + _potential(row), _momentum(row)
+    context[START_ENERGY] = energy if energy != 0.0 else math.nan
+    spins = lx != 0.0 or ly != 0.0 or lz != 0.0
+    context[START_MOMENTUM] = lx if spins else math.nan
+    context[START_MOMENTUM + 1], context[START_MOMENTUM + 2] = ly, lz
 
 
 @njit(error_model="numpy", allocates=False)
@@ -189,8 +193,8 @@ def count_flips(measure: np.ndarray, states: np.ndarray, context: np.ndarray) ->
 @njit(error_model="numpy", allocates=False)
 def _extreme(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> float:
     sign = 1.0 if measure[KIND] == LARGEST else -1.0
-    found = -math.inf
-    for k in range(states.shape[0]):
+    found = sign * quantity(int(measure[CODE]), states[0], context)
+    for k in range(1, states.shape[0]):
         found = max(found, sign * quantity(int(measure[CODE]), states[k], context))
     return sign * found
 

@@ -90,6 +90,7 @@ class Simulation:
     """
 
     time_ns: int
+    state: State
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
         self.setup = setup
@@ -202,6 +203,8 @@ class Simulation:
         check_supported(new.integrator, needs_of(new, (acting.load for acting in self.acting), tied))
         knot = new.string.attach if new.string.attach != self.setup.string.attach else self._string.attach
         check_rates(new, knot if tied else None)
+        if new.string.attached:
+            check_rates(new, new.string.attach)  # where the next reset ties it
 
     def reset(self, setup: Setup | None = None) -> None:
         """Restart at time 0 in the initial state (of a new setup, if given), without active loads and scheduled
@@ -226,8 +229,11 @@ class Simulation:
     def advance(self, until_ns: int) -> State:
         """Advance the body to ``until_ns`` and return its state there, before events at that same time are applied.
 
-        A motion that diverges (|x|, |v| or |ω| above 1e100) stops at the last good state and sets ``failure``.
+        A motion that diverges (|x|, |v| or |ω| above 1e100) stops at the last good state, where it stays until a reset,
+        and sets ``failure``.
         """
+        if self.failure:
+            return self.state
         if until_ns < self.time_ns:
             raise ValueError(f"simulated time doesn't run backwards: {self.time_ns} to {until_ns} ns")
         arrays = self._arrays
@@ -509,8 +515,6 @@ class Simulation:
     @property
     def floors(self) -> list[float]:
         """Error floors by kind (flight.FLOOR_KINDS); 0 where rounding isn't the limit."""
-        if not self.setup.integrator.chooses and self.setup.integrator.name != "free_body":
-            return [0.0] * fl.FLOOR_KINDS
         floors = self.flight.floors.copy()
         fl.note_floors(self.flight, self._arrays.methods, floors)
         return [float(floor) for floor in floors]

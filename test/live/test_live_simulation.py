@@ -259,3 +259,15 @@ def test_the_physics_thread_asks_for_short_time_slices(live):
     (thread,) = (thread for thread in threading.enumerate() if thread.name == "physics")
     live.call(lambda: None)
     assert slice_of(thread.native_id) == SLICE_NS < slice_of(threading.get_native_id())
+
+
+@pytest.mark.parametrize("changes", [{}, {"body_frame": "thing"}, {"world_frame": "map"}])
+def test_a_contact_that_a_frame_would_hide_is_refused(live, changes):
+    for frame in (changes.get("world_frame", "world"), changes.get("body_frame", "bolt")):
+        if frame != "world":
+            scenario = make_scenario({"mesh": "t_handle", **changes, f"contacts.{frame}": [0.0, 0.0, 0.07]})
+            with pytest.raises(InputError, match=f"contacts.{frame}"):
+                LiveSimulation(scenario, name="bolt")
+    with pytest.raises(InputError, match="contacts.rigid_body"):
+        live.begin(make_scenario({"mesh": "t_handle", "contacts.rigid_body": [0.0, 0.0, 0.07]}))
+    assert "tip" in live.scenario.parameters.contacts

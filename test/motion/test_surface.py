@@ -124,3 +124,12 @@ def test_no_sampled_point_of_the_surface_is_nearer_than_the_nearest(seed):
     nearest = surface.nearest_point(point)
     assert np.linalg.norm(nearest - point) <= np.linalg.norm(sampled - point, axis=1).min() + 1e-12
     assert np.linalg.norm(surface.nearest_point(nearest) - nearest) <= 1e-12
+
+
+@pytest.mark.parametrize("sliver", [(0, 0, 1), (0, 1, 1), (0, 1, 0), (2, 2, 2)])
+def test_a_triangle_without_area_changes_no_answer(sliver):
+    """As an .obj or .stl file may hold one, two of its corners being one point."""
+    with_sliver = Surface(CUBE.vertices, np.vstack([CUBE.triangles, [sliver]]))
+    for point in ([0.0, 0.0, 0.5], [-0.1, -0.2, 0.4], [0.3, 0.4, 0.5], [-1.0, -1.0, 2.0]):
+        assert np.array_equal(with_sliver.nearest_point(point), CUBE.nearest_point(point))
+        assert np.array_equal(with_sliver.inward_normal(point), CUBE.inward_normal(point))

@@ -51,6 +51,23 @@ def test_a_change_refused_when_it_acts_leaves_the_scene_as_it_is_for_those_after
     assert run.ghost is not None and run.ghost.simulation.setup.integrator.name == "auto"
 
 
+def test_steps_and_evaluations_are_counted_by_the_integrator_that_made_them() -> None:
+    """On a string: a series of auto is one evaluation, a step of rk4 four, one of dop853 twelve."""
+    string = {"string.attached": True, "string.attach": [0.0, 0.0, 0.07], "string.target": [0.1, 0.0, 0.0]}
+    script = (
+        "[{t: 0.1, set: {integrator: rk4}}, {t: 0.2, set: {integrator: auto}}, {t: 0.3, set: {integrator: dop853}}]"
+    )
+    run = OfflineRun(make_scenario(string), parse_script(script))
+    counted = []
+    for tenths in range(1, 5):
+        run.advance(tenths * SECOND // 10)
+        counted.append((run.simulation.steps, run.simulation.force_evaluations))
+    # A segment of auto ends with a shorter step of the series that it has, and its last one counts when it is made.
+    steps, evaluations = np.diff(counted, axis=0).T.tolist()
+    assert [steps[0] - 100, steps[2] - 100] == [1, 1] and 0 < steps[1] < 50
+    assert [evaluations[0] - 400, evaluations[2] - 1200] == [0, 0] and 0 < evaluations[1] < 50
+
+
 def test_a_step_is_rounded_to_the_nearest_nanosecond() -> None:
     for step_s, step_ns in ((1e-3 + 4e-10, 1_000_000), (1e-3 + 6e-10, 1_000_001), (2e-9, 2), (1.4e-9, 1)):
         assert make_scenario({"step": step_s}).setup.step_ns == step_ns

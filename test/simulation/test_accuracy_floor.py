@@ -14,6 +14,9 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import OfflineRun
+from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.simulation.commands import ReleaseString
 
 BOX = make_body(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.04]))
@@ -76,6 +79,25 @@ def test_simulate_and_a_recording_tell_of_a_floor(capsys, tmp_path):
         assert main(["replay", file]) == 0
         assert told in capsys.readouterr().out
         assert read_runs(file)[0].accuracy_floor == told
+
+
+def test_a_floor_is_judged_by_the_accuracy_and_the_method_of_its_own_segment():
+    """Neither a segment of no length nor one of fixed steps has a floor, and what comes later takes none back."""
+    far = {"initial.position": [1e3, 0.0, 0.0], "initial.angular_velocity": [0.0, 0.0, 1.0]}
+    for script, told in (
+        ("[{t: 0, set: {gravity: [0, 0, -1]}}, {t: 0.5, set: {gravity: [0, 0, 0]}}]", False),
+        ("[{t: 0.5, set: {accuracy: 1.0e-15}}, {t: 0.5, set: {integrator: rk4}}]", False),
+        (
+            "[{t: 0, set: {integrator: rk4, accuracy: 1.0e-15}}, {t: 0.5, set: {integrator: auto, accuracy: 1.0e-9}}]",
+            False,
+        ),
+        ("[{t: 0, set: {accuracy: 1.0e-15}}, {t: 0.5, set: {integrator: rk4}}]", True),
+        ("[{t: 0, set: {accuracy: 1.0e-15}}, {t: 0.5, set: {accuracy: 1.0e-9}}]", True),
+    ):
+        run = OfflineRun(make_scenario(far), parse_script(script))
+        assert run.simulation.accuracy_floor == ""
+        run.advance(SECOND)
+        assert ("far from the world's origin" in run.simulation.accuracy_floor) == told, script
 
 
 def test_fixed_steps_promise_no_accuracy_and_report_no_floor():

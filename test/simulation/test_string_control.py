@@ -114,6 +114,17 @@ def test_a_string_that_a_reset_ties_again_counts_for_the_integrator_though_it_wa
     simulation.check_change(scenario.with_changes({"integrator": "free_body", "string.attached": False}).setup)
 
 
+def test_a_string_that_a_reset_ties_again_is_not_too_fast_there_wherever_its_knot_is_now():
+    """Near the centre of mass it would swing at 4e5 rad/s or little more, at the knot of the reset beyond the limit."""
+    tied = {"string__attached": True, "string__attach": [0.0, 0.0, 0.07], "string__target": [0.0, 0.0, 1.0]}
+    simulation, scenario = simulated(integrator="auto", string__damping_ratio=0.0, **tied)
+    mass, body = scenario.setup.body.mass, scenario.setup.body
+    simulation.submit(TieString("mesh", tuple(body.mesh_point((0.0, 0.0, 0.0)).tolist())))
+    simulation.advance(SECOND // 100)
+    with pytest.raises(CommandRefused, match="string.stiffness"):
+        simulation.check_change(scenario.with_changes({"string.stiffness": mass * 4e5**2}).setup)
+
+
 @pytest.mark.parametrize("frame", ["", "rigid_body", "body/mesh"])
 def test_the_knot_is_the_nearest_point_of_the_surface_as_it_is_then(frame):
     """In world, body (metres from the COM) and mesh coordinates, against trimesh's closest points: 1e-12."""

@@ -47,6 +47,30 @@ def test_what_cant_be_taken_is_said_at_once_and_what_is_refused_later_at_its_ste
         flight.step(0.1)
 
 
+def test_a_motion_that_has_failed_goes_no_further() -> None:
+    """A string that pushes, whose knot runs into its free end: every step says so, whatever is commanded."""
+    string = {
+        "string.attached": True,
+        "string.bilateral": True,
+        "string.rest_length": 0.5,
+        "inertia_model_com": "model",
+    }
+    inertia = {"inertia_model": "explicit", "mesh": "", "explicit_inertia.mass": 0.1}
+    still = {
+        "initial.position": [0.2, 0.0, 0.0],
+        "initial.linear_velocity": [-20.0, 0.0, 0.0],
+        "initial.angular_velocity": [0.0] * 3,
+    }
+    flight = Flight(load_scene("t_handle", {**string, **inertia, **still}))
+    reached = []
+    for _ in range(3):
+        with pytest.raises(InputError, match="meets its free end"):
+            flight.step(0.1)
+        flight.command({"state": {"position": [1.0, 0.0, 0.0]}})
+        reached.append(flight.sample().time_ns)
+    assert 0 < reached[0] == reached[1] == reached[2] < 100_000_000
+
+
 def final_height(spin: float) -> float:
     flight = Flight(load_scene("t_handle", {"gravity": [0, 0, -9.81], "initial.linear_velocity": [0, 0, spin]}))
     return float(flight.step(1.0).position[2])

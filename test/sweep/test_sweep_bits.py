@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Rows of a sweep have the simulation's bits, whoever flies them and whatever is flown beside them."""
 
+import json
+
 import numpy as np
 import pytest
 from sweep_studies import HUNG, POKES, PULLED, STRUCTURE, study
@@ -12,7 +14,7 @@ from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.simulation import batch
 from rigid_proto_ros.simulation.batch import new_results
 from rigid_proto_ros.simulation.flight import floor_text
-from rigid_proto_ros.sweep.rows import Chunk, FailedFlight, run_chunk, simulate_row
+from rigid_proto_ros.sweep.rows import Chunk, FailedFlight, row_summary, run_chunk, simulate_row
 
 
 def same(a: np.ndarray, b: np.ndarray) -> bool:
@@ -92,6 +94,21 @@ def test_energies_and_momentum_are_those_of_the_body_and_gravity_in_force() -> N
         extremes = [found["min.angular_momentum"], found["max.angular_momentum"]]
         assert extremes == pytest.approx(sorted([momentum, after]), rel=1e-12, abs=0.0)
         assert extremes[1] > 1.5 * extremes[0]
+
+
+def test_what_a_body_at_rest_has_none_of_doesnt_drift() -> None:
+    """Neither energy nor angular momentum at the start: their drifts are null, and no number of JSON is infinite."""
+    spec = {
+        "scene": "t_handle",
+        "set": {"initial.angular_velocity": [0.0, 0.0, 0.0]},
+        "script": [{"t": 0.1, "at": "tip", "impulse": [0.001, 0.0, 0.0]}],
+        "duration": 0.2,
+        "vary": {"mass": {"grid": [0.1, 0.2]}},
+        "measure": {kind: ["energy_drift", "momentum_turned", "spin"] for kind in ("final", "max", "min")},
+    }
+    found = json.loads(json.dumps(row_summary(study(spec), 1), allow_nan=False))
+    assert found["failure"] is None and found["max.spin"] > 0.0 and found["min.spin"] == 0.0
+    assert [found[name] for name in found if "drift" in name or "turned" in name] == [None] * 6
 
 
 @pytest.mark.parametrize(
