@@ -276,7 +276,7 @@ class LiveSimulation:
             return scenario
 
         def change() -> None:
-            self._put_in_force(check(), Change(dict(changes)))
+            loop.expect(check(), Change(dict(changes)))
 
         recorder = None
         if "record" in changes:
@@ -293,25 +293,6 @@ class LiveSimulation:
             finished = self.call(lambda: self._switch_recording(recorder))
             if finished is not None:
                 finished.close()
-
-    def _put_in_force(self, scenario: Scenario, change: Change) -> None:
-        """On the physics thread: a checked scenario, and the change that has made it of the present one."""
-        loop, before = self.loop, self.loop.scenario.parameters.named()
-
-        def apply() -> Setup:
-            """When it acts: after commands of the same time that change parameters too, or make it impossible."""
-            try:
-                if loop.scenario is not scenario:
-                    return loop.setup_of(change, scenario.body_mesh)
-                loop.check_change(scenario)
-                return scenario.setup
-            except InputError:
-                loop.change({name: value for name, value in before.items() if name in change.content})
-                self.endpoints.parameters_changed()
-                raise
-
-        loop.replace(scenario)
-        loop.simulation.submit(replace(change, apply=apply))
 
     def _warm_up_change(self, planned: Scenario) -> None:
         """Compile the kernels of another integrator."""
@@ -388,7 +369,7 @@ class LiveSimulation:
 
         def give_up() -> Observer | None:
             recorder = self._switch_recording(None)
-            self.loop.change({"record": ""})
+            self.loop.setup_of(Change({"record": ""}))
             return recorder
 
         recorder = self.call(give_up)

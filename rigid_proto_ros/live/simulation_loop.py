@@ -8,11 +8,12 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 from ..base.errors import InputError
 from ..motion.state import State
-from ..scene.scenario import BodyMesh, Scenario
+from ..scene.scenario import BodyMesh, Scenario, check_inertia
 from ..scene.scenario_run import ScenarioRun
 from ..simulation.commands import Change
 from ..simulation.observer import Observer, Published
@@ -89,6 +90,8 @@ class SimulationLoop(ScenarioRun):
         self._caught_up = True
         self._end_ns: int | None = None
         self._on_end: Callable[[], None] = lambda: None
+        self._waiting: list[Change] = []
+        self._acting = scenario
         self._anchor(stamps_stay=True)
 
     def end_at(self, time_ns: int, on_end: Callable[[], None]) -> None:
@@ -108,17 +111,55 @@ class SimulationLoop(ScenarioRun):
     def replace(self, scenario: Scenario) -> Setup:
         """Put another scenario in force; its real time factor takes effect at once, too."""
         setup = super().replace(scenario)
+        if not self._waiting:
+            self._acting = scenario
         if scenario.parameters.real_time_factor != self.pace.factor:
             self.pace.factor = scenario.parameters.real_time_factor
             if not self.pace.followed:
                 self._anchor()
         return setup
 
+    def expect(self, scenario: Scenario, change: Change) -> None:
+        """Put a checked scenario in force that a change has made of the present one; it acts when its time comes, on
+        what acts by then, and is taken back when it is refused then.
+        """
+        acting = self._acting
+        self.replace(scenario)
+        self._acting = acting
+        self._waiting.append(change)
+
+        def apply() -> Setup:
+            # Changes made by hand act in the order in which they came.
+            self._waiting.pop(0)
+            return self.setup_of(change, scenario.body_mesh)
+
+        self.simulation.submit(replace(change, apply=apply))
+
     def setup_of(self, command: Change, at_hand: BodyMesh | None = None) -> Setup:
-        """Put in force what a change says that acts now; returns the setup. at_hand: a mesh that may be its."""
-        setup = super().setup_of(command) if at_hand is None else self.change(command.content, at_hand=at_hand)
-        self.endpoints.parameters_changed()
-        return setup
+        """Put in force what a change says that acts now; returns the setup, without changes that still wait. Raises
+        InputError. at_hand: a mesh that may be its.
+        """
+        acting = self._acting
+        try:
+            if command.kind == "inertia":
+                acting = check_inertia(acting, command.content)
+            else:
+                acting = acting.with_changes(command.content, at_hand=at_hand)
+            self.check_change(acting)
+            self._acting = acting
+        finally:
+            planned = self._acting
+            for change in self._waiting:
+                with suppress(InputError):  # refused when it acts
+                    changed = planned.with_changes(change.content)
+                    self.check_change(changed)
+                    planned = changed
+            if planned.parameters == self.scenario.parameters:
+                self.scenario = planned
+            else:
+                self.replace(planned)
+                self.endpoints.parameters_changed()
+        return acting.setup
 
     def watch(self, observer: Observer) -> None:
         """Tell another observer from now on."""
@@ -202,6 +243,8 @@ class SimulationLoop(ScenarioRun):
     def reset(self) -> None:
         """Time 0 and the initial state; paused or running stays."""
         # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
+        self._waiting.clear()
+        self._acting = self.scenario
         self.simulation.reset(self.scenario.setup)
         if self.ghost is not None or Published in self.observer.takes:
             self.begin_ghost()

@@ -21,6 +21,8 @@ from rigid_proto_ros.live.pacing import SLICE_NS
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.parameters import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario_run import OfflineRun
+from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.simulation.commands import ThrusterCommand, WrenchCommand
 from rigid_proto_ros.simulation.observer import Logged, Observer, Published
 
@@ -130,6 +132,22 @@ def test_parameters_refused_when_they_act_are_again_what_they_were(live):
     live.set_parameters({"linear_damping": 0.5})
     live.step()
     assert live.loop.simulation.setup.linear_damping == 0.5
+
+
+@pytest.mark.parametrize("first", ["inertia_model", "scale"])
+def test_parameters_set_while_time_stands_act_one_after_another(live, first):
+    changes = {"inertia_model": {"inertia_model": "shell"}, "scale": {"scale": 2.0}}
+    order = [first, *(name for name in changes if name != first)]
+    for name in order:
+        live.set_parameters(changes[name])
+    live.step()
+    listed = [{"t": 0.0, "set": changes[name]} for name in order]
+    run = OfflineRun(make_scenario({"mesh": "t_handle"}), parse_script(json.dumps(listed)))
+    assert run.advance(PERIOD_NS)
+    # The other model moves the centre of mass within the mesh, which has been scaled by then or not.
+    assert np.any(live.state.position != 0.0)
+    assert live.state.row.tobytes() == run.simulation.state.row.tobytes()
+    assert live.scenario.parameters.inertia_model == "shell" and live.scenario.parameters.scale == (2.0,)
 
 
 def test_commands_are_checked_in_the_scene_that_parameters_have_made(live):
