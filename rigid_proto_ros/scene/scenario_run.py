@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from ..base.command_line import Progress
-from ..base.errors import CommandRefused, InputError
+from ..base.errors import InputError
 from ..mesh.reading import Mesh
 from ..simulation.commands import Change, Command, Listed
 from ..simulation.observer import (
@@ -222,20 +222,22 @@ class OfflineRun(ScenarioRun):
 
     def submit(self, script: Iterable[Command]) -> None:
         """Take the commands of a script, which act behind those taken before where their times are equal; each is
-        checked in the scene that those before it in the script have made by then. Raises InputError.
+        checked in the scene that those before it in the script have made by then. Takes all, or none and raises
+        InputError.
         """
-        planned = self.scenario
-        for command in with_contacts(script, planned.setup.contacts):
-            self._submitted += 1
+        planned, taken = self.scenario, []
+        for number, command in enumerate(with_contacts(script, planned.setup.contacts), self._submitted + 1):
             try:
                 if isinstance(command, Change):
                     planned = planned.with_changes(command.content)
                     command = self.bound(command)
-                checked = (check_command(command, planned.setup), planned.setup)
-                self.simulation.submit(command, command.stamp_ns, (0, self._submitted), checked)
-            except CommandRefused as refusal:
-                place = f"script, command {self._submitted} at {command.stamp_ns / 1e9:g} s"
-                raise InputError(place, refusal.received, refusal.accepted) from None
+                taken.append((command, number, (check_command(command, planned.setup), planned.setup)))
+            except InputError as error:
+                place = f"script, command {number} at {command.stamp_ns / 1e9:g} s, {error.field}"
+                raise InputError(place, error.received, error.accepted) from None
+        self._submitted += len(taken)
+        for command, number, checked in taken:
+            self.simulation.submit(command, command.stamp_ns, (0, number), checked)
 
     def advance(self, until_ns: int) -> bool:
         """Advance the body to ``until_ns``, notifying the observer every publication; False when the motion failed."""

@@ -47,6 +47,15 @@ def test_what_cant_be_taken_is_said_at_once_and_what_is_refused_later_at_its_ste
         flight.step(0.1)
 
 
+def test_of_an_entry_that_is_refused_nothing_acts() -> None:
+    flight = Flight(load_scene("t_handle", {"integrator": "lie_midpoint", "string.attach": [0.0, 0.0, 0.0]}))
+    with pytest.raises(InputError, match="a string"):
+        flight.command({"string": {"attach": "tip", "target": [0.0, 0.0, 1.0]}})
+    flight.command({"set": {"integrator": "auto"}})
+    flight.step(0.1)
+    assert flight._run.simulation.attach == (0.0, 0.0, 0.0)
+
+
 def test_a_motion_that_has_failed_goes_no_further() -> None:
     """A string that pushes, whose knot runs into its free end: every step says so, whatever is commanded."""
     string = {
