@@ -5,6 +5,7 @@ matter for the motion, and findings.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -157,7 +158,7 @@ def inspect_mesh(
             continue
         findings += [Finding("tensor", WARNING, text) for text in models[name].warnings]
     volume = None
-    if body.verdict.closed or moments.stand_in is not None:
+    with contextlib.suppress(InputError):  # of a mesh that bounds no solid, and has no other shape to take
         volume = moments.moments("solid").measure * float(np.prod(np.abs(s)))
     shell = moments.moments("shell", s) if "shell" in models else None
     area = None if shell is None else shell.measure * float(s[0]) ** 2
@@ -194,9 +195,9 @@ def as_json(inspection: Inspection) -> dict:
 def verify_moments(body: MeshBody, scale: np.ndarray) -> dict[str, float]:
     """Errors of the solid's volume, centroid and inertia against rational arithmetic on the same vertices."""
     moments = body.moments
-    vertices, triangles = moments.solid_surface()  # raises MeshError if there is no solid
+    unit = moments.mass_properties("solid", scale=scale, density=1.0)  # raises InputError if there is no solid
+    vertices, triangles = moments.solid_surface()
     exact = exact_solid_moments(vertices, triangles, scale.tolist())
-    unit = moments.mass_properties("solid", scale=scale, density=1.0)
     points = referenced_vertices(vertices, triangles) * scale
     diagonal = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
     volume = moments.moments("solid").measure * float(np.prod(np.abs(scale)))

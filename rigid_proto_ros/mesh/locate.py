@@ -77,7 +77,7 @@ def resolve_mesh(name: str, search: Search = NOWHERE_ELSE) -> Path:
             return _in_package(name, *rest.partition("/")[::2], search)
         if colon and scheme not in ("file", ""):
             raise MeshError("mesh", name, "a path, file://, package://, model:// or a bundled name")
-        return _at_path(rest if colon else name, search)
+        return _at_path(rest if colon else name, search, uri=bool(colon))
     except (OSError, RuntimeError, ValueError) as error:
         if isinstance(error, MeshError):
             raise
@@ -87,11 +87,12 @@ def resolve_mesh(name: str, search: Search = NOWHERE_ELSE) -> Path:
         raise MeshError("mesh", name, accepted) from None
 
 
-def _at_path(name: str, search: Search) -> Path:
+def _at_path(name: str, search: Search, uri: bool) -> Path:
     path = Path(name).expanduser()
     bundled = BODIES / f"{name}.obj"
-    places = [search.near / path] if search.near is not None else []
-    for place in (*places, path, *([bundled] if name and "/" not in name else [])):
+    spelled = (path, Path(unquote(name)).expanduser()) if uri else (path,)  # as written, or with %20 for a blank
+    places = [search.near / path for path in spelled] if search.near is not None else []
+    for place in (*places, *spelled, *([bundled] if name and "/" not in name else [])):
         if place.is_file():
             return place.resolve()
     if path.is_dir():

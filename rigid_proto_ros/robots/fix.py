@@ -77,8 +77,10 @@ def fix_robot(
     if b"\0" in data:
         raise InputError("fix", path.name, "a file in UTF-8 or another ASCII-compatible encoding")
     found = [match.span() for match in _INERTIAL.finditer(data) if match["inertial"]]
-    # Included files are put into the tree by reading it.
-    places = {id(element): place for element, place in zip(root.iter("inertial"), found, strict=True)}
+    elements = list(root.iter("inertial"))  # before those of included files are put into the tree by reading it
+    if len(found) != len(elements):
+        raise InputError("fix", path.name, "a file whose <inertial> elements are none within another")
+    places = {id(element): place for element, place in zip(elements, found, strict=True)}
     links = robot_of(root, path).links
     meshes = Meshes(Search(path.parent, folders), accept_open)
     write = _WRITERS[str(root.tag)]

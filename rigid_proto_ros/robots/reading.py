@@ -149,7 +149,7 @@ def rotation_from_wxyz(quaternion: ArrayLike) -> np.ndarray:
 def floats(name: str, text: str, count: int = 3) -> np.ndarray:
     """``count`` numbers of a text, which the file calls ``name``; raises InputError for others."""
     try:
-        values = np.array([float(word) for word in text.split()])
+        values = np.array([float(word.replace("_", "?")) for word in text.split()])  # Python allows _ in numbers
     except ValueError:
         values = np.zeros(0)
     if len(values) != count:

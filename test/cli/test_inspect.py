@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from mesh_files import CUBE_TRIANGLES, obj
+from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.moments import MODELS
@@ -122,6 +122,17 @@ def test_an_open_mesh_has_its_other_models_with_a_given_mass(capsys, tmp_path):
     assert report(capsys, path, "--repair")["volume"] == pytest.approx(1.0, rel=1e-15)
     assert report(capsys, path, "--fallback", "hull")["volume"] == pytest.approx(1.0, rel=1e-14)
     assert report(capsys, path, "--fallback", "box", "--verify")["verification"]["volume_error"] <= 1e-15
+
+
+@pytest.mark.parametrize("shape", ["hull", "box"])
+def test_a_flat_mesh_has_no_shape_to_take_instead_and_its_report_is_printed(capsys, tmp_path, shape):
+    (tmp_path / "flat.obj").write_bytes(obj(CUBE_VERTICES * [1.0, 1.0, 0.0]))
+    arguments = (str(tmp_path / "flat.obj"), "--fallback", shape)
+    status, out, err = inspect(capsys, *arguments, "--json")
+    assert status == 2 and err.count("\n") == 1 and json.loads(out)["verdict"]
+    assert report(capsys, *arguments, "--mass", "2", "--model", "bounding_box")["volume"] is None
+    status, out, err = inspect(capsys, *arguments, "--mass", "2", "--model", "bounding_box", "--verify", "--json")
+    assert status == 2 and err.count("\n") == 1 and json.loads(out)["verification"] is None
 
 
 def test_an_open_mesh_that_is_to_be_verified_is_refused_with_its_report(capsys, tmp_path):

@@ -177,6 +177,7 @@ def test_a_mesh_may_be_named_for_the_link_that_shows_it(capsys, tmp_path, truth)
             urdf([0, 0, 0], [1, 0, 0, 1, 0, 1]).replace('mass value="0.7"', 'mass value="heavy"'),
             "mass of link head: got 'heavy'",
         ),
+        (urdf([0, 0, 0], [1, 0, 0, 1, 0, 1]).replace('mass value="0.7"', 'mass value="1_0"'), "got '1_0'"),
     ],
 )
 def test_files_that_cannot_be_judged_are_refused_in_one_line(capsys, tmp_path, text, expected):

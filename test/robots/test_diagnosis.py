@@ -102,7 +102,7 @@ def test_packages_are_found_upwards_by_name_by_package_xml_and_where_one_says(tm
     folder = tmp_path / "ws" / "src" / "my_robot"
     (folder / "meshes").mkdir(parents=True)
     (folder / "meshes" / "a b.stl").write_bytes(stl(CUBE))
-    files = ("package://my_robot/meshes/a b.stl", "model://my_robot/meshes/a%20b.stl", "file://../meshes/a b.stl")
+    files = ("package://my_robot/meshes/a b.stl", "model://my_robot/meshes/a%20b.stl", "file://../meshes/a%20b.stl")
     uniform, unknown = ("uniform", "visual"), ("unknown", "visual")
     assert judge(urdf(folder / "urdf", *(mesh(file) + inertial() for file in files))) == [uniform] * 3
     folder.rename(tmp_path / "ws" / "src" / "clone")

@@ -163,6 +163,13 @@ def test_what_a_body_of_the_shapes_can_have_stays_unless_all_is_asked_for(parts)
     assert_finds_nothing(path, data)
 
 
+def test_an_inertial_within_another_is_refused(parts):
+    path = parts / "robot.urdf"
+    path.write_bytes(URDF.replace("</inertial>", "<inertial/></inertial>", 1).encode())
+    with pytest.raises(InputError, match="none within another"):
+        fixed(path)
+
+
 def test_xacro_is_refused_with_the_command_that_expands_it_and_wide_characters_too(parts):
     path = parts / "an arm.urdf.xacro"
     path.write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="a"/></robot>')
