@@ -118,7 +118,7 @@ def _read_properties(entity: str, batch: Any, session: RecordedSession) -> None:
     elif "RecordingInfo:name" in batch.schema.names:
         # The node's name, and which run of it.
         name = batch.column("RecordingInfo:name").to_pylist()[0][0].split(",")[0]
-        session.node_name = name if name.isidentifier() else session.node_name
+        session.node_name = name if all(map(str.isidentifier, name.split("/"))) else session.node_name
 
 
 def _sim_times(batch: Any) -> np.ndarray:

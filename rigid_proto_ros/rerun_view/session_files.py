@@ -155,7 +155,7 @@ def record(
             raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
     total = sum(len(session.times) for session in runs)
     told = 0
-    with recording(str(path), runs[-1].node_name.rpartition("/")[2] or "rigid_body") as recorder:
+    with recording(str(path), runs[-1].node_name or "rigid_body") as recorder:
         for number, session in enumerate(runs):
             if number:
                 recorder.on(Reset())

@@ -73,7 +73,9 @@ class RigidBodyNode(Node):
         viewer = make_viewer(scenario, self.get_name())
         endpoints = Endpoints(warn=self.get_logger().warning)
         clock = self._followed_clock(scenario)
-        self.live = LiveSimulation(scenario, self.get_name(), [events, *filter(None, [viewer])], endpoints, clock)
+        # With its namespace: a recording has the node's own topics.
+        name = self.get_fully_qualified_name().strip("/")
+        self.live = LiveSimulation(scenario, name, [events, *filter(None, [viewer])], endpoints, clock)
         self.loop, self.call = self.live.loop, self.live.call
         events.stamps = self.live.stamps
         self.states = StatePublisher(self, frames, self.loop, self.live.stamps)

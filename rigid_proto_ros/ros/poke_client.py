@@ -5,8 +5,8 @@
     poke_client poke --at tip --push 5
     poke_client wrench --force 1 0 0 --for 2
 
-Exit status: 0 all commands were sent, 1 a command was late or refused, 2 the input was refused or no node was found,
-130 ended by Ctrl-C (143 by SIGTERM): commands already sent still act.
+Exit status: 0 all commands were sent, 1 a command was late or refused, or dropped by somebody's reset, 2 the input was
+refused or no node was found, 130 ended by Ctrl-C (143 by SIGTERM): commands already sent still act.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
         help="maximum time to wait for the node (default 10; 0: no limit)",
     )
     line = parser.add_argument_group("one command from the command line")
-    line.add_argument("--at", default="com", help="com, origin, a contact, vertex/<i>, point/<x>,<y>,<z>, ray/...")
+    line.add_argument("--at", help="com (the default), origin, a contact, vertex/<i>, point/<x>,<y>,<z>, ray/...")
     line.add_argument("--force", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N")
     line.add_argument("--push", type=float, metavar="N", help="N along the inward normal")
     line.add_argument("--impulse", type=float, nargs=3, metavar=("X", "Y", "Z"), help="N s, at once (poke only)")
@@ -98,16 +98,19 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
 def _script(args: argparse.Namespace) -> list[Command]:
     from ..scene.script import parse_script, read_script
 
+    given = {
+        key: value
+        for key in ("at", "force", "push", "impulse", "torque", "angular_impulse", "axes", "duration", "slot")
+        if (value := getattr(args, key)) is not None
+    }
     if args.what not in _ONE_LINE_COMMANDS:
+        for key in given:
+            option = "--for" if key == "duration" else f"--{key.replace('_', '-')}"
+            raise InputError(option, "an option of poke and wrench: a script has its own values")
         return read_script(args.what)
     import yaml
 
-    given = {
-        key: value
-        for key in ("force", "push", "impulse", "torque", "angular_impulse", "axes", "duration", "slot")
-        if (value := getattr(args, key)) is not None
-    }
-    given["at"] = _point(args.at)
+    given["at"] = _point(given.get("at", "com"))
     entry = {"t": 0.0, **given} if args.what == "poke" else {"t": 0.0, "wrench": given}
     return parse_script(yaml.safe_dump([entry]), args.what)
 

@@ -61,6 +61,7 @@ class StatePublisher:
         ]
         self._clock: Publisher | None = None
         self._tf: Publisher | None = None
+        self._sought_tf = False
         self._tf_message: Any = None
         self._silent: tuple[Publisher | None, ...] = ()
         self._wanted: Topics = []
@@ -73,7 +74,8 @@ class StatePublisher:
         if parameters.publish_clock and self._clock is None:
             self._clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
             self._topics = [(self._clock, lambda time_ns, _: cdr.time(time_ns)), *self._topics]
-        if parameters.publish_tf and self._tf is None:
+        if parameters.publish_tf and not self._sought_tf:
+            self._sought_tf = True
             self._begin_tf()
         # Once made they are kept: the physics thread may be publishing at the moment that they are switched off.
         self._silent = tuple(

@@ -16,8 +16,10 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
+from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
+from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
@@ -46,7 +48,8 @@ stands.
 @dataclass(frozen=True)
 class Report:
     """sent: commands by kind. late, refused: what the node's counters rose by until ``reached_ns``; reasons: refused
-    ones by reason. last_ns: when the last command acts.
+    ones by reason. last_ns: when the last command acts. was_set_back: whether somebody else has reset or restarted the
+    node before.
     """
 
     sent: dict[str, int]
@@ -55,11 +58,12 @@ class Report:
     reasons: dict[str, int]
     last_ns: int
     reached_ns: int
+    was_set_back: bool
 
     @property
     def all_in_time(self) -> bool:
-        """Whether none was late or refused."""
-        return self.late == 0 and self.refused == 0
+        """Whether none was late, refused or dropped."""
+        return self.late == 0 and self.refused == 0 and not self.was_set_back
 
     @property
     def text(self) -> str:
@@ -68,7 +72,9 @@ class Report:
         why = ", ".join(f"{count} {reason}" for reason, count in self.reasons.items())
         refused = f"{self.refused} refused{f' ({why})' if why else ''}"
         text = f"sent {parts}; {self.late} late, {refused}; the last acts at {self.last_ns / 1e9:.6g} s"
-        if self.sent and self.reached_ns <= self.last_ns:
+        if self.was_set_back:
+            text += ", but the node was reset or restarted before: commands that hadn't acted were dropped"
+        elif self.sent and self.reached_ns <= self.last_ns:
             text += f", but simulated time has stopped at {self.reached_ns / 1e9:.6g} s"
         return text
 
@@ -79,10 +85,15 @@ class ScriptSender(Node):
     """
 
     def __init__(self, node_name: str, timeout_s: float) -> None:
-        super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
         self.target = node_name if node_name.startswith("/") else f"/{node_name}"
+        try:
+            validate_full_topic_name(self.target)
+        except NameValidationException:
+            raise InputError("--node", node_name, "a node's name, such as /rigid_body or /lab/rigid_body") from None
+        super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
         self._counters: dict[str, str] = {}
         self._reports = 0
+        self._was_set_back = False
         self._schedule = self.create_publisher(String, f"{self.target}/schedule", qos.COMMAND)
         self._get_parameters = self.create_client(GetParameters, f"{self.target}/get_parameters")
         self._reset_client = self.create_client(Trigger, f"{self.target}/reset")
@@ -103,23 +114,30 @@ class ScriptSender(Node):
                 # States are stamped by a /clock: by how far it is ahead, a report says that comes after them.
                 reports = self._reports
                 self._spin_until(lambda: self._reports >= reports + 2, f"reports of {self.target}")
-            start_ns = self._stamp_ns() - int(self._counters.get("stamp_offset_ns", 0)) + nanoseconds(lead_s)
+            now_ns = self._stamp_ns() - int(self._counters.get("stamp_offset_ns", 0))
+            # The last report may be from before a reset.
+            self._counters["sim_time_ns"] = str(min(now_ns, self._reached_ns()))
+            self._was_set_back = False
+            start_ns = now_ns + nanoseconds(lead_s)
         horizon_ns = nanoseconds(float(self._parameter("schedule_horizon") or 0.0))
         paused, number = reset, 0
         for time_ns, count, text in schedules(script, start_ns):
             if paused and time_ns > horizon_ns:
-                self._confirm(number)
-                self._call(self._pause_client, SetBool.Request(data=False))
+                self._resume(number)
                 paused = False
             if number + count - self._confirmed() > MAX_UNCONFIRMED:
                 self._confirm(min(number, number + count - MAX_UNCONFIRMED))
-            while time_ns > self._reached_ns() + (horizon_ns if paused else min(horizon_ns, SEND_AHEAD_NS)):
+            ahead_ns = horizon_ns if paused else min(horizon_ns, SEND_AHEAD_NS)
+            while time_ns > self._reached_ns() + ahead_ns and not self._was_set_back:
                 rclpy.spin_once(self, timeout_sec=0.5)
+            if self._was_set_back and not paused:
+                break
             self._schedule.publish(String(data=text))
             number += count
-        self._confirm(number)
         if paused:
-            self._call(self._pause_client, SetBool.Request(data=False))
+            self._resume(number)
+        elif not self._was_set_back:
+            self._confirm(number)
         last_ns = start_ns + (script[-1].stamp_ns if script else 0)
         if script:
             self._wait_until_acted(last_ns)
@@ -128,7 +146,17 @@ class ScriptSender(Node):
         refused = rose.pop("refused_total")
         reasons = {key.removeprefix("refused_"): count for key, count in rose.items() if count}
         late = int(self._counters["late"]) - int(before["late"])
-        return Report(Counter(command.kind for command in script), late, refused, reasons, last_ns, self._reached_ns())
+        sent = Counter(command.kind for command in script[:number])
+        return Report(sent, late, refused, reasons, last_ns, self._reached_ns(), self._was_set_back)
+
+    def _resume(self, number: int) -> None:
+        """Let time run after a reset, once so many commands are confirmed. What reports say of time from then on can't
+        come from before the reset: one that sets time back is somebody else's.
+        """
+        what = f"{self.target} to confirm {number} commands"
+        self._spin_until(lambda: self._confirmed() >= number and (number or self._reached_ns() == 0), what)
+        self._was_set_back = False
+        self._call(self._pause_client, SetBool.Request(data=False))
 
     def _parameter(self, name: str) -> Any:
         """The node's value of a parameter; None where it has none of that name."""
@@ -150,7 +178,9 @@ class ScriptSender(Node):
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name == f"{self.target}: simulation":
+                before_ns = self._reached_ns() if self._counters else 0
                 self._counters = {v.key: v.value for v in status.values}
+                self._was_set_back |= self._reached_ns() < before_ns
                 self._reports += 1
 
     def _stamp_ns(self) -> int:
@@ -178,7 +208,7 @@ class ScriptSender(Node):
         simulated time doesn't get there.
         """
         reached_ns, since = -1, time.monotonic()
-        while self._reached_ns() <= last_ns and time.monotonic() < since + STANDSTILL_S:
+        while self._reached_ns() <= last_ns and time.monotonic() < since + STANDSTILL_S and not self._was_set_back:
             rclpy.spin_once(self, timeout_sec=0.1)
             if self._reached_ns() != reached_ns:
                 reached_ns, since = self._reached_ns(), time.monotonic()

@@ -36,6 +36,7 @@ class SimulationInterfaces:
         self._live = live
         self._loop = live.loop
         self._messages = messages
+        self._entity = live.name.rpartition("/")[2]
 
     def offer(self, node: Node, services: Any) -> None:
         """Create the services, private to the node."""
@@ -154,10 +155,10 @@ class SimulationInterfaces:
         return self._done(response)
 
     def _is_known(self, entity: str, response: Any) -> bool:
-        if entity == self._live.name:
+        if entity == self._entity:
             self._done(response)
             return True
-        message = f"there is no {entity!r}; the only entity is {self._live.name!r}"
+        message = f"there is no {entity!r}; the only entity is {self._entity!r}"
         _ended(response, self._messages.Result.RESULT_NOT_FOUND, message)
         return False
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import itertools
 import resource
 import time
@@ -38,6 +39,13 @@ def test_real_time_that_is_given_up_is_warned_of_and_not_every_second(rig):
     for key, words in (("real_time_lost_s", "s behind real time"), ("overruns", "published late")):
         grown = [b for a, b in itertools.pairwise(reports) if float(b[key]) > float(a[key])]
         assert grown and all(report["level"] == 1 and words in report["message"] for report in grown)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("tf2_msgs") is not None, reason="tf2_msgs is installed")
+def test_that_tf_lacks_its_messages_is_warned_of_once_and_not_at_every_change_of_a_parameter(rig):
+    for gravity in (1.0, 2.0, 3.0):
+        assert rig.set(publish_tf=True, gravity=[0.0, 0.0, -gravity]) == [[True, ""]] * 2
+    assert rig.node_process.errors.count("tf2_msgs isn't installed") == 1
 
 
 def test_a_fixed_step_too_long_for_the_motion_is_a_warning_as_long_as_it_is_in_force(rig):

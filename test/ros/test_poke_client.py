@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -176,6 +177,39 @@ def test_what_comes_late_or_is_refused_is_reported_and_makes_exit_1(rig, client,
     status, said = client(tmp_path / "refused.yaml", "--reset")
     rig.sent += 2
     assert status == 1 and "0 late, 2 refused (1 frame, 1 ray_miss)" in said
+
+
+def test_commands_that_somebody_elses_reset_drops_are_reported_and_make_exit_1(rig, client, tmp_path):
+    (tmp_path / "dropped.yaml").write_text("- {t: 0.1, impulse: [1.0e-6, 0, 0]}\n- {t: 100, impulse: [1.0e-6, 0, 0]}\n")
+    rig.set(real_time_factor=4.0)
+    rig.forget("events")
+
+    def reset() -> None:
+        rig.wait_event("poke")
+        rig.until(lambda: int(rig.diagnostics()["sim_time_ns"]) > SECOND, "a second")
+        rig.trigger("reset")
+
+    with ThreadPoolExecutor() as other:
+        resetting = other.submit(reset)
+        status, said = client(tmp_path / "dropped.yaml", "--reset")
+        resetting.result()
+    rig.sent += 2
+    assert status == 1 and "the node was reset or restarted before: commands that hadn't acted were dropped" in said
+
+
+@pytest.mark.parametrize(
+    "option", [["--push", "5"], ["--at", "com"], ["--for", "2"], ["--angular-impulse", "0", "0", "1"]]
+)
+def test_a_script_takes_none_of_the_options_of_a_single_command(script, option, capsys):
+    assert poke_client([str(script), *option, "--dry-run"]) == 2
+    assert f"{option[0]}: an option of poke and wrench" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["a b", "/a//b", "", "lab/", "tool-2"])
+def test_a_name_that_no_node_can_have_is_refused_in_one_line(name, ros_environment, monkeypatch, capsys):
+    monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
+    assert poke_client(["poke", "--at", "tip", "--push", "1", "--node", name]) == 2
+    assert capsys.readouterr().err.startswith(f"poke_client: --node: got {name!r}; accepted: a node's name")
 
 
 class SlowNode(RosClient):

@@ -36,12 +36,12 @@ def session(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def flyer(ros_environment, tmp_path_factory):
-    """A client of a node /flyer that flies the T-handle, and records from its start to ``flyer.path``."""
+    """A client of a node /lab/flyer that flies the T-handle, and records from its start to ``flyer.path``."""
     folder = tmp_path_factory.mktemp("flyer")
     path = folder / "flight.mcap"
-    names = ("--params-file", scene_path("t_handle"), "-r", "__node:=flyer")
+    names = ("--params-file", scene_path("t_handle"), "-r", "__node:=flyer", "-r", "__ns:=/lab")
     with (
-        RosClient(ros_environment, "/flyer") as client,
+        RosClient(ros_environment, "/lab/flyer") as client,
         running_node(ros_environment, folder / "node", {"record": str(path)}, *names),
     ):
         client.path = path
@@ -78,7 +78,7 @@ def test_a_node_records_by_the_ending_of_the_file_and_all_of_it_is_verified(flye
     assert all(session.complete for session in runs)
     assert "gravity: [0.0, 0.0, -1.0]" in runs[-1].scene
     assert main(["replay", str(path), "--verify"]) == 0
-    assert [session.node_name for session in runs] == ["flyer", "flyer"]
+    assert [session.node_name for session in runs] == ["lab/flyer", "lab/flyer"]
     assert any("flyer@com" in line for line in runs[0].lines)
 
 
@@ -143,7 +143,7 @@ def test_states_go_out_with_their_stamps_to_the_bit(session, ros_environment, do
 def test_commands_give_a_node_the_same_motion_to_the_bit(session, flyer, tmp_path, domain):
     (recorded,), path = read_runs(session), tmp_path / "flown.mcap"
     flyer.set(record=str(path), real_time_factor=4.0)
-    assert main(["replay", str(session), "--publish", "commands", "--node", "/flyer"]) == 0
+    assert main(["replay", str(session), "--publish", "commands", "--node", "/lab/flyer"]) == 0
     # States heard may be those from before the reset.
     flyer.until(lambda: int(flyer.diagnostics()["sim_time_ns"]) >= recorded.end_ns, "end of the session")
     flyer.set(record="")
