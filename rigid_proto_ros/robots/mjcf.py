@@ -61,6 +61,8 @@ class _Source:
         with self._refusing("reads"):
             spec = self.mujoco.MjSpec.from_string(self.text)
         spec.compiler.fusestatic = spec.compiler.discardvisual = False  # which would drop bodies and geoms
+        for joint in spec.joints:
+            joint.align = False  # which would move a body's frame into its principal axes
         self._delete(spec, "keys sensors actuators equalities tendons pairs excludes skins tuples")
         return spec
 

@@ -281,13 +281,17 @@ def _urdf_link(link: Element) -> Link:
 def _urdf_poses(root: Element) -> dict[str, Pose]:
     """Poses of the links in the frame of the root link."""
     above: dict[str, tuple[str, Pose]] = {}
+    names = [link.get("name", "?") for link in root.findall("link")]
     for joint in root.findall("joint"):
         ends = [joint.find(tag) for tag in ("parent", "child")]
         parent, child = ("" if end is None else end.get("link", "") for end in ends)
         if not parent or not child or child in above:
             raise InputError("lump", f"joint {joint.get('name')!r} of {parent!r} and {child!r}", "a tree of links")
+        if parent not in names or child not in names:
+            missing = parent if parent not in names else child
+            raise InputError("lump", f"there is no link {missing!r}, which joint {joint.get('name')!r} connects")
         above[child] = parent, _urdf_pose(joint.find("origin"), f"joint {joint.get('name', '?')}")
-    roots = [link.get("name", "?") for link in root.findall("link") if link.get("name", "?") not in above]
+    roots = [name for name in names if name not in above]
     if len(roots) != 1:
         raise InputError("lump", f"{len(roots)} root links ({', '.join(roots[:4])}); accepted: one tree of links")
     poses = {roots[0]: HERE}

@@ -203,6 +203,7 @@ def test_the_command_writes_a_scene_that_flies(tmp_path, capsys, monkeypatch):
         (["--lump", "pose.urdf"], "xyz of joint arms: got 'along'"),
         (["--lump", "twins.urdf"], "two links 'hand'"),
         (["--lump", "half.urdf"], "without mass or inertia"),
+        (["--lump", "world.urdf"], "no link 'world'"),
         (["--lump", "robot.urdf", "--tolerance", "0"], "--tolerance"),
         (["--lump", "robot.urdf", "--as-scene", ""], "--as-scene"),
         (["--lump", "frame.sdf"], "pose is relative to 'mount'"),
@@ -216,6 +217,7 @@ def test_what_is_no_one_body_is_refused_in_one_line(tmp_path, capsys, monkeypatc
     (tmp_path / "loop.urdf").write_text(URDF.replace("</robot>", f"{joint('fixed', 'base', 'hand')}</robot>"))
     (tmp_path / "pose.urdf").write_text(URDF.replace('xyz="0.3 -0.1 0.2"', 'xyz="along"'))
     (tmp_path / "twins.urdf").write_text(URDF.replace("</robot>", f"{link('hand', 1, '0 0 0')}</robot>"))
+    (tmp_path / "world.urdf").write_text(URDF.replace("</robot>", f"{joint('fixed', 'world', 'base')}</robot>"))
     half = f'<link name="half"><inertial><mass value="1"/></inertial></link>{joint("fixed", "hand", "half")}'
     (tmp_path / "half.urdf").write_text(URDF.replace("</robot>", f"{half}</robot>"))
     (tmp_path / "frame.sdf").write_text(SDF.replace("<pose>0 0.2 0 ", '<pose relative_to="mount">0 0.2 0 '))

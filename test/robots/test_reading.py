@@ -19,6 +19,10 @@ GEOMS = """<mujoco><compiler inertiafromgeom="true"/><asset><mesh name="m" file=
 <worldbody><body name="c"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
 INCLUDED = f'<mujoco><body name="c">{SIX_KG}</body></mujoco>'
 MODELS = {
+    "aligned": """<mujoco><worldbody><body name="a" pos="1 0 0"><freejoint align="true"/>
+      <geom type="box" size="0.1 0.2 0.3" pos="1 0 0" euler="10 20 30"/></body></worldbody></mujoco>""",
+    "all aligned": """<mujoco><compiler alignfree="true"/><worldbody><body name="a" pos="1 0 0"><freejoint/>
+      <geom type="box" size="0.1 0.2 0.3" pos="1 0 0" euler="10 20 30"/></body></worldbody></mujoco>""",
     "attached from geoms": f"""<mujoco><asset><model name="child" file="geoms.xml"/></asset><worldbody><body name="a">{SIX_KG}
       <attach model="child" body="c" prefix="x_"/></body></worldbody></mujoco>""",
     "included by an included file": """<mujoco><worldbody><include file="parts/one.xml"/></worldbody></mujoco>""",
@@ -53,6 +57,16 @@ def test_an_mjcf_weighs_what_it_weighs_in_mujoco(tmp_path, name, monkeypatch):
     path.write_text(MODELS[name])
     monkeypatch.chdir(tmp_path)
     assert_same(lump_robot(path), as_one_body(mujoco.MjModel.from_xml_path("model.xml")))
+
+
+def test_shapes_stay_in_the_frame_of_the_file_whatever_mujoco_aligns(tmp_path):
+    pytest.importorskip("mujoco")
+    place = 'pos="1 0 0" euler="10 20 30"'
+    shape = f'<geom type="box" size="0.1 0.2 0.3" {place}/><inertial {place} mass="48" diaginertia="2.08 1.6 0.8"/>'
+    path = tmp_path / "model.xml"
+    path.write_text(f"""<mujoco><compiler alignfree="true"/><worldbody><body name="a"><freejoint/>{shape}</body>
+<body name="b"><freejoint align="true"/>{shape}</body></worldbody></mujoco>""")
+    assert {d.link: d.status for d in compare_robot(path)} == {"a": "uniform", "b": "uniform"}
 
 
 def test_a_file_included_twice_and_meshes_that_mujoco_cannot_load(tmp_path):
