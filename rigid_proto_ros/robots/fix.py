@@ -55,9 +55,6 @@ def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict, everyth
         return diagnosis.note or "its mass isn't a positive number"
     if link.element is None or id(link.element) not in places:
         return "it is in another file, or its body has no name"
-    frame = link.element.find("pose")
-    if frame is not None and frame.get("relative_to", "") not in ("", link.name):
-        return f"its <pose> is relative to {frame.get('relative_to')!r}"
     others = [part.tag for part in link.element.iter() if part.tag not in (*_REPLACED, "inertial")]
     return f"its <inertial> has a <{others[0]}>, which would be lost" if others else ""
 

@@ -310,17 +310,32 @@ def _text(element: Element, tag: str, default: str) -> str:
     return (element.findtext(tag) or "").strip() or default
 
 
+def _is_true(word: str) -> bool:
+    return word.lower() in ("true", "1")
+
+
+def _frame_of_pose(element: Element) -> str:
+    """The frame that an element's <pose> is relative to, "" where it names none; up to SDF 1.6 the attribute is
+    ``frame``.
+    """
+    pose = element.find("pose")
+    return "" if pose is None else pose.get("relative_to", "") or pose.get("frame", "")
+
+
 def _sdf_pose(element: Element, owner: str) -> Pose:
     """Of an element's <pose>, relative to whatever that is."""
     pose, what = element.find("pose"), f"pose of {owner}"
     words = {} if pose is None else pose.attrib
-    if words.get("rotation_format", "euler_rpy") == "quat_xyzw":
+    form = words.get("rotation_format", "euler_rpy")
+    if form not in ("euler_rpy", "quat_xyzw"):
+        raise InputError(f"rotation_format of the {what}", form, "euler_rpy, quat_xyzw")
+    if form == "quat_xyzw":
         values = floats(what, _text(element, "pose", f"{ZEROS} {ZEROS} 1"), 7)
         if not np.any(values[3:]):
             raise InputError(what, _text(element, "pose", ""), "a quaternion other than 0")
         return Pose(rotation_from_wxyz(values[[6, 3, 4, 5]]), values[:3])
     values = floats(what, _text(element, "pose", f"{ZEROS} {ZEROS}"), 6)
-    if words.get("degrees", "false") in ("true", "1"):
+    if _is_true(words.get("degrees", "")):
         values[3:] = np.radians(values[3:])
     return Pose(rotation_from_rpy(*values[3:]), values[:3])
 
@@ -330,8 +345,7 @@ def _sdf_link(link: Element) -> Link:
     owner, density = f"link {name}", str(WATER) if inertial is None else _text(inertial, "density", str(WATER))
     shapes = []
     for role, part, of in _drawn(link):
-        pose = part.find("pose")
-        relative = "" if pose is None else pose.get("relative_to", "")
+        relative = _frame_of_pose(part)
         problem = f"a pose relative to {relative!r}, not to the link" if relative not in ("", name) else ""
         if of.tag == "mesh" and of.find("submesh") is not None:
             problem = problem or "one submesh of a mesh file"
@@ -342,13 +356,13 @@ def _sdf_link(link: Element) -> Link:
     bare = Link(name, tuple(shapes))
     if inertial is None:
         return bare
-    if inertial.get("auto", "false") in ("true", "1"):
+    if _is_true(inertial.get("auto", "")):
         mass = inertial.findtext("mass")
         computed = replace(bare, problem="the simulator computes its inertial (auto='true')", computed=True)
         return computed if mass is None else replace(computed, mass=number(f"mass of {owner}", mass))
-    pose = inertial.find("pose")
-    if pose is not None and pose.get("relative_to", "") not in ("", name):
-        return replace(bare, problem=f"an <inertial> whose pose is relative to {pose.get('relative_to')!r}")
+    relative = _frame_of_pose(inertial)
+    if relative not in ("", name):
+        return replace(bare, problem=f"an <inertial> whose pose is relative to {relative!r}")
     # SDF's own defaults, which simulators take: 1 kg, and 1 kg m² about each axis.
     six = [_text(inertial, f"inertia/{entry}", "1" if entry in ("ixx", "iyy", "izz") else "0") for entry in SIX]
     rotation = _sdf_pose(inertial, f"the inertial of {owner}").rotation
@@ -371,8 +385,7 @@ def _sdf_poses(root: Element) -> dict[str, Pose]:
             if name not in elements or name in below:
                 raise InputError("lump", f"frame {name!r}", "poses relative to links, joints and frames of the model")
             element = elements[name]
-            pose = element.find("pose")
-            base = "" if pose is None else pose.get("relative_to", "")
+            base = _frame_of_pose(element)
             if element.tag == "joint":
                 base = base or (element.findtext("child") or "").strip()
             if element.tag == "frame":

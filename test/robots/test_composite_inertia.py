@@ -116,7 +116,7 @@ def test_an_sdfs_frames_are_followed(tmp_path):
 
 def test_a_pose_with_a_quaternion_is_that_with_angles(tmp_path):
     path = tmp_path / "robot.sdf"
-    place = '<pose degrees="true">1 2 3 0 0 60</pose>'
+    place = '<pose degrees="True">1 2 3 0 0 60</pose>'
     inertia = "<inertia><ixx>0.03</ixx><ixy>0.001</ixy><iyy>0.02</iyy><izz>0.04</izz></inertia>"
     text = f"""<sdf version="1.9"><model name="m"><link name="a">{place}<inertial>{place}<mass>2</mass>{inertia}
 </inertial></link></model></sdf>"""
@@ -138,6 +138,14 @@ def test_what_an_sdf_leaves_out_of_an_inertial_are_its_defaults(tmp_path):
     far = 5.0 / 6.0 * 36.0
     expected = 6.0, np.array([1.0, 0.0, 0.0]), np.diag([3.0, 2.0 + far, 2.0 + far])
     assert_same(lump_robot(path), expected)
+
+
+def test_an_older_sdf_names_the_frame_of_a_pose_by_another_attribute(tmp_path):
+    path = tmp_path / "robot.sdf"
+    path.write_text(SDF)
+    expected = lump_robot(path).properties
+    path.write_text(SDF.replace("relative_to", "frame").replace("1.9", "1.6"))
+    assert_same(lump_robot(path), (expected.mass, expected.center_of_mass, expected.inertia))
 
 
 def test_only_the_links_of_the_robot_itself_count(tmp_path):
@@ -208,6 +216,7 @@ def test_the_command_writes_a_scene_that_flies(tmp_path, capsys, monkeypatch):
         (["--lump", "robot.urdf", "--as-scene", ""], "--as-scene"),
         (["--lump", "frame.sdf"], "pose is relative to 'mount'"),
         (["--lump", "world.sdf"], "frame 'world'"),
+        (["--lump", "format.sdf"], "rotation_format of the pose of link arm: got 'axis'"),
     ],
 )
 def test_what_is_no_one_body_is_refused_in_one_line(tmp_path, capsys, monkeypatch, arguments, words):
@@ -221,6 +230,7 @@ def test_what_is_no_one_body_is_refused_in_one_line(tmp_path, capsys, monkeypatc
     half = f'<link name="half"><inertial><mass value="1"/></inertial></link>{joint("fixed", "hand", "half")}'
     (tmp_path / "half.urdf").write_text(URDF.replace("</robot>", f"{half}</robot>"))
     (tmp_path / "frame.sdf").write_text(SDF.replace("<pose>0 0.2 0 ", '<pose relative_to="mount">0 0.2 0 '))
+    (tmp_path / "format.sdf").write_text(SDF.replace('relative_to="turn"', 'rotation_format="axis"'))
     (tmp_path / "world.sdf").write_text(SDF.replace('relative_to="turn"', 'relative_to="world"'))
     (tmp_path / "empty.urdf").write_text(f'<robot name="r"><link name="a">{BOX}</link></robot>')
     assert main(["inspect", *arguments]) == 2
