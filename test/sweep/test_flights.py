@@ -85,6 +85,24 @@ def final_height(spin: float) -> float:
     return float(flight.step(1.0).position[2])
 
 
+def reached(scene) -> bytes:
+    flight = Flight(scene)
+    flight.command({"at": {"vertex": 3}, "force": [0.1, 0.0, 0.2], "duration": 0.1})
+    return flight.step(0.2).row.tobytes()
+
+
+def test_a_scene_goes_to_other_processes_whether_it_has_been_flown_or_not(tmp_path) -> None:
+    """Also one of an open mesh, with its hull as substitute, whose file is gone by then."""
+    scenes = [load_scene("t_handle", {"mass": mass, "string.attached": True}) for mass in (0.1, 0.2)]
+    mesh = tmp_path / "open.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n")
+    scenes.append(load_scene("t_handle", {"mesh": str(mesh), "mesh_fallback": "hull", "ghost.integrator": "rk4"}))
+    mesh.unlink()
+    flown = [reached(scene) for scene in scenes]
+    assert list(fly_all(reached, scenes, workers=2)) == flown
+    assert len(set(flown)) == 3
+
+
 @pytest.mark.parametrize("seconds", [float("nan"), float("inf"), 1e300, -1.0, "1", None])
 def test_a_step_that_is_no_time_is_refused(seconds) -> None:
     flight = Flight(load_scene("t_handle"))
