@@ -215,6 +215,11 @@ def _write_scene(whole: Lump, name: str) -> tuple[str, ...]:
 
     with whole_file("--as-scene", name) as scene:
         mesh = Path(name).absolute().with_suffix(".obj")
+        if mesh == Path(name).absolute():
+            raise InputError("--as-scene", name, "the name of a scene; its mesh is written beside it as .obj")
+        own = next((file for file in whole.files if is_same_file(file, name) or is_same_file(file, mesh)), None)
+        if own is not None:
+            raise InputError("--as-scene", name, f"another name, which leaves the robot's own {own.name} as it is")
         values: dict = {
             "mesh": str(mesh) if len(whole.triangles) else "",
             "inertia_model": "explicit",

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor
-from ..mesh.locate import Search
+from ..mesh.locate import Search, resolve_mesh
 from ..mesh.reading import load_mesh
 from .link_shapes import Meshes, check_shape, combined, of_mass, placed, placed_surface
 from .reading import COLLISION, NO_INERTIAL, VISUAL, Link, Pose, check_finite, check_inertial, read_robot
@@ -21,7 +22,8 @@ from .reading import COLLISION, NO_INERTIAL, VISUAL, Link, Pose, check_finite, c
 @dataclass(frozen=True)
 class Lump:
     """``properties``: of all links together. vertices (n, 3), triangles (m, 3): their shapes. links: names and masses
-    of those that count. massless: names of links without an inertial; absent: why a shape isn't in the mesh."""
+    of those that count. massless: names of links without an inertial; absent: why a shape isn't in the mesh. files: the
+    robot's own and those of its meshes that are found."""
 
     properties: MassProperties
     vertices: np.ndarray
@@ -29,6 +31,7 @@ class Lump:
     links: tuple[tuple[str, float], ...]
     massless: tuple[str, ...]
     absent: tuple[str, ...]
+    files: tuple[Path, ...]
 
 
 @np.errstate(all="ignore")  # of numbers near the largest, which are refused
@@ -65,7 +68,11 @@ def lump_robot(path: Path, folders: tuple[Path, ...] = ()) -> Lump:
     vertices, triangles, absent = _merged([(link, poses[link.name]) for link in links], search)
     masses = tuple((link.name, link.mass) for link, _ in heavy)
     massless = tuple(link.name for link in links if link.problem)
-    return Lump(properties, vertices, triangles, masses, massless, absent)
+    files = [path]
+    for name in {shape.file for link in links for shape in link.shapes if shape.file}:
+        with contextlib.suppress(InputError):
+            files.append(resolve_mesh(name, search))
+    return Lump(properties, vertices, triangles, masses, massless, absent, tuple(files))
 
 
 def _computed(link: Link, meshes: Meshes) -> Link:

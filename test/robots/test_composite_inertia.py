@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from mesh_files import CUBE_VERTICES, stl
+from mesh_files import CUBE_VERTICES, obj, stl
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
@@ -196,6 +196,24 @@ def test_the_command_writes_a_scene_that_flies(tmp_path, capsys, monkeypatch):
     assert "without mass: eye" in capsys.readouterr().out
     assert main([*arguments, "--urdf"]) == 0
     assert "<inertial>" in capsys.readouterr().out
+
+
+def test_a_scene_takes_the_place_of_no_file_of_the_robot_nor_of_its_own_mesh(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.obj").write_bytes(obj())
+    box, mesh = (
+        BOX,
+        BOX.replace('<box size="0.1 0.2 0.3"/>', '<mesh filename="arm.obj"/>').replace("visual", "collision"),
+    )
+    (tmp_path / "robot.urdf").write_text(URDF.replace(box, box + mesh, 1))
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    for name, words in {"arm.yaml": "arm.obj", "robot.urdf": "robot.urdf", "new.obj": "beside it"}.items():
+        assert main(["inspect", "--lump", "robot.urdf", "--as-scene", name]) == 2
+        refusal = capsys.readouterr().err
+        assert refusal.count("\n") == 1 and words in refusal
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    for _ in range(2):
+        assert main(["inspect", "--lump", "robot.urdf", "--as-scene", "robot.yaml"]) == 0
 
 
 @pytest.mark.parametrize(
