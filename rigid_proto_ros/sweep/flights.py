@@ -55,6 +55,8 @@ class Flight:
         if record:
             if observer is not None:
                 raise InputError("record", str(record), "a file or an observer, not both")
+            if Path(record).suffix.lower() != ".mcap":
+                raise InputError("record", str(record), "a file that ends in .mcap")
             from ..session.mcap_observer import McapObserver
 
             observer = McapObserver(record, parameters=scene.parameters, simulated_log=True)

@@ -47,6 +47,12 @@ def test_what_cant_be_taken_is_said_at_once_and_what_is_refused_later_at_its_ste
         flight.step(0.1)
 
 
+def test_a_recording_is_named_what_it_is(tmp_path) -> None:
+    with pytest.raises(InputError, match=r"ends in \.mcap"):
+        Flight(load_scene("t_handle"), record=tmp_path / "flight.rrd")
+    assert not list(tmp_path.iterdir())
+
+
 def test_of_an_entry_that_is_refused_nothing_acts() -> None:
     flight = Flight(load_scene("t_handle", {"integrator": "lie_midpoint", "string.attach": [0.0, 0.0, 0.0]}))
     with pytest.raises(InputError, match="a string"):
