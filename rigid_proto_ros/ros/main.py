@@ -93,7 +93,7 @@ class NodeProcess(threading.Thread):
             # The middleware must outlive the physics thread, so rclpy's own handlers of signals stay out.
             rclpy.init(args=self._argv, signal_handler_options=SignalHandlerOptions.NO)
         except Exception as error:  # rclpy's own error types differ between versions
-            raise InputError("ROS arguments", " ".join(self._argv[1:]), " ".join(str(error).split())) from None
+            raise InputError("ROS arguments", " ".join(str(error).split())) from None
         with notify_when_compiling(lambda: _tell("compiling kernels, at the first start only; a minute or two ...")):
             try:
                 node = self._node = RigidBodyNode(given, make_viewer)

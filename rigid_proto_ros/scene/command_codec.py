@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from ..base.errors import CommandRefused, InputError
 from ..base.vectors import vector
-from ..motion.frames import parse_frame
+from ..motion.frames import RESERVED_WORDS, parse_frame
 from ..simulation.commands import (
     Change,
     ClearWrench,
@@ -58,9 +58,16 @@ WORDS: Names = ("world", "body")
 
 
 def frame_names(parameters: Parameters, node_name: str) -> Names:
-    """The names that the node of this name uses for the world frame and the body frame."""
-    world, body = parameters.world_frame, parameters.body_frame
-    return world, body or node_name.rpartition("/")[2] or "rigid_body"
+    """The names that the node of this name uses for the world frame and the body frame. Raises InputError for one that
+    means something else in a ``frame_id``: commands would act in other axes or at another point than they say.
+    """
+    world = parameters.world_frame
+    body = parameters.body_frame or node_name.rpartition("/")[2] or "rigid_body"
+    for field, name, own, other in (("body_frame", body, "body", world), ("world_frame", world, "world", body)):
+        if name == other or (name != own and name in RESERVED_WORDS):
+            words = ", ".join(sorted(RESERVED_WORDS - {own}))
+            raise InputError(field, name, f"a name that isn't the other frame's, and none of {words}")
+    return world, body
 
 
 def of_message(topic: str, data: bytes, names: Names = WORDS) -> Command:

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.frames import Frame
 from rigid_proto_ros.scene import cdr
-from rigid_proto_ros.scene.command_codec import MARKS, of_event, of_message
+from rigid_proto_ros.scene.command_codec import MARKS, frame_names, of_event, of_message
+from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.script import (
     entry_of,
     expand_schedule,
@@ -138,6 +139,25 @@ def test_a_script_is_sent_as_it_is_listed_each_instant_in_one_message(listed) ->
 def test_a_poke_in_the_frame_of_the_nodes_own_name_is_read_as_the_node_reads_it() -> None:
     content = {"stamp_ns": 0, "frame_id": "rigid_body@tip", "force": [1, 0, 0], "torque": [0, 0, 0]}
     assert of_event("poke", content, ("world", "rigid_body")).frame == Frame("body", ("contact", "tip"))
+
+
+@pytest.mark.parametrize(
+    ("world", "body", "node", "refused"),
+    [
+        ("world", "world", "tool", "body_frame"),
+        ("world", "", "lab/world", "body_frame"),
+        ("map", "world", "tool", "body_frame"),
+        ("world", "", "com", "body_frame"),
+        ("body", "", "tool", "world_frame"),
+        ("normal", "", "tool", "world_frame"),
+        ("tool", "", "tool", "body_frame"),
+    ],
+)
+def test_a_frame_whose_name_means_something_else_in_a_command_is_refused(world, body, node, refused) -> None:
+    with pytest.raises(InputError, match=f"^{refused}: "):
+        frame_names(Parameters(world_frame=world, body_frame=body), node)
+    assert frame_names(Parameters(world_frame="map", body_frame="body"), node) == ("map", "body")
+    assert frame_names(Parameters(), "lab/tool") == ("world", "tool")
 
 
 def test_what_moves_nothing_has_no_command_and_what_is_damaged_is_named() -> None:
