@@ -205,13 +205,18 @@ class ScriptSender(Node):
 
     def _wait_until_acted(self, last_ns: int) -> None:
         """Until a report from after the last command: only there a ray meets the body or misses it. Not for ever where
-        simulated time doesn't get there.
+        simulated time doesn't get there; raises InputError where there are no reports any more.
         """
-        reached_ns, since = -1, time.monotonic()
-        while self._reached_ns() <= last_ns and time.monotonic() < since + STANDSTILL_S and not self._was_set_back:
+        reached_ns, since, reports = -1, time.monotonic(), self._reports
+        while self._reached_ns() <= last_ns and not self._was_set_back:
             rclpy.spin_once(self, timeout_sec=0.1)
+            stood_s = time.monotonic() - since
             if self._reached_ns() != reached_ns:
-                reached_ns, since = self._reached_ns(), time.monotonic()
+                reached_ns, since, reports = self._reached_ns(), time.monotonic(), self._reports
+            elif stood_s > STANDSTILL_S and self._reports > reports:
+                return
+            elif stood_s > STALLED_S:
+                raise InputError("--node", self.target, f"a report within {STALLED_S:g} s")
 
     def _reached_ns(self) -> int:
         """Simulated time of the last report."""
