@@ -4,6 +4,8 @@
 ros2 launch rigid_proto_ros rigid_body.launch.py scene:=hammer script:=/path/to/pokes.yaml viewer:=web
 """
 
+from pathlib import Path
+
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
@@ -18,9 +20,9 @@ ARGUMENTS = (
     ("namespace", "", "namespace of the node"),
     ("script", "", "poke script to send: a path, or the name of a bundled one; empty sends nothing"),
     ("reset", "true", "reset first, so that the script's times are simulated time itself"),
-    ("viewer", "none", "live view: none, web or native (Rerun), workbench (the interactive page)"),
+    ("viewer", "", "live view: none, web or native (Rerun), workbench (the interactive page); empty: the scene's"),
     ("record", "", "record the session to this .rrd or .mcap file"),
-    ("use_sim_time", "false", "simulated time follows /clock"),
+    ("use_sim_time", "", "true: simulated time follows /clock; empty: as the scene has it"),
 )
 
 
@@ -41,15 +43,16 @@ def nodes(context: LaunchContext) -> list[Node]:
     from rigid_proto_ros.scene.scene_file import scene_file
 
     given = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
-    parameters = {"viewer": given["viewer"], "use_sim_time": given["use_sim_time"].lower() in ("true", "1", "yes")}
-    parameters.update({name: given[name] for name in ("mesh", "record") if given[name]})
+    parameters = {name: given[name] for name in ("mesh", "viewer", "record") if given[name]}
+    if given["use_sim_time"]:
+        parameters["use_sim_time"] = given["use_sim_time"].lower() in ("true", "1", "yes")
     target = "/".join(["", *filter(None, [given["namespace"].strip("/"), given["name"]])])
     body = Node(
         package=PACKAGE,
         executable="rigid_body_node",
         name=given["name"],
         namespace=given["namespace"],
-        parameters=[*_for_node(str(scene_file(given["scene"])), target), parameters],
+        parameters=[*_for_node(str(scene_file(given["scene"])), target), *filter(None, [parameters])],
         output="screen",
         # A client that waits for it would wait for ever.
         on_exit=Shutdown(),
@@ -66,9 +69,16 @@ def nodes(context: LaunchContext) -> list[Node]:
 
 
 def _for_node(scene: str, target: str) -> list:
-    """The scene as launch takes it: the file, or its values where a node of another name wouldn't find its section."""
+    """The scene as launch takes it: the file, or its values where a node of another name wouldn't find its section;
+    what stands in a section for this very node counts before those.
+    """
     if target == "/rigid_body":
         return [scene]
-    from rigid_proto_ros.scene.scene_file import read_scene_file
+    from rigid_proto_ros.scene.scene_file import mesh_found_from, read_scene_file
 
-    return [read_scene_file(scene).values]
+    own = read_scene_file(scene, target)
+    values = {**read_scene_file(scene).values, **{name: own.values[name] for name in own.values.keys() - own.wildcard}}
+    if isinstance(values.get("mesh"), str):
+        # Launch writes the values to a file elsewhere.
+        values["mesh"] = mesh_found_from(values["mesh"], Path(scene).parent)
+    return [*filter(None, [values])]

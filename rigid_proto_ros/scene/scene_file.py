@@ -115,11 +115,11 @@ def scene_values(
             continue
         values[parameter] = value
     if isinstance(mesh := values.get("mesh"), str):
-        values["mesh"] = _found_from(mesh, Path(path).parent)
+        values["mesh"] = mesh_found_from(mesh, Path(path).parent)
     return values
 
 
-def _found_from(mesh: str, folder: Path) -> str:
+def mesh_found_from(mesh: str, folder: Path) -> str:
     """The mesh by the name that a scene file in ``folder`` gives it, or beside that file if it's only there."""
     for name in (mesh, str(folder / mesh)):
         with suppress(MeshError):

@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import runpy
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -34,8 +37,9 @@ def declared(tree: ast.Module) -> dict[str, tuple[str, str]]:
 
 def test_arguments_that_become_parameters_are_parameters_with_accepted_defaults(tree: ast.Module) -> None:
     arguments = declared(tree)
-    for name in ("mesh", "viewer", "record"):
-        PARAMETERS[name].convert(arguments[name][0])
+    # Empty: the scene's.
+    assert {arguments[name][0] for name in ("mesh", "viewer", "record", "use_sim_time")} == {""}
+    assert {"mesh", "viewer", "record"} <= PARAMETERS.keys()
 
 
 def test_every_argument_is_described_and_used(tree: ast.Module) -> None:
@@ -55,6 +59,42 @@ def test_client_accepts_the_options_that_the_launch_file_gives_it(tree: ast.Modu
     assert '"--timeout", "0"' in text and "on_exit=Shutdown()" in text
     assert poke_client([str(script), "--node", "/a/b", "--timeout", "0", "--reset", "--dry-run"]) == 0
     assert '"at": "tip"' in capsys.readouterr().out
+
+
+@pytest.fixture
+def launched(monkeypatch):
+    """launched(arguments): what the node is given as parameters, with stand-ins for launch."""
+    keep = lambda *_, **given: SimpleNamespace(**given)  # noqa: E731
+    configuration = lambda name: SimpleNamespace(perform=lambda context: context[name])  # noqa: E731
+    for name, content in {
+        "launch": {"LaunchContext": dict, "LaunchDescription": keep},
+        "launch.actions": dict.fromkeys(("DeclareLaunchArgument", "OpaqueFunction", "Shutdown"), keep),
+        "launch.substitutions": {"LaunchConfiguration": configuration},
+        "launch_ros": {},
+        "launch_ros.actions": {"Node": keep},
+    }.items():
+        monkeypatch.setitem(sys.modules, name, SimpleNamespace(**content))
+    module = SimpleNamespace(**runpy.run_path(str(FILE)))
+    defaults = {name: default for name, default, _ in module.ARGUMENTS}
+    return lambda **given: module.nodes({**defaults, **given})[0].parameters
+
+
+def test_a_node_of_another_name_gets_the_scene_its_own_section_and_a_mesh_beside_the_file(launched, tmp_path) -> None:
+    (tmp_path / "part.obj").touch()
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(
+        "rigid_body: {ros__parameters: {mesh: part.obj, density: 1.0, viewer: web}}\n"
+        "/**: {ros__parameters: {mass: 2.0}}\n"
+        "/lab/nut: {ros__parameters: {density: 3.0}}\n"
+    )
+    assert launched(scene=str(scene)) == [str(scene)]
+    assert launched(scene=str(scene), viewer="none", use_sim_time="true") == [
+        str(scene),
+        {"viewer": "none", "use_sim_time": True},
+    ]
+    shared = {"mesh": str(tmp_path / "part.obj"), "viewer": "web", "mass": 2.0}
+    assert launched(scene=str(scene), name="nut") == [{**shared, "density": 1.0}]
+    assert launched(scene=str(scene), name="nut", namespace="lab") == [{**shared, "density": 3.0}]
 
 
 @pytest.mark.skipif(not LAUNCH_INSTALLED, reason="launch_ros comes with a ROS installation, not with the wheels")
