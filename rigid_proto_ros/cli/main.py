@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import gc
 import importlib
+import io
 import sys
 
 from .. import __version__
@@ -59,6 +60,8 @@ def main(argv: list[str] | None = None) -> int:
     args = parser.parse_args(argv)
     program = f"rigid_proto {args.command}"
     if own_process:
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(errors="backslashreplace")  # of what the terminal's encoding doesn't have
         # All commands need this module, and during its import there is nothing to close yet.
         importlib.import_module("..base.compilation", __package__)
         return interrupts.run(lambda: _run(args), lambda error: tell(program, error))

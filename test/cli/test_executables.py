@@ -96,6 +96,12 @@ def test_an_output_that_nobody_reads_or_that_takes_nothing_is_told_in_a_line_at_
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_an_output_in_an_encoding_without_the_units_is_written_nevertheless():
+    inspect, ascii_alone = command("rigid_proto", "inspect", "book"), {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(inspect, capture_output=True, text=True, env=ascii_alone, check=False)
+    assert (done.returncode, done.stderr) == (0, "") and "m\\xb3" in done.stdout
+
+
 @pytest.mark.parametrize(
     "argument",
     [
