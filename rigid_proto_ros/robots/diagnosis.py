@@ -33,7 +33,7 @@ from ..mesh.reading import load_mesh
 from ..mesh.solids import convex_hull
 from .causes import LIMIT, explain_center, explain_inertia
 from .link_shapes import LinkShapes, Meshes
-from .reading import COLLISION, HERE, VISUAL, Link, Shape, check_inertial, read_robot
+from .reading import COLLISION, HERE, VISUAL, Link, Shape, check_finite, check_inertial, read_robot
 
 IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED = "impossible", "impossible for its shape", "explained"
 NOT_UNIFORM, UNIFORM, UNKNOWN = "not uniform", "uniform", "unknown"
@@ -74,8 +74,11 @@ class LinkDiagnosis:
     def as_dict(self) -> dict:
         """The diagnosis as a JSON object; ``expected`` is in the link's axes."""
         expected = self.expected and self.expected.as_dict()
-        mass = self.mass if math.isfinite(self.mass) else None
-        return {**vars(self), "mass": mass, "causes": list(self.causes), "expected": expected}
+        plain = {
+            name: None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in vars(self).items()
+        }
+        return {**plain, "causes": list(self.causes), "expected": expected}
 
 
 def impossible_inertial(link: Link) -> str:
@@ -171,6 +174,7 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
         return plain
     try:
         truth = parts.uniform(link.mass)
+        check_finite(f"a solid of link {link.name}", inertia=truth.inertia)
         plain = replace(plain, expected=truth)
         check_inertial(link)
     except InputError as error:

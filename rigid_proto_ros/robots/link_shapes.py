@@ -20,6 +20,8 @@ from .reading import Link, Pose, Shape, check_finite
 
 SEGMENTS = 48
 """Corners of a round shape's circle; a multiple of 4, so that its box is exact."""
+NEAR = 1e-12
+"""Smallest size of a shape over its distance from the link's origin: of smaller ones, rounding leaves no shape."""
 
 
 def check_shape(shape: Shape) -> None:
@@ -88,7 +90,11 @@ def placed_surface(shape: Shape, mesh: Mesh | None) -> tuple[np.ndarray, np.ndar
         if np.prod(shape.scale) < 0.0:
             triangles = triangles[:, ::-1]
     points = vertices @ shape.pose.rotation.T + shape.pose.position
-    check_finite(shape.file or shape.kind, reach=np.abs(points).max(initial=0.0))
+    named, reach = shape.file or shape.kind, float(np.abs(points).max(initial=0.0))
+    check_finite(named, reach=reach)
+    size = float(np.ptp(points, axis=0).max())
+    if size < NEAR * reach:
+        raise InputError(named, f"{size:.3g} m across, {reach:.3g} m away", f"at least {NEAR:g} of the distance across")
     return points, triangles
 
 

@@ -59,6 +59,30 @@ def test_what_no_body_has_is_impossible_with_and_without_shapes(tmp_path, capsys
     assert any("needs no inertial" in cause for cause in link["causes"]) == (not any(six))
 
 
+FAR = BOX.replace("<geometry>", '<origin xyz="1e20 0 0"/><geometry>')
+SPHERE = '<collision><geometry><sphere radius="{}"/></geometry></collision>'
+
+
+@pytest.mark.parametrize(
+    ("shapes", "mass", "word", "note"),
+    [
+        (FAR, "1", "unknown", "of the distance"),
+        (FAR + SPHERE.format("1e-30"), "1", "impossible for its shape", ""),
+        (SPHERE.format("1e-3"), "1e-300", "impossible for its shape", ""),  # times which no double is the tensor's size
+        (BOX.replace("3", "1e30"), "1", "unknown", "a solid of link l0"),
+    ],
+)
+def test_shapes_of_any_size_and_place_are_judged_and_written_only_if_a_body_can_have_them(
+    tmp_path, capsys, shapes, mass, word, note
+):
+    path = urdf(tmp_path, (shapes, mass, "0 0 0", (1, 0, 0, 1, 0, 1)))
+    for more in ([], ["--fix", str(tmp_path / "fixed.urdf"), "--all"]):
+        assert main(["inspect", "--compare", str(path), "--json", *more]) in (0, 1)
+        (link,) = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)["links"]
+        assert link["status"] == word and note in link["note"]
+    assert link["written"] == (link["expected"] is not None)
+
+
 def test_each_verdict_and_its_exit_status(tmp_path, capsys):
     # The uniform box's moments are 13/12, 10/12 and 5/12 of its mass; all mass at its corners gives three times that.
     lost = '<visual><geometry><mesh filename="gone.stl"/></geometry></visual>'
