@@ -154,12 +154,13 @@ def write_demo(mesh: str) -> tuple[Path, Path]:
 def _report(session: Path) -> int:
     """Print a summary that is read from the recording."""
     from ..rerun_view.rrd_reading import read_session
+    from .executables import as_typed
 
     recorded = read_session(session)
     if not len(recorded.times):
         print(f"rigid_proto demo: {session} contains no states", file=sys.stderr)
         return 1
     print(f"{len(recorded.times)} states and {len(recorded.events)} commands and services recorded")
-    print(f"Show it:              .venv/bin/rerun {session}")
-    print(f"Check it bit for bit: .venv/bin/rigid_proto replay {session} --verify")
+    print(f"Show it:              {as_typed('rerun')} {session}")
+    print(f"Check it bit for bit: {as_typed('rigid_proto')} replay {session} --verify")
     return 0

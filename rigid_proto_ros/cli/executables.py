@@ -80,6 +80,19 @@ def own_executable(name: str) -> list[str]:
     return [sys.executable, "-m", "rigid_proto_ros.cli.executables", name]
 
 
+def as_typed(name: str) -> str:
+    """What starts an executable of this environment in the user's shell: its name, or its path where PATH doesn't have
+    it.
+    """
+    import shutil
+    from pathlib import Path
+
+    beside = Path(sys.executable).with_name(name)
+    if shutil.which(name) or not beside.is_file():
+        return name
+    return str(beside.relative_to(Path.cwd()) if beside.is_relative_to(Path.cwd()) else beside)
+
+
 def text_parameter(name: str, text: str) -> list[str]:
     """ROS arguments that give the node a text. Quoted: they are read as YAML, where ``part #2.obj`` is ``part``."""
     return ["-p", f"{name}:={json.dumps(text, ensure_ascii=False)}"]

@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the node in this process, so that signals reach it directly."""
     from ..scene.scenario import read_scene
     from ..scene.scene_file import scene_file
-    from .executables import own_executable, text_parameter
+    from .executables import as_typed, own_executable, text_parameter
 
     own_executable("rigid_body_node")
 
@@ -45,7 +45,8 @@ def run(args: argparse.Namespace) -> int:
     # To be seen and not to be thrown out of sight: 2 cm/s in the 0.05 s of a poke.
     force = f"{0.35 * scenario.setup.body.mass:.1g}"
     at = "com" if args.mesh else next(iter(scenario.setup.contacts), "com")
-    print(f"Try in another terminal: .venv/bin/poke_client poke --at {at} --force {force} 0 0   (Ctrl-C ends the node)")
+    client = as_typed("poke_client")
+    print(f"Try in another terminal: {client} poke --at {at} --force {force} 0 0   (Ctrl-C ends the node)")
     sys.stdout.flush()
     from ..ros.main import main
 

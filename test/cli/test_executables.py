@@ -52,6 +52,22 @@ def test_without_rclpy_the_node_and_its_client_say_what_to_source_or_install(pro
     assert "/opt/ros/" in line and "rigid_proto_ros[ros]" in line
 
 
+def test_a_command_to_type_is_a_name_where_the_path_has_it_and_else_a_path(monkeypatch, tmp_path) -> None:
+    for folder in (".venv/bin", "onpath"):
+        (tmp_path / folder).mkdir(parents=True)
+        for name in ("python", "poke_client"):
+            (tmp_path / folder / name).touch(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(executables.sys, "executable", str(tmp_path / ".venv" / "bin" / "python"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert executables.as_typed("poke_client") == ".venv/bin/poke_client"
+    assert executables.as_typed("rerun") == "rerun"
+    monkeypatch.chdir(tmp_path / "onpath")
+    assert executables.as_typed("poke_client") == str(tmp_path / ".venv" / "bin" / "poke_client")
+    monkeypatch.setenv("PATH", str(tmp_path / "onpath"))
+    assert executables.as_typed("poke_client") == "poke_client"
+
+
 @pytest.mark.parametrize(
     ("command", "package", "named"),
     [
