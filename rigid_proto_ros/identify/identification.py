@@ -156,6 +156,7 @@ def identify(
         count = len(flight.pose[0].times_ns)
         if count < FEWEST:
             raise InputError("session", f"{flight.name} has {count} samples", f"at least {FEWEST} poses")
+    flights = [flight.from_first_position() for flight in flights]
     fit = [group for group in fit if not (group == "mass" and known.mass is not None)]
     kinds = {series.kind for flight in flights for series in flight.series}
     for group, kind in {"gyro_bias": RATE, "accel_bias": ACCELERATION, "imu_place": ACCELERATION}.items():

@@ -218,7 +218,7 @@ def _from_path(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> V
     free = np.array(["com" in unknowns] * 3 + ["mass" in unknowns and is_pushed, is_damped])
     known = np.array([*values.center_of_mass, 1.0 / values.mass, 0.0])
     found, sds = _solved(np.concatenate(rows), free, known, np.array([LOOSE * values.size] * 3 + [np.inf] * 2))
-    mass = 1.0 / float(found[3]) if free[3] and found[3] > TOLD * sds[3] else values.mass
+    mass = 1.0 / _inverse(found[3], sds[3], values.mass) if free[3] else values.mass
     inertia = values.inertia * (mass / values.mass)
     damping = np.array([max(float(found[4]) * mass, 0.0) if is_damped else values.damping[0], values.damping[1]])
     return replace(values, mass=mass, inertia=inertia, center_of_mass=found[:3], damping=damping)
@@ -247,10 +247,18 @@ def _from_turns(poses: Sequence[_Poses], unknowns: Unknowns, values: Values) -> 
     free, known = np.array([True] * 5 + [is_pushed, is_damped]), np.array([*before, 1.0 / trace, 0.0])
     found, sds = _solved(np.concatenate(rows), free, known, np.array([LOOSE] * 5 + [np.inf] * 2))
     tensor = possible_tensor(np.eye(3) / 3.0 + np.tensordot(found[:5], _SHAPES, 1), THIN)
-    if is_pushed and found[5] > TOLD * sds[5]:
-        trace = 1.0 / float(found[5])
+    if is_pushed:
+        trace = 1.0 / _inverse(found[5], sds[5], trace)
     damping = np.array([values.damping[0], max(float(found[6]) * trace, 0.0) if is_damped else values.damping[1]])
     return replace(values, inertia=trace * tensor, damping=damping)
+
+
+def _inverse(found: float, sd: float, guess: float) -> float:
+    """1/guess, or what was found for it where that is told; where it isn't, no more than is possible: the loads would
+    throw a body that is far too light about.
+    """
+    most = found + TOLD * sd
+    return float(found) if found > TOLD * sd else min(1.0 / guess, most) if most > 0.0 else 1.0 / guess
 
 
 def _rates(poses: _Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -142,6 +142,14 @@ class MeasuredFlight:
                     return position, attitude
         raise InputError("session", f"{self.name} has no poses", "poses, transforms or odometry")
 
+    def from_first_position(self) -> MeasuredFlight:
+        """The same with positions counted from the first: far from the world's origin their size would decide what the
+        least noise is.
+        """
+        first = self.pose[0].values[0]
+        series = [replace(one, values=one.values - first) if one.kind == POSITION else one for one in self.series]
+        return replace(self, series=tuple(series))
+
     def own(self, values: Values) -> Values:
         """``values`` with the gravity and damping of this flight, where each has its own."""
         gravity, damping = values.gravity, values.damping

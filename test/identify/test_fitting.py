@@ -102,6 +102,31 @@ def test_the_first_body_is_near_for_long_and_short_pushes(push: tuple[float, flo
     assert np.linalg.norm(first.inertia - truth.inertia) < 0.1 * np.linalg.norm(truth.inertia)  # .006 to .012
 
 
+def test_the_first_body_is_no_lighter_than_a_push_that_does_not_tell_its_mass_allows() -> None:
+    truth = mf.values_of(1e6, (4.0, 0.0, 2.0), 1e8 * np.diag([0.5, 0.9, 1.0]), study.EARTH)
+    load = mf.load_history((0.8, 0.1, "world", (10.0, 2.0, 3.0), (3e5, 1e6, 5e5), (0.0, 0.0, 0.0)))
+    start, rng = mf.tumbling((3.0, 5.0, 2.0)), np.random.default_rng(1)
+    flight = mf.mocap(truth, start, rng, 2.0, load=load, noise=(0.2, mf.MOCAP[1]))
+    ball = mf.values_of(1.0, (0, 0, 0), 4e-3 * np.eye(3), study.EARTH)
+    first = initial_values([flight], make_unknowns(DEFAULT_FIT, topics_of([flight])), ball)
+    # Of a ball of 1 kg the push would make one of 1e9 rad/s, which takes minutes to simulate.
+    assert 1e5 < first.mass < 1e7 and np.trace(first.inertia) > 1e6
+    assert identify([flight]).mass.value is None
+
+
+def test_flights_far_from_the_worlds_origin_tell_as_much() -> None:
+    truth = _body()
+    found = []
+    for place in (0.0, 5e6):
+        flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(1), 2.0, load=mf.load_history(POKE))
+        position, attitude = flight.series
+        position = dataclasses.replace(position, values=position.values + [place, place, 0.0])
+        found.append(identify([dataclasses.replace(flight, series=(position, attitude))]))
+    near, far = (np.array([[one.value, one.sd] for one in (x.mass, *x.center_of_mass, *x.inertia)]) for x in found)
+    # Positions of 5e6 m have a rounding of 1e-9 m, which is nothing beside their noise.
+    assert np.all(np.abs(far - near) < 1e-3 * near[:, 1:])
+
+
 def test_a_weak_poke_late_in_a_long_fall_tells_the_mass_too() -> None:
     truth = _body()
     poke = (8.0, 0.05, "world", (0.05, 0.02, 0.0), (0.0, 0.0, 0.3), (0.0, 0.0, 0.0))
