@@ -83,12 +83,15 @@ class Flight:
         """Simulate so long, and return the state at the end. Raises InputError for no such time, when the motion fails,
         or when a command is refused as it comes to act.
         """
+        simulation = self._run.simulation
         # A difference of two times may be a rounding below 0.
         if not (isinstance(seconds, Real) and abs(seconds) <= MAX_TIME_S and nanoseconds(seconds) >= 0):
             raise InputError("step", seconds, f"a number of seconds from 0 to {MAX_TIME_S:g}")
-        simulation = self._run.simulation
+        until_ns = simulation.time_ns + nanoseconds(seconds)
+        if until_ns > nanoseconds(MAX_TIME_S):
+            raise InputError("step", seconds, f"a step that ends by {MAX_TIME_S:g} s of simulated time")
         refused = simulation.refused.total()
-        if not self._run.advance(simulation.time_ns + nanoseconds(seconds)):
+        if not self._run.advance(until_ns):
             raise InputError("step", simulation.failure)
         if simulation.refused.total() > refused:
             counts = ", ".join(f"{count} {reason}" for reason, count in simulation.refused.items())

@@ -117,6 +117,15 @@ def test_a_step_that_is_no_time_is_refused(seconds) -> None:
     assert flight.step(-1e-17).time_ns == 0 and flight.step(0.1).time_ns == 100_000_000
 
 
+def test_simulated_time_ends_where_that_of_commands_does() -> None:
+    """Beyond 146 years it would be later than never."""
+    flight = Flight(load_scene("t_handle", {"initial.angular_velocity": [0.0, 0.0, 0.0]}))
+    assert flight.step(1e9).time_ns == 10**18
+    with pytest.raises(InputError, match=r"ends by 1e\+09 s"):
+        flight.step(1.0)
+    assert flight.step(0.0).time_ns == 10**18
+
+
 @pytest.mark.parametrize("entry", ["hello", None, [{"force": [0.0, 0.0, 1.0]}]])
 def test_a_command_that_is_no_entry_is_refused(entry) -> None:
     with pytest.raises(InputError, match="command: .*a mapping such as"):
