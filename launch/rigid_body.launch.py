@@ -59,7 +59,9 @@ def nodes(context: LaunchContext) -> list[Node]:
     )
     if not given["script"]:
         return [body]
-    script = given["script"] if "/" in given["script"] else str(example_path(given["script"].removesuffix(".yaml")))
+    script = given["script"]
+    if "/" not in script and not Path(script).is_file():
+        script = str(example_path(script.removesuffix(".yaml")))
     # The first start compiles for a minute or two: the client waits for as long as it takes.
     options = ["--node", target, "--timeout", "0"]
     if given["reset"].lower() in ("true", "1", "yes"):

@@ -63,7 +63,7 @@ def test_client_accepts_the_options_that_the_launch_file_gives_it(tree: ast.Modu
 
 @pytest.fixture
 def launched(monkeypatch):
-    """launched(arguments): what the node is given as parameters, with stand-ins for launch."""
+    """launched(arguments): the actions, with stand-ins for launch."""
     keep = lambda *_, **given: SimpleNamespace(**given)  # noqa: E731
     configuration = lambda name: SimpleNamespace(perform=lambda context: context[name])  # noqa: E731
     for name, content in {
@@ -76,7 +76,7 @@ def launched(monkeypatch):
         monkeypatch.setitem(sys.modules, name, SimpleNamespace(**content))
     module = SimpleNamespace(**runpy.run_path(str(FILE)))
     defaults = {name: default for name, default, _ in module.ARGUMENTS}
-    return lambda **given: module.nodes({**defaults, **given})[0].parameters
+    return lambda **given: module.nodes({**defaults, **given})
 
 
 def test_a_node_of_another_name_gets_the_scene_its_own_section_and_a_mesh_beside_the_file(launched, tmp_path) -> None:
@@ -87,14 +87,23 @@ def test_a_node_of_another_name_gets_the_scene_its_own_section_and_a_mesh_beside
         "/**: {ros__parameters: {mass: 2.0}}\n"
         "/lab/nut: {ros__parameters: {density: 3.0}}\n"
     )
-    assert launched(scene=str(scene)) == [str(scene)]
-    assert launched(scene=str(scene), viewer="none", use_sim_time="true") == [
+    assert launched(scene=str(scene))[0].parameters == [str(scene)]
+    assert launched(scene=str(scene), viewer="none", use_sim_time="true")[0].parameters == [
         str(scene),
         {"viewer": "none", "use_sim_time": True},
     ]
     shared = {"mesh": str(tmp_path / "part.obj"), "viewer": "web", "mass": 2.0}
-    assert launched(scene=str(scene), name="nut") == [{**shared, "density": 1.0}]
-    assert launched(scene=str(scene), name="nut", namespace="lab") == [{**shared, "density": 3.0}]
+    assert launched(scene=str(scene), name="nut")[0].parameters == [{**shared, "density": 1.0}]
+    assert launched(scene=str(scene), name="nut", namespace="lab")[0].parameters == [{**shared, "density": 3.0}]
+
+
+def test_a_script_is_a_file_or_the_name_of_a_bundled_one(launched, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    bundled = str(SOURCE / "msg_examples" / "flip_and_poke.yaml")
+    assert launched(script="flip_and_poke")[1].arguments[0] == bundled
+    assert launched(script="flip_and_poke.yaml")[1].arguments[0] == bundled
+    (tmp_path / "pokes.yaml").touch()
+    assert launched(script="pokes.yaml")[1].arguments[0] == "pokes.yaml"
 
 
 @pytest.mark.skipif(not LAUNCH_INSTALLED, reason="launch_ros comes with a ROS installation, not with the wheels")
