@@ -278,7 +278,8 @@ def _check_keys(entry: dict, known: Set[str], others: Set[str] = frozenset()) ->
 def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
     if type(value) is float and lower <= value <= upper:
         return value  # as most are: a script may have thousands
-    if type(value) not in (int, float) or not lower <= value <= upper:
+    # NumPy's doubles are floats, too.
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not lower <= value <= upper:
         raise InputError(field, value, f"a number from {lower:g} to {upper:g}")
     return float(value)
 

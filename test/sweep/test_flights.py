@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Flights from Python: commanded, stepped and recorded as scripts and the node do it, one by one and on all cores."""
 
+import numpy as np
 import pytest
 
 from rigid_proto_ros.base.errors import InputError
@@ -45,6 +46,20 @@ def test_what_cant_be_taken_is_said_at_once_and_what_is_refused_later_at_its_ste
     flight.command({"at": {"ray": {"origin": [9, 9, 9], "direction": [1, 0, 0]}}, "force": [1, 0, 0]})
     with pytest.raises(InputError, match="1 ray_miss"):
         flight.step(0.1)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    reached = []
+    for kind in (float, np.float64):
+        flight = Flight(load_scene("t_handle"))
+        numbers = [kind(x) for x in (0.1, -0.2, 0.3)]
+        flight.command({"t": kind(0.05), "at": {"point": numbers}, "force": numbers, "duration": kind(0.02)})
+        flight.command({"state": {"angular_velocity": numbers}})
+        flight.command({"thrusters": [*numbers, kind(0.0)]})
+        reached.append(flight.step(kind(0.1)).row.tobytes())
+    assert reached[0] == reached[1]
+    with pytest.raises(InputError, match="force: got True"):
+        flight.command({"force": [True, 0.0, 0.0]})
 
 
 def test_a_recording_is_named_what_it_is(tmp_path) -> None:
