@@ -143,6 +143,8 @@ def _times_ns(entry: Any, number: int, max_commands: int) -> list[int]:
         raise InputError("every", None, "the seconds between repeats")
     every = _number(entry.get("every", 0.0), "every", 0.0, MAX_TIME_S)
     times_ns = [t_ns + nanoseconds(k * every) for k in range(int(repeat))]
+    if times_ns[-1] > nanoseconds(MAX_TIME_S):
+        raise InputError("every", every, f"repeats that end by {MAX_TIME_S:g} s")
     jitter = _number(entry.get("jitter", 0.0), "jitter", 0.0, MAX_TIME_S)
     if jitter == 0.0:
         return times_ns

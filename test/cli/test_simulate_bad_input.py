@@ -65,6 +65,7 @@ SCENES = {
 SCRIPTS = {
     "not_yaml": ("- {t: 1", "line"),
     "mapping": ("script: [{t: 1, force: [0, 0, 1]}]\n", "a list"),
+    "repeats of ages": ("[{t: 1, impulse: [1, 0, 0], repeat: 20, every: 1.0e+9}]\n", "entry 1, every"),
     "twice": ("- {t: 1, t: 2, force: [0, 0, 1]}\n", "line 1: got 't twice"),
     "twice_in_json": ('[{"t": 1, "t": 2, "force": [0, 0, 1]}]', "line 1: got 't twice"),
     "text_entry": ("- hello\n", "entry 1"),
