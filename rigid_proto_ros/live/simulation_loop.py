@@ -80,6 +80,7 @@ class SimulationLoop(ScenarioRun):
         self._has_subscribers = self._has_listeners = True
         self._budget = WorkBudget()
         self.pace = Pace(scenario.parameters.real_time_factor, self.stamps.clock)
+        self.resets = 0
         self._steps_left = 0
         self._steps_requested = 0
         self._commands_come = self._steps_expected = False
@@ -242,6 +243,7 @@ class SimulationLoop(ScenarioRun):
 
     def reset(self) -> None:
         """Time 0 and the initial state; paused or running stays."""
+        self.resets += 1
         # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
         self._waiting.clear()
         self._acting = self.scenario

@@ -71,6 +71,7 @@ class Diagnostics:
             "wall_stamp": commands.wall_stamp,
             "messages_lost": self._subscriber.messages_lost,
             "queue_full": self._subscriber.queue_full,
+            "resets": loop.resets,
             "kinetic_energy": simulation.kinetic_energy,
             "potential_energy": simulation.potential_energy,
             "angular_momentum_norm": float((momentum * momentum).sum()) ** 0.5,

@@ -48,8 +48,8 @@ stands.
 @dataclass(frozen=True)
 class Report:
     """sent: commands by kind. late, refused: what the node's counters rose by until ``reached_ns``; reasons: refused
-    ones by reason. last_ns: when the last command acts. was_set_back: whether somebody else has reset or restarted the
-    node before.
+    ones by reason. last_ns: when the last command acts. was_reset: whether somebody else has reset or restarted
+    the node meanwhile.
     """
 
     sent: dict[str, int]
@@ -58,12 +58,12 @@ class Report:
     reasons: dict[str, int]
     last_ns: int
     reached_ns: int
-    was_set_back: bool
+    was_reset: bool
 
     @property
     def all_in_time(self) -> bool:
         """Whether none was late, refused or dropped."""
-        return self.late == 0 and self.refused == 0 and not self.was_set_back
+        return self.late == 0 and self.refused == 0 and not self.was_reset
 
     @property
     def text(self) -> str:
@@ -72,8 +72,8 @@ class Report:
         why = ", ".join(f"{count} {reason}" for reason, count in self.reasons.items())
         refused = f"{self.refused} refused{f' ({why})' if why else ''}"
         text = f"sent {parts}; {self.late} late, {refused}; the last acts at {self.last_ns / 1e9:.6g} s"
-        if self.was_set_back:
-            text += ", but the node was reset or restarted before: commands that hadn't acted were dropped"
+        if self.was_reset:
+            text += ", but the node was reset or restarted meanwhile: commands that hadn't acted were dropped"
         elif self.sent and self.reached_ns <= self.last_ns:
             text += f", but simulated time has stopped at {self.reached_ns / 1e9:.6g} s"
         return text
@@ -93,7 +93,7 @@ class ScriptSender(Node):
         super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
         self._counters: dict[str, str] = {}
         self._reports = 0
-        self._was_set_back = False
+        self._restarted = False
         self._schedule = self.create_publisher(String, f"{self.target}/schedule", qos.COMMAND)
         self._get_parameters = self.create_client(GetParameters, f"{self.target}/get_parameters")
         self._reset_client = self.create_client(Trigger, f"{self.target}/reset")
@@ -105,6 +105,7 @@ class ScriptSender(Node):
         """Send all commands, each for the simulated time at which it acts, and wait until all have acted."""
         before = dict(self._counters)
         self._received_before = int(before["commands_received"])
+        self._resets = int(before.get("resets", 0)) + reset
         start_ns = 0
         if reset:
             self._call(self._pause_client, SetBool.Request(data=True))
@@ -114,49 +115,43 @@ class ScriptSender(Node):
                 # States are stamped by a /clock: by how far it is ahead, a report says that comes after them.
                 reports = self._reports
                 self._spin_until(lambda: self._reports >= reports + 2, f"reports of {self.target}")
-            now_ns = self._stamp_ns() - int(self._counters.get("stamp_offset_ns", 0))
-            # The last report may be from before a reset.
-            self._counters["sim_time_ns"] = str(min(now_ns, self._reached_ns()))
-            self._was_set_back = False
-            start_ns = now_ns + nanoseconds(lead_s)
+            start_ns = self._stamp_ns() - int(self._counters.get("stamp_offset_ns", 0)) + nanoseconds(lead_s)
         horizon_ns = nanoseconds(float(self._parameter("schedule_horizon") or 0.0))
         paused, number = reset, 0
         for time_ns, count, text in schedules(script, start_ns):
             if paused and time_ns > horizon_ns:
-                self._resume(number)
+                self._confirm(number)
+                self._call(self._pause_client, SetBool.Request(data=False))
                 paused = False
             if number + count - self._confirmed() > MAX_UNCONFIRMED:
                 self._confirm(min(number, number + count - MAX_UNCONFIRMED))
             ahead_ns = horizon_ns if paused else min(horizon_ns, SEND_AHEAD_NS)
-            while time_ns > self._reached_ns() + ahead_ns and not self._was_set_back:
+            while time_ns > self._reached_ns() + ahead_ns and not self._was_reset():
                 rclpy.spin_once(self, timeout_sec=0.5)
-            if self._was_set_back and not paused:
+            if self._was_reset():
                 break
             self._schedule.publish(String(data=text))
             number += count
-        if paused:
-            self._resume(number)
-        elif not self._was_set_back:
+        if not self._was_reset():
             self._confirm(number)
+        if paused:
+            self._call(self._pause_client, SetBool.Request(data=False))
         last_ns = start_ns + (script[-1].stamp_ns if script else 0)
         if script:
             self._wait_until_acted(last_ns)
+        if self._restarted:
+            before = dict.fromkeys(before, "0")
         # All of one report: what it has reached, it has counted.
         rose = {key: int(self._counters[key]) - int(before[key]) for key in before if key.startswith("refused_")}
         refused = rose.pop("refused_total")
         reasons = {key.removeprefix("refused_"): count for key, count in rose.items() if count}
         late = int(self._counters["late"]) - int(before["late"])
         sent = Counter(command.kind for command in script[:number])
-        return Report(sent, late, refused, reasons, last_ns, self._reached_ns(), self._was_set_back)
+        return Report(sent, late, refused, reasons, last_ns, self._reached_ns(), self._was_reset())
 
-    def _resume(self, number: int) -> None:
-        """Let time run after a reset, once so many commands are confirmed. What reports say of time from then on can't
-        come from before the reset: one that sets time back is somebody else's.
-        """
-        what = f"{self.target} to confirm {number} commands"
-        self._spin_until(lambda: self._confirmed() >= number and (number or self._reached_ns() == 0), what)
-        self._was_set_back = False
-        self._call(self._pause_client, SetBool.Request(data=False))
+    def _was_reset(self) -> bool:
+        """Whether somebody else has reset the node since ``send`` began, or it has restarted."""
+        return self._restarted or int(self._counters.get("resets", 0)) > self._resets
 
     def _parameter(self, name: str) -> Any:
         """The node's value of a parameter; None where it has none of that name."""
@@ -178,9 +173,9 @@ class ScriptSender(Node):
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name == f"{self.target}: simulation":
-                before_ns = self._reached_ns() if self._counters else 0
-                self._counters = {v.key: v.value for v in status.values}
-                self._was_set_back |= self._reached_ns() < before_ns
+                before, self._counters = self._counters, {v.key: v.value for v in status.values}
+                received = [int(counters.get("commands_received", 0)) for counters in (before, self._counters)]
+                self._restarted |= received[1] < received[0]
                 self._reports += 1
 
     def _stamp_ns(self) -> int:
@@ -208,7 +203,7 @@ class ScriptSender(Node):
         simulated time doesn't get there; raises InputError where there are no reports any more.
         """
         reached_ns, since, reports = -1, time.monotonic(), self._reports
-        while self._reached_ns() <= last_ns and not self._was_set_back:
+        while self._reached_ns() <= last_ns and not self._was_reset():
             rclpy.spin_once(self, timeout_sec=0.1)
             stood_s = time.monotonic() - since
             if self._reached_ns() != reached_ns:

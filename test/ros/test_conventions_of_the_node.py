@@ -28,7 +28,7 @@ KEYS = {
     *("refused_nonfinite", "refused_magnitude", "refused_stamp", "refused_ray_miss", "refused_tensor"),
     *("refused_integrator", "refused_schedule", "refused_thrusters", "refused_state", "late", "wall_stamp"),
     *("messages_lost", "queue_full", "kinetic_energy", "potential_energy", "angular_momentum_norm"),
-    *("angular_momentum_drift", "integrator", "state", "recording"),
+    *("angular_momentum_drift", "integrator", "state", "recording", "resets"),
 }
 NODE = "/rigid_body"
 OF_RCLPY = {
