@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..motion.body import Body
 from ..simulation.observer import ShownLoad
 from . import style
 from .backend import Backend
@@ -85,6 +86,13 @@ class Loads:
         if acting is not None:
             acting.end_ns = time_ns
             self._ended.append(acting)
+
+    def body_changed(self, before: Body, after: Body) -> None:
+        """Points of attack stay where they are in the mesh; one at the COM stays there."""
+        for acting in (*self._acting.values(), *self._ended):
+            if acting.load.point.any():
+                point = before.mesh_point(acting.load.point) * after.scale - after.center_of_mass
+                acting.load = replace(acting.load, point=point)
 
     def draw(
         self,

@@ -142,6 +142,8 @@ class Picture:
     def _set_body(self, time_ns: int, setup: Setup) -> None:
         """The body is that of this setup from ``time_ns`` on."""
         size = 0.0 if self.shape is None else self.shape.size
+        if self.setup is not None:
+            self.loads.body_changed(self.setup.body, setup.body)
         self.setup = setup
         self.shape = Shape(self._vertices, setup.body)
         self._poinsot.set_body(self.shape.moments, self.shape.axes)

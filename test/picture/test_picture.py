@@ -192,6 +192,23 @@ def test_a_load_shorter_than_the_time_between_two_states_is_shown_at_the_next_on
     assert [t for t, own in rows.items() if len(own)] == [210_000_000]
 
 
+def test_the_arrow_of_a_load_stays_at_its_point_of_a_body_that_changes():
+    picture, drawn = pictured()
+    push = ShownLoad("wrench", "body", np.array([0.1, 0.2, -0.3]), np.array([0.0, 0.0, 2.0]), np.zeros(3))
+    at_com = ShownLoad("poke", "body", np.zeros(3), np.array([0.0, 0.0, 2.0]), np.zeros(3))
+    for number, load in enumerate((push, at_com)):
+        picture.on(LoadBegan(0, number, load))
+    picture.draw(times(5), np.tile([0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], (5, 1)))
+    # Twice as large, about another centre: the point of the mesh is (0.4, 0.3, -0.25) / (2, 1, 1).
+    picture.on(BodyChanged(45_000_000, flight.setup_of(com=[0.1, 0.0, 0.0], scale=2.0 * flight.SCALE)))
+    picture.draw(times(1, 5), np.array([[0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]]))
+    for load, before, after in (("wrench", [0.1, 0.2, -0.3], [0.7, 0.6, -0.5]), ("poke", np.zeros(3), np.zeros(3))):
+        name = style.load_part(load, "force")
+        for time_ns, point in ((40_000_000, before), (50_000_000, after)):
+            (origin,), (vector,) = drawn.origins[name][time_ns], drawn.rows(name)[time_ns]
+            assert min(np.linalg.norm([origin - point, origin + vector - point], axis=1)) < 1e-12
+
+
 def test_an_impulse_is_shown_from_its_instant_for_a_moment():
     picture, drawn = pictured()
     push = ShownLoad("impulse", "body", np.array([0.1, 0, 0]), np.array([0.0, 0.0, 2.0]), np.zeros(3))
