@@ -209,8 +209,10 @@ def check_rates(setup: Setup, knot: Vector | None) -> None:
 
 def _check_rate(parameter: str, value: float, most: float, unit: str, rate: float) -> None:
     """most: the value that gives the rate FASTEST [1/s or rad/s]."""
-    if rate > FASTEST:
-        accepted = f"at most {most:.3g} {unit}".rstrip()
+    if rate > FASTEST and value > most:
+        # Three digits, which rounded up would be refused themselves.
+        near = f"{most:.3g}"
+        accepted = f"at most {near if float(near) <= most else f'{0.995 * most:.3g}'} {unit}".rstrip()
         why = f"auto follows rates up to {FASTEST:g} /s, and this is one of {rate:.3g} /s"
         raise CommandRefused("integrator", parameter, value, f"{accepted} for this body: {why}")
 

@@ -70,9 +70,9 @@ def test_what_is_too_fast_is_refused_with_the_most_that_this_body_takes(paramete
     assert (refusal.value.reason, refusal.value.field) == ("integrator", parameter)
     said = float(refusal.value.accepted.split()[2])
     assert most is None or said == most
-    # A hair less is taken, and a hair more isn't.
+    # It is taken, and a hair more isn't.
     name = parameter.removeprefix("string.")
-    for part, taken in ((0.99, True), (1.01, False)):
+    for part, taken in ((1.0, True), (1.02, False)):
         if name == parameter:
             changed = {name: part * said}
         else:
@@ -84,6 +84,19 @@ def test_what_is_too_fast_is_refused_with_the_most_that_this_body_takes(paramete
                 flight(BODY, integrator="auto", **changed)
     # Fixed steps are the user's own choice.
     flight(BODY, integrator="rk4", **changes)
+
+
+def test_the_most_that_is_said_is_taken_of_bodies_of_any_mass():
+    """Three digits of the limit, rounded down."""
+    for mass in np.linspace(0.1, 0.2, 21).tolist():
+        body = make_body(mass, np.zeros(3), mass * np.diag((0.02, 0.03, 0.04)))
+        for name, field in (("linear_damping", "linear_damping"), ("stiffness", "string.stiffness")):
+            changes = {"string": tied(stiffness=1e14)} if name == "stiffness" else {name: 1e14}
+            with pytest.raises(CommandRefused, match=field) as refusal:
+                flight(body, integrator="auto", **changes)
+            said = float(refusal.value.accepted.split()[2])
+            taken = {"string": tied(stiffness=said)} if name == "stiffness" else {name: said}
+            flight(body, integrator="auto", **taken)
 
 
 def test_tying_and_changing_in_flight_are_refused_and_counted():
