@@ -95,7 +95,7 @@ class _Source:
         try:
             with contextlib.chdir(self.path.parent):
                 yield
-        except ValueError as error:
+        except Exception as error:  # MuJoCo raises others, too, for a file that it doesn't expect
             reason = " ".join(str(error).replace("XML Error:", "").replace("Error:", "").split())
             raise InputError("robot file", self.path.name, f"what MuJoCo {verb} ({reason})") from None
 
