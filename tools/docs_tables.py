@@ -278,8 +278,14 @@ def node_load() -> str:
     median, late = (f"{found[latency, figure]:.1f} ms" for figure in ("p50", "p99"))
     sentence = f"{_measured_on(measured[0])}. From a wrench to the first twist that shows it: {median}, at 99 % {late}."
     flood = "10 000 wrenches per second"
-    sent, received, lost = (f"{found[flood, figure]:,.0f}" for figure in ("sent", "received", "lost"))
-    sentence += f" Of {sent} wrenches, 10,000 per second, {received} were taken, and {lost} were counted as lost."
+    sent, received, lost = (found[flood, figure] for figure in ("sent", "received", "lost"))
+    sentence += (
+        f" Of {sent:,.0f} wrenches, 10,000 per second, {received:,.0f} were taken, and {lost:,.0f} were counted as"
+    )
+    sentence += (
+        f" lost; {sent - received - lost:,.0f} found the node's own queue full, which is reported (`queue_full`)"
+    )
+    sentence += " but not counted."
     return f"{sentence}\n\n{_table(('node', 'share of a core', 'publications per second'), rows)}"
 
 
