@@ -182,6 +182,8 @@ def read_mjcf(root: Element, path: Path) -> rd.Robot:
     """The bodies of a <mujoco>; raises InputError for what MuJoCo refuses, and without it."""
     inertials = {body.get("name", ""): body.find("inertial") for body in root.iter("body")}
     _include(root, path, path, iter(range(MAX_INCLUDES)))
+    if any(not model.get("file") for model in root.iter("model")):  # MuJoCo may loop at a later file after such a one
+        raise InputError("robot file", path.name, "a file for each <model>")
     source = _Source(root, path)
     spec, frames = source.parsed(), source.without_files()
     for body in frames.bodies[1:]:  # what the file says of inertials may be what MuJoCo refuses

@@ -91,7 +91,7 @@ def test_mjcf_is_read_as_its_compiler_reads_it(tmp_path, text):
         ('<include file="none.xml"/>', "none.xml"),
         (f'<worldbody><body name="b"><geom class="no" type="sphere"/>{BODY}</body></worldbody>', "unknown default"),
         ('<compiler coordinate="global"/>', "coordinate"),
-        ('<asset><model name="x"/></asset>', "what MuJoCo reads"),
+        ('<asset><model name="x"/></asset>', "a file for each"),
     ],
 )
 def test_mjcf_that_cannot_be_honoured_is_refused(tmp_path, text, words_of_refusal):
