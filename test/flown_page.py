@@ -214,9 +214,9 @@ class FlownPage:
 
     def click(self, mesh_point, direction=None) -> None:
         """Click on the body, as it is drawn, where it has this point; direction of the view (3,) [world]."""
-        state, body = self.page.state, self.scenario.setup.body
+        state, body = self.page.state, self.page.picture.setup.body
         origin, unit = self.page.backend.origin, self.page.backend.unit
-        seen = DrawnPose(0.0, state.position, state.orientation_xyzw, origin.copy(), unit)
+        seen = DrawnPose(0.0, state.position, state.orientation_xyzw, origin.copy(), unit, self.page.picture.setup)
         point = state.position + state.rotation @ body.point(tuple(mesh_point))
         direction = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
         eye = (point - 3.0 * self.page.picture.shape.size * direction - origin) / unit
@@ -225,7 +225,7 @@ class FlownPage:
 
     def grab(self, mesh_point) -> np.ndarray:
         """Press on the body at this point; where that is (3,) [world]."""
-        state, body = self.page.state, self.scenario.setup.body
+        state, body = self.page.state, self.page.picture.setup.body
         place = state.position + state.rotation @ body.point(tuple(mesh_point))
         drawn = self._drawn(place)
         self.do(lambda: self.page.pointer.grab(1, drawn, drawn))

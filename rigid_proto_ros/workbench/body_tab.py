@@ -399,5 +399,8 @@ class UploadFolder:
 
     async def _fly(self, stand_in: dict[str, object]) -> None:
         upload = self.present
-        if upload is not None and await self._fly_scene(upload.scene(self._unit.value, stand_in)):
+        if upload is None:
+            return
+        taken = await self._fly_scene(upload.scene(self._unit.value, stand_in))
+        if taken and self.present is upload:  # and no other one was uploaded meanwhile
             self._show([f"{upload.name}: simulated"], None)

@@ -39,12 +39,14 @@ NEW_WEIGHT = "ballast.weight"
 @dataclass
 class _Control:
     """handle: the input. shown(values) gives what it shows of parameters; changes(input) what an input means for them,
-    None for nothing; it raises InputError for one that can't be read or would have no effect."""
+    None for nothing; it raises InputError for one that can't be read or would have no effect. waits: it was touched,
+    and hasn't been taken as meant yet."""
 
     handle: Any
     shown: Callable[[Values], object]
     changes: Callable[[Any], Changes | None]
     touched_s: float = -1e9
+    waits: bool = False
 
 
 class Controls:
@@ -61,10 +63,17 @@ class Controls:
         self._values = values
         for control in self._controls:
             if at_once or time.monotonic() > control.touched_s + TOUCHED_S:
-                control.touched_s = -1e9
+                control.touched_s, control.waits = -1e9, False
                 shown = control.shown(values)
                 if not _same(shown, control.handle.value):
                     control.handle.value = shown
+
+    def settle(self) -> None:
+        """Take what was typed last as it stands, before something else is done."""
+        for control in self._controls:
+            if control.waits:
+                self._take(control, control.touched_s)
+                control.touched_s = -1e9
 
     def show_again(self) -> None:
         """Everything as it is in force, after a refusal."""
@@ -102,30 +111,35 @@ class Controls:
 
     def any_parameter(self) -> None:
         """One that is chosen by name, as text."""
-        chosen: Any = self._gui.add_dropdown("Parameter", ("mass",), hint="Those that can change at any time")
+        name = "mass"
+        chosen: Any = self._gui.add_dropdown("Parameter", (name,), hint="Those that can change at any time")
         text: Any = self._gui.add_text("Value", "", hint="Numbers separated by blanks; true or false; a name")
 
         def shown(values: Values) -> object:
+            nonlocal name
             # Each once: a page with two equal options stays blank.
             names = dict.fromkeys((*values, NEW_WEIGHT))
-            options = tuple(name for name in names if parameter_named(name).changes != "read-only")
+            options = tuple(each for each in names if parameter_named(each).changes != "read-only")
             if chosen.options != options:
-                weights = [name for name in options if name.startswith("ballast.")]
-                name = weights[0] if len(weights) > 1 or chosen.value not in options else chosen.value
+                weights = [each for each in options if each.startswith("ballast.")]
+                name = weights[0] if len(weights) > 1 or name not in options else name
                 chosen.options, chosen.value = options, name
-            value = values.get(chosen.value, (0.0, 0.0, 0.0, 0.0))
+            value = values.get(name, (0.0, 0.0, 0.0, 0.0))
             if isinstance(value, (str, bool)):
                 return str(value).lower() if isinstance(value, bool) else value
             return " ".join(f"{x:.9g}" for x in np.ravel(value))
 
         def changes(typed: str) -> Changes:
             words = typed.replace(",", " ").strip(" []").split()
-            array = parameter_named(chosen.value).type == "doubles"
-            return {chosen.value: [scalar(word) for word in words] if array else scalar(typed.strip())}
+            array = parameter_named(name).type == "doubles"
+            return {name: [scalar(word) for word in words] if array else scalar(typed.strip())}
 
         @chosen.on_update
         async def _(event: viser.GuiEvent[Any]) -> None:
+            nonlocal name
             if event.client is not None:
+                self.settle()  # a value that was typed is the former parameter's
+                name = chosen.value
                 text.value = str(shown(self._values))
 
         self.bind(text, shown, changes, TYPING_S)
@@ -162,6 +176,7 @@ class Controls:
             if event.client is None:
                 return  # we wrote it ourselves
             touched_s = control.touched_s = time.monotonic()
+            control.waits = True
             if wait_s:
                 asyncio.get_running_loop().call_later(wait_s, self._take, control, touched_s)
             else:
@@ -170,8 +185,9 @@ class Controls:
         return handle
 
     def _take(self, control: _Control, touched_s: float) -> None:
-        if control.touched_s != touched_s:
-            return  # touched again since
+        if not control.waits or control.touched_s != touched_s:
+            return  # taken, or touched again since
+        control.waits = False
         try:
             changes = control.changes(control.handle.value)
         except InputError as error:

@@ -235,21 +235,25 @@ class Page:
 
     def tick(self, now_s: float) -> None:
         """Take what the simulation has told, and draw it."""
+        events = self._told.take()
+        if self.flight.moment_ns is not None and any(isinstance(event, Reset) for event in events):
+            self.flight.look_at_present()  # another client's reset: the run that is looked back at is over
         looking = self.flight.moment_ns is not None
         with self.server.atomic():
             if looking:
-                self._told.take()
+                for event in events:
+                    if isinstance(event, (SceneChanged, Refused)):
+                        self._on(event)
                 self._draw_past()
             else:
                 if self._drawn_moment_ns is not None:
                     self._return_to_present()
-                self._take()
+                self._take(events)
             self.backend.finish(now_s)
-        self.poses.add(
-            DrawnPose(
-                now_s, self.state.position, self.state.orientation_xyzw, self.backend.origin.copy(), self.backend.unit
-            )
-        )
+        state, setup = self.state, self.picture.setup
+        if setup is not None:
+            place = self.backend.origin.copy(), self.backend.unit
+            self.poses.add(DrawnPose(now_s, state.position, state.orientation_xyzw, *place, setup))
         self.pointer.hold()
         self.lessons.draw(now_s)
         self.readout_tab.draw(now_s)
@@ -263,10 +267,10 @@ class Page:
         tied = simulation.string is not None
         return motion_words(self._scenario, len(self._loads), tied, simulation.at_rest, self.live.paused)
 
-    def _take(self) -> None:
+    def _take(self, events: list[Event]) -> None:
         times: list[int] = []
         rows: list[np.ndarray] = []
-        for event in self._told.take():
+        for event in events:
             if isinstance(event, Published):
                 times.append(event.time_ns)
                 rows.append(event.row)
@@ -295,6 +299,7 @@ class Page:
                 self.backend.is_new |= self._new_scene
                 self.picture.on(event)
                 self.backend.is_new = False
+                self._label_contacts()
                 self._body_changed()
             case GhostChanged(time_ns, setup):
                 self.picture.set_ghost(time_ns, setup)
@@ -353,7 +358,7 @@ class Page:
         self.lessons.changed(before, self._scenario)
         # First: the body of a new scene is what the factors are shown relative to.
         self.body_tab.changed(self._scenario, self._new_scene)
-        self.controls.update(self._scenario.parameters.named())
+        self.controls.update(self._scenario.parameters.named(), at_once=self._new_scene)
 
     def _reset(self) -> None:
         self._new_scene |= self.flight.scenes_begun != self._scenes_seen
@@ -424,7 +429,7 @@ class Page:
                 self.picture.on(change)
         held = self._string_energies(times, rows)
         self.picture.draw(times, rows)
-        self.readings.take(setup, self.state, held[-1], None)
+        self.readings.look_at(setup, self.state, held[-1])
 
     def _draw_body(self, time_ns: int, setup: Setup) -> None:
         """Draw the body of this setup from now on, as it was at ``time_ns``."""
@@ -435,6 +440,7 @@ class Page:
             vertices, triangles = (None, None) if surface is None else (surface.vertices, surface.triangles)
             self.picture.on(MeshChanged(time_ns, vertices, triangles, ""))
         self.picture.on(BodyChanged(time_ns, setup))
+        self._label_contacts()
         if self.backend.unit != self._unit:
             self._furnish(setup)
             self._unit = self.backend.unit
@@ -510,9 +516,13 @@ class Page:
 
     def _on_lesson(self, course: Course) -> None:
         self.show_tab.show_for((*course.shows, *course.labels))
-        contacts = self.live.scenario.setup.contacts
-        body = self.live.scenario.setup.body
-        named = [name for name in course.labels if name in contacts]
         self.backend.labelled = {CONTACTS, *course.labels}
-        points = np.array([body.point(contacts[name]) for name in named]).reshape(-1, 3)
-        self.backend.labels(CONTACTS, np.array([len(named)]), points, named)
+        self._label_contacts()
+
+    def _label_contacts(self) -> None:
+        """Name the contacts that the lesson mentions, where they are on the body as it is drawn."""
+        setup = self.picture.setup
+        if setup is not None:
+            named = [name for name in self.lessons.course.labels if name in setup.contacts]
+            points = np.array([setup.body.point(setup.contacts[name]) for name in named]).reshape(-1, 3)
+            self.backend.labels(CONTACTS, np.array([len(named)]), points, named)

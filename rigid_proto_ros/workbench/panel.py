@@ -84,6 +84,7 @@ class TimeBar:
 
         @play.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
+            controls.settle()
             if play.value == RESET:
                 flight.reset()
             elif play.value == STEP:

@@ -17,6 +17,7 @@ import viser
 
 from ..base.rotation import matrix_from_quaternion
 from ..scene.scenario import Scenario
+from ..simulation.setup import Setup
 from .flight import Entry, Flight
 
 USUAL_DELAY_S = 0.06
@@ -48,13 +49,14 @@ class Tools:
 @dataclass(frozen=True)
 class DrawnPose:
     """time_s: by the monotonic clock. The picture shows the world point ``origin`` (3,) at its middle, ``unit`` metres
-    as one."""
+    as one. setup: of the body that is drawn."""
 
     time_s: float
     position: np.ndarray
     orientation_xyzw: np.ndarray
     origin: np.ndarray
     unit: float
+    setup: Setup
 
     def world_point(self, drawn_point: Iterable[float]) -> np.ndarray:
         """A point of the picture (3,) in the world [m]."""
@@ -144,8 +146,7 @@ class Pointer:
 
     def click(self, ray_origin: Iterable[float], ray_direction: Iterable[float], seen: DrawnPose, push: bool) -> bool:
         """Poke where the ray of the picture meets the body as it was ``seen``; whether it meets it."""
-        setup = self._flight.scenario.setup
-        body, surface, force = setup.body, setup.surface, self._tools.force
+        body, surface, force = seen.setup.body, seen.setup.surface, self._tools.force
         direction = np.array(list(ray_direction), dtype=float)
         direction /= np.linalg.norm(direction)
         if surface is None:
@@ -172,16 +173,15 @@ class Pointer:
 
     def grab(self, client_id: int, start: Iterable[float], end: Iterable[float]) -> None:
         """Tie the string where the body was grabbed, and take its free end to the pointer."""
-        scenario = self._flight.scenario
         if self.dragging or self._flight.refuses_in_past():
             return
-        body, surface = scenario.setup.body, scenario.setup.surface
         now = time.monotonic()
         seen = self._poses.usual(now)
         if seen is None:
             return
+        body, surface = seen.setup.body, seen.setup.surface
         entries: list[Entry] = []
-        if scenario.parameters.string.frequency <= 0.0:
+        if self._flight.scenario.parameters.string.frequency <= 0.0:
             entries.append({"set": {"string.frequency": FREQUENCY}})
         point = (0.0, 0.0, 0.0) if surface is None else numbers(seen.body_point(start))
         entries.append({"string": {"attach": numbers(body.mesh_point(point))}})

@@ -181,10 +181,11 @@ class Readings:
 
     @property
     def samples(self) -> np.ndarray:
-        """(n, 10): time [s]; energies [J] translational, rotational, of gravity, total, of the string; ω in principal
-        axes (3); angle of L [°].
+        """Up to the last state (n, 10): time [s]; energies [J] translational, rotational, of gravity, total, of the
+        string; ω in principal axes (3); angle of L [°].
         """
-        return np.array(self._samples)
+        samples = np.array(self._samples).reshape(-1, 10)
+        return samples if self._last is None else samples[samples[:, 0] <= self._last[1].time_ns * 1e-9]
 
     def is_due(self, time_ns: int) -> bool:
         """Whether a point of the plots belongs to this time."""
@@ -206,6 +207,10 @@ class Readings:
             self._samples.append((time_s, *energies, *spins.tolist(), self._turned(momentum)))
         while self._samples[0][0] < time_s - PLOTTED_S:
             self._samples.popleft()
+
+    def look_at(self, setup: Setup, state: State, string_energy: float) -> None:
+        """A state of the past; the samples stay."""
+        self._last = (setup, state, string_energy, None)
 
     def _turned(self, momentum: np.ndarray) -> float:
         """The angle [°] that L (3,) has turned by."""
@@ -277,9 +282,11 @@ class ReadoutTab:
             content = html_table(readings.values.items())
             if self._numbers.content != content:
                 self._numbers.content = content
-        samples = readings.samples
-        if now_s >= self._plots_due_s and len(samples) > 1:
+        if now_s >= self._plots_due_s:
             self._plots_due_s = now_s + PLOTS_S
+            samples = readings.samples
+            if not len(samples):
+                samples = np.zeros((1, samples.shape[1]))
             ages = samples[:, 0] - samples[-1, 0]
             # A string that has held nothing for as long as is plotted isn't named.
             self._held.shown = bool(samples[:, 5].any())

@@ -383,6 +383,40 @@ def test_a_pushed_body_shows_the_force_and_at_most_three_labels(flown: FlownPage
     assert not backend._nodes[style.load_part("poke", "force")].visible
 
 
+def test_names_stay_at_their_contacts_when_the_body_changes_and_when_the_past_is_shown(flown: FlownPage) -> None:
+    flown.pick(lesson("hammer").title)
+    page = flown.page
+
+    def named_where_they_are() -> None:
+        state, setup, backend = page.state, page.picture.setup, page.backend
+        labels = {label.text: label.position for label in backend._labels if label.visible}
+        for name in ("head", "grip"):
+            place = state.position + state.rotation @ setup.body.point(setup.contacts[name])
+            assert np.allclose(labels[name], (place - backend.origin) / backend.unit, atol=1e-9), name
+
+    # The box's centre of mass is 8 cm from that of the solid.
+    for label, value in (("Model", "bounding_box"), ("Size ×", (0.3,)), ("Model", "solid")):
+        flown.set(label, value)
+        flown.fly(0.5)
+        named_where_they_are()
+    flown._update(flown.widget("Seconds back"), 1.2)
+    flown.until(lambda: page._drawn_moment_ns is not None, "moment of the past")
+    named_where_they_are()
+
+
+def test_a_click_on_a_body_that_is_to_change_when_time_goes_on_hits_what_is_drawn(flown: FlownPage) -> None:
+    flown.press("Pause", of="Simulation")
+    flown.set("Size ×", (0.5,))
+    flown.wait_until_still()
+    assert not np.allclose(flown.page.picture.setup.body.scale, flown.scenario.setup.body.scale)
+    flown.click((0.0, 0.0, 0.065), flown.live.state.rotation @ np.array([0.0, -1.0, 0.0]))
+    flown.press("Play", of="Simulation")
+    flown.fly(0.02)
+    lines = [json.loads(line) for _, line in flown.page.flight.memory.session().events]
+    (point,) = (line["content"]["frame_id"].partition("point/")[2] for line in lines if line["kind"] == "poke")
+    assert float(point.split(",")[2]) == pytest.approx(0.065, abs=1e-6), "mesh coordinates, whatever the scale"
+
+
 def test_of_a_tensor_no_rounding_is_shown(flown: FlownPage) -> None:
     assert [x == 0.0 for x in numbers(flown.widget("Tensor").value)] == [False, True, True, False, True, False]
     assert "| 0 % |" in flown.page.body_tab.table, "the masses of the two models"

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import shutil
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ from flown_page import FlownPage, flies_again
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.mesh.locate import resolve_mesh
+from rigid_proto_ros.workbench import controls
 from rigid_proto_ros.workbench.controls import NEW_WEIGHT
 from rigid_proto_ros.workbench.panel import SPEEDS
 
@@ -51,6 +54,57 @@ def test_any_speed_that_is_in_force_is_shown_and_another_can_be_chosen(flown: Fl
     flown.set("Speed", "1")
     assert flown.scenario.parameters.real_time_factor == 1.0
     assert (speed.value, tuple(speed.options)) == ("1", tuple(SPEEDS))
+
+
+@pytest.fixture
+def slowly_typed(monkeypatch: pytest.MonkeyPatch):
+    """A page that waits for a minute after the last key."""
+    monkeypatch.setattr(controls, "TYPING_S", 60.0)
+    page = FlownPage()
+    yield page
+    page.end()
+
+
+def test_what_was_just_typed_is_taken_before_another_parameter_is_chosen_or_time_begins_anew(slowly_typed) -> None:
+    flown = slowly_typed
+    flown.set("Parameter", "mass")
+    flown.set("Value", "0.25")
+    flown.set("Parameter", "density")
+    assert flown.scenario.parameters.mass == 0.25 and flown.widget("Value").value == "7850"
+    flown.set("Initial spin [rad/s]", "0 0 5")
+    flown.press("Reset", of="Simulation")
+    assert list(flown.scenario.parameters.initial.angular_velocity) == [0.0, 0.0, 5.0]
+    assert flown.live.state.time_ns == 0 and np.linalg.norm(flown.live.state.angular_velocity) == pytest.approx(5.0)
+    # What is typed for one scene is nothing to the next.
+    flown.set("Density [kg/m³]", "3")
+    assert flown.do(lambda: flown.page.flight.fly({"mesh": "hammer", "density": 2000.0}))
+    flown.fly(0.0)
+    assert flown.scenario.parameters.density == 2000.0 and flown.widget("Density [kg/m³]").value == "2000"
+    flown.press("Reset", of="Simulation")
+    assert flown.scenario.parameters.density == 2000.0 and not flown.said
+
+
+def test_a_file_that_is_uploaded_while_another_is_prepared_can_be_simulated(flown: FlownPage) -> None:
+    folder, page = flown.page.body_tab.upload, flown.page
+    text = b"# z up\n" + resolve_mesh("hammer").read_bytes()
+    flown.do(lambda: folder.take("first.obj", text))
+
+    async def uploads_meanwhile() -> None:
+        flying = asyncio.ensure_future(folder._fly({}))
+        await asyncio.sleep(0.0)
+        await folder.take("second.obj", text)
+        await flying
+
+    held = threading.Event()
+    page.flight.prepare(lambda: held.wait(60.0), lambda: None)
+    threading.Timer(0.5, held.set).start()
+    flown.do(uploads_meanwhile)
+    flown.fly(0.0)
+    assert flown.scenario.parameters.mesh.endswith("first.obj")
+    assert folder.present.name == "second.obj"
+    flown.press("Simulate it")
+    flown.fly(0.0)
+    assert flown.scenario.parameters.mesh.endswith("second.obj")
 
 
 def test_a_density_is_refused_while_a_tensor_is_in_force(flown: FlownPage) -> None:

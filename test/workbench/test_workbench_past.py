@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 pytest.importorskip("viser")
@@ -101,6 +102,38 @@ def test_a_reset_ends_a_drag(flown: FlownPage, by_the_page: bool) -> None:
     flown.pull(place + [0.0, 0.0, 0.1])
     flown.fly(0.1)
     assert flown.live.loop.simulation.string is None
+
+
+def test_plots_of_the_past_end_at_it_and_those_of_the_present_are_whole_again(flown: FlownPage) -> None:
+    flown.fly(10.0)
+    whole = flown.page.readings.samples
+    for seconds in (8.0, 2.0):
+        look_back(flown, seconds)
+        flown.until(lambda s=seconds: abs(flown.page.state.time_ns - (10.0 - s) * 1e9) < 1e8, "moment")
+        assert np.array_equal(flown.page.readings.samples, whole[whole[:, 0] <= 10.0 - seconds])
+    look_at_present(flown)
+    assert np.array_equal(flown.page.readings.samples, whole)
+
+
+def test_after_a_reset_while_time_stands_the_plots_of_the_run_before_are_gone(flown: FlownPage) -> None:
+    flown.fly(3.0)
+    flown.press("Pause", of="Simulation")
+    plot = flown.page.readout_tab._free
+    flown.until(lambda: len(plot._handle.data[0]) > 10, "plot")
+    flown.press("Reset", of="Simulation")
+    flown.until(lambda: len(plot._handle.data[0]) == 1, "plot of the start alone")
+
+
+def test_what_another_client_does_while_the_past_is_shown_is_shown(flown: FlownPage) -> None:
+    flown.fly(1.0)
+    look_back(flown, 0.5)
+    flown.live.set_parameters({"density": 1234.5})
+    flown.until(lambda: flown.widget("Density [kg/m³]").value == "1234.5", "density set elsewhere")
+    flown.live.reset()
+    flown.until(lambda: flown.page._drawn_moment_ns is None and not flown.page._undrawn, "run that has begun")
+    flown.wait_until_asked()
+    assert not flown.live.paused and flown.page.state.time_ns == 0 and flown.page.flight.moment_ns is None
+    assert len(flown.page.readings.samples) == 1
 
 
 def test_a_ghost_that_is_switched_off_is_gone_from_the_picture(flown: FlownPage) -> None:
