@@ -223,10 +223,14 @@ def _load_entries(simulation: Simulation) -> Iterator[Entry]:
             continue
         load = acting.load
         entry: Entry = {"at": "com" if load.mesh_point is None else {"point": list(load.mesh_point)}}
-        if load.axes == "normal":
+        surface = simulation.setup.surface
+        if load.axes != "normal":
+            entry |= {"force": list(load.force), "torque": list(load.torque), "axes": load.axes}
+        elif surface and load.mesh_point and vector(surface.inward_normal(load.mesh_point)) == load.mesh_normal:
             entry["push"] = load.force[0]
         else:
-            entry |= {"force": list(load.force), "torque": list(load.torque), "axes": load.axes}
+            # Along the normal of a mesh that has been changed for another one.
+            entry |= {"force": load.own_force(simulation.setup.body).tolist(), "axes": "body"}
         if acting.slot > UNNAMED_SLOT:
             entry["slot"] = slot_name(acting.slot)
         if not endless:

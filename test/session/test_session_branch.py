@@ -111,10 +111,10 @@ ALL_KINDS = """
 """
 
 
-def flown(changes: dict, until_ns: int) -> RecordedSession:
-    """A session of all kinds of commands that there are."""
+def flown(changes: dict, until_ns: int, script: str = ALL_KINDS) -> RecordedSession:
+    """A session, by default of all kinds of commands that there are."""
     scenario, told = make_scenario({**FEATURES, **changes}), EventLines()
-    run = OfflineRun(scenario, parse_script(ALL_KINDS), told)
+    run = OfflineRun(scenario, parse_script(script), told)
     assert run.advance(until_ns)
     return RecordedSession(
         scene=scenario.text,
@@ -152,6 +152,12 @@ def test_a_branch_goes_on_under_every_kind_of_command(integrator, tolerance):
         # A free end that is on its way arrives when it would have, though not as evenly.
         if tied is None or tied.end_ns <= cut_ns:
             assert_goes_on(session, cut_ns, tolerance)
+
+
+def test_a_push_goes_on_along_the_normal_of_a_mesh_that_was_changed_for_another_one():
+    script = "- {t: 0.1, at: {vertex: 5}, push: 0.1, duration: 1.0}\n- {t: 0.2, set: {mesh: l_bracket}}\n"
+    session = flown({"contacts.tip": [0.0, 0.0, 0.0]}, 900_000_000, script)
+    assert_goes_on(session, 300_000_000, 1e-8)
 
 
 def test_what_acts_ends_in_a_branch_when_it_would_have_ended():
