@@ -157,6 +157,8 @@ def test_rigid_proto_commands_run(
 ) -> None:
     """Sweeps fly thousands of rows, so they are for the long run."""
     pytest.importorskip("rerun")
+    # As `make run` leaves one.
+    assert rigid_proto(["simulate", "t_handle", "--duration", "1", "--record", "out/session.rrd"]) == 0
     # In the order of the page: a later one uses the recording of an earlier one.
     run = [c for c in commands() if words(c)[0].removeprefix(".venv/bin/") == "rigid_proto"]
     for command in dict.fromkeys(run):
