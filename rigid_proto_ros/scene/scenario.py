@@ -62,7 +62,7 @@ class Scenario:
 
     def __reduce__(self) -> tuple[Callable[..., Scenario], tuple[Parameters, Mesh | None]]:
         """For another process it is made anew: compiled functions and their addresses are this one's."""
-        return _made_anew, (self.parameters, self.body_mesh.mesh if self.body_mesh else None)
+        return _of_parameters, (self.parameters, self.body_mesh.mesh if self.body_mesh else None)
 
     def with_changes(
         self, changes: Mapping[str, object], mesh: Mesh | None = None, at_hand: BodyMesh | None = None
@@ -127,11 +127,10 @@ def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Sce
 
     mesh: a mesh at hand, used instead of loading the one that the parameter names.
     """
-    parameters = Parameters().replaced(values)
-    return build_scenario(parameters, load_body_mesh(parameters, mesh))
+    return _of_parameters(Parameters().replaced(values), mesh)
 
 
-def _made_anew(parameters: Parameters, mesh: Mesh | None) -> Scenario:
+def _of_parameters(parameters: Parameters, mesh: Mesh | None) -> Scenario:
     return build_scenario(parameters, load_body_mesh(parameters, mesh))
 
 
