@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--fallback", choices=FALLBACKS[1:], help="fallback shape for a mesh that encloses no volume")
     parser.add_argument(
-        "--accept-open", type=float, default=0.0, metavar="B",
+        "--accept-open", type=float, metavar="B",
         help="close holes with flat caps if the relative change of volume and tensor by any way to close them is at "
         "most B (0.01: 1 %%); also for a robot's meshes",
     )  # fmt: skip
@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--density", args.density, "--mass or --density, not both")
     scale = scale_vector(1.0 if args.scale is None else args.scale)
     inspection = inspect_mesh(
-        mesh_body(args.mesh, repair=args.repair, fallback=args.fallback or "", accept_open=args.accept_open),
+        mesh_body(args.mesh, repair=args.repair, fallback=args.fallback or "", accept_open=args.accept_open or 0.0),
         model=args.model or "solid",
         scale=scale,
         mass=args.mass or 0.0,

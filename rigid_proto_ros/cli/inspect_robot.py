@@ -48,7 +48,7 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
 def given(args: argparse.Namespace, name: str) -> bool:
     """Whether an option was given, also as 0."""
     value = getattr(args, name.replace("-", "_"))
-    return value is not None and value is not False and (name != "accept-open" or value != 0.0)
+    return value is not None and value is not False
 
 
 def _refuse(args: argparse.Namespace, use: str, *names: str) -> None:
@@ -102,7 +102,7 @@ def _judge(args: argparse.Namespace, robot: str) -> tuple[int, dict]:
         mesh=args.mesh,
         scale=None if args.scale is None else scale_vector(args.scale),
         folders=tuple(args.package_path or ()),
-        accept_open=args.accept_open,
+        accept_open=args.accept_open or 0.0,
         tolerance=args.tolerance or LIMIT,
     )
     if not args.json:
@@ -148,7 +148,7 @@ def _fix(args: argparse.Namespace) -> int:
     if is_same_file(robot, args.fix):
         raise InputError("--fix", args.fix, "another file than the robot's")
     folders = tuple(args.package_path or ())
-    data, links = fix_robot(robot, folders=folders, accept_open=args.accept_open, everything=args.all)
+    data, links = fix_robot(robot, folders=folders, accept_open=args.accept_open or 0.0, everything=args.all)
     with whole_file("--fix", args.fix) as path:
         path.write_bytes(data)
     if args.json:

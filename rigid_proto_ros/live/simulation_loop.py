@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 from ..base.errors import InputError
 from ..motion.state import State
-from ..scene.scenario import BodyMesh, Scenario, check_inertia
-from ..scene.scenario_run import ScenarioRun
+from ..scene.scenario import BodyMesh, Scenario
+from ..scene.scenario_run import ScenarioRun, after_change
 from ..simulation.commands import Change
 from ..simulation.observer import Observer, Published
 from ..simulation.setup import Setup
@@ -142,17 +142,14 @@ class SimulationLoop(ScenarioRun):
         """
         acting = self._acting
         try:
-            if command.kind == "inertia":
-                acting = check_inertia(acting, command.content)
-            else:
-                acting = acting.with_changes(command.content, at_hand=at_hand)
+            acting = after_change(acting, command, at_hand)
             self.check_change(acting)
             self._acting = acting
         finally:
             planned = self._acting
             for change in self._waiting:
                 with suppress(InputError):  # refused when it acts
-                    changed = planned.with_changes(change.content)
+                    changed = after_change(planned, change)
                     self.check_change(changed)
                     planned = changed
             if planned.parameters == self.scenario.parameters:

@@ -10,7 +10,7 @@ has none.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 
@@ -18,7 +18,6 @@ import numpy as np
 
 from ..base.command_line import Progress
 from ..base.errors import InputError
-from ..mesh.reading import Mesh
 from ..simulation.commands import Change, Command, Listed
 from ..simulation.observer import (
     Event,
@@ -129,6 +128,13 @@ class Publications:
             self._number += 1
 
 
+def after_change(scenario: Scenario, change: Change, at_hand: BodyMesh | None = None) -> Scenario:
+    """The scenario that a change makes of this one; raises InputError. at_hand: as in ``Scenario.with_changes``."""
+    if change.kind == "inertia":
+        return check_inertia(scenario, change.content)
+    return scenario.with_changes(change.content, at_hand=at_hand)
+
+
 class ScenarioRun:
     """scenario: the one in force. ghost: None until ``begin_ghost``, and where the scenario asks for none."""
 
@@ -163,21 +169,15 @@ class ScenarioRun:
         """Raises InputError where this scenario can't follow the present one."""
         self.simulation.check_change(scenario.setup)
 
-    def change(self, changes: Mapping[str, object], mesh: Mesh | None = None, at_hand: BodyMesh | None = None) -> Setup:
-        """Put changed parameters in force, as ``Scenario.with_changes`` has it; returns the setup, which the
-        simulation is given by a command. Raises InputError, and then all stays as it was.
-        """
-        return self.replace(self.scenario.with_changes(changes, mesh, at_hand))
-
     def bound(self, change: Change) -> Change:
         """The change with a setup from this run's parameters (``setup_of``) at the time when it acts."""
         return replace(change, apply=partial(self.setup_of, change))
 
     def setup_of(self, command: Change) -> Setup:
-        """Put in force what a change says that acts now; returns the setup. Raises InputError."""
-        if command.kind == "inertia":
-            return self.replace(check_inertia(self.scenario, command.content))
-        return self.change(command.content)
+        """Put in force what a change says that acts now; returns the setup. Raises InputError, and then all stays as it
+        was.
+        """
+        return self.replace(after_change(self.scenario, command))
 
     def replace(self, scenario: Scenario) -> Setup:
         """Put another scenario in force, its publication rate too; the ghost follows, and the observer is notified."""

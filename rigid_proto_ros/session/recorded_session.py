@@ -230,7 +230,9 @@ class Resimulation(ScenarioRun):
     def setup_of(self, command: Change) -> Setup:
         """Put in force what a change says, with the mesh that was flown then."""
         mesh = self._mesh_of(command.content["mesh"]) if command.content.get("mesh") else None
-        return super().setup_of(command) if mesh is None else self.change(command.content, mesh)
+        if mesh is None:
+            return super().setup_of(command)
+        return self.replace(self.scenario.with_changes(command.content, mesh))
 
 
 def resimulation(session: RecordedSession, observer: Observer | None = None) -> Resimulation:

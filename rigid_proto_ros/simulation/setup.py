@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from decimal import ROUND_DOWN, Context
 from functools import cached_property
 from typing import NamedTuple
 
@@ -211,8 +212,8 @@ def _check_rate(parameter: str, value: float, most: float, unit: str, rate: floa
     """most: the value that gives the rate FASTEST [1/s or rad/s]."""
     if rate > FASTEST and value > most:
         # Three digits, which rounded up would be refused themselves.
-        near = f"{most:.3g}"
-        accepted = f"at most {near if float(near) <= most else f'{0.995 * most:.3g}'} {unit}".rstrip()
+        digits = Context(prec=3, rounding=ROUND_DOWN).create_decimal_from_float(most)
+        accepted = f"at most {float(digits):g} {unit}".rstrip()
         why = f"auto follows rates up to {FASTEST:g} /s, and this is one of {rate:.3g} /s"
         raise CommandRefused("integrator", parameter, value, f"{accepted} for this body: {why}")
 

@@ -72,7 +72,7 @@ def test_what_is_too_fast_is_refused_with_the_most_that_this_body_takes(paramete
     assert most is None or said == most
     # It is taken, and a hair more isn't.
     name = parameter.removeprefix("string.")
-    for part, taken in ((1.0, True), (1.02, False)):
+    for part, taken in ((1.0, True), (1.01, False)):
         if name == parameter:
             changed = {name: part * said}
         else:

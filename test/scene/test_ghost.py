@@ -88,7 +88,7 @@ def test_a_ghost_asked_for_in_flight_begins_at_the_next_reset():
     flight.start()
     while flight.simulation.time_ns < SECOND:
         flight.tick()
-    flight.change({"ghost.inertia_model": "bounding_box"})
+    flight.replace(flight.scenario.with_changes({"ghost.inertia_model": "bounding_box"}))
     while flight.simulation.time_ns < 2 * SECOND:
         flight.tick()
     assert not watcher.began and not watcher.ghost
@@ -115,14 +115,14 @@ def test_a_ghost_switched_off_is_gone_at_once_and_begins_again_at_a_reset():
 
     flight.start()
     fly_to(SECOND)
-    flight.change({"ghost.inertia_model": ""})
+    flight.replace(flight.scenario.with_changes({"ghost.inertia_model": ""}))
     off_ns = flight.simulation.time_ns
     fly_to(2 * SECOND)
     assert watcher.began == [0] and watcher.ended == [off_ns] and max(watcher.ghost) <= off_ns
     flight.reset()
     watcher.ghost.clear()
     fly_to(SECOND)
-    flight.change({"ghost.inertia_model": "bounding_box"})
+    flight.replace(flight.scenario.with_changes({"ghost.inertia_model": "bounding_box"}))
     fly_to(2 * SECOND)
     assert watcher.began == [0] and not watcher.ghost
     flight.reset()

@@ -55,7 +55,7 @@ class HandSession:
         """A parameter call; dots as two underscores. A refused one changes nothing."""
         named = with_mass_of_density({name.replace("__", "."): value for name, value in changes.items()})
         with suppress(InputError):
-            setup = self.run.change(named)
+            setup = self.run.replace(self.run.scenario.with_changes(named))
             self.submit(Change(named, lambda: setup))
 
     def pause(self) -> None:
