@@ -11,7 +11,7 @@ from rigid_proto_ros.sweep.flights import Flight, fly_all, load_scene
 POINTS = np.array([[0, -1, 1], [0, 1, -1], [0, 1, 1], [0, -1, -1]]) * 0.05  # m; a to d of config/t_handle.yaml
 TORQUES = np.cross(POINTS, np.array([[2, -1, -1], [2, 1, 1], [2, 1, -1], [2, -1, 1]]) / 6**0.5).T  # N m per N
 SCENE = load_scene("t_handle", {"wrench_timeout": 0.0})
-SPINS = np.random.default_rng(1).normal(0.0, 4.0, (8, 3)).tolist()  # rad/s
+SPINS = np.random.default_rng(1).normal(0.0, 4.0, (8, 3))  # rad/s
 
 
 def cost(gains: tuple[float, float]) -> float:
@@ -26,7 +26,7 @@ def cost(gains: tuple[float, float]) -> float:
             rate = state.angular_velocity_body
             total += error @ error + rate @ rate / 9.0
             force = TORQUES.T @ (-gains[0] * error - gains[1] * rate) / (TORQUES[0] ** 2).sum()
-            flight.command({"thrusters": (force - force.min()).tolist()})
+            flight.command({"thrusters": force - force.min()})
             flight.step(0.02)
     return total / (100 * len(SPINS))
 

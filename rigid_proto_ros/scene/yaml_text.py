@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
 import yaml
 
 from ..base.errors import InputError
@@ -176,3 +178,14 @@ def flow(value: object) -> str:
     if isinstance(value, str) and _WORD.match(value) and isinstance(scalar(value), str):
         return value
     return yaml_value(value)
+
+
+def plain(value: object) -> Any:
+    """A value as YAML has it, from NumPy's numbers and arrays, tuples and paths, also within lists and mappings."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {key: plain(of_key) for key, of_key in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    return os.fspath(value) if isinstance(value, os.PathLike) else value

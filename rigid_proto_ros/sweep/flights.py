@@ -30,6 +30,7 @@ from ..motion.state import State
 from ..scene.scenario import Scenario, read_scene
 from ..scene.scenario_run import OfflineRun
 from ..scene.script import MAX_TIME_S, expand_script
+from ..scene.yaml_text import plain
 from ..simulation.commands import nanoseconds
 from ..simulation.observer import Observer
 from .table import cores
@@ -43,7 +44,7 @@ Result = TypeVar("Result")
 
 def load_scene(name: str, settings: Mapping[str, object] | None = None) -> Scene:
     """A scene file by path or bundled name, parameters on top as ``{"gravity": [0, 0, -9.81]}``; raises InputError."""
-    return read_scene(name, settings, lambda warning: print(warning, file=sys.stderr))
+    return read_scene(name, plain(settings or {}), lambda warning: print(warning, file=sys.stderr))
 
 
 class Flight:
@@ -77,7 +78,7 @@ class Flight:
             raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
         # Counted from now, in whole nanoseconds; seconds don't hold them all.
         start_ns = 0 if "t" in entry else self._run.simulation.time_ns
-        self._run.submit(expand_script([{"t": 0.0, **entry}], "command", start_ns=start_ns))
+        self._run.submit(expand_script([{"t": 0.0, **plain(entry)}], "command", start_ns=start_ns))
 
     def step(self, seconds: float) -> State:
         """Simulate so long, and return the state at the end. Raises InputError for no such time, when the motion fails,
@@ -96,13 +97,14 @@ class Flight:
         if simulation.refused.total() > refused:
             counts = ", ".join(f"{count} {reason}" for reason, count in simulation.refused.items())
             raise CommandRefused("schedule", "command", f"refused when it was due to act ({counts})")
-        return simulation.state
+        return self.sample()
 
     def sample(self) -> State:
         """The state now: time_ns, position, orientation_xyzw, linear_velocity, angular_velocity, angular_velocity_body;
         before what was commanded at this very time has acted.
         """
-        return self._run.simulation.state
+        state = self._run.simulation.state
+        return State(state.time_ns, state.row.copy())  # the caller's own: arrays are changed in place
 
     @property
     def accuracy_floor(self) -> str:

@@ -27,7 +27,7 @@ from ..scene.parameters import HUGE, Parameters, Value, parameter_named, with_ma
 from ..scene.scenario import BodyMesh, Scenario, build_scenario
 from ..scene.scenario_run import OfflineRun
 from ..scene.script import MAX_TIME_S, expand_script
-from ..scene.yaml_text import dump_yaml
+from ..scene.yaml_text import dump_yaml, plain
 from ..simulation import batch
 from ..simulation import flight as fl
 from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand
@@ -35,7 +35,7 @@ from ..simulation.quantities import CONTEXT, STATE, begin, fill_state, measure_f
 from ..simulation.setup import Setup, check_command, check_start
 from ..simulation.simulation import Simulation
 from .sampling import Draw, as_text
-from .study import Study, Variation, Vary, body_mesh_of, plain, vertex_number
+from .study import Study, Variation, Vary, body_mesh_of, vertex_number
 from .targets import Target
 
 _LOADS = {"force": FORCE, "impulse": FORCE, "push": FORCE, "torque": TORQUE, "angular_impulse": TORQUE}

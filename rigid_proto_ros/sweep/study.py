@@ -32,7 +32,7 @@ from ..scene.scenario import BodyMesh, Scenario, build_scenario, load_body_mesh,
 from ..scene.scenario_run import OfflineRun
 from ..scene.scene_file import scene_file, scene_values
 from ..scene.script import expand_script
-from ..scene.yaml_text import load_yaml, read_text
+from ..scene.yaml_text import load_yaml, plain, read_text
 from ..simulation.commands import Command, nanoseconds
 from .fields import mapping, number, whole
 from .measures import Measures, read_measures
@@ -167,13 +167,6 @@ class Study:
 def vertex_number(uniform: float, body_mesh: BodyMesh | None) -> int:
     """Which vertex a uniform number in [0, 1) chooses; 0 without a mesh, which is then refused for want of one."""
     return int(uniform * len(body_mesh.surface.vertices)) if body_mesh else 0
-
-
-def plain(value: Any) -> object:
-    """A value as YAML has it."""
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    return list(value) if isinstance(value, tuple) else value
 
 
 def body_mesh_of(parameters: Parameters) -> BodyMesh | None:

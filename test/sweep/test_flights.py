@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Flights from Python: commanded, stepped and recorded as scripts and the node do it, one by one and on all cores."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -48,18 +50,35 @@ def test_what_cant_be_taken_is_said_at_once_and_what_is_refused_later_at_its_ste
         flight.step(0.1)
 
 
-def test_numbers_of_numpy_are_numbers() -> None:
-    reached = []
-    for kind in (float, np.float64):
-        flight = Flight(load_scene("t_handle"))
-        numbers = [kind(x) for x in (0.1, -0.2, 0.3)]
-        flight.command({"t": kind(0.05), "at": {"point": numbers}, "force": numbers, "duration": kind(0.02)})
-        flight.command({"state": {"angular_velocity": numbers}})
-        flight.command({"thrusters": [*numbers, kind(0.0)]})
-        reached.append(flight.step(kind(0.1)).row.tobytes())
-    assert reached[0] == reached[1]
-    with pytest.raises(InputError, match="force: got True"):
-        flight.command({"force": [True, 0.0, 0.0]})
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_numbers_and_arrays_of_numpy_are_numbers_and_lists(tmp_path, kind) -> None:
+    pytest.importorskip("mcap")
+    from rigid_proto_ros.rerun_view.session_files import read_runs
+    from rigid_proto_ros.session.check import verify
+
+    vector = np.array([0.125, -0.25, 0.5], kind)
+
+    def flown(number, numbers, path, record="") -> bytes:
+        scene = load_scene("t_handle", {"mass": number(2.0), "gravity": numbers, "mesh": path("hammer")})
+        with Flight(scene, record=record) as flight:
+            flight.command({"t": number(0.0625), "at": {"point": numbers}, "force": numbers, "duration": number(0.5)})
+            flight.command({"state": {"angular_velocity": numbers}})
+            flight.command({"set": {"gravity": numbers, "density": number(500.0)}})
+            flight.command({"string": {"target": numbers}})
+            return flight.step(number(0.125)).row.tobytes()
+
+    recording = tmp_path / "flight.mcap"
+    assert flown(kind, vector, Path, recording) == flown(float, tuple(vector.tolist()), str)
+    (session,) = read_runs(recording)
+    assert verify(session) is None
+
+
+def test_a_sample_is_the_callers_own() -> None:
+    flight = Flight(load_scene("t_handle"))
+    for sample in (flight.sample(), flight.step(0.1)):
+        expected = flight.sample().row.tobytes()
+        sample.position[:] += 9.0
+        assert flight.sample().row.tobytes() == expected
 
 
 def test_a_recording_is_named_what_it_is(tmp_path) -> None:
