@@ -13,6 +13,7 @@ from collections import ChainMap
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -285,6 +286,9 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list[Any]) -> t
             for probe in form.probes:
                 _checked(target, probe, field, values, entries)
         found.append(Vary(target, form))
+    for vector, part in permutations(map(str, spec), 2):
+        if part.startswith(f"{vector}."):
+            raise InputError(f"{name}, vary", f"{vector} and {part}", "one of them: each replaces the other")
     lengths = {len(v.form.values) for v in found if isinstance(v.form, Points) and v.form.kind == LIST}
     if len(lengths) > 1:
         raise InputError(f"{name}, vary", sorted(lengths), "lists of the same length; they advance together")

@@ -24,6 +24,7 @@ TWELVE = {"from": 1, "to": 2, "count": 10**6}
     [
         ({"vary": {"mas": {"grid": [1.0]}}}, "vary", "did you mean mass"),
         ({"varry": {}}, "study", "did you mean vary"),
+        ({"vary": {"scale.z": {"grid": [1.0]}, "scale": {"grid": [2.0]}}}, "vary", "one of them"),
         ({"scene": "t_handel"}, "scene", "t_handle"),
         ({"vary": {"mass": {"grid": []}}}, "vary.mass.grid", "1 to"),
         ({"vary": {"mass": {"grid": [1.0, math.nan]}}}, "vary.mass.grid, value 2", "finite"),
