@@ -20,6 +20,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..base.errors import CommandRefused, InputError
+from ..base.files import is_same_file
 from ..motion.frames import parse_frame
 from ..motion.state import State, shift_com
 from ..scene.command_codec import frame_names
@@ -336,6 +337,8 @@ class LiveSimulation:
         path = scenario.parameters.record
         if not path:
             return None
+        if self._recorder is not None and is_same_file(path, self.scenario.parameters.record):
+            raise InputError("record", path, "another file than the one that is being recorded")
         from ..rerun_view.session_files import make_recorder
 
         return make_recorder(path, self.name, scenario.parameters, self._recording_failed)

@@ -34,6 +34,9 @@ TICK_NS = 10_000_000
 LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
 """A message's stamp counts seconds in 32 bits."""
 
+LONGEST_NS = 1e18
+"""Thirty years [ns of wall time], for which nobody waits: a small enough factor asks for infinity."""
+
 MAX_LAG_NS = 250_000_000
 """A thread further behind than this [ns of wall time] gives the time up instead of racing after it."""
 
@@ -138,8 +141,9 @@ class Pace:
         return max(reached_ns, self._anchor_simulated_ns + reading_ns - self.anchored_ns)
 
     def wall_ns(self, simulated_ns: int) -> int:
-        """When the wall clock gets to a simulated time."""
-        return self.anchored_ns + int((simulated_ns - self._anchor_simulated_ns) / self.factor) + 1
+        """When the wall clock gets to a simulated time, or in LONGEST_NS where it is later."""
+        rest_ns = (simulated_ns - self._anchor_simulated_ns) / self.factor
+        return self.anchored_ns + int(min(rest_ns, LONGEST_NS)) + 1
 
 
 # Time slices

@@ -36,6 +36,9 @@ LOCKSTEP_NS = 100_000
 FOLLOW_NS = 1_000_000
 """A followed clock is read this often [ns of wall time]."""
 
+RAREST_NS = 100_000_000
+"""Where publications are further apart than this [ns of wall time], the motion is advanced between them, too."""
+
 STEP_PATIENCE_S = 10.0
 """How long a request to step waits for the end of it."""
 
@@ -250,6 +253,8 @@ class SimulationLoop(ScenarioRun):
         self.publications.restart()
         self._steps_left = self._steps_requested = 0
         self._anchor()
+        # Stamped anew: the message that is latched is from before.
+        self.simulation.announce()
 
     # In the thread's loop
 
@@ -303,7 +308,9 @@ class SimulationLoop(ScenarioRun):
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
         self._commands_come = self.endpoints.take_commands(wall_ns, False)
-        if ends or not self._has_listeners or self.pace.followed or not self._caught_up:
+        # Else what acts in between, and reports of it, would wait for the next publication.
+        rarely = self.publications.rate * self.pace.factor * RAREST_NS < 1e9
+        if ends or rarely or not self._has_listeners or self.pace.followed or not self._caught_up:
             self.catch_up()
         if ends and self._end_ns is not None and self.simulation.time_ns >= self._end_ns:
             self.paused = True
@@ -413,7 +420,7 @@ class SimulationLoop(ScenarioRun):
         publication_ns = self.pace.wall_ns(self.publications.next_ns)
         if self._commands_come:
             # Commands taken a little before a publication show in it; those taken with it would show a period later.
-            early_ns = publication_ns - int(LEAD * 1e9 / (self.publications.rate * factor))
+            early_ns = self.pace.wall_ns(self.publications.next_ns - int(LEAD * 1e9 / self.publications.rate))
             if early_ns - self._last_drain_ns >= ACTIVE_DRAIN_NS:
                 return min(latest_ns, early_ns)
         return min(latest_ns, publication_ns)

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -36,17 +36,18 @@ def make_recorder(
     parameters: Parameters | None = None,
     on_error: Callable[[str], None] | None = None,
     simulated_log: bool = False,
+    files: Sequence[tuple[str, bytes]] = (),
 ) -> Recorder:
     """An observer that records to ``path``; raises InputError where it can't.
 
     parameters: the scene's, of which frames' names count. simulated_log: messages of an .mcap are logged at simulated
-    time, as suits a run without a clock; else at the wall's.
+    time, as suits a run without a clock; else at the wall's. files: meshes for an .mcap, as McapObserver has them.
     """
     if is_mcap(path):
         try:
             from ..session.mcap_observer import McapObserver
 
-            return McapObserver(path, node_name, parameters, on_error, simulated_log)
+            return McapObserver(path, node_name, parameters, on_error, simulated_log, files)
         except ImportError:
             raise InputError("record", is_missing("mcap", "mcap")) from None
     if importlib.util.find_spec("rerun") is None:
@@ -54,20 +55,6 @@ def make_recorder(
     from .observer import FileRecorder
 
     return FileRecorder(path, node_name, on_error)
-
-
-@contextmanager
-def recording(path: str, node_name: str = "rigid_body", parameters: Parameters | None = None) -> Iterator[Recorder]:
-    """A recorder at simulated time for the block, closed at its end; raises InputError where the file can't be
-    written.
-    """
-    recorder = make_recorder(path, node_name, parameters, on_error=lambda _: None, simulated_log=True)
-    try:
-        yield recorder
-    finally:
-        recorder.close()
-    if recorder.error:
-        raise InputError("--record", path, f"a file that can be written ({recorder.error})")
 
 
 def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
@@ -148,19 +135,29 @@ def record(
 
     Raises InputError for a session without a scene and a file that can't be written.
     """
-    from ..session.recorded_session import play
+    from ..session.recorded_session import play, recorded_parameters
 
     for session in runs:
         if not session.scene and given is None:
             raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
     total = sum(len(session.times) for session in runs)
-    told = 0
-    with recording(str(path), runs[-1].node_name or "rigid_body") as recorder:
+    told, last = 0, runs[-1]
+    recorder = make_recorder(
+        str(path),
+        last.node_name or "rigid_body",
+        recorded_parameters(last) if given is None else given.parameters,
+        on_error=lambda _: None,
+        simulated_log=True,
+        files=last.attachments,
+    )
+    with closing(recorder):
         for number, session in enumerate(runs):
             if number:
                 recorder.on(Reset())
             play(session, recorder, given, partial(_after, told, total, progress))
             told += len(session.times)
+    if recorder.error:
+        raise InputError("--record", str(path), f"a file that can be written ({recorder.error})")
 
 
 def _after(told: int, total: int, progress: Callable[[float, float], None], done: float, _: float) -> None:

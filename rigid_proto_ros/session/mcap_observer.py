@@ -7,11 +7,13 @@ disk then. All runs go into one file: a reset begins the next one, as in a bag o
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import logging
+import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,8 +58,9 @@ class McapObserver(Observer):
     """Records to ``path``; topics are named after the node, frames as its messages name them.
 
     Messages are logged at the wall's time, as bags have it, or with ``simulated_log`` at simulated time, each run
-    behind the one before. on_error gets one line when recording has stopped because the file can't be written, from
-    another thread; ``error`` keeps it. Raises InputError where the file can't be opened.
+    behind the one before. files (name, bytes): meshes at hand, whose own files may be gone. on_error gets one line when
+    recording has stopped because the file can't be written, from another thread; ``error`` keeps it. Raises InputError
+    where the file can't be opened.
     """
 
     takes = frozenset({Published, Logged, Applied, BodyChanged, SceneChanged, Started, Reset, AccuracyFloor})
@@ -69,6 +72,7 @@ class McapObserver(Observer):
         parameters: Parameters | None = None,
         on_error: Callable[[str], None] | None = None,
         simulated_log: bool = False,
+        files: Sequence[tuple[str, bytes]] = (),
     ) -> None:
         self.error = ""
         self._path = path
@@ -77,6 +81,7 @@ class McapObserver(Observer):
         self._run_begins_ns = self._latest_log_ns = self._chunk = self._run = 0
         self._world, self._body_frame = frame_names(parameters or Parameters(), node_name)
         self._scene = ""
+        self._files = files
         self._attached: set[str] = set()
         self._writer: Writer | None = None
         try:
@@ -150,6 +155,8 @@ class McapObserver(Observer):
                 break
         if self._writer is not None:
             self._writer.flush()
+            if not os.path.samestat(os.stat(self._path), os.fstat(self._stream.fileno())):
+                raise OSError(errno.ESTALE, "another file took its place")
 
     def _write(self, writer: Writer, wall_ns: int, event: Event) -> None:
         if isinstance(event, Reset):
@@ -194,16 +201,17 @@ class McapObserver(Observer):
         if not sha256 or sha256 in self._attached:
             return
         self._attached.add(sha256)
-        try:
+        files = [*self._files]
+        with suppress(InputError, OSError):
             path = resolve_mesh(str(read_scene_text(scene).values.get("mesh", "")))
-            data = path.read_bytes()
-        except (InputError, OSError):
-            return
-        # A file that was changed since it was loaded isn't the one that flies.
-        if hashlib.sha256(data).hexdigest() == sha256:
-            # The chunk before it declares the topics: from there on a cut file can be read.
-            writer.flush()
-            writer.add_attachment(0, log_time, path.name, "application/octet-stream", data)
+            files.append((path.name, path.read_bytes()))
+        for name, data in files:
+            # A file that was changed since it was loaded isn't the one that flies.
+            if hashlib.sha256(data).hexdigest() == sha256:
+                # The chunk before it declares the topics: from there on a cut file can be read.
+                writer.flush()
+                writer.add_attachment(0, log_time, name, "application/octet-stream", data)
+                return
 
     def _lost(self, reason: str) -> None:
         if self._writer is not None:

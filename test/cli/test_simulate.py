@@ -135,3 +135,12 @@ def test_without_a_duration_a_flight_lasts_ten_seconds_or_one_more_than_its_scri
     assert simulated(capsys, "book", "--script", str(script))["time_ns"] == 13_250_000_000
     assert main(["simulate", "book", "--script", str(script), "--duration", "2"]) == 0
     assert "1 of the script's 2 commands act at or after the end, 2 s" in capsys.readouterr().err
+
+
+def test_a_command_that_is_refused_as_it_acts_fails_the_run_as_poke_client_says_it(tmp_path, capsys):
+    script = tmp_path / "script.yaml"
+    script.write_text("- {t: 0.1, at: {ray: {origin: [9, 9, 9], direction: [1, 0, 0]}}, force: [1, 0, 0]}\n")
+    assert main(["simulate", "book", "--script", str(script), "--duration", "0.2", "--json"]) == 1
+    said = capsys.readouterr()
+    assert json.loads(said.out)["time_ns"] == 200_000_000
+    assert "1 commands refused: ray_miss" in said.err

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.simulation.commands import ThrusterCommand, WrenchCommand
-from rigid_proto_ros.simulation.observer import Logged, Observer, Published
+from rigid_proto_ros.simulation.observer import BodyChanged, Logged, Observer, Published
 
 PERIOD_NS = 10_000_000
 
@@ -239,6 +240,35 @@ def test_a_recording_begins_and_ends_in_flight(live, tmp_path):
     live.step(2)
     (run,) = read_runs(path)
     assert (np.asarray(run.times) // PERIOD_NS).tolist() == [3, 4, 5]
+
+
+def test_the_file_that_is_being_recorded_is_refused_for_a_second_recording_by_any_name(live, tmp_path):
+    from rigid_proto_ros.rerun_view.session_files import read_runs
+
+    path = tmp_path / "flight.mcap"
+    live.set_parameters({"record": str(path)})
+    live.step(3)
+    with pytest.raises(InputError, match="another file than the one that is being recorded"):
+        live.set_parameters({"record": f"{tmp_path}/./flight.mcap"})
+    live.step(2)
+    live.set_parameters({"record": ""})
+    (run,) = read_runs(path)
+    assert (np.asarray(run.times) // PERIOD_NS).tolist() == [1, 2, 3, 4, 5]
+
+
+def test_a_reset_tells_of_the_body_anew_with_its_own_time(live):
+    class Bodies(Observer):
+        takes = frozenset({BodyChanged})
+        times: ClassVar[list[int]] = []
+
+        def on(self, event) -> None:
+            if isinstance(event, BodyChanged):
+                self.times.append(event.time_ns)
+
+    live.step(3)
+    live.add_observer(Bodies())
+    live.reset()
+    assert Bodies.times == [3 * PERIOD_NS, 0]
 
 
 @pytest.mark.parametrize("end", ["stop", "reset", "another recording"])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import itertools
+import time
 
 import pytest
 from flights import SECOND, wrench
@@ -117,6 +118,29 @@ def test_without_listeners_a_motion_that_is_too_dear_gives_time_up_and_says_so(m
     while rig.loop.pace.real_time_lost_s == lost_s:
         rig.loop.tick()
     assert rig.loop.simulation.time_ns > 0
+
+
+def test_simulated_time_goes_on_between_publications_that_are_far_apart(monkeypatch):
+    now = [10**12]
+    monkeypatch.setattr("rigid_proto_ros.live.pacing.time.monotonic_ns", lambda: now[0])
+    rig = Rig({"publish_rate": 0.01})
+    rig.loop.tick()
+    rig.loop.simulation.submit(wrench("world", (1e-3, 0.0, 0.0)), SECOND)
+    now[0] += 2 * SECOND
+    rig.loop.tick()
+    assert rig.loop.simulation.time_ns == 2 * SECOND
+    assert rig.loop.simulation.events.count == 1
+    assert rig.published == [0]
+
+
+@pytest.mark.parametrize("factor", [1e-305, 5e-324])
+def test_a_factor_that_asks_for_a_time_beyond_all_numbers_stops_the_motion_and_not_the_thread(factor):
+    rig = Rig({"publish_rate": 1e-6, "real_time_factor": factor})
+    rig.lively = True
+    for _ in range(3):
+        rig.loop.tick()
+        assert rig.loop.next_wake_ns() < time.monotonic_ns() + SECOND
+    assert rig.loop.simulation.time_ns == 0
 
 
 def test_while_commands_come_they_are_taken_once_more_shortly_before_each_publication(monkeypatch):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import json
 import shlex
+import shutil
 import subprocess
 import sys
 import time
@@ -146,6 +147,10 @@ def test_meshes_come_from_inside_where_their_files_are_gone(tmp_path):
     book.unlink()
     hammer.unlink()
     assert main(["replay", session, "--verify"]) == 0
+    again = str(tmp_path / "again.mcap")
+    assert main(["replay", session, "--record", again]) == 0
+    Path(session).unlink()
+    assert main(["replay", again, "--verify"]) == 0
 
 
 @needs_rerun
@@ -286,6 +291,30 @@ def test_a_full_disk_stops_the_recording_and_not_the_flight_and_the_rest_is_read
     assert not session.complete
     assert 0 < session.end_ns <= SECOND
     assert verify(session) is None
+
+
+def test_a_lost_file_stops_the_recording_and_is_told(tmp_path):
+    said: list[str] = []
+    path = tmp_path / "gone" / "s.mcap"
+    observer = McapObserver(path, on_error=said.append, simulated_log=True)
+    run = OfflineRun(read_scene("book"), [], observer)
+    shutil.rmtree(path.parent)
+    assert run.advance(SECOND)
+    observer.close()
+    assert said == [f"recording stopped: {path}: No such file or directory"]
+
+
+@needs_rerun
+def test_a_converted_session_keeps_the_names_of_its_frames(tmp_path):
+    names = ["--set", "world_frame=map", "--set", "body_frame=hull"]
+    recorded = [str(tmp_path / f"s.{ending}") for ending in ("mcap", "rrd")]
+    assert main(["simulate", "book", *names, "--duration", "0.1", "--bag", recorded[0], "--record", recorded[1]]) == 0
+    for session in recorded:
+        converted = str(tmp_path / "converted.mcap")
+        assert main(["replay", session, "--record", converted]) == 0
+        topics = decoded(converted)
+        assert {m.header.frame_id for _, m in topics["/rigid_body/pose"]} == {"map"}
+        assert {m.header.frame_id for _, m in topics["/rigid_body/inertia"]} == {"hull/mesh"}
 
 
 def test_a_recording_without_states_has_nothing_to_verify(tmp_path, capsys):
