@@ -50,11 +50,16 @@ def united_surface(
     parts: dict[int, manifold3d.Manifold] = {}
     for c in np.argsort(cavity, kind="stable").tolist():
         faces = topology.corners[topology.component == c]
+        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
         if cavity[c]:
             faces = faces[:, [0, 2, 1]]
         used, local = np.unique(faces, return_inverse=True)
-        local = local.reshape(-1, 3).astype(np.uint64)
-        solid = manifold3d.Manifold(manifold3d.Mesh64(vert_properties=vertices[used] - middle, tri_verts=local))
+        local = local.reshape(-1, 3)
+        steps = local * len(used) + np.roll(local, -1, axis=1)
+        if len(np.unique(steps)) < steps.size:  # faces that lie on each other, of which manifold3d makes a wrong union
+            raise refusal
+        mesh = manifold3d.Mesh64(vert_properties=vertices[used] - middle, tri_verts=local.astype(np.uint64))
+        solid = manifold3d.Manifold(mesh)
         if solid.status() != manifold3d.Error.NoError:
             raise refusal
         if cavity[c]:
