@@ -186,7 +186,7 @@ class Resimulation(ScenarioRun):
         node_name: str = "rigid_body",
     ) -> None:
         super().__init__(scenario, observer)
-        # Its own are recorded like all events, and those of recordings from before there were such ones aren't.
+        # Recordings from before there were such events have none.
         self.simulation.logs_timeouts = False
         self.frames = frame_names(scenario.parameters, node_name)
         self._mesh_of = mesh_of
@@ -194,6 +194,10 @@ class Resimulation(ScenarioRun):
         waiting: list[tuple[int, str, dict, Command | None, int]] = []
         for number, line in enumerate(event_lines, 1):
             time_ns, kind, content = decode_event(line, number)
+            if kind == "timeout":
+                # It comes by itself, where it belongs: one that a change brings about comes behind that.
+                self.simulation.logs_timeouts = True
+                continue
             try:
                 if kind == "set":
                     convert_all(content)

@@ -334,3 +334,16 @@ def test_a_node_that_a_recording_does_not_hold_is_refused(tmp_path, capsys):
     capsys.readouterr()
     assert main(["replay", session, "--node", "other"]) == 2
     assert "accepted: rigid_body" in capsys.readouterr().err
+
+
+def test_wrenches_and_thrusters_that_a_change_of_their_timeout_ends_are_verified(tmp_path):
+    scene, script, session = tmp_path / "scene.yaml", tmp_path / "script.yaml", tmp_path / "s.mcap"
+    scene.write_text("/**:\n  ros__parameters:\n    thrusters: {up: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]}\n")
+    script.write_text(
+        "- {t: 0.0, wrench: {force: [1, 0, 0]}}\n- {t: 0.0, thrusters: [0.5]}\n- {t: 0.5, set: {wrench_timeout: 0.1}}\n"
+    )
+    assert main(["simulate", str(scene), "--script", str(script), "--duration", "1", "--bag", str(session)]) == 0
+    (run,) = read_runs(session)
+    kinds = [(time_ns, json.loads(line)["kind"]) for time_ns, line in run.events[2:]]
+    assert kinds == [(SECOND // 2, "set"), (SECOND // 2, "timeout"), (SECOND // 2, "timeout")]
+    assert verify(run) is None
