@@ -128,7 +128,8 @@ class Flight:
     on, "" when it is over.
 
     scenario: the one in force; scenes_begun: how many others began since the start. moment_ns: the time of the past
-    that is looked at, None while the present is. before_jump() is called before time jumps.
+    that is looked at, None while the present is. before_jump() is called before time jumps. jumps: what is told now
+    belongs to a scene, or to another future, that begins, and was not done by hand.
     """
 
     def __init__(self, live: LiveSimulation, say: Callable[[str], None]) -> None:
@@ -140,6 +141,7 @@ class Flight:
         self._doing, self._since_s = "", 0.0
         self._worker = ThreadPoolExecutor(1, "page")
         self.scenes_begun = 0
+        self.jumps = False
         self._past: RecordedSession | None = None
         self.moment_ns: int | None = None
         self._ran_before = False
@@ -252,7 +254,9 @@ class Flight:
             values.update(self._kept)
             if speed is not None:
                 values["real_time_factor"] = speed
-            self._begin(make_scenario(values), script, (self.paused and not goes_on) if paused is None else paused)
+            scenario = make_scenario(values)
+            self.scenes_begun += 1
+            self._begin(scenario, script, (self.paused and not goes_on) if paused is None else paused)
             return True
 
         return await self._ask("preparing the scene", begin) or False
@@ -264,17 +268,19 @@ class Flight:
         return {name: value for name, value in in_force.items() if name in LOOKS or _is_of_the_node(name)}
 
     def _begin(self, scenario: Scenario, script: str, paused: bool) -> None:
-        self.scenes_begun += 1
         was_paused = self.paused
         # Time stands first: a scene that begins paused begins at its time 0.
         self.live.pause(True)
         try:
+            self.jumps = True
             self.live.begin(scenario)
             if script.strip():
                 self.live.schedule(script)
         except InputError:
             self.live.pause(was_paused)
             raise
+        finally:
+            self.jumps = False
         self.live.pause(paused)
 
     def reset(self) -> None:

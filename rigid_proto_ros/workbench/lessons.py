@@ -43,8 +43,8 @@ ALONE = "watch 1"
 @dataclass(frozen=True)
 class Course:
     """steps: one for each of the lesson's sentences, a tuple of the actions that complete it: ``poke``, ``poke com``,
-    ``poke away``, ``drag`` and ``reset``, ``set NAME`` for a parameter, ``show NAME`` for a switch, in any order and as
-    often as listed, then ``watch SECONDS`` of simulated time.
+    ``poke away``, ``drag`` and ``reset``, ``set NAME`` for a parameter, ``show NAME`` for a switch, in this order, then
+    ``watch SECONDS`` of simulated time. Parameters and switches may be set before their turn.
 
     numbers: the readouts shown with the lesson. shows: switches, or parts, that are on. labels: the parts and contacts
     with a label in the picture, at most three; an arrow without a label isn't drawn. speed: simulated seconds per
@@ -60,7 +60,7 @@ class Course:
 
 
 PUSHED = (SPEED, SPIN, TRANSLATIONAL, ROTATIONAL, MOMENTUM)
-THREE_THROWS = (("watch 3",), (TURN, TURN, "reset", "reset", "watch 2"), ("set gyroscopic", "reset", "watch 2"))
+THREE_THROWS = (("watch 3",), (TURN, "reset", "watch 2"), (TURN, "set gyroscopic", "reset", "watch 2"))
 
 COURSES = {
     "ballast_stops_flip": Course(
@@ -83,7 +83,7 @@ COURSES = {
         reveals=(CENTRE_OF_MASS,),
     ),
     "hollow_box": Course(
-        (("poke",), ("set inertia_model", "reset", "poke"), (ALONE,)),
+        (("poke",), ("reset", "set inertia_model", "poke"), (ALONE,)),
         (SPIN, SPEED, ROTATIONAL, MOMENTUM, ENERGY),
         (SEE_INTO,),
         (style.MOMENTUM, "corner"),
@@ -171,7 +171,7 @@ class LessonProgress:
 
     def did(self, what: str) -> bool:
         """Note an action; returns whether it completes a step."""
-        if what not in self._open:
+        if what not in self._open[:1] and not (what.startswith(("set ", "show ")) and what in self._open):
             return False
         self._open.remove(what)
         return self._completed()

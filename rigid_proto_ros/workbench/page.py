@@ -84,7 +84,7 @@ CLASS_LABELS = 1.6
 
 
 class Told(Observer):
-    """Takes what the physics thread tells, for the page's thread."""
+    """Takes what the physics thread tells, for the page's thread, and whether it tells it of a jump (``Flight``)."""
 
     takes = frozenset(
         {
@@ -93,17 +93,18 @@ class Told(Observer):
         }
     )
 
-    def __init__(self) -> None:
-        self._queue: deque[Event] = deque()
+    def __init__(self, flight: Flight) -> None:
+        self._flight = flight
+        self._queue: deque[tuple[Event, bool]] = deque()
 
     def on(self, event: Event) -> None:
         """Keep it; rows of states are the teller's own."""
         if isinstance(event, (Published, GhostPublished)):
             event = event._replace(row=event.row.copy())
         if type(event) in self.takes:
-            self._queue.append(event)
+            self._queue.append((event, self._flight.jumps))
 
-    def take(self) -> list[Event]:
+    def take(self) -> list[tuple[Event, bool]]:
         """All that was told since the last call, in order."""
         return [self._queue.popleft() for _ in range(len(self._queue))]
 
@@ -125,7 +126,7 @@ class Page:
         self.live = live
         self.flight = Flight(live, self._say)
         live.add_observer(self.flight.memory)
-        self._told = Told()
+        self._told = Told(self.flight)
         self._listening = False
         # The picture, and the hand in it.
         self.room = Room(server)
@@ -148,8 +149,9 @@ class Page:
         self._drawn_moment_ns: int | None = None
         self._new_scene = True
         self._scenes_seen = 0
+        self._mesh_sha256 = ""
         self._undrawn = True
-        self._unit = self.backend.unit
+        self._unit, self._home = self.backend.unit, self.backend.origin
         self.readings = Readings()
         self._make_panel()
         self._open = asyncio.Event()
@@ -236,14 +238,14 @@ class Page:
     def tick(self, now_s: float) -> None:
         """Take what the simulation has told, and draw it."""
         events = self._told.take()
-        if self.flight.moment_ns is not None and any(isinstance(event, Reset) for event in events):
+        if self.flight.moment_ns is not None and any(isinstance(event, Reset) for event, _ in events):
             self.flight.look_at_present()  # another client's reset: the run that is looked back at is over
         looking = self.flight.moment_ns is not None
         with self.server.atomic():
             if looking:
-                for event in events:
+                for event, jumps in events:
                     if isinstance(event, (SceneChanged, Refused)):
-                        self._on(event)
+                        self._on(event, jumps)
                 self._draw_past()
             else:
                 if self._drawn_moment_ns is not None:
@@ -267,10 +269,10 @@ class Page:
         tied = simulation.string is not None
         return motion_words(self._scenario, len(self._loads), tied, simulation.at_rest, self.live.paused)
 
-    def _take(self, events: list[Event]) -> None:
+    def _take(self, events: list[tuple[Event, bool]]) -> None:
         times: list[int] = []
         rows: list[np.ndarray] = []
-        for event in events:
+        for event, jumps in events:
             if isinstance(event, Published):
                 times.append(event.time_ns)
                 rows.append(event.row)
@@ -279,7 +281,7 @@ class Page:
             else:
                 self._draw(times, rows)
                 times, rows = [], []
-                self._on(event)
+                self._on(event, jumps)
                 self._undrawn = True
         self._draw(times, rows)
         state = self.live.state
@@ -289,12 +291,14 @@ class Page:
             # While time stands, or hasn't begun because kernels are being compiled, nothing is published.
             self._draw([state.time_ns], [state.row])
 
-    def _on(self, event: Event) -> None:
+    def _on(self, event: Event, jumps: bool) -> None:
         match event:
             case Started() | MeshChanged():
                 self.picture.on(event)
                 self.poses.forget()
-                self._new_scene = True
+                # A run that continues from its past has its mesh read anew.
+                self._new_scene |= event.mesh_sha256 != self._mesh_sha256
+                self._mesh_sha256 = event.mesh_sha256
             case BodyChanged():
                 self.backend.is_new |= self._new_scene
                 self.picture.on(event)
@@ -305,9 +309,9 @@ class Page:
                 self.picture.set_ghost(time_ns, setup)
                 self._ghost_row = None
             case SceneChanged():
-                self._scene_changed()
+                self._scene_changed(jumps)
             case Reset():
-                self._reset()
+                self._reset(jumps)
             case LoadBegan() | LoadEnded():
                 self._load_changed(event)
             case StringChanged():
@@ -353,14 +357,15 @@ class Page:
             lever = float(np.linalg.norm(np.cross(load.point, force))) / strength / size
             self.lessons.did("poke com" if lever < AT_COM else "poke away" if lever > AWAY else "poke between")
 
-    def _scene_changed(self) -> None:
+    def _scene_changed(self, jumps: bool) -> None:
         before, self._scenario = self._scenario, self.live.scenario
-        self.lessons.changed(before, self._scenario)
+        if not jumps:
+            self.lessons.changed(before, self._scenario)
         # First: the body of a new scene is what the factors are shown relative to.
         self.body_tab.changed(self._scenario, self._new_scene)
         self.controls.update(self._scenario.parameters.named(), at_once=self._new_scene)
 
-    def _reset(self) -> None:
+    def _reset(self, jumps: bool) -> None:
         self._new_scene |= self.flight.scenes_begun != self._scenes_seen
         self._scenes_seen = self.flight.scenes_begun
         self.picture.restart()
@@ -370,8 +375,9 @@ class Page:
         self.readings.restart()
         self._loads.clear()
         self._strings.clear()
-        self.backend.origin = np.array(self.live.state.position)
-        self.lessons.did("reset")
+        self.backend.origin = self.room.follow(self.live.state.position, self._home, self.backend.unit)
+        if not jumps:
+            self.lessons.did("reset")
 
     # Drawing
 
@@ -485,7 +491,7 @@ class Page:
         low, high = places.min(axis=0) - 0.5 * size, places.max(axis=0) + 0.5 * size
         if held:
             low, high = np.minimum(low, setup.string.target), np.maximum(high, setup.string.target)
-        self.backend.origin = np.array(start)
+        self.backend.origin = self._home = np.array(start)
         unit = self.backend.unit
         self.room.furnish(unit, (low - start) / unit, (high - start) / unit, falls and not held)
         self.backend.see_from(self.room.far)

@@ -111,7 +111,7 @@ STEPS: dict[str, tuple[tuple[tuple, ...], ...]] = {
     ),
     "book": (
         (("fly", 3.1),),
-        (("throw", "0 8 0"), ("throw", "0 0 8"), ("fly", 2.1)),
+        (("throw", "0 8 0"), ("fly", 2.1)),
         (("set_gyroscopic", False), ("throw", "8 0.05 0.05"), ("fly", 2.1)),
     ),
     "com_or_rim": ((("push_com",),), (("reset",), ("push", 0.68, 0.0, 0.0)), (("fly", 1.1),)),
@@ -212,3 +212,68 @@ def test_time_that_jumps_was_not_watched_and_another_lesson_begins_without_marks
     assert progress.done == 1
     progress.begin("book")
     assert progress.done == 0
+
+
+def test_beginning_a_lesson_is_no_action_of_its_user(user: User) -> None:
+    # The lesson before has another density, which the first step here asks to change.
+    for title in (lesson("t_handle").title, lesson("weigh_by_throwing").title):
+        user.set("Lesson", FREE)
+        user.pick(title)
+        user.fly(0.1)
+    assert user.scenario.parameters.density == 700.0
+    user.fly(3.0)
+    assert "✓" not in user.page.lessons._text.content
+    user.set_density("7000")
+    user.fly(2.1)
+    assert user.page.lessons._text.content.count("✓") == 1
+    user.press("Begin again")
+    user.until(lambda: user.page.lessons._asked, "question")
+    user.do(lambda: user.page.lessons.answer(0))
+    user.fly(3.0)
+    assert user.scenario.parameters.density == 700.0
+    assert "✓" not in user.page.lessons._text.content
+
+
+def test_going_on_from_the_past_is_no_action_of_a_step(user: User) -> None:
+    user.set("Lesson", FREE)
+    user.pick(lesson("top_on_string").title)
+    user.fly(2.1)
+    text = user.page.lessons._text
+    assert text.content.count("✓") == 1
+    user.do(lambda: user.page.flight.look_at(1.0))
+    user.until(lambda: user.page._drawn_moment_ns is not None, "past")
+    user.do(user.page.flight.go_on_from_here)
+    user.fly(2.5)
+    assert user.scenario.parameters.initial.angular_velocity != (0.0, -600.0, 0.0)
+    assert text.content.count("✓") == 1
+
+
+@pytest.mark.parametrize(
+    "name, before, after",
+    [
+        ("spinning_top", ("poke",), ("poke", "set initial.angular_velocity", "reset", "poke")),
+        ("com_or_rim", ("poke com",), ("poke away", "reset", "poke away")),
+        ("hollow_box", ("poke",), ("poke", "set inertia_model", "reset", "poke")),
+        ("true_or_box_tensor", None, ("reset", "set inertia_model", "reset")),
+    ],
+)
+def test_a_push_or_a_reset_before_its_turn_does_not_count(name, before, after) -> None:
+    progress = LessonProgress()
+    progress.begin(name)
+    for what in before or ():
+        progress.did(what)
+    for time_s in range(0, 21) if before is None else ():
+        progress.watched(time_s * 10**8)
+    progress.watched(0)
+    assert progress.done == 1
+    *first, last = after
+    for what in first:
+        progress.did(what)
+        for k in range(1, 21):
+            progress.watched(k * 10**8)
+        progress.watched(0)
+        assert progress.done == 1, what
+    progress.did(last)
+    for k in range(1, 11):
+        progress.watched(k * 10**8)
+    assert progress.done >= 2

@@ -75,6 +75,27 @@ def test_what_is_done_while_the_past_is_shown_is_refused_with_what_to_do(flown: 
     flown.fly(0.1)
 
 
+def test_going_on_from_the_past_moves_neither_the_camera_nor_the_reference_of_size_and_mass(
+    flown: FlownPage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flown.pick(lesson("thrown_hammer").title)
+    flown.set("Mass ×", (0.3,))
+    flown.fly(0.6)
+    looks: list[object] = []
+    monkeypatch.setattr(flown.page.room, "look", looks.append)
+    look_back(flown, 0.3)
+    seen = flown.page.backend.origin.copy()
+    flown.do(flown.page.flight.go_on_from_here)
+    flown.fly(0.0)
+    flown.until(lambda: flown.page._drawn_moment_ns is None, "present")
+    assert flown.widget("Mass ×").value == (0.3,) and not looks
+    assert np.array_equal(flown.page.backend.origin, seen)
+    # It is 1.5 m below the place where it goes on, and 0.45 m beside it.
+    assert np.linalg.norm(flown.page.state.position - seen) > 1.0
+    flown.reset()
+    assert not looks and np.array_equal(flown.page.backend.origin, seen)
+
+
 @pytest.mark.parametrize("paused", [False, True])
 def test_a_step_returns_from_the_past_to_the_present_and_time_stands_there(flown: FlownPage, paused: bool) -> None:
     flown.do(lambda: flown.page.flight.pause(paused))
