@@ -11,6 +11,7 @@ from ..base.errors import InputError, is_missing
 from ..base.files import check_whole_file, whole_file
 
 FPS = 30.0
+"""Pictures a second, as they are played."""
 
 EXAMPLES = (("rigid_proto lesson t_handle --html out/t_handle.html", "for a class: open it in a browser"),)
 
@@ -23,7 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration",
         type=number_from(0.1, 600.0),
         metavar="S",
-        help="simulated seconds (default 10, or until 1 s after the lesson's script)",
+        help="simulated seconds (default 10, or until 1 s after the lesson's script; for a body that falls, until it "
+        "is as high as at first)",
     )
 
 
@@ -31,6 +33,8 @@ def run(args: argparse.Namespace) -> int:
     """Simulate the lesson's scene, with its script if it has one, and write the file."""
     try:
         from ..workbench.lesson_file import lesson_html
+        from ..workbench.lessons import COURSES
+        from ..workbench.room import fall_s
     except ImportError:
         raise InputError("--html", is_missing("viser", "workbench")) from None
     from ..base.bundled import example_path
@@ -46,13 +50,15 @@ def run(args: argparse.Namespace) -> int:
     check_whole_file("--html", args.html)
     script = read_script(example_path(shown.script)) if shown.script else []
     last_ns = max((command.stamp_ns for command in script), default=0)
-    duration_ns = max(nanoseconds(10.0), last_ns + nanoseconds(1.0))
+    scenario = read_scene(args.name, None, lambda text: print(f"rigid_proto lesson: {text}", file=sys.stderr))
+    setup = scenario.setup
+    falls = setup.gravity.any() and not setup.string.attached
+    duration_ns = max(nanoseconds(fall_s(setup) if falls else 10.0), last_ns + nanoseconds(1.0))
     if args.duration is not None:
         duration_ns = nanoseconds(args.duration)
-    scenario = read_scene(args.name, None, lambda text: print(f"rigid_proto lesson: {text}", file=sys.stderr))
     record = FlightRecord()
     OfflineRun(scenario, script, record).advance(duration_ns)
-    made, _ = frames(record, source_of_scene(scenario, script), FPS)
+    made, _ = frames(record, source_of_scene(scenario, script), FPS / COURSES[shown.name].speed)
     with whole_file("--html", args.html) as path:
         path.write_text(lesson_html(shown, made), encoding="utf-8")
     print(f"{args.html}: {duration_ns / 1e9:g} s of {args.name}; open it in a browser")

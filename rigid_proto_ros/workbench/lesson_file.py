@@ -20,10 +20,10 @@ from ..picture.picture import Picture
 from ..scene.lessons import Lesson
 from ..simulation.observer import BodyChanged, Event, StringChanged
 from .drawing import ViserBackend
+from .lessons import COURSES, Course
+from .panel import ALWAYS, PARTS, SEE_INTO
 from .room import Room
 from .server import stop_server
-
-SHOWN = (style.BODY_MESH, style.GHOST_MESH, style.STRING, style.HAND, style.LOADS, style.MOMENTUM)
 
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
@@ -41,7 +41,7 @@ small {{ color: #666; }}
   aside {{ width: auto; height: 40%; border: 0; border-top: 1px solid #ddd; }}
 }}
 </style></head><body><iframe title="the motion" srcdoc="{player}"></iframe>
-<aside><h1>{title}</h1><p>{question}</p><ol type="A">{choices}</ol>
+<aside><h1>{title}</h1>{speed}<p>{question}</p><ol type="A">{choices}</ol>
 <details><summary>Show the answer</summary><p><b>{answer}</b> {reason}</p></details>
 <h2>To try yourself</h2>{sentences}<p><small>{commands}</small></p></aside></body></html>
 """
@@ -49,12 +49,13 @@ small {{ color: #666; }}
 
 
 def lesson_html(lesson: Lesson, record: FlightRecord) -> str:
-    """The file's text. record: the flight, with states as far apart as they are to be played."""
+    """The file's text. record: the flight, with states as far apart as they are to be played at the lesson's speed."""
+    course = COURSES[lesson.name]
     # Its greeting would stand between the lines that the command prints.
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", verbose=False)
     try:
-        player = _recorded(server, record)
+        player = _recorded(server, record, course)
     finally:
         stop_server(server)
     # viser 1.1 leaves the canvas of a recording nearly transparent where it has begun to fade it in.
@@ -68,19 +69,22 @@ def lesson_html(lesson: Lesson, record: FlightRecord) -> str:
         reason=escape(lesson.reason),
         sentences="".join(f"<p>{escape(sentence)}</p>" for sentence in lesson.sentences),
         commands=escape(lesson.commands),
+        speed=f"<p><small>Played at {course.speed:g} of the real speed.</small></p>" if course.speed != 1.0 else "",
     )
 
 
-def _recorded(server: viser.ViserServer, record: FlightRecord) -> str:
-    """The player with the motion in it."""
+def _recorded(server: viser.ViserServer, record: FlightRecord, course: Course) -> str:
+    """The player with the motion in it, and with the parts that the course shows."""
     changes, times_ns, rows, ghosts = record.changes, record.times_ns, record.rows, record.ghosts
     room = Room(server)
-    shown = set(SHOWN)
+    named = (*course.shows, *course.labels)
+    shown = {style.BODY_MESH, *ALWAYS, *named, *(part for name in named for part in PARTS.get(name, ()))}
     falls = any(isinstance(event, BodyChanged) and np.any(event.setup.gravity) for event in changes)
     if falls:
         shown.add(style.COM_TRAIL)
     backend = ViserBackend(server.scene, shown, lambda _: None)
-    backend.labelled.add(style.MOMENTUM)
+    backend.labelled.update(course.labels)
+    backend.see_into(SEE_INTO in course.shows)
     picture = Picture(backend, backend.wanted, rate=1_000_000_000)
     backend.origin = rows[0, 0:3].copy()
     waiting = list(changes)
@@ -91,7 +95,7 @@ def _recorded(server: viser.ViserServer, record: FlightRecord) -> str:
         picture.draw(np.array([time_ns]), row[np.newaxis])
         if time_ns in ghosts and picture.ghost is not None:
             picture.draw_ghost(np.array([time_ns]), ghosts[time_ns][np.newaxis])
-        backend.finish(1e-9 * time_ns)
+        backend.finish(1e-9 * time_ns / course.speed)
         if serializer is None:
             low, high = _corners(rows, changes, picture, backend.origin)
             size = backend.unit
@@ -100,7 +104,7 @@ def _recorded(server: viser.ViserServer, record: FlightRecord) -> str:
             backend.see_from(room.far)
             serializer = server.get_scene_serializer()
         if k + 1 < len(times_ns):
-            serializer.insert_sleep(1e-9 * float(times_ns[k + 1] - time_ns))
+            serializer.insert_sleep(1e-9 * float(times_ns[k + 1] - time_ns) / course.speed)
     assert serializer is not None, "a flight has a state at least"
     return serializer.as_html()
 

@@ -47,7 +47,7 @@ from .lessons import Course, LessonPanel
 from .panel import ALWAYS, CENTRE_OF_MASS, ForcesTab, SessionTab, ShowTab, TimeBar, motion_words
 from .pointer import DrawnPose, DrawnPoses, Pointer, Tools, suggested_force
 from .readouts import Readings, ReadoutTab
-from .room import Room
+from .room import Room, fall_s
 from .server import ClassMode
 
 FRAME_S = 0.02
@@ -64,9 +64,6 @@ TRAIL_NS = 4_000_000_000
 
 FORESEEN_S = 3.0
 """[s] Of the motion of a body on a string, that the picture makes room for."""
-
-LEAST_FALL_S, LONGEST_FALL_S = 0.6, 1.5
-"""[s] The same of one that falls, which has room until it is as high as at first."""
 
 COM_SIZE = 0.025
 """Radius of the centre of mass as drawn, in body sizes."""
@@ -150,6 +147,7 @@ class Page:
         self._new_scene = True
         self._scenes_seen = 0
         self._mesh_sha256 = ""
+        self._resets_heard = 0
         self._undrawn = True
         self._unit, self._home = self.backend.unit, self.backend.origin
         self.readings = Readings()
@@ -214,6 +212,10 @@ class Page:
         if self._listening:
             return
         self._listening = self._new_scene = True
+        # What acts now is told anew; what has ended meanwhile was not heard.
+        self._forget_drawn()
+        if self.live.loop.resets != self._resets_heard:
+            self.readings.restart()
         await asyncio.to_thread(self.live.add_observer, self._told)
         self._open.set()
         begins_anew, self._begins_anew = self._begins_anew, False
@@ -232,6 +234,7 @@ class Page:
             self._open.clear()
             self.flight.look_at_present()
             await asyncio.to_thread(self.live.remove_observer, self._told)
+            self._resets_heard = self.live.loop.resets
 
     # What the simulation tells
 
@@ -368,16 +371,19 @@ class Page:
     def _reset(self, jumps: bool) -> None:
         self._new_scene |= self.flight.scenes_begun != self._scenes_seen
         self._scenes_seen = self.flight.scenes_begun
-        self.picture.restart()
-        self.backend.forget()
+        self._forget_drawn()
         self.poses.forget()
         self.pointer.forget()
         self.readings.restart()
-        self._loads.clear()
         self._strings.clear()
         self.backend.origin = self.room.follow(self.live.state.position, self._home, self.backend.unit)
         if not jumps:
             self.lessons.did("reset")
+
+    def _forget_drawn(self) -> None:
+        self.picture.restart()
+        self.backend.forget()
+        self._loads.clear()
 
     # Drawing
 
@@ -454,9 +460,7 @@ class Page:
     def _return_to_present(self) -> None:
         self._drawn_moment_ns = None
         self._draw_body(self.live.state.time_ns, self.live.scenario.setup)
-        self.picture.restart()
-        self.backend.forget()
-        self._loads.clear()
+        self._forget_drawn()
         loop = self.live.loop
 
         def introduce() -> None:
@@ -481,10 +485,7 @@ class Page:
         points = [start]
         falls, held = bool(setup.gravity.any()), setup.string.attached
         if falls or held:
-            trial, foreseen_s = Simulation(setup), FORESEEN_S
-            if not held:
-                rise, pull = -float(setup.initial[7:10] @ setup.gravity), float(setup.gravity @ setup.gravity)
-                foreseen_s = min(max(2.0 * rise / pull, LEAST_FALL_S), LONGEST_FALL_S)
+            trial, foreseen_s = Simulation(setup), FORESEEN_S if held else fall_s(setup)
             for k in range(1, 41):
                 points.append(trial.advance(round(foreseen_s * 1e9 * k / 40)).position)
         places = np.array(points)

@@ -13,6 +13,7 @@ import numpy as np
 import viser
 
 from ..picture.surface import BOX_CORNERS
+from ..simulation.setup import Setup
 from .drawing import move
 from .readouts import nice_step
 
@@ -46,6 +47,9 @@ GRID: dict[str, Any] = {
     "section_thickness": 0.9,
 }
 
+LEAST_FALL_S, LONGEST_FALL_S = 0.6, 1.5
+"""[s] Of the flight of a body that falls, which the picture has room for."""
+
 SKY_ROWS = 64
 
 
@@ -62,6 +66,12 @@ class Theme(NamedTuple):
 
 LIGHT = Theme((236, 236, 238), (244, 245, 247), (220, 220, 224), (202, 202, 208), (250, 251, 253), 0.32)
 DARK = Theme((44, 47, 52), (36, 38, 43), (58, 62, 68), (72, 77, 84), (26, 28, 32), 0.5)
+
+
+def fall_s(setup: Setup) -> float:
+    """How long [s] a body that falls stays in sight: until it is as high as at first."""
+    rise, pull = -float(setup.initial[7:10] @ setup.gravity), float(setup.gravity @ setup.gravity)
+    return min(max(2.0 * rise / pull, LEAST_FALL_S), LONGEST_FALL_S)
 
 
 def distance_to_see(half_sides: np.ndarray) -> float:

@@ -15,7 +15,12 @@ from PIL import Image
 pytest.importorskip("viser", reason="viser is not installed: no player")
 
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
+from rigid_proto_ros.workbench import lesson_file
+from rigid_proto_ros.workbench.drawing import ViserBackend
+from rigid_proto_ros.workbench.lessons import COURSES
+from rigid_proto_ros.workbench.room import Room
 
 
 def test_the_file_holds_the_lessons_words_and_refers_to_nothing_outside_it(tmp_path, capsys) -> None:
@@ -28,6 +33,43 @@ def test_the_file_holds_the_lessons_words_and_refers_to_nothing_outside_it(tmp_p
         assert words in text
     assert not re.search(r"""(src|href)=["']?https?:""", text)
     assert [path.name for path in tmp_path.iterdir()] == [file.name]
+
+
+@pytest.mark.parametrize("name", ["t_handle", "com_or_rim", "dropped_term", "spinning_top", "thrown_hammer"])
+def test_the_file_shows_the_parts_that_the_page_shows(name, tmp_path, monkeypatch) -> None:
+    made: list[ViserBackend] = []
+
+    class Kept(ViserBackend):
+        def __init__(self, *arguments) -> None:
+            super().__init__(*arguments)
+            made.append(self)
+
+    monkeypatch.setattr(lesson_file, "ViserBackend", Kept)
+    assert main(["lesson", name, "--html", str(tmp_path / "a.html"), "--duration", "0.1"]) == 0
+    (backend,) = made
+    labels = COURSES[name].labels
+    for part in (style.MOMENTUM, style.OMEGA):
+        assert backend.wanted(part) == (part in backend.labelled) == (part in labels)
+    assert backend.wanted(style.PRINCIPAL_AXES) == (name == "spinning_top")
+    assert backend.wanted(style.TRAIL) == (name == "thrown_hammer")
+
+
+def test_a_body_that_falls_is_followed_while_it_is_in_sight_and_no_longer(tmp_path, capsys, monkeypatch) -> None:
+    rooms: list[Room] = []
+
+    class Kept(Room):
+        def __init__(self, *arguments) -> None:
+            super().__init__(*arguments)
+            rooms.append(self)
+
+    monkeypatch.setattr(lesson_file, "Room", Kept)
+    file = tmp_path / "a.html"
+    assert main(["lesson", "thrown_hammer", "--html", str(file)]) == 0
+    # The flight of 5 m/s up takes 2·5/9.81 s.
+    assert f"{10.0 / 9.81:.6g} s of thrown_hammer" in capsys.readouterr().out
+    # 4.7; of ten seconds, 440 m deep, 915.
+    assert rooms[0].far < 10.0
+    assert "Played at 0.1 of the real speed" in file.read_text("utf-8")
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ from rigid_proto_ros.workbench.flight import COMPILING, RunMemory
 from rigid_proto_ros.workbench.lessons import COURSES, FREE
 from rigid_proto_ros.workbench.page import CLASS_LABELS
 from rigid_proto_ros.workbench.panel import CENTRE_OF_MASS, SEE_INTO, motion_words
-from rigid_proto_ros.workbench.readouts import ENERGY, PLOTTED_S, SPEED
+from rigid_proto_ros.workbench.readouts import DRIFT, ENERGY, PLOTTED_S, SPEED
 
 
 def test_a_lesson_that_asks_begins_at_its_time_0_with_its_ghost_however_fast_time_goes(
@@ -260,6 +260,32 @@ def test_the_last_page_that_closes_while_it_looks_back_leaves_the_body_as_it_was
     flown.come()
     flown.until(lambda: page._told in flown.live._observers, "page that hears again")
     flown.fly(0.1)
+
+
+def test_a_page_that_comes_back_shows_nothing_that_ended_or_began_while_none_was_there(flown: FlownPage) -> None:
+    page = flown.page
+    flown.live.schedule('[{"t": 0, "wrench": {"force": [0.01, 0, 0], "torque": [0, 0.01, 0], "duration": 0.3}}]')
+    flown.fly(0.2)
+    arrow = flown.node("world/loads/wrench/force")
+    assert page._words() == "a force acts" and arrow.visible
+
+    def gone() -> None:
+        flown.leave()
+        flown.until(lambda: page._told not in flown.live._observers, "end of listening")
+
+    gone()
+    flown.advance(1.0)
+    flown.come()
+    flown.until(lambda: page._told in flown.live._observers, "page that hears again")
+    flown.fly(0.1)
+    assert page._words() == "free rotation, exact" and not arrow.visible
+    assert float(page.readings.values[DRIFT].rstrip("°")) > 1.0
+    gone()
+    flown.live.reset()
+    flown.come()
+    flown.until(lambda: page._told in flown.live._observers, "page that hears again")
+    flown.fly(2.0)
+    assert page.readings.values[DRIFT] == "0°"
 
 
 def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -> None:

@@ -262,7 +262,7 @@ def test_a_push_or_a_reset_before_its_turn_does_not_count(name, before, after) -
     progress.begin(name)
     for what in before or ():
         progress.did(what)
-    for time_s in range(0, 21) if before is None else ():
+    for time_s in range(21) if before is None else ():
         progress.watched(time_s * 10**8)
     progress.watched(0)
     assert progress.done == 1
