@@ -214,14 +214,15 @@ class Simulation:
             self._arrays.call(END_ALL)
             self._notify([])
         self.notify_floor(at_end=True)
-        self.observer.on(Reset())
-        self.events.reset()
         before = self.setup
         self.setup = setup or self.setup
+        # A run begins with its mesh, of which a recording says so at once.
+        self._tell_of_mesh(before)
+        self.observer.on(Reset())
+        self.events.reset()
         self._start_over()
         self.log("reset", {})
         if self.setup is not before:
-            self._tell_of_mesh(before)
             self.announce()
 
     # Main loop

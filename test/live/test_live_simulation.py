@@ -15,6 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from conftest import needs_rerun
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
@@ -254,6 +255,23 @@ def test_the_file_that_is_being_recorded_is_refused_for_a_second_recording_by_an
     live.set_parameters({"record": ""})
     (run,) = read_runs(path)
     assert (np.asarray(run.times) // PERIOD_NS).tolist() == [1, 2, 3, 4, 5]
+
+
+@needs_rerun
+@pytest.mark.parametrize("ending", ["rrd", "mcap"])
+def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_verified(live, tmp_path, ending):
+    from rigid_proto_ros.rerun_view.session_files import read_runs
+    from rigid_proto_ros.session.check import verify
+
+    path = tmp_path / f"flight.{ending}"
+    live.set_parameters({"record": str(path)})
+    live.step(2)
+    live.set_parameters({"mesh": "hammer"})
+    live.reset()
+    live.schedule("{t: 0, at: {vertex: 3}, push: 1}")
+    live.step(2)
+    live.set_parameters({"record": ""})
+    assert verify(read_runs(path)[-1]) is None
 
 
 def test_a_reset_tells_of_the_body_anew_with_its_own_time(live):
