@@ -129,15 +129,14 @@ def flush(observer: Observer) -> None:
     observer._flush = own
 
 
-def cells(path: Path, entity: str, name: str) -> tuple[list[int], list]:
-    """Simulated times [ns] and values of a component over all chunks of an entity, what holds at all times left out."""
-    from rigid_proto_ros.rerun_view.backend import SIM_TIME
+def cells(path: Path, entity: str, name: str, timeline: str = "sim_time") -> tuple[list[int], list]:
+    """Times [ns] and values of a component over all chunks of an entity, what holds at all times left out."""
     from rigid_proto_ros.rerun_view.rrd_reading import record_batches
 
     times, found = [], []
     for chunk_entity, static, batch in record_batches(path):
         if chunk_entity == entity and not static and name in batch.schema.names:
-            times.extend(batch.column(SIM_TIME).to_numpy(zero_copy_only=False).astype(np.int64).tolist())
+            times.extend(batch.column(timeline).to_numpy(zero_copy_only=False).astype(np.int64).tolist())
             found.extend(batch.column(name).to_pylist())
     return times, found
 

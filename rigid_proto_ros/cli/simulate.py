@@ -115,6 +115,7 @@ def run(args: argparse.Namespace) -> int:
     if record is not None:
         from ..export.flight_record import source_of_scene
 
+        record.end_ns = flight.simulation.time_ns
         write_exports(args, record, source_of_scene(scenario, script), _warn if args.json else print)
     if floor := flight.simulation.accuracy_floor:
         _warn(f"accuracy {flight.simulation.setup.accuracy:g} is not held throughout: {floor}")

@@ -37,7 +37,8 @@ AGREES = 1e-4
 
 class FlightRecord(Observer):
     """One run. changes: what isn't a state, in the order in which it was told. states, ghosts: rows (13,) of the body
-    and of its ghost by time [ns], ascending.
+    and of its ghost by time [ns], ascending. end_ns: when the flight ended [ns], if that is known to be later than the
+    last state.
     """
 
     takes = frozenset(
@@ -48,6 +49,7 @@ class FlightRecord(Observer):
         self.changes: list[Event] = []
         self.states: dict[int, np.ndarray] = {}
         self.ghosts: dict[int, np.ndarray] = {}
+        self.end_ns = 0
 
     def on(self, event: Event) -> None:
         """Keep it; of two states at one time, as a bag may hold them, the first."""
@@ -84,7 +86,7 @@ def frames(record: FlightRecord, source: Source | None, fps: float) -> tuple[Fli
     """
     if source is None:
         return record, "the session can't be simulated again: the recorded states are used as frames"
-    start_ns, end_ns = int(record.times_ns[0]), int(record.times_ns[-1])
+    start_ns, end_ns = int(record.times_ns[0]), max(int(record.times_ns[-1]), record.end_ns)
     count = int((end_ns - start_ns) * 1e-9 * fps) + 1
     if count > FRAMES_MAX:
         raise InputError("--fps", fps, f"at most {FRAMES_MAX} frames of the simulation")

@@ -50,6 +50,7 @@ class Document:
         self.start_ns = start_ns
         self.lists: dict[str, list[dict[str, Any]]] = {name: [] for name in LISTS}
         self.extensions: dict[str, set[str]] = {"extensionsUsed": set(), "extensionsRequired": set()}
+        self.extension_lists: dict[str, Any] = {}
         self.data = bytearray()
         self._channels: list[dict[str, Any]] = []
         self._samplers: list[dict[str, Any]] = []
@@ -141,8 +142,9 @@ class Document:
             "buffers": [{"byteLength": len(self.data)}],
             **self.lists,
             **{name: sorted(own) for name, own in self.extensions.items()},
+            "extensions": self.extension_lists,
         }
-        text = json.dumps({name: own for name, own in parts.items() if own != []}).encode()
+        text = json.dumps({name: own for name, own in parts.items() if own not in ([], {})}).encode()
         text += b" " * (-len(text) % 4)
         data = bytes(self.data) + bytes(-len(self.data) % 4)
         head = struct.pack("<4sII", MAGIC, 2, 28 + len(text) + len(data))
@@ -175,9 +177,9 @@ def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
             if model is None:
                 _draw_surface(document, below, name, track.surface, style.STYLES[MESHES[part]])
             else:
-                data, middle = model
+                own, binary, middle = model
                 inner = document.node("model", below, translation=(-middle).tolist())
-                document.lists["nodes"][inner]["children"] = add_model(document, data)
+                document.lists["nodes"][inner]["children"] = add_model(document, own, binary)
     _draw_string(document, root, tracks.string)
     with whole_file("--gltf", file) as path:
         path.write_bytes(document.binary())
@@ -232,9 +234,10 @@ def _draw_string(document: Document, root: int, string: dict[int, np.ndarray | N
 # section 3). Skins, cameras and animations of its own are left out: a rigid body has none.
 
 
-def model_of(record: FlightRecord) -> tuple[bytes, np.ndarray] | None:
-    """The bytes of the .glb that the body is drawn as, and the middle (3,) of its vertices' box; None where it came
-    from another kind of file, where that has changed or gone, and where it isn't the only one.
+def model_of(record: FlightRecord) -> tuple[dict[str, Any], bytes, np.ndarray] | None:
+    """Document and data of the .glb that the body is drawn as, and the middle (3,) of its vertices' box; None where it
+    came from another kind of file, where that has changed or gone, has data elsewhere or no scene, and where it isn't
+    the only one.
     """
     drawn = [event for event in record.changes if isinstance(event, (Started, MeshChanged))]
     if len(drawn) != 1 or not isinstance(drawn[0], Started) or drawn[0].vertices is None:
@@ -246,8 +249,15 @@ def model_of(record: FlightRecord) -> tuple[bytes, np.ndarray] | None:
         return None
     if data[:4] != MAGIC or hashlib.sha256(data).hexdigest() != drawn[0].mesh_sha256:
         return None
-    return data, 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    length = int.from_bytes(data[12:16], "little")
+    model = json.loads(data[20 : 20 + length])
+    if not model.get("scenes") or ["uri" in buffer for buffer in model.get("buffers", ())] != [False]:
+        return None
+    return model, data[28 + length :], 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
 
+
+EXTENSION_LISTS = ("KHR_lights_punctual", "KHR_materials_variants")
+"""Extensions whose items, which nodes and meshes name by number, stand at the document's top."""
 
 REFERENCES = {
     "bufferView": "bufferViews",
@@ -260,13 +270,11 @@ REFERENCES = {
 """Properties that name an item of a list by its number."""
 
 
-def add_model(document: Document, data: bytes) -> list[int]:
+def add_model(document: Document, model: dict[str, Any], binary: bytes) -> list[int]:
     """Add what a .glb's scene shows to a document; returns the numbers of the scene's nodes there."""
-    length = int.from_bytes(data[12:16], "little")
-    model = json.loads(data[20 : 20 + length])
     document.data += bytes(-len(document.data) % 4)
     begin = len(document.data)
-    document.data += data[28 + length :]
+    document.data += binary
     start = {kind: len(own) for kind, own in document.lists.items()}
     for view in model.get("bufferViews", ()):
         view["byteOffset"] = begin + view.get("byteOffset", 0)
@@ -282,6 +290,8 @@ def add_model(document: Document, data: bytes) -> list[int]:
         document.lists[kind] += items
     for name, own in document.extensions.items():
         own |= set(model.get(name, ()))
+    own_lists = model.get("extensions", {})
+    document.extension_lists = {name: own_lists[name] for name in EXTENSION_LISTS if name in own_lists}
     return [root + start["nodes"] for root in model["scenes"][model.get("scene", 0)]["nodes"]]
 
 

@@ -25,7 +25,7 @@ WANTED = frozenset({style.GHOST, style.GHOST_MESH, style.STRING})
 @dataclass(frozen=True)
 class Track:
     """A body at times_ns (n,): its positions (n, 3) [m] and unit quaternions (n, 4); its mesh, None without one, and
-    that mesh's places [m] and scales (n, 3) in its frame.
+    that mesh's places [m] and scales (n, 3) in its frame, scales of 0 where it isn't shown.
     """
 
     times_ns: np.ndarray
@@ -58,7 +58,14 @@ class Tracks(Backend):
         self.size = min(size, self.size or size)
 
     def mesh(self, name: str, surface: DrawnMesh | None) -> None:
-        """Keep the mesh; raises InputError for another one, or none, in flight."""
+        """Keep the mesh, and when a ghost that ended isn't shown; raises InputError for another mesh, or none of the
+        body, in flight.
+        """
+        if name == style.GHOST_MESH and style.GHOST in self._drawn:
+            _, *pose, _, scales = self._drawn[style.GHOST][-1]
+            if surface is None or not scales.any():
+                nothing = np.zeros((1, 3))
+                self._drawn[style.GHOST].append((self._times, *(value[-1:] for value in pose), nothing, nothing))
         gone = surface is None and name == style.BODY_MESH and name in self._surfaces
         if gone or (surface is not None and self._surfaces.setdefault(name, surface) is not surface):
             reason = f"the mesh changes at {self._times[0] / 1e9:.9g} s"

@@ -86,13 +86,18 @@ def _place_mesh(prim: UsdGeom.Mesh, codes: list[float], track: Track) -> None:
     """Pose of the mesh relative to its body: once, or at each frame if it changes during the simulation."""
     from pxr import Gf, UsdGeom
 
+    shown = track.mesh_scales.any(axis=1)
+    if not shown.all():
+        visibility = prim.CreateVisibilityAttr()
+        for code, is_shown in zip(codes, shown.tolist(), strict=True):
+            visibility.Set(UsdGeom.Tokens.inherited if is_shown else UsdGeom.Tokens.invisible, code)
     place = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)
     size = prim.AddScaleOp(UsdGeom.XformOp.PrecisionDouble)
-    for op, values in ((place, track.mesh_places), (size, track.mesh_scales)):
+    for op, values in ((place, track.mesh_places[shown]), (size, track.mesh_scales[shown])):
         if not np.ptp(values, axis=0).any():
             op.Set(Gf.Vec3d(*values[0].tolist()))
             continue
-        for code, value in zip(codes, values.tolist(), strict=True):
+        for code, value in zip(np.array(codes)[shown].tolist(), values.tolist(), strict=True):
             op.Set(Gf.Vec3d(*value), code)
 
 

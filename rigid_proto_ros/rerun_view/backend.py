@@ -162,6 +162,7 @@ class RerunBackend(Backend):
     def restart(self) -> None:
         """Another run: nothing has been plotted, and paths begin anew."""
         self.plotted: dict[str, tuple[float, float]] = {}
+        self._begun = np.zeros(0, np.int64)
         self._path_ends: dict[str, np.ndarray] = {}
 
     def send(self, entity: str, *parts: Any) -> None:
@@ -177,6 +178,7 @@ class RerunBackend(Backend):
             walls_ns = self._walls[np.minimum(np.searchsorted(self._known, times_ns), len(self._known) - 1)]
         else:
             self._known, self._walls = times_ns, walls_ns
+            self._begun = self._begun if len(self._begun) else walls_ns[:1]
         self._times = time_columns(times_ns, walls_ns)
         self._count = len(times_ns)
 
@@ -200,7 +202,7 @@ class RerunBackend(Backend):
         stream.meshes[name] = number + 1, surface
         entity, own = _mesh_entity(name, number + 1), style.STYLES[name]
         if number:
-            stream.send(entity, time_columns(np.zeros(1), self._walls[:1]), nowhere)
+            stream.send(entity, time_columns(np.zeros(1), self._begun), nowhere)
         drawn = rr.Mesh3D(
             vertex_positions=surface.vertices,
             triangle_indices=surface.triangles,
@@ -262,7 +264,7 @@ class RerunBackend(Backend):
         """Log labels as points of no size, below the part; those of loads change, others are logged once."""
         entity, changes = f"{name}/label", name.startswith(style.LOADS)
         if len(texts):
-            colour, known = style.STYLES[name].colours[0], None if changes else texts[0]
+            colour, known = style.STYLES[name].colours[0], None if changes else list(texts[: counts.max()])
             self._look(
                 entity,
                 0.0,

@@ -56,16 +56,18 @@ TITLES = {
 }
 
 HIDDEN = (style.BOUNDING_BOX, style.INERTIA_BOX, style.INERTIA_ELLIPSOID, style.PRINCIPAL_AXES)
-"""Parts of the body that are shown at a click in the viewer's list."""
+"""Parts of the body that are shown at a click in the viewer's list; of one without a mesh its box is seen at once."""
 
 
 @dataclass(frozen=True)
 class Subject:
     """What a flight is about, so what is shown of it. reach [m]: how far about the COM it is to be seen. ghost:
     another body beside it. falls: under gravity, on no string. tied: to one. dropped_term: its motion lacks ω × Iω.
+    mesh: it has one.
     """
 
     reach: float = 1.0
+    mesh: bool = True
     ghost: bool = False
     falls: bool = False
     tied: bool = False
@@ -165,7 +167,9 @@ def _body_view(subject: Subject) -> Any:
     else:
         # So far off that the arrow of a force at the body's end is seen whole, with its label.
         eye, target = np.array([1.65, -1.3, 0.85]), np.zeros(3)
-    hidden = [name for name in HIDDEN if not (subject.ghost and name == style.BOUNDING_BOX)]
+    shown = {style.BOUNDING_BOX} if subject.ghost else set()
+    shown |= set() if subject.mesh else {style.INERTIA_BOX}
+    hidden = [name for name in HIDDEN if name not in shown]
     overrides: dict[Any, Any] = {"/" + name: rrb.EntityBehavior(visible=False) for name in hidden}
     overrides["/" + style.TRAIL] = _last_seconds(TRAIL_SECONDS)
     overrides["/" + style.COM_TRAIL] = _last_seconds(FAR_SECONDS if subject.falls else TRAIL_SECONDS)

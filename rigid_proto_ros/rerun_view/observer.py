@@ -30,6 +30,7 @@ import rerun as rr
 
 from ..base.errors import InputError
 from ..base.files import output_file
+from ..base.rotation import matrix_from_quaternion
 from ..picture import style
 from ..picture.picture import Picture
 from ..session.mailbox import BATCH, Mailbox, Noted
@@ -50,6 +51,7 @@ from ..simulation.observer import (
     Started,
     StringChanged,
 )
+from ..simulation.setup import Setup
 from . import backend as e
 from .backend import RerunBackend, Stream, forget_closed_recordings, last_line, scalar_columns
 from .layout import Finished, Subject, blueprint
@@ -87,6 +89,7 @@ class RerunObserver(Observer):
         self._backend = RerunBackend()
         self._picture = Picture(self._backend)
         self._started: Started | None = None
+        self._rows: dict[type, np.ndarray] = {}
         self._lines: dict[str, list[tuple[int, int, str]]] = {}
         self._commanded = False
         self._flushing_since_s: float | None = None
@@ -182,7 +185,7 @@ class RerunObserver(Observer):
         name = self._name if self._run == 1 else f"{self._name}, run {self._run}"
         self._stream = self._backend.stream = self._open_next(stream, uuid.uuid4().hex, name)
         self._last_time_ns = 0
-        self._lines, self._commanded = {}, False
+        self._rows, self._lines, self._commanded = {}, {}, False
         self._picture.restart()
         self._backend.restart()
         self._send_scene(self._stream)
@@ -216,6 +219,7 @@ class RerunObserver(Observer):
         tip = 0.0 if shape.tip is None else float(np.linalg.norm(shape.tip))
         subject = Subject(
             reach=max(shape.size, REACH_PER_TIP * tip),
+            mesh=shape.tip is not None,
             ghost=picture.ghost is not None,
             falls=bool(np.any(setup.gravity)) and not tied,
             tied=tied,
@@ -262,7 +266,10 @@ class RerunObserver(Observer):
                 self._next_run(self._stream)
             return
         self._backend.begin(np.array([event.time_ns]), np.array([wall_ns]))
+        before = self._picture.setup, self._picture.ghost
         self._picture.on(event)
+        self._stay_in_place(Published, (style.BODY, style.CENTRE), before[0], self._picture.setup)
+        self._stay_in_place(GhostPublished, (style.GHOST,), before[1], self._picture.ghost)
         if isinstance(event, Started):
             self._started = event
             if self._backend.stream is not None:
@@ -270,6 +277,19 @@ class RerunObserver(Observer):
         elif isinstance(event, MeshChanged) and self._started is not None:
             vertices, triangles, sha256 = event.vertices, event.triangles, event.mesh_sha256
             self._started = self._started._replace(vertices=vertices, triangles=triangles, mesh_sha256=sha256)
+
+    def _stay_in_place(self, kind: type, frames: tuple[str, ...], before: Setup | None, after: Setup | None) -> None:
+        """Move the frames of a body whose COM moves within its mesh: the mesh stays where it is, as it does in flight,
+        also until the next state.
+        """
+        if kind not in self._rows or before is None or after is None or before.geometry != after.geometry:
+            return
+        row, moved = self._rows[kind], after.body.center_of_mass - before.body.center_of_mass
+        if moved.any():
+            row[0:3] += matrix_from_quaternion(row[3:7]) @ moved
+            for frame in frames:
+                attitudes = None if frame == style.CENTRE else row[np.newaxis, 3:7]
+                self._backend.place(frame, row[np.newaxis, 0:3], attitudes)
 
     def _write_states(self, states: list[Noted]) -> None:
         """Exact states and picture, which all belong to the present body, and what happened."""
@@ -286,6 +306,7 @@ class RerunObserver(Observer):
             if not chosen:
                 continue
             times, walls, rows = (np.array(column) for column in zip(*chosen, strict=True))
+            self._rows[kind] = rows[-1].copy()
             self._backend.begin(times, walls)
             if kind is GhostPublished:
                 self._picture.draw_ghost(times, rows)

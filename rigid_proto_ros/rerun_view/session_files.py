@@ -99,8 +99,8 @@ def is_bag(path: Path) -> bool:
     """Whether a path is to be read as a bag: a folder, or a file that begins as an MCAP file does, or is named so or
     .db3.
     """
-    if path.is_dir() or ".mcap" in path.suffixes or path.suffix == ".db3":
-        return True
+    if path.is_dir() or path.suffix == ".db3" or (".mcap" in path.suffixes and path.suffix != ".rrd"):
+        return True  # flight.mcap.zstd, too, but not flight.mcap.rrd, made of a bag
     try:
         with open(path, "rb") as stream:
             return stream.read(5) == b"\x89MCAP"
@@ -135,11 +135,14 @@ def record(
 
     Raises InputError for a session without a scene and a file that can't be written.
     """
-    from ..session.recorded_session import play, recorded_parameters
+    from ..session.recorded_session import play, recorded_parameters, resimulation
 
+    # What is refused is refused before a recording of an earlier flight is overwritten.
     for session in runs:
-        if not session.scene and given is None:
+        if given is None and (session.missing or not session.scene):
             raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
+        if given is None:
+            resimulation(session)
     total = sum(len(session.times) for session in runs)
     told, last = 0, runs[-1]
     recorder = make_recorder(

@@ -30,7 +30,7 @@ class Player:
         self.nodes = {node["name"]: number for number, node in enumerate(self.document["nodes"])}
         self._parents = {c: n for n, node in enumerate(self.document["nodes"]) for c in node.get("children", [])}
         self._channels = {}
-        for animation in self.document["animations"]:
+        for animation in self.document.get("animations", []):
             for channel in animation["channels"]:
                 sampler = animation["samplers"][channel["sampler"]]
                 times, values = self.read(sampler["input"])[:, 0], self.read(sampler["output"])

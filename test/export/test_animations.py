@@ -4,7 +4,10 @@ every frame, and the body has the mass properties that it has."""
 
 from __future__ import annotations
 
+import base64
 import io
+import json
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -187,6 +190,32 @@ def test_the_ghost_flies_beside_the_body_with_a_centre_of_its_own(tmp_path):
     assert nodes["ghost"]["extras"]["inertia_model"] == "bounding_box"
 
 
+def test_a_ghost_that_is_gone_is_not_seen_until_it_comes_back(tmp_path):
+    (tmp_path / "s.yaml").write_text(
+        "- {t: 0.5, set: {ghost.inertia_model: ''}}\n- {t: 0.8, set: {ghost.inertia_model: points}}\n"
+    )
+    files = ["--gltf", str(tmp_path / "two.glb"), "--usd", str(tmp_path / "two.usda")]
+    script = ["--script", str(tmp_path / "s.yaml"), "--duration", "1"]
+    assert main(["simulate", "true_or_box_tensor", *script, *files]) == 0
+    player, stage = Player(tmp_path / "two.glb"), Stage(tmp_path / "two.usda")
+    for t, seen in ((0.4, True), (0.55, False), (0.75, False), (0.9, True)):
+        assert player.value(player.nodes["ghost mesh"], "scale", t).any() == seen, t
+        assert (stage.prim("ghost/mesh").GetAttribute("visibility").Get(stage.code(t)) == "inherited") == seen, t
+        assert player.value(player.nodes["body mesh"], "scale", t).all()
+
+
+def test_the_motion_ends_with_the_simulation_and_not_with_its_last_published_state(tmp_path):
+    file = tmp_path / "rare.glb"
+    words = ["--set", "publish_rate=0.5", "--duration", "1.01", "--gltf", str(file)]
+    assert main(["simulate", "t_handle", *words]) == 0
+    player = Player(file)
+    times, turns, _ = player.keys("body", "rotation")
+    assert len(times) == 32 and times[-1] == pytest.approx(1.01)
+    run = OfflineRun(read_scene("t_handle"))
+    run.advance(1_010_000_000)
+    assert np.allclose(turns[-1], run.simulation.state.orientation_xyzw, atol=1e-7)
+
+
 def test_a_body_without_a_mesh_that_does_not_move_is_a_node_with_one_key(tmp_path):
     file = tmp_path / "none.glb"
     explicit = ["--set", "mesh=", "--set", "inertia_model=explicit", "--set", "explicit_inertia.mass=1.0"]
@@ -240,6 +269,46 @@ def test_a_glb_keeps_its_materials_and_pictures_and_is_where_the_body_is(tmp_pat
         for name in ("half 0", "half 1"):
             drawn = z_up(player.world(name, player.mesh_points(name), k / 24))
             assert np.abs(drawn - expected).max() < 1e-6
+
+
+def edited(file: Path, document: dict) -> None:
+    """Another document in a .glb."""
+    player = Player(file)
+    text = json.dumps(player.document | document).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(player.binary), len(text), b"JSON")
+    file.write_bytes(head + text + struct.pack("<I4s", len(player.binary), b"BIN\0") + player.binary)
+
+
+def flown(tmp_path: Path) -> Player:
+    words = ["--set", f"mesh={tmp_path / 'cube.glb'}", "--duration", "0.1", "--gltf", str(tmp_path / "flight.glb")]
+    assert main(["simulate", "t_handle", *words]) == 0
+    return Player(tmp_path / "flight.glb")
+
+
+def test_a_glb_with_a_lamp_keeps_it(tmp_path):
+    painted_cube(tmp_path / "cube.glb")
+    nodes = Player(tmp_path / "cube.glb").document["nodes"]
+    nodes[0]["extensions"] = {"KHR_lights_punctual": {"light": 0}}
+    lamps = {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}
+    edited(tmp_path / "cube.glb", {"nodes": nodes, "extensions": lamps, "extensionsUsed": list(lamps)})
+    made = flown(tmp_path).document
+    assert made["extensions"] == lamps and made["extensionsUsed"] == list(lamps)
+
+
+@pytest.mark.parametrize("without", ["scenes", "buffers"])
+def test_a_glb_without_a_scene_or_with_its_data_elsewhere_is_drawn_as_the_surface_that_was_flown(without, tmp_path):
+    painted_cube(tmp_path / "cube.glb")
+    player = Player(tmp_path / "cube.glb")
+    data = {"uri": "data:application/octet-stream;base64," + base64.b64encode(player.binary).decode()}
+    if without == "scenes":
+        # A file that says of no scene what belongs to it shows all its nodes.
+        edited(tmp_path / "cube.glb", {"scenes": []})
+    else:
+        edited(tmp_path / "cube.glb", {"buffers": [{**player.document["buffers"][0], **data}]})
+    made = flown(tmp_path)
+    assert "model" not in made.nodes and len(made.document["buffers"]) == 1
+    assert np.ptp(made.mesh_points("body mesh"), axis=0) == pytest.approx([0.1, 0.1, 0.1])
 
 
 def test_usdchecker_finds_what_breaks_its_rules_and_nothing_in_a_flight(flight, tmp_path, capsys):

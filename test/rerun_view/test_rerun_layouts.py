@@ -58,6 +58,13 @@ def test_a_finished_recording_has_no_view_that_shows_nothing() -> None:
     assert "/" not in shown  # the log of commands
 
 
+@pytest.mark.parametrize("mesh", [True, False])
+def test_a_body_without_a_mesh_is_seen_as_its_box_of_equal_inertia(mesh: bool) -> None:
+    (motion,) = (view for view in views(Subject(mesh=mesh)) if view.name == "Motion")
+    assert ("/" + style.INERTIA_BOX in motion.visualizer_overrides) == mesh
+    assert "/" + style.INERTIA_ELLIPSOID in motion.visualizer_overrides
+
+
 def test_the_viewers_own_background_is_left_as_it_is() -> None:
     for view in views(Subject()):
         assert "Background" not in (getattr(view, "properties", None) or {})

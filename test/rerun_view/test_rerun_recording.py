@@ -13,9 +13,13 @@ import rerun_flight as flight
 from rerun_flight import cells
 
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.picture import style
+from rigid_proto_ros.rerun_view.backend import ROS_TIME
 from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, STALLED_S, FileRecorder
-from rigid_proto_ros.rerun_view.rrd_reading import FRAME_HEAD, read_session, whole_bytes
+from rigid_proto_ros.rerun_view.rrd_reading import FRAME_HEAD, read_session, record_batches, whole_bytes
+from rigid_proto_ros.rerun_view.session_files import read_runs, record
+from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.simulation.observer import (
     BodyChanged,
     MeshChanged,
@@ -110,6 +114,14 @@ def test_a_change_of_the_body_moves_the_mesh_from_that_time_on(tmp_path, states)
     times, translations = cells(path, style.BODY_MESH, "Transform3D:translation")
     assert times == [0, 5_000_000]
     assert np.allclose(translations[1], translations[0] + flight.COM - heavier.body.center_of_mass, atol=1e-8)
+    # The mesh stays in place about its new COM, until the next state too, as in flight.
+    for frame in (style.BODY, style.CENTRE):
+        times, places = cells(path, frame, "Transform3D:translation")
+        assert times == [0, 5_000_000, flight.PERIOD_NS]
+        shift = matrix_from_quaternion(states[0, 3:7]) @ np.full(3, 0.01)
+        assert np.allclose(np.subtract(places[1], places[0]), shift, atol=1e-8)
+    _, attitudes = cells(path, style.BODY, "Transform3D:quaternion")
+    assert attitudes[1] == attitudes[0]
     _, energies = cells(path, style.ENERGY, "Scalars:scalars")
     velocity = states[1, 7:10]
     assert np.isclose(energies[1][0], 0.5 * 24.0 * velocity @ velocity, rtol=1e-13)
@@ -134,6 +146,21 @@ def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
     scale = flight.SCALE.tolist()
     assert first[0] == [0, 200_000_000] and np.allclose(first[1], [[scale], [[1e-9] * 3]])
     assert second[0] == [0, 200_000_000] and np.allclose(second[1], [[[1e-9] * 3], [scale]])
+    # Nor is it seen earlier by the wall's clock.
+    clocks = (
+        cells(tmp_path / "meshes.run1.rrd", style.BODY_MESH + end, "Transform3D:scale", ROS_TIME) for end in ("", "_2")
+    )
+    (first, _), (second, _) = clocks
+    assert second[0] <= first[0]
+
+
+def test_each_principal_axis_has_its_own_label(recording):
+    texts = [
+        batch.column("Points3D:labels").to_pylist()
+        for entity, static, batch in record_batches(recording)
+        if static and entity == f"{style.PRINCIPAL_AXES}/label" and "Points3D:labels" in batch.schema.names
+    ]
+    assert texts == [[["I₁", "I₂", "I₃"]]]
 
 
 def test_a_reset_keeps_the_run_before_beside_the_new_one_which_begins_with_what_is_then_in_force(tmp_path, states):
@@ -164,6 +191,28 @@ def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path):
     for name in ("taken/session.rrd", "session.mcap", ".", "full.rrd"):
         with pytest.raises(InputError, match="[Nn]o space" if name == "full.rrd" else "record"):
             FileRecorder(str(tmp_path / name))
+
+
+def test_a_session_that_cannot_be_played_leaves_an_earlier_recording_as_it_was(tmp_path):
+    path = tmp_path / "earlier.rrd"
+    path.write_bytes(b"earlier")
+    good = RecordedSession(scene="rigid_body: {ros__parameters: {mesh: book}}")
+    broken = RecordedSession(scene=good.scene, events=[(0, "no line of a log")])
+    for runs in (
+        [broken],
+        [good, broken],
+        [RecordedSession()],
+        [RecordedSession(scene=good.scene, missing=("events",))],
+    ):
+        with pytest.raises(InputError):
+            record(runs, path)
+        assert path.read_bytes() == b"earlier"
+
+
+def test_a_recording_made_of_a_bag_and_named_after_it_is_read(recording, tmp_path):
+    path = tmp_path / "flight.mcap.rrd"
+    path.write_bytes(recording.read_bytes())
+    assert len(read_runs(path)[0].times) == COUNT
 
 
 def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_run(tmp_path, states):
