@@ -86,7 +86,7 @@ def _place_mesh(prim: UsdGeom.Mesh, codes: list[float], track: Track) -> None:
     """Pose of the mesh relative to its body: once, or at each frame if it changes during the simulation."""
     from pxr import Gf, UsdGeom
 
-    shown = track.mesh_scales.any(axis=1)
+    shown: np.ndarray = np.any(track.mesh_scales, axis=1)
     if not shown.all():
         visibility = prim.CreateVisibilityAttr()
         for code, is_shown in zip(codes, shown.tolist(), strict=True):
