@@ -87,8 +87,7 @@ class LiveSimulation:
 
     def announce(self) -> None:
         """Tell the observers what is going to fly; once, before ``start``."""
-        self.loop.announce()
-        self.loop.notify_scene()
+        self._introduce(self.loop.observer)
 
     def start(self, on_crash: Callable[[], None] = lambda: None) -> None:
         """Simulated time begins. on_crash() is called should the thread end by a fault of the program. What isn't

@@ -274,6 +274,26 @@ def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_
     assert verify(read_runs(path)[-1]) is None
 
 
+@needs_rerun
+def test_a_recording_from_the_start_shows_the_string_that_is_tied_from_the_start(tmp_path):
+    from rerun_flight import cells
+
+    from rigid_proto_ros.picture import style
+
+    path = str(tmp_path / "flight.rrd")
+    tied = {"string.attached": True, "string.target": [0.0, 0.0, 1.0]}
+    live = LiveSimulation(make_scenario({"mesh": "t_handle", "start_paused": True, "record": path, **tied}))
+    live.announce()
+    live.start()
+    live.step(2)
+    live.stop()
+    times, energies = cells(path, style.ENERGY, "Scalars:scalars")
+    assert len(times) == 2 and cells(path, style.STRING, "LineStrips3D:strips")[0] == times
+    # Of its 50 N/m, stretched by 1 m: 25 J, part of which the body has after 10 ms.
+    *_, total, string = energies[0]
+    assert total == pytest.approx(25.0, rel=0.1) and 10.0 < string < total
+
+
 def test_a_reset_tells_of_the_body_anew_with_its_own_time(live):
     class Bodies(Observer):
         takes = frozenset({BodyChanged})
