@@ -217,6 +217,8 @@ Y_UP = ("glb", "obj")
 
 Z_UP_COMMENT = re.compile(rb"^#.*\bz[ -]?(?:axis )?(?:is )?up\b", re.IGNORECASE | re.MULTILINE)
 
+OPTION, ACCEPT_OPEN = re.compile(r"--[\w-]+(?: \S+)? \((\w+)\)"), re.compile(r", which --accept-open \S+ accepts")
+
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 """Length in metres of each unit that a file may use."""
 
@@ -258,12 +260,13 @@ class Upload:
     @property
     def refusal(self) -> str:
         """Why it can't be simulated as a solid without changes, or empty."""
-        return "" if self.inspection.refusal is None else str(self.inspection.refusal)
+        return "" if self.inspection.refusal is None else _without_options(str(self.inspection.refusal))
 
     @property
     def verdict(self) -> list[str]:
-        """One line per remark, beginning with the severity."""
-        return [f"{finding.severity}: {finding.message}" for finding in self.inspection.findings]
+        """One line per remark, beginning with the severity. None of the unit: the page asks for it, and shows the size."""
+        findings = (finding for finding in self.inspection.findings if finding.code != "unit_suspicion")
+        return [f"{finding.severity}: {_without_options(finding.message)}" for finding in findings]
 
     def size_and_mass(self, unit: str) -> str:
         """Size and mass in one line, for coordinates in this unit and SENSIBLE_DENSITY."""
@@ -283,6 +286,11 @@ class Upload:
             "initial.orientation_xyzw": UPRIGHT[self.up],
             **stand_in,
         }
+
+
+def _without_options(message: str) -> str:
+    """A remark of ``inspect`` with the parameters that the page has in place of the command's options."""
+    return OPTION.sub(r"\1", ACCEPT_OPEN.sub("", message))
 
 
 def take_upload(file_name: str, data: bytes) -> Upload:

@@ -100,6 +100,19 @@ def test_a_bust_in_millimetres_is_said_to_weigh_24_kg_before_it_flies_and_not_as
     assert not body.initial[7:13].any()
 
 
+def test_a_verdict_names_what_the_page_has_and_no_options_of_the_command(place: Path) -> None:
+    assert take_upload("bust.obj", bust_in_millimetres()).verdict == []
+    lines = BOOK.decode().splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith("f "))
+    hole = take_upload("hole.obj", "\n".join(lines[:first] + lines[first + 1 :]).encode())
+    (line,) = hole.verdict
+    assert line.startswith("error: open surface with 3 boundary edges; any way to close it changes volume and tensor by")
+    assert line.endswith(" %; mesh_repair welds edges and caps holes")
+    assert hole.refusal.endswith(" %; use mesh_repair, mesh_fallback, or another model with mass")
+    for upload in (hole, take_upload("open.obj", OPEN)):
+        assert "--" not in " ".join([upload.refusal, *upload.verdict])
+
+
 def test_a_glb_is_taken_in_metres_with_y_up_and_one_that_names_other_files_is_refused(place: Path) -> None:
     document = Document(0)
     corners = document.accessor(BOX_CORNERS, VERTICES, bounds=True)
