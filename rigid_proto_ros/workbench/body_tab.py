@@ -264,7 +264,7 @@ class Upload:
 
     @property
     def verdict(self) -> list[str]:
-        """One line per remark, beginning with the severity. None of the unit: the page asks for it, and shows the size."""
+        """One line per remark, beginning with the severity. The page asks for the unit, with the size in sight."""
         findings = (finding for finding in self.inspection.findings if finding.code != "unit_suspicion")
         return [f"{finding.severity}: {_without_options(finding.message)}" for finding in findings]
 

@@ -49,6 +49,9 @@ SOON_S = 0.3
 
 COMPILING = "compiling, once only"
 
+SCENE, FUTURE = "another scene", "another future of this one"
+"""What begins at a jump of time."""
+
 Entry = dict[str, Any]
 """One entry of a poke script."""
 
@@ -127,9 +130,9 @@ class Flight:
     """say(text) tells the users of a refusal, and refused() is called after it. busy(text): what takes time from now
     on, "" when it is over.
 
-    scenario: the one in force; scenes_begun: how many others began since the start. moment_ns: the time of the past
-    that is looked at, None while the present is. before_jump() is called before time jumps. jumps: what is told now
-    belongs to a scene, or to another future, that begins, and was not done by hand.
+    scenario: the one in force. moment_ns: the time of the past that is looked at, None while the present is.
+    before_jump() is called before time jumps. jump: SCENE or FUTURE while one begins, empty else: what is told
+    meanwhile wasn't done by hand.
     """
 
     def __init__(self, live: LiveSimulation, say: Callable[[str], None]) -> None:
@@ -140,8 +143,7 @@ class Flight:
         self.before_jump: Callable[[], None] = lambda: None
         self._doing, self._since_s = "", 0.0
         self._worker = ThreadPoolExecutor(1, "page")
-        self.scenes_begun = 0
-        self.jumps = False
+        self.jump = ""
         self._past: RecordedSession | None = None
         self.moment_ns: int | None = None
         self._ran_before = False
@@ -254,9 +256,8 @@ class Flight:
             values.update(self._kept)
             if speed is not None:
                 values["real_time_factor"] = speed
-            scenario = make_scenario(values)
-            self.scenes_begun += 1
-            self._begin(scenario, script, (self.paused and not goes_on) if paused is None else paused)
+            paused_then = (self.paused and not goes_on) if paused is None else paused
+            self._begin(SCENE, make_scenario(values), script, paused_then)
             return True
 
         return await self._ask("preparing the scene", begin) or False
@@ -267,12 +268,12 @@ class Flight:
         in_force = self.scenario.parameters.named()
         return {name: value for name, value in in_force.items() if name in LOOKS or _is_of_the_node(name)}
 
-    def _begin(self, scenario: Scenario, script: str, paused: bool) -> None:
+    def _begin(self, jump: str, scenario: Scenario, script: str, paused: bool) -> None:
         was_paused = self.paused
         # Time stands first: a scene that begins paused begins at its time 0.
         self.live.pause(True)
         try:
-            self.jumps = True
+            self.jump = jump
             self.live.begin(scenario)
             if script.strip():
                 self.live.schedule(script)
@@ -280,7 +281,7 @@ class Flight:
             self.live.pause(was_paused)
             raise
         finally:
-            self.jumps = False
+            self.jump = ""
         self.live.pause(paused)
 
     def reset(self) -> None:
@@ -351,7 +352,7 @@ class Flight:
         if found is not None:
             # Before it begins: what is told while the past is looked at isn't heard.
             self._past = self.moment_ns = None
-            await self._ask("going back", functools.partial(self._begin, *found, False))
+            await self._ask("going back", functools.partial(self._begin, FUTURE, *found, False))
 
 
 def _is_of_the_node(name: str) -> bool:

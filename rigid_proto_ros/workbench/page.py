@@ -42,7 +42,7 @@ from ..simulation.simulation import Simulation
 from .body_tab import BodyTab
 from .controls import Controls
 from .drawing import ViserBackend
-from .flight import Flight
+from .flight import SCENE, Flight
 from .lessons import Course, LessonPanel
 from .panel import ALWAYS, CENTRE_OF_MASS, ForcesTab, SessionTab, ShowTab, TimeBar, motion_words
 from .pointer import DrawnPose, DrawnPoses, Pointer, Tools, suggested_force
@@ -81,7 +81,7 @@ CLASS_LABELS = 1.6
 
 
 class Told(Observer):
-    """Takes what the physics thread tells, for the page's thread, and whether it tells it of a jump (``Flight``)."""
+    """Takes what the physics thread tells, for the page's thread, and of which jump (``Flight``)."""
 
     takes = frozenset(
         {
@@ -92,16 +92,16 @@ class Told(Observer):
 
     def __init__(self, flight: Flight) -> None:
         self._flight = flight
-        self._queue: deque[tuple[Event, bool]] = deque()
+        self._queue: deque[tuple[Event, str]] = deque()
 
     def on(self, event: Event) -> None:
         """Keep it; rows of states are the teller's own."""
         if isinstance(event, (Published, GhostPublished)):
             event = event._replace(row=event.row.copy())
         if type(event) in self.takes:
-            self._queue.append((event, self._flight.jumps))
+            self._queue.append((event, self._flight.jump))
 
-    def take(self) -> list[tuple[Event, bool]]:
+    def take(self) -> list[tuple[Event, str]]:
         """All that was told since the last call, in order."""
         return [self._queue.popleft() for _ in range(len(self._queue))]
 
@@ -145,7 +145,6 @@ class Page:
         self._ghost_row: np.ndarray | None = None
         self._drawn_moment_ns: int | None = None
         self._new_scene = True
-        self._scenes_seen = 0
         self._mesh_sha256 = ""
         self._resets_heard = 0
         self._undrawn = True
@@ -246,9 +245,9 @@ class Page:
         looking = self.flight.moment_ns is not None
         with self.server.atomic():
             if looking:
-                for event, jumps in events:
+                for event, jump in events:
                     if isinstance(event, (SceneChanged, Refused)):
-                        self._on(event, jumps)
+                        self._on(event, jump)
                 self._draw_past()
             else:
                 if self._drawn_moment_ns is not None:
@@ -272,10 +271,10 @@ class Page:
         tied = simulation.string is not None
         return motion_words(self._scenario, len(self._loads), tied, simulation.at_rest, self.live.paused)
 
-    def _take(self, events: list[tuple[Event, bool]]) -> None:
+    def _take(self, events: list[tuple[Event, str]]) -> None:
         times: list[int] = []
         rows: list[np.ndarray] = []
-        for event, jumps in events:
+        for event, jump in events:
             if isinstance(event, Published):
                 times.append(event.time_ns)
                 rows.append(event.row)
@@ -284,7 +283,7 @@ class Page:
             else:
                 self._draw(times, rows)
                 times, rows = [], []
-                self._on(event, jumps)
+                self._on(event, jump)
                 self._undrawn = True
         self._draw(times, rows)
         state = self.live.state
@@ -294,7 +293,7 @@ class Page:
             # While time stands, or hasn't begun because kernels are being compiled, nothing is published.
             self._draw([state.time_ns], [state.row])
 
-    def _on(self, event: Event, jumps: bool) -> None:
+    def _on(self, event: Event, jump: str) -> None:
         match event:
             case Started() | MeshChanged():
                 self.picture.on(event)
@@ -312,9 +311,9 @@ class Page:
                 self.picture.set_ghost(time_ns, setup)
                 self._ghost_row = None
             case SceneChanged():
-                self._scene_changed(jumps)
+                self._scene_changed(jump)
             case Reset():
-                self._reset(jumps)
+                self._reset(jump)
             case LoadBegan() | LoadEnded():
                 self._load_changed(event)
             case StringChanged():
@@ -360,24 +359,23 @@ class Page:
             lever = float(np.linalg.norm(np.cross(load.point, force))) / strength / size
             self.lessons.did("poke com" if lever < AT_COM else "poke away" if lever > AWAY else "poke between")
 
-    def _scene_changed(self, jumps: bool) -> None:
+    def _scene_changed(self, jump: str) -> None:
         before, self._scenario = self._scenario, self.live.scenario
-        if not jumps:
+        self._new_scene |= jump == SCENE
+        if not jump:
             self.lessons.changed(before, self._scenario)
         # First: the body of a new scene is what the factors are shown relative to.
         self.body_tab.changed(self._scenario, self._new_scene)
         self.controls.update(self._scenario.parameters.named(), at_once=self._new_scene)
 
-    def _reset(self, jumps: bool) -> None:
-        self._new_scene |= self.flight.scenes_begun != self._scenes_seen
-        self._scenes_seen = self.flight.scenes_begun
+    def _reset(self, jump: str) -> None:
         self._forget_drawn()
         self.poses.forget()
         self.pointer.forget()
         self.readings.restart()
         self._strings.clear()
         self.backend.origin = self.room.follow(self.live.state.position, self._home, self.backend.unit)
-        if not jumps:
+        if not jump:
             self.lessons.did("reset")
 
     def _forget_drawn(self) -> None:

@@ -214,6 +214,19 @@ def test_time_that_jumps_was_not_watched_and_another_lesson_begins_without_marks
     assert progress.done == 0
 
 
+def test_factors_are_those_of_the_body_that_a_lesson_begins_with(user: User) -> None:
+    for name in ("hammer", "com_or_rim", "book", "weigh_by_throwing"):
+        user.set("Lesson", FREE)
+        user.pick(lesson(name).title)
+        user.fly(0.1)
+        assert user.widget("Mass ×").value == user.widget("Size ×").value == (0.0,)
+        user.set("Mass ×", (0.3,))
+        user.set("Size ×", (-0.1,))
+        user.fly(0.1)
+        user.reset()
+        assert (user.widget("Mass ×").value, user.widget("Size ×").value) == ((0.3,), (-0.1,))
+
+
 def test_beginning_a_lesson_is_no_action_of_its_user(user: User) -> None:
     # The lesson before has another density, which the first step here asks to change.
     for title in (lesson("t_handle").title, lesson("weigh_by_throwing").title):

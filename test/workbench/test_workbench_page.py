@@ -61,7 +61,7 @@ def fly(page: Browser, scene) -> None:
 
     asyncio.run_coroutine_threadsafe(begin(), flown.server.get_event_loop()).result(PATIENCE_S)
     shown = flown.page
-    page.until(lambda: shown._scenes_seen == shown.flight.scenes_begun and not shown._undrawn, "another body")
+    page.until(lambda: not shown._told._queue and not shown._undrawn, "another body")
     page.drawn(3)
 
 
