@@ -106,7 +106,9 @@ def test_a_verdict_names_what_the_page_has_and_no_options_of_the_command(place: 
     first = next(k for k, line in enumerate(lines) if line.startswith("f "))
     hole = take_upload("hole.obj", "\n".join(lines[:first] + lines[first + 1 :]).encode())
     (line,) = hole.verdict
-    assert line.startswith("error: open surface with 3 boundary edges; any way to close it changes volume and tensor by")
+    assert line.startswith(
+        "error: open surface with 3 boundary edges; any way to close it changes volume and tensor by"
+    )
     assert line.endswith(" %; mesh_repair welds edges and caps holes")
     assert hole.refusal.endswith(" %; use mesh_repair, mesh_fallback, or another model with mass")
     for upload in (hole, take_upload("open.obj", OPEN)):
