@@ -17,6 +17,7 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError
 from ..base.files import whole_file
+from ..mass.moments import referenced_vertices
 from ..mesh.locate import resolve_mesh
 from ..picture import style
 from ..picture.backend import DrawnMesh
@@ -240,14 +241,16 @@ def model_of(record: FlightRecord) -> tuple[dict[str, Any], bytes, np.ndarray] |
     the only one.
     """
     drawn = [event for event in record.changes if isinstance(event, (Started, MeshChanged))]
-    if len(drawn) != 1 or not isinstance(drawn[0], Started) or drawn[0].vertices is None:
+    if len(drawn) != 1 or not isinstance(began := drawn[0], Started):
         return None
-    vertices = np.asarray(drawn[0].vertices, dtype=float)
+    if began.vertices is None or began.triangles is None:
+        return None
+    vertices = referenced_vertices(np.asarray(began.vertices, dtype=float), began.triangles)
     try:
-        data = resolve_mesh(str(read_scene_text(drawn[0].scene).values.get("mesh", ""))).read_bytes()
+        data = resolve_mesh(str(read_scene_text(began.scene).values.get("mesh", ""))).read_bytes()
     except (InputError, OSError):
         return None
-    if data[:4] != MAGIC or hashlib.sha256(data).hexdigest() != drawn[0].mesh_sha256:
+    if data[:4] != MAGIC or hashlib.sha256(data).hexdigest() != began.mesh_sha256:
         return None
     length = int.from_bytes(data[12:16], "little")
     model = json.loads(data[20 : 20 + length])

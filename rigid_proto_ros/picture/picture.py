@@ -131,7 +131,11 @@ class Picture:
         """Another mesh: vertices (n, 3) [mesh coordinates], triangles (m, 3); a BodyChanged follows."""
         self._vertices = self._mesh = None
         if vertices is not None and triangles is not None and len(triangles):
-            self._vertices = np.array(vertices, dtype=float)
+            # A stray vertex that no triangle uses is no part of the body.
+            used = np.zeros(len(vertices), dtype=bool)
+            used[triangles] = True
+            triangles = (np.cumsum(used) - 1)[triangles]
+            self._vertices = np.array(vertices, dtype=float)[used]
             # Single precision has no digits for a mesh far from its origin.
             self._middle = 0.5 * (self._vertices.min(axis=0) + self._vertices.max(axis=0))
             self._mesh = shaded_surface(self._vertices - self._middle, triangles)

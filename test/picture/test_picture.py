@@ -320,6 +320,22 @@ def test_a_mesh_far_from_its_origin_is_drawn_to_single_precision_of_its_size():
     assert np.allclose(corners.mean(axis=0), 0.0, atol=1e-8)
 
 
+def test_a_stray_vertex_that_no_triangle_uses_changes_nothing_of_the_picture():
+    picture, drawn = pictured()
+    strayed = Drawn()
+    other = Picture(strayed)
+    stray = np.insert(flight.VERTICES, 3, [0.0, 0.0, 100.0], axis=0)
+    other.on(Started("", stray, flight.TRIANGLES + (flight.TRIANGLES >= 3), ""))
+    other.on(BodyChanged(0, flight.SETUP))
+    for each in (picture, other):
+        each.draw(times(20), flight.rows(20))
+    assert strayed.size == drawn.size
+    for name, rows in drawn.parts.items():
+        assert np.array_equal(list(rows.values()), list(strayed.parts[name].values())), name
+    for with_stray, without in zip(strayed.meshes[style.BODY_MESH], drawn.meshes[style.BODY_MESH], strict=True):
+        assert np.array_equal(with_stray, without)
+
+
 def test_trails_go_through_the_com_and_its_farthest_vertex_at_each_state():
     picture, drawn = pictured()
     states = flight.rows(20)
