@@ -212,8 +212,8 @@ class SimulationLoop(ScenarioRun):
     def steps(self, periods: int = 1) -> Iterator[None]:
         """While paused, advance over so many publications; yields while the thread's ticks make them.
 
-        Raises InputError while time runs, or when it takes longer than STEP_PATIENCE_S; the step goes on by itself
-        then.
+        Raises InputError while time runs, where the motion has failed, or when it takes longer than STEP_PATIENCE_S; the
+        step goes on by itself then.
         """
         if not self.paused:
             raise InputError("step", "the simulation is running; pause it first")
@@ -228,8 +228,10 @@ class SimulationLoop(ScenarioRun):
             if not self.stepping:
                 begun = True
                 if self.step(periods):
-                    return
+                    break
             yield
+        if self.simulation.failure:
+            raise InputError("step", f"stopped in the last good state until a reset: {self.simulation.failure}")
 
     def request_step(self) -> None:
         """A wrench or thruster command has come: paused and in lockstep it is followed by a step."""

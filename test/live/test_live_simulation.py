@@ -257,6 +257,15 @@ def test_the_file_that_is_being_recorded_is_refused_for_a_second_recording_by_an
     assert (np.asarray(run.times) // PERIOD_NS).tolist() == [1, 2, 3, 4, 5]
 
 
+def test_a_step_of_a_motion_that_has_failed_is_refused_with_the_reason(live):
+    live.schedule("{t: 0, state: {linear_velocity: [9.9e99, 0, 0], position: [9.9e99, 0, 0]}}")
+    for _ in range(2):
+        with pytest.raises(InputError, match="until a reset: the motion passed 1e\\+100"):
+            live.step(100)
+    live.reset()
+    assert live.step() == PERIOD_NS
+
+
 @needs_rerun
 @pytest.mark.parametrize("ending", ["rrd", "mcap"])
 def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_verified(live, tmp_path, ending):
