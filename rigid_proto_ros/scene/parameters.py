@@ -96,6 +96,8 @@ class Parameter:
             return value if isinstance(value, bool if self.type == "bool" else str) else None
         if self.type == "doubles":
             return _to_doubles(value)
+        if self.type == "integer" and type(value) is int:
+            return value  # a double would round it from 2^53 on
         number = _to_double(value)
         if self.type == "double" or number is None:
             return number
@@ -110,7 +112,7 @@ class Parameter:
         if self.lengths and len(numbers) not in self.lengths:
             return False
         above = all(n > self.lower if self.above else n >= self.lower for n in numbers)
-        return above and all(math.isfinite(n) and n <= self.upper for n in numbers)
+        return above and all(n <= self.upper and math.isfinite(n) for n in numbers)
 
 
 def _to_double(value: object) -> float | None:

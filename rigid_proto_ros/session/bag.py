@@ -43,8 +43,8 @@ class BagContent:
 
 def read_bag(path: Path, wanted: Callable[[str], bool]) -> BagContent:
     """All that is whole in a bag, of the topics that are ``wanted(topic)``; raises InputError."""
-    content = BagContent()
-    for file in _files(path):
+    content, files = BagContent(), _files(path)
+    for file in files:
         finished = False
         schemas: dict[int, str] = {}
         topics: dict[int, str] = {}
@@ -65,6 +65,9 @@ def read_bag(path: Path, wanted: Callable[[str], bool]) -> BagContent:
             else:
                 finished = isinstance(record, records.Footer)
         content.complete &= finished
+    if MADE_WITH in content.metadata and len(files) > 1:
+        # Ours are never split: these would be taken for one flight.
+        raise InputError("session", str(path), f"one of the {len(files)} recordings in this folder")
     if not (content.types or content.attachments or content.metadata):
         raise InputError("session", str(path), "a recording with data; this one ends before its first chunk")
     return content

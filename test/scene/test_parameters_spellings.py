@@ -43,6 +43,15 @@ def test_every_spelling_is_the_same_number(parameter):
         assert all(type(v) is float for v in (converted if isinstance(converted, list) else [converted]))
 
 
+def test_a_seed_keeps_all_its_digits():
+    seed = PARAMETERS["noise.seed"]
+    assert seed.convert(2**53 + 1) == 2**53 + 1
+    assert seed.convert(3.0) == 3
+    for bad in (2**62 + 1, 10**400, -1, True):
+        with pytest.raises(InputError):
+            seed.convert(bad)
+
+
 @pytest.mark.parametrize("parameter", NUMERIC, ids=IDS)
 def test_what_is_no_number_within_bounds_is_refused_with_field_value_and_what_is_accepted(parameter):
     value = whole(parameter)

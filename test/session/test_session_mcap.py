@@ -327,6 +327,15 @@ def test_a_recording_without_states_has_nothing_to_verify(tmp_path, capsys):
 
 
 @needs_rerun
+def test_a_folder_with_several_recordings_is_not_taken_for_one_flight(tmp_path, capsys):
+    for name in ("one", "two"):
+        assert main(["simulate", "book", "--duration", "0.1", "--bag", str(tmp_path / f"{name}.mcap")]) == 0
+    assert main(["replay", str(tmp_path)]) == 2
+    assert "one of the 2 recordings in this folder" in capsys.readouterr().err
+    (tmp_path / "two.mcap").unlink()
+    assert main(["replay", str(tmp_path), "--verify"]) == 0
+
+
 def test_a_node_that_a_recording_does_not_hold_is_refused(tmp_path, capsys):
     session = str(tmp_path / "s.rrd")
     assert main(["simulate", "book", "--duration", "0.2", "--record", session]) == 0
