@@ -212,8 +212,8 @@ class SimulationLoop(ScenarioRun):
     def steps(self, periods: int = 1) -> Iterator[None]:
         """While paused, advance over so many publications; yields while the thread's ticks make them.
 
-        Raises InputError while time runs, where the motion has failed, or when it takes longer than STEP_PATIENCE_S; the
-        step goes on by itself then.
+        Raises InputError while time runs, where the motion has failed, and when it takes longer than STEP_PATIENCE_S;
+        the step goes on by itself then.
         """
         if not self.paused:
             raise InputError("step", "the simulation is running; pause it first")
