@@ -164,7 +164,9 @@ def _topic(messages: list[tuple[int, Any]], name: str, message_type: str, frame:
         messages, frame = _one_transform(messages, name, frame), ""
     elif frame and message_type not in KINDS["wrench"]:
         raise InputError(name, f"{name}@{frame}", f"{name} alone, since a {message_type} has no choice of frames")
-    stamps = [m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec or logged for logged, m in messages]
+    stamps = [m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for _, m in messages]
+    if not any(stamps):  # nobody set them; one alone may be the begin of simulated time
+        stamps = [logged for logged, _ in messages]
     # Of messages with one stamp the first counts: a repeated one says nothing new.
     times, first = np.unique(np.array(stamps, np.int64), return_index=True)
     numbers = np.array([_NUMBERS[message_type](message) for _, message in messages])[first]

@@ -14,7 +14,7 @@ from scipy.special import chdtrc
 
 from .fitting import Estimate, residuals_of
 from .initial_estimate import noise_by_differences
-from .measurements import UNITS, MeasuredFlight
+from .measurements import ATTITUDE, UNITS, MeasuredFlight
 from .unknowns import Unknowns, Values
 
 MOST_RELATIVE = 0.5
@@ -42,6 +42,9 @@ LEAST_PROBABILITY = 1e-4
 """Of noise that is white looking so little like it: below it the check fails."""
 TOO_LARGE = 1.5
 """Residuals so many times the noise between neighbouring samples are no noise."""
+LOST = 0.3
+"""Residuals of attitudes [rad] above which the fit doesn't follow them, however white they are: the body turned too far
+between samples."""
 
 POKE = "one poke of a known force beside the centre of mass"
 TUMBLE = "a motion that tumbles about several axes"
@@ -169,18 +172,23 @@ class ResidualCheck:
     @property
     def is_noise(self) -> bool:
         """Whether the residuals are no larger than noise."""
-        return self.is_white or self.noise <= TOO_LARGE * self.by_differences
+        is_lost = self.unit == UNITS[ATTITUDE] and self.noise > LOST
+        return not is_lost and (self.is_white or self.noise <= TOO_LARGE * self.by_differences)
 
     @property
     def remarks(self) -> list[str]:
         """What it shows, in sentences; empty when all is noise."""
         if self.is_noise:
             return []
+        residuals = f"{self.series} of {self.flight}: the residuals of {self.noise:.3g} {self.unit}"
+        if self.is_white:
+            return [
+                f"{residuals} are so large that nothing follows the attitudes: the body turns too far between samples"
+            ]
         return [
-            f"{self.series} of {self.flight}: the residuals of {self.noise:.3g} {self.unit} aren't white noise, and"
-            f" neighbouring samples differ by {self.by_differences:.3g} only: drag (--fit damping), gravity (--fit"
-            " gravity), clocks (--fit offset), a contact (--from and --to exclude it), or a wrench that isn't in the"
-            " bag; the standard deviations are too small"
+            f"{residuals} aren't white noise, and neighbouring samples differ by {self.by_differences:.3g} only: drag"
+            " (--fit damping), gravity (--fit gravity), clocks (--fit offset), a contact (--from and --to exclude it),"
+            " or a wrench that isn't in the bag; the standard deviations are too small"
         ]
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -111,8 +112,17 @@ class MeshMoments:
         key = (model, *stretch.tolist())
         if key not in self._moments:
             vertices, triangles = self.solid_surface() if model == "solid" else (self.vertices, self.triangles)
-            stretched = vertices if np.all(stretch == 1.0) else vertices * stretch
-            self._moments[key] = MODELS[model](stretched, triangles, self.polygon_starts)
+            if np.all(stretch == 1.0):
+                self._moments[key] = MODELS[model](vertices, triangles, self.polygon_starts)
+                return self._moments[key]
+            # About a vertex: far from the origin the products would round.
+            base = vertices[triangles[:1, 0]].sum(axis=0)
+            numbers = MODELS[model]((vertices - base) * stretch, triangles, self.polygon_starts).numbers.copy()
+            for k in range(3):
+                exact = Fraction(numbers[1 + k]) + Fraction(base[k]) * Fraction(stretch[k])
+                numbers[1 + k] = float(exact)
+                numbers[7 + k] += float(exact - Fraction(numbers[1 + k]))
+            self._moments[key] = Moments(numbers)
         return self._moments[key]
 
     def body_mass(self, *, scale: ArrayLike = (1.0, 1.0, 1.0), mass: float = 0.0, density: float = 1000.0) -> float:

@@ -150,6 +150,21 @@ def _poses(tmp_path: Path, **others) -> Path:
     return fb.write(tmp_path / "bag.mcap", {"/pose": ("geometry_msgs/msg/PoseStamped", messages)} | others)
 
 
+def test_a_stamp_of_zero_among_others_is_the_begin_of_simulated_time(tmp_path: Path) -> None:
+    """Recorders log such messages at the time of day; without a single stamp that time counts."""
+    messages = []
+    for time_ns in range(0, 200_000_000, 10_000_000):
+        message = fb.pose(time_ns, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        message["header"]["stamp"]["sec"] = 0
+        messages.append((time_ns, message))
+    bag = fb.write(tmp_path / "sim.mcap", {"/pose": ("geometry_msgs/msg/PoseStamped", messages)})
+    assert np.array_equal(bag_flight(bag, Choice()).series[0].times_ns, np.arange(20) * 10_000_000)
+    for _, message in messages:
+        message["header"]["stamp"]["nanosec"] = 0
+    bag = fb.write(tmp_path / "none.mcap", {"/pose": ("geometry_msgs/msg/PoseStamped", messages)})
+    assert np.array_equal(bag_flight(bag, Choice()).series[0].times_ns, fb.EPOCH_NS + np.arange(20) * 10_000_000)
+
+
 def test_transforms_without_a_tree_are_poses(tmp_path: Path) -> None:
     position, attitude = mf.mocap(_truth(), mf.tumbling(), np.random.default_rng(3), 0.5).series
     rows = zip(position.times_ns, position.values, attitude.values, strict=True)

@@ -195,6 +195,14 @@ def test_an_imu_that_is_a_fifth_of_a_second_off_is_said_not_to_fit() -> None:
     assert not found.fits or abs(found.others["offset of /imu"].value - 0.2) < 4.0 * found.others["offset of /imu"].sd
 
 
+def test_attitudes_that_no_motion_follows_are_said_though_their_residuals_are_white() -> None:
+    """As of a body that turns several times between unevenly spaced samples."""
+    rng = np.random.default_rng(5)
+    flight = mf.mocap(_body(), mf.tumbling(), rng, 2.0, noise=(0.5e-3, 1.0))
+    found = identify([flight])
+    assert not found.fits and any("turns too far between samples" in remark for remark in found.remarks)
+
+
 def test_drag_that_is_not_in_the_model_is_said_and_found_when_asked_for_with_its_unit() -> None:
     truth = _body((0.2, 2e-3))
     flight = mf.mocap(truth, mf.tumbling(), np.random.default_rng(6), 3.0, load=mf.load_history(POKE))

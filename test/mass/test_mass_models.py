@@ -47,6 +47,21 @@ def test_shell_of_a_box_is_the_sum_of_its_six_plates():
     assert properties.inertia[0, 0] == pytest.approx(ixx, rel=1e-14)
 
 
+def test_a_stretched_shell_far_from_the_origin_keeps_its_digits(lopsided):
+    """Its tensor was off by 5e-11 here, and by 3e-6 for a thinner one."""
+    vertices, triangles = np.round(lopsided[0] * 2**20) / 2**20, lopsided[1]
+    shift, scale = np.array([1e6, -3e5, 2e6]), np.array([0.13, -0.0037, 7.1])
+    near, far = (
+        MeshMoments(vertices + moved, triangles).mass_properties("shell", mass=2.0, scale=scale)
+        for moved in (np.zeros(3), shift)
+    )
+    assert far.inertia == pytest.approx(near.inertia, rel=1e-13, abs=1e-13 * np.abs(near.inertia).max())
+    error = np.abs(far.center_of_mass - (near.center_of_mass + shift * scale))
+    assert np.all(
+        error <= 1e-13 * np.linalg.norm(np.ptp(vertices * scale, axis=0)) + 2 * np.spacing(np.abs(shift * scale))
+    )
+
+
 def test_ballast_is_point_masses_added_by_the_parallel_axis_theorem(lopsided):
     moments = MeshMoments(*lopsided)
     scale = np.array([2.0, -1.0, 0.5])
