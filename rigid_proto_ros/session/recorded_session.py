@@ -266,7 +266,9 @@ def play(
     else:
         again = resimulation(session, observer)
         again.announce()
-        again.begin_ghost()
+        # What a ghost did before a recording that was begun later isn't known.
+        if not len(session.times) or session.times.min() == 0:
+            again.begin_ghost()
     for count, k in enumerate(np.argsort(session.times, kind="stable").tolist()):
         progress(count, len(session.times))
         time_ns, row = int(session.times[k]), session.rows[k]

@@ -24,6 +24,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rigid_proto_ros.base.bundled import example_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.rerun_view.session_files import read_runs
@@ -33,6 +34,7 @@ from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
 from rigid_proto_ros.session.messages import twist_row
+from rigid_proto_ros.session.recorded_session import RecordedSession, play
 from rigid_proto_ros.simulation.observer import Logged, Observer, Observers, Published
 
 SECOND = 10**9
@@ -315,6 +317,16 @@ def test_a_converted_session_keeps_the_names_of_its_frames(tmp_path):
         topics = decoded(converted)
         assert {m.header.frame_id for _, m in topics["/rigid_body/pose"]} == {"map"}
         assert {m.header.frame_id for _, m in topics["/rigid_body/inertia"]} == {"hull/mesh"}
+
+
+def test_no_ghost_is_made_up_for_a_recording_that_was_begun_later():
+    scenario, flown = read_scene("true_or_box_tensor"), FlightRecord()
+    OfflineRun(scenario, observer=flown).advance(10**8)
+    for first in (0, 5):
+        session = RecordedSession(scene=scenario.text, times=flown.times_ns[first:], rows=flown.rows[first:])
+        play(session, told := FlightRecord())
+        assert np.array_equal(told.rows, flown.rows[first:])
+        assert list(told.ghosts) == ([] if first else list(flown.ghosts))
 
 
 def test_a_recording_without_states_has_nothing_to_verify(tmp_path, capsys):
