@@ -29,6 +29,9 @@ from ..simulation.observer import BodyChanged, Observer, Published
 from ..simulation.setup import Setup
 from .messages import PROJECTIONS
 
+SAME = 1e-6
+"""[m, and of a quaternion's parts] How near a computed state must be to a recorded one to be the same."""
+
 
 @dataclass(frozen=True)
 class StampedRows:
@@ -245,6 +248,20 @@ def resimulation(session: RecordedSession, observer: Observer | None = None) -> 
     return Resimulation(scenario, session.lines, observer, mesh_finder(session), session.node_name)
 
 
+def _begins_at_start(session: RecordedSession) -> bool:
+    """Whether the flight computed from the start comes to the first recorded state. Of a recording that was begun later
+    it isn't known what a ghost did before.
+    """
+    if not len(session.times) or session.times.min() == 0:
+        return True
+    first = int(session.times.argmin())
+    try:
+        computed = resimulation(session).advance(int(session.times[first]))
+    except InputError:
+        return False
+    return bool(np.abs(computed[:7] - session.rows[first, :7]).max() < SAME)
+
+
 def play(
     session: RecordedSession,
     observer: Observer,
@@ -266,8 +283,7 @@ def play(
     else:
         again = resimulation(session, observer)
         again.announce()
-        # What a ghost did before a recording that was begun later isn't known.
-        if not len(session.times) or session.times.min() == 0:
+        if _begins_at_start(session):
             again.begin_ghost()
     for count, k in enumerate(np.argsort(session.times, kind="stable").tolist()):
         progress(count, len(session.times))
