@@ -283,7 +283,7 @@ def play(
     else:
         again = resimulation(session, observer)
         again.announce()
-        if _begins_at_start(session):
+        if again.scenario.ghost is not None and _begins_at_start(session):
             again.begin_ghost()
     for count, k in enumerate(np.argsort(session.times, kind="stable").tolist()):
         progress(count, len(session.times))
