@@ -95,7 +95,7 @@ class Picture:
     def restart(self) -> None:
         """A new run: simulated time starts again at 0; mesh, body and scales stay."""
         self.redraw()
-        self._momentum_at_start: np.ndarray | None = None
+        self._first_momentum = np.zeros(3)
         self._poinsot = Poinsot()
         self.loads = Loads()
         self.string = Strings()
@@ -266,14 +266,14 @@ class Picture:
         string_energy (n,) [J] is None as long as the run has had no string.
         """
         assert self.setup is not None and self.shape is not None
-        if self._momentum_at_start is None:
-            self._momentum_at_start = L[0].copy()
+        if not self._first_momentum.any():
+            self._first_momentum = L[np.argmax(L.any(axis=1))].copy()
         own, backend = energies(rows, self.setup), self.backend
         total = own.sum(axis=1) if string_energy is None else own.sum(axis=1) + string_energy
         shown = [own, total] if string_energy is None else [own, total, string_energy]
         backend.scalars(style.ENERGY, np.column_stack(shown))
         backend.scalars(style.ANGULAR_MOMENTUM, np.column_stack([L, np.linalg.norm(L, axis=1)]))
-        angle = np.degrees(angle_to(self._momentum_at_start, L))
+        angle = np.degrees(angle_to(self._first_momentum, L))
         backend.scalars(style.ANGULAR_MOMENTUM_ANGLE, angle[:, np.newaxis])
         backend.scalars(style.ANGULAR_VELOCITY_PRINCIPAL, rows[:, 10:13] @ self.shape.axes)
         if np.any(self.setup.gravity) or rows[:, 7:10].any():

@@ -250,6 +250,16 @@ def test_without_a_string_the_energies_are_three_and_their_total():
     assert style.STRING_LINE_DISTANCE not in drawn.parts
 
 
+def test_the_momentum_of_a_body_that_was_at_rest_drifts_from_where_it_first_points():
+    picture, drawn = pictured(WEIGHTLESS)
+    states = np.tile([0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], (30, 1))
+    states[15:, 10], states[25:, 10:12] = 1.0, [0.0, 2.0]
+    for first in (0, 10, 20):
+        picture.draw(times(10, first), states[first : first + 10])
+    angles = np.ravel(list(drawn.rows(style.ANGULAR_MOMENTUM_ANGLE).values()))
+    assert np.allclose(angles, 25 * [0.0] + 5 * [90.0])
+
+
 def test_the_drawn_ellipsoid_touches_the_drawn_plane_where_the_spin_ends():
     rows = flight.rows(60)
     rows[-10:, 10:13] = 0.0
