@@ -371,7 +371,7 @@ class LiveSimulation:
 
         def give_up() -> Observer | None:
             recorder = self._switch_recording(None)
-            self.loop.setup_of(Change({"record": ""}))
+            self.loop.stop_recording()
             return recorder
 
         recorder = self.call(give_up)

@@ -162,6 +162,16 @@ class SimulationLoop(ScenarioRun):
                 self.endpoints.parameters_changed()
         return acting.setup
 
+    def stop_recording(self) -> None:
+        """``record`` is empty from now on, which is no event and doesn't touch the motion; behind changes that wait, of
+        which one may have begun the recording, it is one of them.
+        """
+        change = Change({"record": ""})
+        if self._waiting:
+            self.expect(after_change(self.scenario, change), change)
+        else:
+            self.setup_of(change)
+
     def watch(self, observer: Observer) -> None:
         """Tell another observer from now on."""
         self.observer = observer

@@ -243,6 +243,26 @@ def test_a_recording_begins_and_ends_in_flight(live, tmp_path):
     assert (np.asarray(run.times) // PERIOD_NS).tolist() == [3, 4, 5]
 
 
+def test_a_recording_that_is_lost_while_time_stands_can_be_begun_again(live, tmp_path):
+    from rigid_proto_ros.rerun_view.session_files import read_runs
+
+    path = tmp_path / "flight.mcap"
+    live.set_parameters({"record": str(path)})
+    path.unlink()
+    deadline = time.monotonic() + 60.0
+    while live.scenario.parameters.record:
+        assert time.monotonic() < deadline, "nobody has noticed"
+        time.sleep(0.05)
+        live.give_up_failed_recording()
+    live.step()
+    assert live.scenario.parameters.record == ""
+    live.set_parameters({"record": str(path)})
+    live.step(2)
+    live.set_parameters({"record": ""})
+    (run,) = read_runs(path)
+    assert (np.asarray(run.times) // PERIOD_NS).tolist() == [2, 3]
+
+
 def test_the_file_that_is_being_recorded_is_refused_for_a_second_recording_by_any_name(live, tmp_path):
     from rigid_proto_ros.rerun_view.session_files import read_runs
 
