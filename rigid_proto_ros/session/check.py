@@ -79,6 +79,8 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         if difference is not None:
             return difference
         compared = len(computed.lines)
+        if again.simulation.failure and again.simulation.time_ns != time_ns:
+            return Difference(time_ns, again.simulation.failure)
         if what := _row_difference(count + 1, name, row, state):
             if count == 0 and not recorded and first_ns > 0:
                 raise began_later
@@ -133,8 +135,6 @@ def _advance(
     if refused is not None:
         what = f"command {len(computed) + 1} was applied in the recording, but is refused here: {refused}"
         return Difference(again.simulation.time_ns, what), row
-    if again.simulation.failure and again.simulation.time_ns != time_ns:
-        return Difference(time_ns, again.simulation.failure), row
     return None, row
 
 

@@ -286,6 +286,23 @@ def test_a_step_of_a_motion_that_has_failed_is_refused_with_the_reason(live):
     assert live.step() == PERIOD_NS
 
 
+def test_a_recording_of_a_motion_that_failed_is_verified_with_what_was_asked_for_afterwards(live, tmp_path):
+    from rigid_proto_ros.rerun_view.session_files import read_runs
+    from rigid_proto_ros.session.check import verify
+
+    path = tmp_path / "flight.mcap"
+    live.set_parameters({"record": str(path), "integrator": "euler", "publish_rate": 10.0})
+    live.schedule("{t: 0.15, state: {angular_velocity: [1e4, 2e4, 3e4]}}")
+    with pytest.raises(InputError, match="until a reset"):
+        live.step(3)
+    live.pause(False)
+    live.stop()
+    (run,) = read_runs(path)
+    assert json.loads(run.lines[-1])["kind"] == "pause"
+    assert run.events[-1][0] > run.end_ns
+    assert verify(run) is None
+
+
 @needs_rerun
 @pytest.mark.parametrize("ending", ["rrd", "mcap"])
 def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_verified(live, tmp_path, ending):
