@@ -145,6 +145,7 @@ class Page:
         self._ghost_row: np.ndarray | None = None
         self._drawn_moment_ns: int | None = None
         self._new_scene = True
+        self._dragged = False
         self._mesh_sha256 = ""
         self._resets_heard = 0
         self._undrawn = True
@@ -319,7 +320,10 @@ class Page:
             case StringChanged():
                 self._strings.append(event)
                 self.picture.on(event)
-                if event.string is not None and self.pointer.dragging:
+                if event.string is not None:
+                    self._dragged |= self.pointer.dragging
+                elif self._dragged:
+                    self._dragged = False
                     self.lessons.did("drag")
             case Refused(message=message):
                 self.flight.say(f"Refused: {message}")
@@ -382,6 +386,7 @@ class Page:
         self.picture.restart()
         self.backend.forget()
         self._loads.clear()
+        self._dragged = False
 
     # Drawing
 

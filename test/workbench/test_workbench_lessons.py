@@ -214,6 +214,26 @@ def test_time_that_jumps_was_not_watched_and_another_lesson_begins_without_marks
     assert progress.done == 0
 
 
+def test_a_drag_is_done_when_the_body_is_released_and_not_by_a_reset(user: User) -> None:
+    user.set("Lesson", FREE)
+    user.pick(lesson("t_handle").title)
+    user.fly(4.1)
+    user.push(0.0, 0.0, 0.068)
+    user.fly(2.1)
+    text = user.page.lessons._text
+    assert text.content.count("✓") == 2
+    for end in (user.reset, user.let_go):
+        place = user.grab((0.0, 0.045, 0.0))
+        for _ in range(2):
+            user.pull(place + [0.0, 0.1, 0.0])
+            user.fly(0.8)
+        assert user.page.pointer.dragging
+        assert text.content.count("✓") == 2
+        end()
+        user.fly(1.1)
+        assert text.content.count("✓") == (3 if end == user.let_go else 2)
+
+
 def test_factors_are_those_of_the_body_that_a_lesson_begins_with(user: User) -> None:
     for name in ("hammer", "com_or_rim", "book", "weigh_by_throwing"):
         user.set("Lesson", FREE)
