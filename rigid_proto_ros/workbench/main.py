@@ -60,7 +60,8 @@ class Workbench:
 
 def address_of(server: viser.ViserServer) -> str:
     """Where a browser finds it."""
-    return f"http://{server.get_host()}:{server.get_port()}"
+    host = server.get_host()
+    return f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
 
 
 def serve(

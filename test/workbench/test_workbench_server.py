@@ -21,7 +21,7 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.ports import LOOPBACK
 from rigid_proto_ros.workbench.controls import Controls
-from rigid_proto_ros.workbench.main import TITLE, serve
+from rigid_proto_ros.workbench.main import TITLE, address_of, serve
 from rigid_proto_ros.workbench.server import make_server, refusal, stop_server
 
 
@@ -40,6 +40,13 @@ NOT_HERE = "203.0.113.7"
 def test_a_host_that_nothing_can_listen_on_is_refused_by_name(host: str) -> None:
     with pytest.raises(InputError, match="--host: got"):
         make_server(TITLE, host, None, any_free_port())
+
+
+@pytest.mark.parametrize(
+    "host, address", [(LOOPBACK, "http://127.0.0.1:8080"), ("::1", "http://[::1]:8080"), ("here", "http://here:8080")]
+)
+def test_the_address_that_is_told_is_one_that_a_browser_takes(host: str, address: str) -> None:
+    assert address_of(SimpleNamespace(get_host=lambda: host, get_port=lambda: 8080)) == address
 
 
 def test_a_port_asked_for_and_taken_is_refused_and_a_default_one_moves_on(server) -> None:
