@@ -85,6 +85,7 @@ class RerunObserver(Observer):
         self.error = ""
         self._name, self._on_error = name, on_error or _logger.error
         self._run, self._last_time_ns = 1, 0
+        self._begin_ns: int | None = None
         self._stream: Stream | None = self._open(uuid.uuid4().hex, name)
         self._backend = RerunBackend()
         self._picture = Picture(self._backend)
@@ -184,7 +185,7 @@ class RerunObserver(Observer):
         self._run += self._last_time_ns > 0
         name = self._name if self._run == 1 else f"{self._name}, run {self._run}"
         self._stream = self._backend.stream = self._open_next(stream, uuid.uuid4().hex, name)
-        self._last_time_ns = 0
+        self._last_time_ns, self._begin_ns = 0, None
         self._rows, self._lines, self._commanded = {}, {}, False
         self._picture.restart()
         self._backend.restart()
@@ -307,6 +308,7 @@ class RerunObserver(Observer):
                 continue
             times, walls, rows = (np.array(column) for column in zip(*chosen, strict=True))
             self._rows[kind] = rows[-1].copy()
+            self._begin_ns = int(times[0]) if self._begin_ns is None else self._begin_ns
             self._backend.begin(times, walls)
             if kind is GhostPublished:
                 self._picture.draw_ghost(times, rows)
@@ -347,7 +349,8 @@ class FileRecorder(RerunObserver):
     def _end(self, stream: Stream) -> None:
         """Finish the file, with the layout for what it holds."""
         assert isinstance(stream, FileStream)
-        self._arrange(stream, Finished(1e-9 * self._last_time_ns, self._backend.plotted, self._commanded))
+        duration_s = 1e-9 * (self._last_time_ns - (self._begin_ns or 0))
+        self._arrange(stream, Finished(duration_s, self._backend.plotted, self._commanded))
         stream.close()
         self._mailbox.moved()
         self._stream = None

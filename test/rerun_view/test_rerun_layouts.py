@@ -10,13 +10,16 @@ import pytest
 
 pytest.importorskip("rerun", reason="rerun-sdk is not installed: no recordings")
 
+import rerun_flight as flight
 from rerun.chunk import RrdReader
 from rerun_flight import cells
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.picture import style
+from rigid_proto_ros.rerun_view import observer
 from rigid_proto_ros.rerun_view.layout import TITLES, Finished, Subject, blueprint, value_axis
 from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.simulation.observer import BodyChanged, Published, Started
 
 FINISHED = Finished(10.0, dict.fromkeys(TITLES, (0.0, 1.0)), True)
 """A run in which everything has been plotted."""
@@ -101,6 +104,18 @@ def test_a_finished_recording_says_how_far_its_plots_reach(tmp_path) -> None:
 
 
 ENDS = [(0.0, 5.5), (-6.0, 6.0), (-0.2, 0.9), (0.2, 0.8), (0.98, 1.03), (-3.0, 50.64), (0.0, 7.2e-3), (-12.0, 12.0)]
+
+
+def test_the_plots_of_a_recording_that_was_begun_in_flight_are_as_long_as_it(tmp_path, monkeypatch) -> None:
+    made = []
+    monkeypatch.setattr(observer, "blueprint", lambda _, finished: made.append(finished) or blueprint(Subject()))
+    recorder = observer.FileRecorder(str(tmp_path / "late.rrd"))
+    recorder.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
+    recorder.on(BodyChanged(1_000_000_000_000, flight.SETUP))
+    for k, row in enumerate(flight.rows(201)):
+        recorder.on(Published(1_000_000_000_000 + 10_000_000 * k, row))
+    recorder.close()
+    assert made[-1].duration_s == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(
