@@ -45,7 +45,9 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
     start_ns = int(record.times_ns[0])
 
     def codes(times_ns: np.ndarray) -> list[float]:
-        return (np.maximum(times_ns - start_ns, 0) * 1e-9 * fps).tolist()
+        # A frame's time is rounded to the ns: just behind its whole code, what is held would be seen a frame late.
+        exact = np.maximum(times_ns - start_ns, 0) * 1e-9 * fps
+        return np.where(np.abs(exact - np.rint(exact)) <= 0.6e-9 * fps, np.rint(exact), exact).tolist()
 
     stage.SetStartTimeCode(0.0)
     stage.SetEndTimeCode(codes(record.times_ns)[-1])

@@ -216,6 +216,17 @@ def test_the_motion_ends_with_the_simulation_and_not_with_its_last_published_sta
     assert np.allclose(turns[-1], run.simulation.state.orientation_xyzw, atol=1e-7)
 
 
+def test_frames_have_whole_time_codes_and_show_what_is_there_from_them_on(tmp_path):
+    file, script = tmp_path / "tied.usda", tmp_path / "tie.yaml"
+    # Frame 2 is at 66666667 ns, rounded up.
+    script.write_text("- {t: 0.05, string: {target: [0.0, 0.0, 0.3]}}")
+    assert main(["simulate", "hammer", "--script", str(script), "--duration", "0.2", "--usd", str(file)]) == 0
+    stage = Stage(file)
+    codes = stage.prim("body").GetAttribute("xformOp:translate").GetTimeSamples()
+    assert codes == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert stage.string(1.0 / 30.0) is None and stage.string(2.0 / 30.0) is not None
+
+
 def test_a_body_without_a_mesh_that_does_not_move_is_a_node_with_one_key(tmp_path):
     file = tmp_path / "none.glb"
     explicit = ["--set", "mesh=", "--set", "inertia_model=explicit", "--set", "explicit_inertia.mass=1.0"]
