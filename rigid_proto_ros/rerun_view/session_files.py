@@ -157,7 +157,7 @@ def record(
         for number, session in enumerate(runs):
             if number:
                 recorder.on(Reset())
-            play(session, recorder, given, partial(_after, told, total, progress))
+            play(session, recorder, given, partial(_after, told, total, progress), all_events=True)
             told += len(session.times)
     if recorder.error:
         raise InputError("--record", str(path), f"a file that can be written ({recorder.error})")

@@ -63,8 +63,7 @@ def script_of_session(session: RecordedSession) -> SceneAndScript:
     writer = _Writer()
     again = writer.again = resimulation(session, writer)
     scenario = writer.last = again.scenario
-    if session.events:
-        again.advance(max(time_ns for time_ns, _ in session.events) + 1)
+    again.advance(again.end_ns)
     if writer.lines != session.lines:
         raise InputError("events", f"{len(session.lines)} lines", "all lines of the log since the start or a reset")
     # What differs from the defaults, without what belongs to the running node.

@@ -89,7 +89,7 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
             return Difference(time_ns, what, f"command {before}: {recorded[before - 1]}" if before else "")
         if count % 1000 == 0:
             progress(count / len(states))
-    end_ns = max([again.simulation.time_ns, *(acted_ns + 1 for acted_ns in times_ns)])
+    end_ns = max(again.simulation.time_ns, again.end_ns)
     difference, _ = _advance(again, end_ns, computed.lines, recorded, compared)
     missing = len(computed.lines)
     if difference is None and missing < len(recorded):

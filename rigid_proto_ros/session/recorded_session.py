@@ -10,6 +10,7 @@ import json
 import tempfile
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from operator import itemgetter
 from pathlib import Path
@@ -177,7 +178,7 @@ class Resimulation(ScenarioRun):
     """A session's simulation; its commands are submitted when their time has come, as they were then. Raises InputError
     for events that can't be decoded.
 
-    mesh_of(name) gives the mesh that a change names, or None to load it.
+    mesh_of(name) gives the mesh that a change names, or None to load it. end_ns: when all events have acted.
     """
 
     def __init__(
@@ -194,12 +195,14 @@ class Resimulation(ScenarioRun):
         self.frames = frame_names(scenario.parameters, node_name)
         self._mesh_of = mesh_of
         self._changes_ns = -1
+        self.end_ns = 0
         waiting: list[tuple[int, str, dict, Command | None, int]] = []
         for number, line in enumerate(event_lines, 1):
             time_ns, kind, content = decode_event(line, number)
             if kind == "timeout":
                 # It comes by itself, where it belongs: one that a change brings about comes behind that.
                 self.simulation.logs_timeouts = True
+                self.end_ns = max(self.end_ns, time_ns + 1)
                 continue
             try:
                 if kind == "set":
@@ -207,6 +210,8 @@ class Resimulation(ScenarioRun):
                 command = of_event(kind, content, self.frames)
             except InputError as error:
                 raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
+            # A mark is made before what acts at its time, which the recording may not have come to.
+            self.end_ns = max(self.end_ns, time_ns + (command is not None))
             waiting.append((time_ns, kind, content, command, number))
         # Stable: what happened at one instant keeps its order.
         self._waiting = deque(sorted(waiting, key=itemgetter(0)))
@@ -267,9 +272,10 @@ def play(
     observer: Observer,
     given: Scenario | None = None,
     progress: Callable[[float, float], None] = lambda _done, _total: None,
+    all_events: bool = False,
 ) -> None:
-    """Tell ``observer`` the session from its start to its last state; ``progress`` is called with (states told, all
-    states).
+    """Tell ``observer`` the session from its start to its last state, or with ``all_events`` to its last event;
+    ``progress`` is called with (states told, all states).
 
     given: the scene of a session that lacks it; then states alone are told. Raises InputError for events that can't be
     decoded, and for a session without a scene.
@@ -302,3 +308,6 @@ def play(
             for name in session.published
         )
         again.publish(time_ns, computed if alike else row)
+    if again is not None and all_events:
+        with suppress(InputError):
+            again.advance(max(again.end_ns, again.simulation.time_ns))

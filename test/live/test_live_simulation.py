@@ -263,6 +263,32 @@ def test_a_recording_that_is_lost_while_time_stands_can_be_begun_again(live, tmp
     assert (np.asarray(run.times) // PERIOD_NS).tolist() == [2, 3]
 
 
+@needs_rerun
+@pytest.mark.parametrize("ending", ["rrd", "mcap"])
+def test_what_was_done_behind_the_last_state_is_in_a_converted_session_too(live, tmp_path, ending):
+    from rigid_proto_ros.rerun_view.session_files import read_runs, record
+    from rigid_proto_ros.session.as_script import script_of_session
+    from rigid_proto_ros.session.check import verify
+
+    path, converted = tmp_path / f"flight.{ending}", tmp_path / f"converted.{ending}"
+    live.set_parameters({"record": str(path), "wrench_timeout": 0.05})
+    live.schedule("{t: 0, wrench: {force: [1, 0, 0]}}")
+    live.step(4)
+    live.schedule("{t: 0, set: {mass: 2.0}}")
+    live.schedule("{t: 0, impulse: [1, 0, 0]}")
+    # Time comes to where the wrench times out, and no further.
+    live.call(lambda: live.loop.simulation.advance(5 * PERIOD_NS))
+    live.call(lambda: live.loop.simulation.log("pause", {"data": True}))
+    live.stop()
+    (run,) = read_runs(path)
+    assert [json.loads(line)["kind"] for line in run.lines[-3:]] == ["set", "poke", "pause"]
+    record([run], converted)
+    (again,) = read_runs(converted)
+    assert again.lines == run.lines
+    assert verify(run) is None and verify(again) is None
+    assert len(script_of_session(run).entries) == 4
+
+
 def test_the_file_that_is_being_recorded_is_refused_for_a_second_recording_by_any_name(live, tmp_path):
     from rigid_proto_ros.rerun_view.session_files import read_runs
 
