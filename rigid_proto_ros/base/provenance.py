@@ -16,7 +16,7 @@ from llvmlite import binding
 
 from .. import __version__
 
-MOTION = "2026-11-26c"
+MOTION = "2026-11-26d"
 """Since when the motion has had its present bits, with a letter from the second time on one day: versions with the same
 give the same ones, on any machine.
 """

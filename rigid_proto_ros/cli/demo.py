@@ -124,9 +124,10 @@ def write_demo(mesh: str) -> tuple[Path, Path]:
     body, surface = scenario.setup.body, scenario.setup.surface
     if surface is None:
         raise InputError("--mesh", mesh, "a mesh")
-    points = surface.vertices - body.center_of_mass
-    farthest = int(np.argmax((points * points).sum(axis=1)))
-    diagonal = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+    used = np.unique(surface.triangles)  # a vertex that no triangle uses is no part of the body
+    points = surface.vertices[used] - body.center_of_mass
+    farthest = int(used[np.argmax((points * points).sum(axis=1))])
+    diagonal = float(np.linalg.norm(surface.extent))
     spin = SPIN * (body.principal_axes[:, 1] + 0.02 * body.principal_axes[:, 0] + 0.02 * body.principal_axes[:, 2])
     push = body.mass * DRIFT * diagonal
     # A torque that would turn the body by its own spin in a second, about its stiffest axis.

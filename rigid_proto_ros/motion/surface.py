@@ -17,6 +17,7 @@ from ..base.arithmetic import inverse_tangent_of
 from ..base.compilation import njit
 from ..base.rotation import length, norm
 from ..base.vectors import Numbers
+from ..mass.moments import referenced_vertices
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Surface:
     @cached_property
     def extent(self) -> np.ndarray:
         """Sides of the bounding box (3,)."""
-        sides: np.ndarray = self.vertices.max(axis=0) - self.vertices.min(axis=0)
+        sides: np.ndarray = np.ptp(referenced_vertices(self.vertices, self.triangles), axis=0)
         return sides
 
     def ray_hit(self, origin: Numbers, direction: Numbers) -> tuple[np.ndarray, int] | None:

@@ -10,6 +10,7 @@ import pytest
 from flights import SECOND
 from mass_solids import box, inward
 
+from rigid_proto_ros.base.bundled import BODIES
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.scene.scenario import make_scenario
@@ -86,10 +87,13 @@ def test_contacts_move_with_a_mesh_that_is_scaled_in_flight() -> None:
     np.testing.assert_allclose(flown[1], 0.5 * flown[0], rtol=1e-9, atol=1e-9 * np.abs(flown[0]).max())
 
 
-def test_displacements_are_measured_by_half_the_diagonal_as_scaled_and_by_1_m_without_a_mesh() -> None:
-    hammer = load_mesh("hammer")
-    diagonal = np.linalg.norm(np.ptp(hammer.vertices, axis=0) * 2.0)
-    assert make_scenario({"mesh": "hammer", "scale": 2.0}).setup.length == pytest.approx(0.5 * diagonal, rel=1e-14)
+def test_displacements_are_measured_by_half_the_diagonal_as_scaled_and_by_1_m_without_a_mesh(tmp_path: Path) -> None:
+    diagonal = np.linalg.norm(np.ptp(load_mesh("hammer").vertices, axis=0) * 2.0)
+    # A vertex that no triangle uses is no part of the body.
+    stray = tmp_path / "stray.obj"
+    stray.write_text((BODIES / "hammer.obj").read_text() + "v 100 0 0\n")
+    for mesh in ("hammer", str(stray)):
+        assert make_scenario({"mesh": mesh, "scale": 2.0}).setup.length == pytest.approx(0.5 * diagonal, rel=1e-14)
     explicit = {"mesh": "", "inertia_model": "explicit"}
     assert make_scenario(explicit).setup.length == 1.0
 
