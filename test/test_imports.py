@@ -39,7 +39,7 @@ ALLOWED = {
     "numba": ("base", "mesh", "mass", "motion", "simulation", "sweep", "identify.trajectories"),
     "llvmlite": ("base.simd", "base.arithmetic", "base.provenance"),  # comes with numba
     "yaml": ("scene", "session", "sweep", "ros", "cli"),
-    "trimesh": ("robots.link_shapes",),
+    "trimesh": ("mesh.assembly", "robots.link_shapes"),
     "collada": ("mesh.assembly",),
     "mujoco": ("robots.mjcf",),
     "manifold3d": ("mesh.solids", "bodies.surfaces"),

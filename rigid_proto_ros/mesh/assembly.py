@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Scenes of placed parts as one surface, and COLLADA, read by pycollada without materials, lights and animation."""
+"""Scenes of placed parts as one surface, and formats read by a library: COLLADA by pycollada, without materials, lights
+and animation, and by trimesh formats that have no reader here.
+"""
 
 from __future__ import annotations
 
 import io
 import xml.etree.ElementTree as ElementTree
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +16,7 @@ from ..base.errors import MeshError, is_missing
 _LIBRARIES = ("images", "effects", "materials", "cameras", "lights", "animations", "animation_clips", "controllers")
 _UNUSED = (*(f"library_{kind}" for kind in _LIBRARIES), "bind_material", "instance_camera", "instance_light", "extra")
 """Elements without effect on triangles. pycollada drops a geometry whose material it can't read."""
+_ARCHIVES = ("zip", "bz2", "tar.bz2", "tar.gz", "zae")
 MAX_TRIANGLES = 20_000_000
 """A mesh with more triangles is refused: this many take about 1.5 GB."""
 
@@ -94,3 +98,29 @@ def add_collada(data: bytes, assembly: Assembly) -> float:
             if isinstance(primitive, collada.triangleset.TriangleSet) and primitive.vertex is not None:
                 assembly.add(primitive.vertex, primitive.vertex_index, bound.matrix, f"geometry {bound.original.id}")
     return unit
+
+
+def other_formats() -> tuple[str, ...]:
+    """File extensions that the installed trimesh reads, without archives."""
+    import trimesh
+
+    return tuple(sorted(set(trimesh.available_formats()) - set(_ARCHIVES)))
+
+
+def add_by_trimesh(data: bytes, suffix: str, assembly: Assembly) -> float:
+    """Add what trimesh reads from a file's bytes; returns the file's unit in metres, 1 if it states none.
+
+    Vertices stay as in the file, neither merged nor sorted. Raises MeshError for a file with anything but triangles,
+    which would otherwise be left out silently, and trimesh's errors.
+    """
+    import trimesh
+
+    load: Any = trimesh.load_scene
+    scene = load(io.BytesIO(data), file_type=suffix, process=False, maintain_order=True, skip_materials=True)
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        part = scene.geometry[name]
+        if not isinstance(part, trimesh.Trimesh):
+            raise MeshError(assembly.name, f"{name} is a {type(part).__name__}", "triangles alone")
+        assembly.add(np.asarray(part.vertices), np.asarray(part.faces), np.asarray(matrix), name)
+    return 1.0 if scene.units is None else float(trimesh.units.unit_conversion(scene.units, "meters"))

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.errors import InputError, MeshError
 from ..base.files import read_bounded
-from .assembly import MAX_TRIANGLES, Assembly, add_collada
+from .assembly import MAX_TRIANGLES, Assembly, add_by_trimesh, add_collada, other_formats
 from .gltf import add_gltf
 from .locate import NOWHERE_ELSE, Search, resolve_mesh
 from .obj import read_obj
@@ -24,7 +24,8 @@ from .threemf import add_threemf
 OWN_FORMATS = ("obj", "off", "ply", "stl")
 """Formats of one surface. trimesh 5.2 silently misreads some files of each (benchmarks/mesh_readers.py)."""
 FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae")
-"""Formats read according to their specifications; those beyond OWN_FORMATS are scenes of placed parts."""
+"""Formats read according to their specifications; those beyond OWN_FORMATS are scenes of placed parts. Other formats
+are read by trimesh."""
 MAX_BYTES = 400 * MAX_TRIANGLES
 """A larger file is refused without reading it; .obj text with normals takes about 150 bytes per triangle."""
 
@@ -83,8 +84,10 @@ def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[np.ndarray, np.nd
             add_gltf(data, beside, assembly)
         elif suffix == "3mf":
             unit = add_threemf(data, assembly, MAX_BYTES)
-        else:
+        elif suffix == "dae":
             unit = add_collada(data, assembly)
+        else:
+            unit = add_by_trimesh(data, suffix, assembly)
     except InputError as error:
         raise MeshError(error.field, error.received, error.accepted) from None
     except Exception as error:  # a damaged file may cause any error in a reader
@@ -99,8 +102,8 @@ def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[np.ndarray, np.nd
 def read_mesh(data: bytes, path: Path) -> Mesh:
     """The mesh in a file's bytes, read according to the file's extension; raises MeshError naming what is wrong."""
     suffix = path.suffix.lower().lstrip(".")
-    if suffix not in FORMATS:
-        raise MeshError("mesh", path.name, f"a file named .{', .'.join(FORMATS)}")
+    if suffix not in FORMATS and suffix not in other_formats():
+        raise MeshError("mesh", path.name, f"a file named .{', .'.join(FORMATS)}, or another format that trimesh reads")
     if not data.strip():
         raise MeshError(path.name, "the file is empty")
     sha256, starts, unit = hashlib.sha256(data).hexdigest(), None, 1.0

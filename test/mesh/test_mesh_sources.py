@@ -90,3 +90,31 @@ def test_a_binary_ply_with_several_lists_and_one_in_big_endian_are_read(tmp_path
         assert volume(load(tmp_path, "a.ply", header.encode() + rows)) == 1.0
         with pytest.raises(MeshError, match="truncated"):
             load(tmp_path, "cut.ply", (header.encode() + rows)[:-3])
+
+
+def xaml(matrix: str) -> bytes:
+    points = " ".join(f"{x},{y},{z}" for x, y, z in mf.CUBE_VERTICES)
+    corners = " ".join(str(i) for i in mf.CUBE_TRIANGLES.ravel())
+    return (
+        '<ModelVisual3D xmlns="http://schemas.microsoft.com/winfx/2006/xaml/presentation"><ModelVisual3D.Transform>'
+        f'<MatrixTransform3D Matrix="{matrix}"/></ModelVisual3D.Transform><ModelVisual3D.Content><GeometryModel3D>'
+        f'<GeometryModel3D.Geometry><MeshGeometry3D Positions="{points}" Normals="{points}" TriangleIndices="{corners}"/>'
+        "</GeometryModel3D.Geometry></GeometryModel3D></ModelVisual3D.Content></ModelVisual3D>"
+    ).encode()
+
+
+def test_a_format_without_a_reader_here_is_read_by_trimesh(tmp_path):
+    pytest.importorskip("lxml")
+    path = tmp_path / "a.xaml"
+    path.write_bytes(xaml("2 0 0 0 0 2 0 0 0 0 2 0 5 6 7 1"))
+    mesh = load_mesh(str(path))
+    assert mesh.vertices.tolist() == (2.0 * mf.CUBE_VERTICES + [5.0, 6.0, 7.0]).tolist()
+    assert volume(load_mesh(str(path))) == 8.0
+    path.write_bytes(b"<a/>")
+    with pytest.raises(MeshError, match=r"a\.xaml"):
+        load_mesh(str(path))
+
+    path = tmp_path / "points.xyz"
+    path.write_text("0 0 0\n1 0 0\n0 1 0\n0 0 1\n")
+    with pytest.raises(MeshError, match="PointCloud"):
+        load_mesh(str(path))
