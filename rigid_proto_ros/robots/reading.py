@@ -220,7 +220,7 @@ def robot_of(root: Element, path: Path) -> Robot:
     if root.tag == "robot":
         return Robot([_urdf_link(link) for link in root.findall("link")], lambda: _urdf_poses(root))
     if root.tag == "sdf":
-        return Robot([_sdf_link(link) for link in root.iter("link")], lambda: _sdf_poses(root))
+        return Robot(_sdf_links(root), lambda: _sdf_poses(root))
     if root.tag == "mujoco":
         from .mjcf import read_mjcf
 
@@ -338,6 +338,14 @@ def _sdf_pose(element: Element, owner: str) -> Pose:
     if _is_true(words.get("degrees", "")):
         values[3:] = np.radians(values[3:])
     return Pose(rotation_from_rpy(*values[3:]), values[:3])
+
+
+def _sdf_links(root: Element) -> list[Link]:
+    """All links; of several models, which may have links of the same name, as ``model::link``."""
+    models = list(root.iter("model"))
+    owner = {link: model.get("name", "?") for model in models for link in model.findall("link") if len(models) > 1}
+    links = [(element, _sdf_link(element)) for element in root.iter("link")]
+    return [replace(link, name=f"{owner[at]}::{link.name}") if at in owner else link for at, link in links]
 
 
 def _sdf_link(link: Element) -> Link:

@@ -10,6 +10,7 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.robots.composite_inertia import lump_robot
 from rigid_proto_ros.robots.diagnosis import compare_robot
+from rigid_proto_ros.robots.reading import read_robot
 
 SIX_KG = '<inertial pos="0.1 0 0" mass="6" diaginertia="0.2 0.3 0.4" euler="0 0 30"/>'
 CHILD = f"""<mujoco model="child"><compiler angle="radian"/><default><geom type="capsule" size="0.1 0.2"/></default>
@@ -117,6 +118,15 @@ def sdf(folder, links: str):
 BOX = (
     '<collision name="{0}"><pose>{1} 0 0 0 0 0</pose>{2}<geometry><box><size>1 1 1</size></box></geometry></collision>'
 )
+
+
+def test_links_of_several_models_have_the_names_of_their_models_before_theirs(tmp_path):
+    inertial = "<inertial><mass>1</mass></inertial>"
+    models = [f'<model name="{name}"><link name="link">{inertial}</link></model>' for name in ("cup", "table")]
+    path = tmp_path / "world.sdf"
+    path.write_text(f'<sdf version="1.9"><world name="w">{"".join(models)}</world></sdf>')
+    assert [link.name for link in read_robot(path).links] == ["cup::link", "table::link"]
+    assert [link.name for link in read_robot(sdf(tmp_path, f'<link name="link">{inertial}</link>')).links] == ["link"]
 
 
 def test_prefixes_that_an_sdf_does_not_declare_are_names_and_blank_lines_before_it_are_no_fault(tmp_path):
