@@ -116,7 +116,7 @@ class MeshMoments:
                 self._moments[key] = MODELS[model](vertices, triangles, self.polygon_starts)
                 return self._moments[key]
             # About a vertex: far from the origin the products would round.
-            base = vertices[triangles[:1, 0]].sum(axis=0)
+            base = vertices[triangles[0, 0]] if len(triangles) else np.zeros(3)
             numbers = MODELS[model]((vertices - base) * stretch, triangles, self.polygon_starts).numbers.copy()
             for k in range(3):
                 exact = Fraction(numbers[1 + k]) + Fraction(base[k]) * Fraction(stretch[k])
