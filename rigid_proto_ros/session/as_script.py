@@ -208,8 +208,9 @@ def _string_entries(simulation: Simulation) -> Iterator[Entry]:
     if tied is None:
         return
     if tied.end_ns > now_ns:
-        # A target is reached over the time since the one before it, here since time 0: so when it would have been.
-        yield {"t": (tied.end_ns - now_ns) // 2 / 1e9, "string": {"target": tied.target.tolist()}}
+        # A target is reached over the time since the one before it, here since time 0: so when it would have been. As a
+        # parameter, since a target's message would begin a timeout.
+        yield {"t": (tied.end_ns - now_ns) // 2 / 1e9, "set": {"string.target": tied.target.tolist()}}
     if tied.release_ns is not None:
         yield {"t": (tied.release_ns - now_ns) / 1e9, "string": "release"}
 

@@ -75,8 +75,9 @@ class StringControl:
             return
         tied = replace(self.tied, attach=self.attach)
         if after.target != before.target:
-            tied = tied.moved(after.target, state.time_ns, 0)
-        if after.timeout_ns != before.timeout_ns and tied.release_ns is not None:
+            # One that parameters tie has no timeout.
+            tied = tied.moved(after.target, state.time_ns, 0 if after.attached else after.timeout_ns)
+        if after.timeout_ns != before.timeout_ns and not (after.attached and tied.release_ns is None):
             release_ns = max(tied.last_target_ns + after.timeout_ns, state.time_ns)
             tied = replace(tied, release_ns=release_ns if after.timeout_ns else None)
         # Each change of parameters makes a new body, mostly with the same numbers.

@@ -185,6 +185,15 @@ def test_what_acts_ends_in_a_branch_when_it_would_have_ended():
     assert not branch.acting
 
 
+def test_a_string_tied_by_parameters_stays_tied_in_a_branch_that_begins_while_its_end_moves():
+    tied = {"string.attached": True, "string.target": [0.0, 0.0, 0.1], "string.timeout": 0.4}
+    session = flown(tied, 2 * SECOND, "- {t: 1.0, set: {string.target: [0.0, 0.0, 0.3]}}\n")
+    branch = branched(session, 1_050_000_000).simulation
+    branch.advance(SECOND)
+    assert branch.string is not None
+    assert branch.string.release_ns is None and branch.string.target.tolist() == [0.0, 0.0, 0.3]
+
+
 @pytest.mark.parametrize("option", ["--as-scene", "--record"])
 def test_a_place_that_cannot_be_written_is_named_with_its_option_before_the_work(session, option, capsys):
     place = "/proc/x.yaml" if option == "--as-scene" else "/proc/x.mcap"

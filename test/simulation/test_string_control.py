@@ -105,6 +105,39 @@ def test_timeout_zero_never_lets_go_an_attached_string_needs_no_target_and_clear
     assert simulation.string is not None
 
 
+@pytest.mark.parametrize(
+    ("attached", "timeout_s", "change", "release_ms"),
+    [
+        (False, 0.0, {"string.timeout": 2.0}, 2000),
+        (False, 0.0, {"string.timeout": 0.5}, 1000),
+        (False, 1.5, {"string.timeout": 2.0}, 2000),
+        (False, 1.5, {"string.timeout": 0.0}, None),
+        (False, 1.5, {"string.target": [0.0, 0.1, 1.0]}, 2500),
+        (False, 1.5, {"string.target": [0.0, 0.1, 1.0], "string.timeout": 0.5}, 1500),
+        (False, 0.0, {"string.target": [0.0, 0.1, 1.0]}, None),
+        (True, 1.5, {"string.target": [0.0, 0.1, 1.0]}, None),
+        (True, 1.5, {"string.timeout": 0.5}, None),
+    ],
+)
+def test_a_string_tied_by_hand_keeps_a_timeout_when_parameters_change_and_one_tied_by_them_has_none(
+    attached, timeout_s, change, release_ms
+):
+    """Its last target comes at 0, the change at 1 s."""
+    simulation, scenario = simulated(string__timeout=timeout_s, string__attached=attached)
+    if not attached:
+        simulation.submit(MoveString((0.0, 0.0, 1.0)), 0)
+    simulation.submit(Change({}, lambda: scenario.with_changes(change).setup), SECOND)
+    for time_ms in (1000, 1500, 2000, 2500, 5000):
+        simulation.advance(time_ms * MS)
+        assert simulation.string is not None
+        simulation.advance(time_ms * MS + 1)
+        if time_ms == release_ms:
+            assert simulation.string is None
+            return
+        assert simulation.string is not None
+    assert release_ms is None
+
+
 def test_a_string_that_a_reset_ties_again_counts_for_the_integrator_though_it_was_let_go():
     simulation, scenario = simulated(string__attached=True, string__target=[0.0, 0.0, 1.0])
     simulation.submit(ReleaseString(), 100 * MS)
