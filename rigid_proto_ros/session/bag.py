@@ -185,7 +185,6 @@ def session_runs(path: Path, node: str = "") -> list[RecordedSession]:
     whole = RecordedSession(
         complete=content.complete,
         node_name=prefix.strip("/"),
-        scenes=[text for _, text in scenes],
         missing=tuple(missing),
         attachments=content.attachments,
         made_with=content.metadata.get(MADE_WITH, {}),
@@ -201,7 +200,8 @@ def session_runs(path: Path, node: str = "") -> list[RecordedSession]:
         before = [text for log, text in scenes if begin is not None and log < begin]
         at_reset = [text for log, text in scenes if log == begin]
         in_force = [*at_reset[:1], *before[-1:], *(text for _, text in scenes[:1])]
-        run = replace(whole, scene=in_force[0] if in_force else "")
+        later = [text for log, text in scenes if begin is None or log >= begin]
+        run = replace(whole, scene=in_force[0] if in_force else "", scenes=later)
         run.mesh_sha256 = mesh_sha256_of(run.scene)
         run.accuracy_floor = content.metadata.get(FLOOR.format(k), {}).get("floor", "")
         run.events = [

@@ -56,10 +56,10 @@ class RecordedSession:
     complete: the file was finished properly.
 
     A bag holds no state rows but what the node published of them: ``published``, by topic; ``rows`` are then found from
-    those, for the eye. scenes: every text of the scene topic, in order. node_name: what stands before the topics'
-    names. missing: topics that a check would need. attachments: (name, bytes) of files inside; made_with: the
-    processor, and versions by package; accuracy_floor: why the motion is held to less than its accuracy, as an .mcap of
-    ours says it; folder: where the session lies.
+    those, for the eye. scenes: the texts of the scene topic from the run's start on, in order. node_name: what stands
+    before the topics' names. missing: topics that a check would need. attachments: (name, bytes) of files inside;
+    made_with: the processor, and versions by package; accuracy_floor: why the motion is held to less than its accuracy,
+    as an .mcap of ours says it; folder: where the session lies.
     """
 
     scene: str = ""
@@ -162,14 +162,29 @@ def session_scenario(session: RecordedSession) -> Scenario:
 
 
 def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
-    """By name, the meshes that later scenes of the session say were flown; None for those that none speaks of."""
-    hashes: dict[str, str] = {}
-    for scene in session.scenes:
-        if mesh_sha256_of(scene):
-            hashes[str(read_scene_text(scene, "a recorded scene").values.get("mesh", ""))] = mesh_sha256_of(scene)
+    """Called for each change of the mesh, one after another: the mesh of this name that was flown then, as the session's
+    scenes say, since a file may change while its name stays; None for a name that none speaks of.
+    """
+    flown: list[tuple[str, str]] = []
+    for scene in (session.scene, *session.scenes) if session.scenes else ():
+        sha256 = mesh_sha256_of(scene)
+        named = str(read_scene_text(scene, "a recorded scene").values.get("mesh", "")), sha256
+        if not flown or (sha256 and named != flown[-1]):
+            flown.append(named)
+    place = 0
 
     def find(name: str) -> Mesh | None:
-        return find_mesh(name, hashes[name], session.attachments, session.folder) if name in hashes else None
+        nonlocal place
+        places = [k for k, (other, _) in enumerate(flown) if other == name]
+        if not places:
+            return None
+        # The next scene of this name, unless the mesh in force is set once more; the last one where scenes are missing.
+        later = [k for k in places if k > place]
+        if later and (place not in places or later[0] == place + 1):
+            place = later[0]
+        elif place not in places:
+            place = places[-1]
+        return find_mesh(name, flown[place][1], session.attachments, session.folder)
 
     return find
 

@@ -28,32 +28,36 @@ from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.rerun_view.session_files import read_runs
-from rigid_proto_ros.scene.scenario import make_scenario, read_scene
+from rigid_proto_ros.scene.scenario import make_scenario, mesh_sha256_of, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun, notify_start
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
 from rigid_proto_ros.session.messages import twist_row
 from rigid_proto_ros.session.recorded_session import RecordedSession, play
-from rigid_proto_ros.simulation.observer import Logged, Observer, Observers, Published
+from rigid_proto_ros.simulation.observer import Logged, Observer, Observers, Published, SceneChanged, Started
+from rigid_proto_ros.sweep.flights import Flight, load_scene
 
 SECOND = 10**9
 
 
 class Kept(Observer):
-    """States and event lines as the simulation told them."""
+    """States, event lines and scenes as the simulation told them."""
 
     def __init__(self) -> None:
         self.states: dict[int, list[float]] = {}
         self.lines: list[str] = []
+        self.scenes: list[str] = []
 
-    takes = frozenset({Published, Logged})
+    takes = frozenset({Published, Logged, Started, SceneChanged})
 
     def on(self, event) -> None:
         if isinstance(event, Published):
             self.states[event.time_ns] = event.row.tolist()
         elif isinstance(event, Logged):
             self.lines.append(event.line)
+        elif isinstance(event, Started | SceneChanged):
+            self.scenes.append(event.scene)
 
 
 @pytest.fixture(scope="module")
@@ -153,6 +157,30 @@ def test_meshes_come_from_inside_where_their_files_are_gone(tmp_path):
     assert main(["replay", session, "--record", again]) == 0
     Path(session).unlink()
     assert main(["replay", again, "--verify"]) == 0
+
+
+@pytest.mark.parametrize("first", ["book", "mesh"])
+def test_a_mesh_whose_file_changed_before_it_was_set_again_is_each_time_the_one_that_flew(tmp_path, first):
+    kept = Kept()
+    file, contents = tmp_path / "mesh.obj", [resolve_mesh(name).read_bytes() for name in ("hammer", "l_bracket")]
+    file.write_bytes(contents[0])
+    scene = load_scene("t_handle", {"mesh": "book" if first == "book" else str(file)})
+    flight = Flight(scene, observer=kept)
+    for content, mesh in zip((contents[0], contents[0], contents[1]), (file, "teapot", file), strict=True):
+        file.write_bytes(content)
+        flight.command({"set": {"mesh": str(mesh)}})
+        flight.command({"at": {"vertex": 3}, "force": [0.0, 0.0, 1.0]})
+        state = flight.step(0.1)
+    session = RecordedSession(
+        scene=kept.scenes[0],
+        events=[(json.loads(line)["time_ns"], line) for line in kept.lines],
+        times=np.array([state.time_ns]),
+        rows=state.row[None],
+        mesh_sha256=mesh_sha256_of(kept.scenes[0]),
+        scenes=kept.scenes,
+        attachments=[(file.name, content) for content in contents],
+    )
+    assert verify(session) is None
 
 
 @needs_rerun
