@@ -236,6 +236,7 @@ class Resimulation(ScenarioRun):
 
         Raises CommandRefused for a recorded command that can't be taken.
         """
+        acted_ns = -1
         # Marks at the time asked for were made before anything else could act there.
         while self._waiting and (
             self._waiting[0][0] < until_ns or (self._waiting[0][0] == until_ns and self._waiting[0][3] is None)
@@ -243,8 +244,12 @@ class Resimulation(ScenarioRun):
             time_ns, kind, content, command, number = self._waiting.popleft()
             self.simulation.advance(max(time_ns, self.simulation.time_ns))
             if command is None:
+                if acted_ns == time_ns:
+                    # Nothing but the end of the motion, in its next step, keeps time where a command has acted.
+                    self.simulation.advance(time_ns + self.simulation.setup.step_ns)
                 self.simulation.log(kind, content)
                 continue
+            acted_ns = time_ns
             if isinstance(command, Change):
                 self._changes_ns = time_ns
                 command = self.bound(command)

@@ -312,15 +312,18 @@ def test_a_step_of_a_motion_that_has_failed_is_refused_with_the_reason(live):
     assert live.step() == PERIOD_NS
 
 
-def test_a_recording_of_a_motion_that_failed_is_verified_with_what_was_asked_for_afterwards(live, tmp_path):
+@pytest.mark.parametrize("behind", ["", "{t: 0.156, force: [0, 0, 1]}"])
+def test_a_recording_of_a_motion_that_failed_is_verified_with_what_was_asked_for_afterwards(live, tmp_path, behind):
+    """It fails at 0.156 s, where a command acts or none."""
     from rigid_proto_ros.rerun_view.session_files import read_runs
     from rigid_proto_ros.session.check import verify
 
     path = tmp_path / "flight.mcap"
     live.set_parameters({"record": str(path), "integrator": "euler", "publish_rate": 10.0})
-    live.schedule("{t: 0.15, state: {angular_velocity: [1e4, 2e4, 3e4]}}")
+    live.schedule(f"[{{t: 0.15, state: {{angular_velocity: [1e4, 2e4, 3e4]}}}}, {behind}]")
     with pytest.raises(InputError, match="until a reset"):
         live.step(3)
+    assert live.state.time_ns == 156_000_000
     live.pause(False)
     live.stop()
     (run,) = read_runs(path)
