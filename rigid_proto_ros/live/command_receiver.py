@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -68,9 +68,8 @@ class CommandReceiver:
                 sent = loop.bound(sent)
             when_ns, counter = self._effective(sent.stamp_ns, loop.stamps.offset_ns)
             self._count(counter, 1)
-            # In the scene that parameters have made, though they may not have acted yet.
-            setup = loop.scenario.setup
-            loop.simulation.submit(sent, when_ns, checked=(check_command(sent, setup), setup))
+            checked = loop.accepted(lambda waiting: self._checked(sent, when_ns, waiting))
+            loop.simulation.submit(sent, when_ns, checked=checked)
         except CommandRefused as refusal:
             loop.simulation.refuse(refusal)
             raise
@@ -92,7 +91,7 @@ class CommandReceiver:
             listed = read_schedule(text())
             count = len(listed) if isinstance(listed, list) else 1
             commands = with_contacts(expand_schedule(listed), loop.scenario.setup.contacts)
-            taken, counted = self._planned(commands, isinstance(listed, list))
+            taken, counted = loop.accepted(lambda ahead: self._planned(commands, isinstance(listed, list), ahead))
         except InputError as error:
             reason = error.reason if isinstance(error, CommandRefused) else "schedule"
             refusal = CommandRefused(reason, error.field, error.received, error.accepted)
@@ -106,18 +105,28 @@ class CommandReceiver:
         finally:
             self.received["schedule"] += count
 
-    def _planned(self, commands: list[Command], is_list: bool) -> tuple[list[Submission], dict[str, set[int]]]:
+    def _checked(self, command: Command, when_ns: int, waiting: Sequence[tuple[int, Change]]) -> tuple[bytes, Setup]:
+        """The command's load and the setup for which it holds; raises InputError."""
+        # In the scene that parameters have made, though they may not have acted yet.
+        scenario = self._loop.scenario
+        if waiting:
+            ((_, scenario),) = self._loop.planned([replace(command, stamp_ns=when_ns)], waiting)
+        return check_command(command, scenario.setup), scenario.setup
+
+    def _planned(
+        self, commands: list[Command], is_list: bool, waiting: Sequence[tuple[int, Change]]
+    ) -> tuple[list[Submission], dict[str, set[int]]]:
         """The commands in order of time, those of one time in the order of the list, each checked in the scene that
-        those before it have made of the present one; and the entries to be counted by each counter, once though they
-        stand for several commands. Raises InputError.
+        those before it, and changes that wait, have made of the present one; and the entries to be counted by each
+        counter, once though they stand for several commands. Raises InputError.
         """
         taken: list[Submission] = []
         counted: dict[str, set[int]] = {}
-        scenario = self._loop.scenario
-        for k in sorted(range(len(commands)), key=lambda k: commands[k].stamp_ns):
-            command = commands[k]
+        order = sorted(range(len(commands)), key=lambda k: commands[k].stamp_ns)
+        for k, (command, scenario) in zip(
+            order, self._loop.planned([commands[k] for k in order], waiting), strict=True
+        ):
             if isinstance(command, Change):
-                scenario = scenario.with_changes(command.content)
                 command = replace(command, apply=partial(self._loop.setup_of, command, scenario.body_mesh))
             checked = (check_command(command, scenario.setup), scenario.setup)
             when_ns, counter = self._effective(command.stamp_ns, 0)

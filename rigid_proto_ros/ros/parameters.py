@@ -128,7 +128,8 @@ class LiveParameters:
             named |= {p.name: p for p in _as_ros({name: 0.0})}
         # What is so already is no change: a dump of this very node can be loaded. But a command that acts before may
         # change it: one that waits, or comes while time stands.
-        waiting = named.keys() if self._live.paused else self._live.loop.simulation.waiting_parameters
+        ahead = {name for _, change in self._live.loop.simulation.waiting_changes for name in change.content}
+        waiting = named.keys() if self._live.paused else ahead
         changed = [
             p for p in named.values() if not self._is_in_force(p) or (p.name in waiting and not is_read_only(p.name))
         ]

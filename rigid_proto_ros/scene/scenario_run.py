@@ -10,9 +10,12 @@ has none.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -33,6 +36,8 @@ from ..simulation.setup import Setup, check_command
 from ..simulation.simulation import Simulation
 from .scenario import BodyMesh, Scenario, check_inertia, publication_ns
 from .script import with_contacts
+
+Value = TypeVar("Value")
 
 
 class Ghost(Observer):
@@ -165,6 +170,33 @@ class ScenarioRun:
         if self.ghost is not None:
             self.ghost.advance(time_ns)
 
+    def planned(
+        self, commands: Iterable[Command], waiting: Iterable[tuple[int, Change]] = ()
+    ) -> Iterator[tuple[Command, Scenario]]:
+        """Commands in order of time, each with the scenario that changes before it make of the present one: those among
+        them, and those that wait. Raises InputError.
+        """
+        scenario, changes = self.scenario, deque(waiting)
+        for command in commands:
+            while changes and changes[0][0] <= command.stamp_ns:
+                with suppress(InputError):  # refused when it acts
+                    scenario = after_change(scenario, changes.popleft()[1], scenario.body_mesh)
+            if isinstance(command, Change):
+                scenario = after_change(scenario, command)
+            yield command, scenario
+
+    def accepted(self, check: Callable[[Sequence[tuple[int, Change]]], Value]) -> Value:
+        """What check(waiting) returns, a check of commands: under the present parameters, and where these don't take
+        them under the changes that wait. Raises InputError.
+        """
+        try:
+            return check(())
+        except InputError:
+            waiting = self.simulation.waiting_changes
+            if not waiting:
+                raise
+            return check(waiting)
+
     def check_change(self, scenario: Scenario) -> None:
         """Raises InputError where this scenario can't follow the present one."""
         self.simulation.check_change(scenario.setup)
@@ -225,19 +257,26 @@ class OfflineRun(ScenarioRun):
         checked in the scene that those before it in the script have made by then. Takes all, or none and raises
         InputError.
         """
-        planned, taken = self.scenario, []
-        for number, command in enumerate(with_contacts(script, planned.setup.contacts), self._submitted + 1):
-            try:
-                if isinstance(command, Change):
-                    planned = planned.with_changes(command.content)
-                    command = self.bound(command)
-                taken.append((command, number, (check_command(command, planned.setup), planned.setup)))
-            except InputError as error:
-                place = f"script, command {number} at {command.stamp_ns / 1e9:g} s, {error.field}"
-                raise InputError(place, error.received, error.accepted) from None
+        commands = list(with_contacts(script, self.scenario.setup.contacts))
+        taken = self.accepted(lambda waiting: self._checked(commands, waiting))
         self._submitted += len(taken)
         for command, number, checked in taken:
             self.simulation.submit(command, command.stamp_ns, (0, number), checked)
+
+    def _checked(
+        self, commands: Sequence[Command], waiting: Sequence[tuple[int, Change]]
+    ) -> list[tuple[Command, int, tuple[bytes, Setup]]]:
+        taken: list[tuple[Command, int, tuple[bytes, Setup]]] = []
+        try:
+            for command, scenario in self.planned(commands, waiting):
+                acting = self.bound(command) if isinstance(command, Change) else command
+                number = self._submitted + len(taken) + 1
+                taken.append((acting, number, (check_command(acting, scenario.setup), scenario.setup)))
+        except InputError as error:
+            number, at_s = self._submitted + len(taken) + 1, commands[len(taken)].stamp_ns / 1e9
+            place = f"script, command {number} at {at_s:g} s, {error.field}"
+            raise InputError(place, error.received, error.accepted) from None
+        return taken
 
     def advance(self, until_ns: int) -> bool:
         """Advance the body to ``until_ns``, notifying the observer every publication; False when the motion failed."""

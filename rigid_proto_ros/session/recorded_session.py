@@ -162,8 +162,8 @@ def session_scenario(session: RecordedSession) -> Scenario:
 
 
 def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
-    """Called for each change of the mesh, one after another: the mesh of this name that was flown then, as the session's
-    scenes say, since a file may change while its name stays; None for a name that none speaks of.
+    """Called for each change of the mesh, one after another: the mesh of this name that was flown then, as the scenes
+    say, since a file may change while its name stays; None for a name that none speaks of.
     """
     flown: list[tuple[str, str]] = []
     for scene in (session.scene, *session.scenes) if session.scenes else ():

@@ -586,10 +586,11 @@ class Simulation:
         return length(moved) / size if size > 0.0 else 0.0
 
     @property
-    def waiting_parameters(self) -> set[str]:
-        """Names of the parameters that commands set which wait for their time; from any thread."""
-        waiting = [pending.command for *_, pending in list(self._pending)]
-        return {name for command in waiting if isinstance(command, Change) for name in command.content}
+    def waiting_changes(self) -> list[tuple[int, Change]]:
+        """The changes of parameters that wait, with their times [ns], in the order in which they will act; from any
+        thread.
+        """
+        return [(t, p.command) for t, _, p in sorted(self._pending) if isinstance(p.command, Change)]
 
     @property
     def at_rest(self) -> bool:

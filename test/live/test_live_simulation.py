@@ -162,6 +162,21 @@ def test_commands_are_checked_in_the_scene_that_parameters_have_made(live):
     assert not live.loop.simulation.refused and live.state.linear_velocity[0] == pytest.approx(1e4, rel=1e-9)
 
 
+def test_commands_are_checked_under_the_changes_that_wait_before_them(live):
+    live.set_parameters({"integrator": "free_body"})
+    live.step()
+    entries = [{"t": 0.02, "set": {"integrator": "auto"}}, {"t": 0.03, "at": "tip", "force": [0.0, 0.0, 0.1]}]
+    for entry in (*entries, {"t": 0.04, "set": {"angular_damping": 1e-6}}):
+        live.schedule(json.dumps([entry]))
+    held = WrenchCommand(True, parse_frame("world@tip"), (0.0, 0.01, 0.0), ZERO, stamp_ns=30_000_000)
+    live.submit(held)
+    with pytest.raises(CommandRefused, match="free_body"):
+        live.schedule(json.dumps([{**entries[1], "t": 0.015}]))
+    live.step(5)
+    assert live.call(lambda: dict(live.loop.simulation.refused)) == {"integrator": 1}
+    assert live.scenario.parameters.angular_damping == 1e-6 and live.state.linear_velocity[1] > 0.0
+
+
 def test_in_lockstep_a_refused_message_steps_too(live):
     live.set_parameters({"lockstep": True})
     for command in (

@@ -96,6 +96,22 @@ def test_of_an_entry_that_is_refused_nothing_acts() -> None:
     assert flight._run.simulation.attach == (0.0, 0.0, 0.0)
 
 
+def test_commands_are_checked_under_the_changes_that_wait_before_them() -> None:
+    scene = load_scene("t_handle", {"integrator": "free_body"})
+    entries = [
+        {"t": 1.0, "set": {"integrator": "auto"}},
+        {"t": 2.0, "at": "tip", "force": [0.0, 0.01, 0.0]},
+        {"t": 3.0, "set": {"linear_damping": 0.1}},
+    ]
+    flight, run = Flight(scene), OfflineRun(scene, parse_script(str(entries)))
+    for entry in entries:
+        flight.command(entry)
+    with pytest.raises(InputError, match="free_body"):
+        flight.command({**entries[1], "t": 0.9})
+    run.advance(4_000_000_000)
+    assert flight.step(4.0).row.tobytes() == run.simulation.state.row.tobytes() and not run.simulation.refused
+
+
 def test_a_motion_that_has_failed_goes_no_further() -> None:
     """A string that pushes, whose knot runs into its free end: every step says so, whatever is commanded."""
     string = {
