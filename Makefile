@@ -25,7 +25,7 @@ setup: $(READY) ## .venv with all that run, up, test and lint need
 	@command -v python3 >/dev/null || { echo "make setup: python3 is missing; install it with: sudo apt install python3 python3-venv" >&2; exit 1; }
 	@python3 requirements/make_venv.py $*
 
-run: $(FOR_RUN) ## fly a bundled body, or MESH=path/to.obj, for 10 s; leaves out/session.rrd
+run: $(FOR_RUN) ## simulate a bundled body, or MESH=path/to.obj, for 10 s; leaves out/session.rrd
 	@$(ROS) .venv/bin/rigid_proto demo $(if $(MESH),--mesh "$(MESH)")
 
 # 130 is how the two below end after Ctrl-C: for them no error, of which make would report.
@@ -50,7 +50,7 @@ lint: setup ## ruff and mypy
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 
-pictures: setup run ## fly, and draw the pictures of README and lessons anew (needs mesa-vulkan-drivers and chromium)
+pictures: setup run ## draw the pictures of README and lessons anew (needs mesa-vulkan-drivers and chromium)
 	.venv/bin/rigid_proto snapshot out/session.rrd --at 4.05 -o docs/flight.png
 	$(PY) docs/lessons/pictures.py
 	PYTHONPATH=test $(PY) test/workbench_pictures.py docs
@@ -58,7 +58,7 @@ pictures: setup run ## fly, and draw the pictures of README and lessons anew (ne
 build: setup ## colcon build into build/, install/ and log/; then: source install/setup.bash
 	$(ROS) $(PY) -m colcon build --packages-select rigid_proto_ros
 
-bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU and versions
+bench: .venv-bench/.pins ## comparison with other tools; CSV with date, commit, CPU and versions
 	@for file in $$(grep -l '^if __name__ == "__main__"' benchmarks/*.py | grep -vE 'references|soak|clients'); do echo "$$file"; .venv-bench/bin/python "$$file" || exit 1; done
 
 .venv-bench/.pins: benchmarks/requirements.txt $(wildcard requirements/*) | $(READY)
@@ -67,7 +67,7 @@ bench: .venv-bench/.pins ## ours against the peers; CSV with date, commit, CPU a
 	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --no-build-isolation --no-deps -e .
 	@touch $@
 
-soak: setup ## an hour of random commands, guests and changes; MINUTES=5 for the short form
+soak: setup ## an hour of random commands and changes, while subscribers and viewers come and go; MINUTES=5 for the short form
 	$(ROS) $(PY) benchmarks/soak.py --minutes $(or $(MINUTES),60)
 
 stress: setup ## long and hostile tests, those of random examples with new ones, and the same bits elsewhere

@@ -15,7 +15,7 @@ PACKAGE = "rigid_proto_ros"
 
 ARGUMENTS = (
     ("scene", "t_handle", "scene: the path of a parameter file, or the name of a bundled one"),
-    ("mesh", "", "fly this mesh instead of the scene's: a path, a package:// URI or a bundled name"),
+    ("mesh", "", "simulate this mesh instead of the scene's: a path, a package:// URI or a bundled name"),
     ("name", "rigid_body", "name of the node, and of the body's frame"),
     ("namespace", "", "namespace of the node"),
     ("script", "", "poke script to send: a path, or the name of a bundled one; empty sends nothing"),

@@ -1,6 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# A sweep: 1,000 random pokes at random points of three bodies, each with its true tensor and with its bounding box's.
+# A sweep: 1,000 random pokes at random points of three bodies, each with its true
+# tensor and centre of mass, and with those of its bounding box.
 set -e
 mkdir -p out
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -93,18 +94,32 @@ def test_teapot_leaves_at_one_speed_and_spins_as_its_page_says(at: str, spin: fl
     assert np.linalg.norm(state.angular_velocity) == pytest.approx(spin, abs=0.05)
 
 
-@pytest.mark.parametrize("spin, lean", [(30.0, 3.8), (60.0, 1.8)])
+@pytest.mark.parametrize("spin, lean", [(30.0, "3.7"), (60.0, "1.9")])
 def test_spinning_top_leans_sideways_by_the_push_over_its_momentum(spin: float, lean: float) -> None:
     scenario = read_scene("spinning_top", {"initial.angular_velocity": [0.0, 0.0, spin]})
     run = OfflineRun(scenario, parse_script("- {t: 0.1, at: stem, impulse: [0.001, 0, 0]}"))
+    body = run.simulation.setup.body
+    across, _, along = body.principal_moments
+    impulse, momentum = 0.001 * (0.075 - body.center_of_mass[2]), along * spin
+    # Ten whole turns of the axis about L: the mean of its directions is that of L.
+    period = 2.0 * math.pi * across / math.hypot(impulse, momentum)
     stems = []
     for k in range(1000):
-        run.advance(nanoseconds(0.1 + 0.001 * k))
+        run.advance(nanoseconds(0.1 + 0.01 * k * period))
         stems.append(run.simulation.state.rotation[:, 2])
-    # The new direction of L, about which the axis nods: leaning along the push by J d / L sideways.
-    along, sideways, _ = np.mean(stems, axis=0)
-    assert math.degrees(math.asin(sideways)) == pytest.approx(lean, abs=0.06)
-    assert abs(sideways) > 5.0 * abs(along)
+    forward, sideways, up = np.mean(stems, axis=0)
+    angle = math.atan2(sideways, up)
+    assert angle == pytest.approx(math.atan2(impulse, momentum), rel=1e-5)
+    assert abs(forward) < 1e-5
+    assert f"{math.degrees(angle):.1f}" == lean
+    assert f"{lean}°" in (PAGES / "spinning_top.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("scene, axis", [("book", 0), ("tennis_racket", 1), ("t_handle", 2)])
+def test_bodies_turn_over_at_the_times_that_their_pages_say(scene: str, axis: int) -> None:
+    said = re.search(r"at ([0-9.]+(?:,\s[0-9.]+)*)\sand\s([0-9.]+)\ss\b", (PAGES / f"{scene}.md").read_text("utf-8"))
+    flips = fly(scene, 10.0, interval_s=0.001).flips(axis)
+    assert [f"{time_s:.1f}" for time_s in flips] == [*said[1].replace(",", " ").split(), said[2]]
 
 
 def test_top_at_rest_is_turned_over_by_the_same_push() -> None:

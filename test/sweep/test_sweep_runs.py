@@ -13,6 +13,7 @@ from sweep_studies import POKES, PULLED, study
 from rigid_proto_ros.base.interrupts import with_this_package
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.sweep.rows import run_chunk
+from rigid_proto_ros.sweep.study import read_study
 from rigid_proto_ros.sweep.table import KEY, run_study
 
 pq = pytest.importorskip("pyarrow.parquet")
@@ -97,6 +98,16 @@ def test_a_study_that_is_refused_is_one_line_and_exit_2(tmp_path, capsys) -> Non
     assert said.count("\n") == 1 and "vary.mass.uniform" in said and "a < b" in said
     assert main(["sweep", "flip_map", "--row", "4653"]) == 2
     assert "0 to 4652" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name, begin, end", [("flip_map", 705, 799), ("box_tensor", 740, 760)])
+def test_each_measure_of_a_bundled_study_depends_on_its_row(name: str, begin: int, end: int) -> None:
+    columns = run_chunk(read_study(name), begin, end).columns
+    measured = [
+        column for column in columns if column.split(".")[0] in ("flips", "first", "max", "difference", "turned")
+    ]
+    assert measured
+    assert all(len(set(columns[column].tolist())) > 1 for column in measured)
 
 
 NUDGED = {
