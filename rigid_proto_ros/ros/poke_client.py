@@ -73,7 +73,9 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument("--node", default="/rigid_body", metavar="NAME", help="the node (default /rigid_body)")
     parser.add_argument("--reset", action="store_true", help="reset first, so that t is absolute simulated time")
     lead, timeout = number_from(0.0, 3600.0), number_from(0.0, MAX_TIME_S)
-    parser.add_argument("--lead", type=lead, default=0.2, metavar="S", help="without --reset: seconds from now to t = 0 (default 0.2)")
+    parser.add_argument(
+        "--lead", type=lead, default=0.2, metavar="S", help="without --reset: seconds from now to t = 0 (default 0.2)"
+    )
     parser.add_argument("--dry-run", action="store_true", help="print what would be sent, and send nothing")
     parser.add_argument(
         "--timeout",
