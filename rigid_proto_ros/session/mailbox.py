@@ -38,6 +38,7 @@ class Mailbox:
         self._on_given_up = on_given_up
         self._given_up = False
         self._moved_at = time.monotonic()
+        self._idle = False
         self._waiting: queue.Queue[Noted] = queue.Queue(MOST_WAITING)
         self._wake = threading.Event()
 
@@ -72,8 +73,16 @@ class Mailbox:
 
     def wait(self, seconds: float) -> None:
         """Return after ``seconds``, or at once when the mailbox is filling up, is closed, or on ``wake``."""
+        self._idle = True
         self._wake.wait(seconds)
         self._wake.clear()
+        self.moved()
+        self._idle = False
+
+    @property
+    def stuck_s(self) -> float:
+        """How long the consumer, unless it waits, has got nothing done [s]."""
+        return 0.0 if self._idle else time.monotonic() - self._moved_at
 
     def wake(self) -> None:
         """End the consumer's ``wait``."""

@@ -9,6 +9,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -19,6 +20,7 @@ pytest.importorskip("mcap_ros2")
 
 from conftest import needs_rerun
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 
 from rigid_proto_ros.base.bundled import example_path
@@ -321,6 +323,28 @@ def test_a_full_disk_stops_the_recording_and_not_the_flight_and_the_rest_is_read
     assert not session.complete
     assert 0 < session.end_ns <= SECOND
     assert verify(session) is None
+
+
+def test_a_file_that_takes_nothing_is_told_as_long_as_it_does(tmp_path, monkeypatch):
+    flowing, path, deadline = threading.Event(), tmp_path / "s.mcap", time.monotonic() + 180.0
+    flush = Writer.flush
+
+    def flush_later(self) -> None:
+        flowing.wait()
+        flush(self)
+
+    monkeypatch.setattr(Writer, "flush", flush_later)
+    observer = McapObserver(path)
+    while not observer.stalled:
+        assert time.monotonic() < deadline, "nothing is told"
+        time.sleep(0.05)
+    assert observer.stalled.startswith(f"recording {path}: nothing could be written for ") and not observer.error
+    flowing.set()
+    while observer.stalled:
+        assert time.monotonic() < deadline, "it is told on and on"
+        time.sleep(0.05)
+    observer.close()
+    assert not observer.error
 
 
 def test_a_lost_file_stops_the_recording_and_is_told(tmp_path):
