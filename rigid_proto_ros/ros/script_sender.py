@@ -111,11 +111,7 @@ class ScriptSender(Node):
             self._call(self._pause_client, SetBool.Request(data=True))
             self._call(self._reset_client, Trigger.Request())
         else:
-            if self._parameter("use_sim_time"):
-                # States are stamped by a /clock: by how far it is ahead, a report says that comes after them.
-                reports = self._reports
-                self._spin_until(lambda: self._reports >= reports + 2, f"reports of {self.target}")
-            start_ns = self._stamp_ns() - int(self._counters.get("stamp_offset_ns", 0)) + nanoseconds(lead_s)
+            start_ns = self._present_ns() + nanoseconds(lead_s)
         horizon_ns = nanoseconds(float(self._parameter("schedule_horizon") or 0.0))
         paused, number = reset, 0
         for time_ns, count, text in schedules(script, start_ns):
@@ -178,18 +174,21 @@ class ScriptSender(Node):
                 self._restarted |= received[1] < received[0]
                 self._reports += 1
 
-    def _stamp_ns(self) -> int:
-        """The stamp of a state published from now on."""
+    def _present_ns(self) -> int:
+        """Simulated time now: by the next state or, where states are rare or stamped by a /clock, the next report."""
         stamps: list[int] = []
 
         def on_pose(message: PoseStamped) -> None:
             stamp = message.header.stamp
             stamps.append(stamp.sec * 1_000_000_000 + stamp.nanosec)
 
+        follows_clock, reports = self._parameter("use_sim_time"), self._reports
         subscription = self.create_subscription(PoseStamped, f"{self.target}/pose", on_pose, 1)
-        self._spin_until(lambda: stamps, f"a state on {self.target}/pose")
+        self._spin_until(
+            lambda: self._reports > reports or (stamps and not follows_clock), f"a state or a report of {self.target}"
+        )
         self.destroy_subscription(subscription)
-        return stamps[0]
+        return self._reached_ns() if self._reports > reports else stamps[0]
 
     def _confirmed(self) -> int:
         return int(self._counters["commands_received"]) - self._received_before

@@ -163,6 +163,13 @@ def test_without_reset_every_time_counts_from_now_and_the_lead_and_single_comman
     assert (wrench["content"]["frame_id"], wrench["content"]["force"]) == ("world@com;duration=2.0", [1.0, 0.0, 0.0])
 
 
+def test_a_node_that_publishes_states_rarely_is_commanded_without_waiting_for_one(rig, client):
+    rig.set(publish_rate=0.01)
+    status, said = client("poke", "--at", "tip", "--push", 5, "--lead", 1)
+    rig.sent += 1
+    assert status == 0 and "sent 1 poke; 0 late, 0 refused" in said
+
+
 def test_what_comes_late_or_is_refused_is_reported_and_makes_exit_1(rig, client, tmp_path):
     (tmp_path / "late.yaml").write_text("- {t: 0.0, impulse: [1.0e-6, 0, 0]}\n")
     # A ray that misses is refused when its time has come, long after all are sent.
