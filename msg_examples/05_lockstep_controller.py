@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """A controller in lockstep with the node: four thrusters stop the T-handle's tumbling and turn it upright.
 
-The node waits for each command, so every run gives the same motion, bit for bit. Start the node first: make up
+The node waits for each command, so every run is the same, bit for bit; it stays paused. Start the node first: make up
 """
 
 import numpy as np
