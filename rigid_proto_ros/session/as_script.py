@@ -187,7 +187,14 @@ def _scene(scenario: Scenario, row: np.ndarray, changes: dict[str, object]) -> S
         "record": "",
         **changes,
     }
-    return make_scenario(values, scenario.body_mesh.mesh if scenario.body_mesh else None)
+    mesh = scenario.body_mesh.mesh if scenario.body_mesh else None
+    try:
+        return make_scenario(values, mesh)
+    except InputError as error:
+        if error.field != "ghost.integrator":
+            raise
+        # The ghost went without the string, which no scene can say.
+        return make_scenario({**values, "ghost.integrator": ""}, mesh)
 
 
 def _string_values(simulation: Simulation) -> dict[str, object]:

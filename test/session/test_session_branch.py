@@ -185,6 +185,16 @@ def test_what_acts_ends_in_a_branch_when_it_would_have_ended():
     assert not branch.acting
 
 
+def test_a_branch_has_no_ghost_whose_integrator_cannot_take_the_string_that_is_tied():
+    changes = {"ghost.integrator": "free_body", "ghost.inertia_model": "bounding_box"}
+    session = flown(
+        changes, 600_000_000, "- {t: 0.1, at: com, force: [0, 0, 1]}\n- {t: 0.3, string: {target: [0, 0, 1]}}\n"
+    )
+    for cut_ns, integrator in ((200_000_000, "free_body"), (500_000_000, "")):
+        ghost = branched(session, cut_ns).scenario.parameters.ghost
+        assert (ghost.integrator, ghost.inertia_model) == (integrator, "bounding_box")
+
+
 def test_a_string_tied_by_parameters_stays_tied_in_a_branch_that_begins_while_its_end_moves():
     tied = {"string.attached": True, "string.target": [0.0, 0.0, 0.1], "string.timeout": 0.4}
     session = flown(tied, 2 * SECOND, "- {t: 1.0, set: {string.target: [0.0, 0.0, 0.3]}}\n")
