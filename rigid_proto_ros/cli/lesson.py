@@ -24,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration",
         type=number_from(0.1, 600.0),
         metavar="S",
-        help="simulated seconds (default 10, or until 1 s after the lesson's script; for a body that falls, until it "
-        "is as high as at first)",
+        help="simulated seconds (default 10, or as many as the lesson needs; for a body that falls, until it is as "
+        "high as at first)",
     )
 
 
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     scenario = read_scene(args.name, None, lambda text: print(f"rigid_proto lesson: {text}", file=sys.stderr))
     setup = scenario.setup
     falls = setup.gravity.any() and not setup.string.attached
-    duration_ns = max(nanoseconds(fall_s(setup) if falls else 10.0), last_ns + nanoseconds(1.0))
+    duration_ns = max(nanoseconds(fall_s(setup) if falls else shown.duration_s), last_ns + nanoseconds(1.0))
     if args.duration is not None:
         duration_ns = nanoseconds(args.duration)
     record = FlightRecord()

@@ -22,7 +22,7 @@ _QUESTION = re.compile(r"Question: (.+\?) A: (.+) B: (.+) C: (.+) Answer: ([ABC]
 class Lesson:
     """name: of the scene. question: what is asked first, with its choices; answer: the number of the right one.
     sentences: what to try and what to see. reason: why, in a paragraph. commands: how to run it. script: name of the
-    bundled example that goes with it, or empty.
+    bundled example that goes with it, or empty. duration_s: of the first command.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Lesson:
     reason: str
     commands: str
     script: str
+    duration_s: float
     path: Path
 
 
@@ -56,6 +57,7 @@ def lesson(name: str) -> Lesson:
     assert question is not None, asked
     sentences = tuple(re.split(r"(?<=[.!?]) (?=[A-Z])", trials))
     script = re.search(r"msg_examples/(\w+)\.yaml", commands)
+    duration = re.search(r"--duration (\d+)", commands)
     text, *choices, letter = question.groups()
     return Lesson(
         path.stem,
@@ -67,5 +69,6 @@ def lesson(name: str) -> Lesson:
         " ".join(reasons),
         commands,
         script[1] if script else "",
+        float(duration[1]) if duration else 10.0,
         path,
     )
