@@ -254,7 +254,9 @@ def _thruster_entries(simulation: Simulation) -> Iterator[Entry]:
         return
     ends = [push.off_ns for push in pushes]
     if control.times_out:
-        ends = [min(end_ns, control.last_ns + simulation.setup.wrench_timeout_ns) for end_ns in ends]
+        timeout_ns, thrusters = control.last_ns + simulation.setup.wrench_timeout_ns, control.thrusters.values()
+        least_ns = [push.on_ns + thruster.minimum_on_ns for push, thruster in zip(pushes, thrusters, strict=True)]
+        ends = [min(end_ns, max(timeout_ns, on_ns)) for end_ns, on_ns in zip(ends, least_ns, strict=True)]
     for time_ns in (now_ns, *sorted({end_ns for end_ns in ends if end_ns != NEVER})):
         forces = [push.force if end_ns > time_ns else 0.0 for push, end_ns in zip(pushes, ends, strict=True)]
         yield {"t": (time_ns - now_ns) / 1e9, "thrusters": forces}

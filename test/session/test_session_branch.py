@@ -185,6 +185,18 @@ def test_what_acts_ends_in_a_branch_when_it_would_have_ended():
     assert not branch.acting
 
 
+@pytest.mark.parametrize(
+    ("cut_ms", "forces"), [(699, [0.03, 0.01]), (700, [0.03, 0.01]), (701, [0.03, 0.01]), (801, [])]
+)
+def test_thrusters_that_a_timeout_would_end_stay_on_in_a_branch_for_their_least_time(cut_ms, forces):
+    """On at .1 s for at least .7 s; the timeout comes .6 s after the command."""
+    least = {"thruster.minimum_on_time": 0.7}
+    session = flown(least, SECOND, "- {t: 0.1, thrusters: [0.03, 0.01]}\n")
+    branch = branched(session, cut_ms * 1_000_000).simulation
+    branch.advance(1)
+    assert [push.force for push in branch.thrusters.pushes if push.force] == forces
+
+
 def test_a_branch_has_no_ghost_whose_integrator_cannot_take_the_string_that_is_tied():
     changes = {"ghost.integrator": "free_body", "ghost.inertia_model": "bounding_box"}
     session = flown(
