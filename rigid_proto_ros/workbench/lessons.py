@@ -319,6 +319,7 @@ class LessonPanel:
         if self._asked:
             self._guess, self._asked = choice, False
             self._reveal(self.course.reveals)
+            self._flight.look_at_present()
             self._flight.pause(False)
             self._show_text()
 

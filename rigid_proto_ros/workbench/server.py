@@ -129,7 +129,8 @@ def refusal(served_on: str, host: str, origin: str | None) -> str:
 #
 # On a telephone, and on any narrow window that is higher than wide, the picture is above and the panel below it, not
 # over it; a narrow window that is wider than high leaves it three fifths of the width. On paper the whole panel is
-# below the picture, however far it was scrolled.
+# below the picture, however far it was scrolled; backgrounds, which browsers leave out of print, are asked for where
+# words and lines depend on them.
 #
 # viser lays its controls over the lower 60 % of a narrow page, where the body is, and puts other panels below them, a
 # long way down; wider pages get a panel of one width, however little is left beside it. It has no setting for any of
@@ -216,6 +217,7 @@ STYLE = f"""<style>
   }}
   .mantine-Notifications-root, {_BAR}, [role="tablist"] {{ display: none !important; }}
   {_CANVAS} {{ height: {PRINTED_PICTURE} !important; width: auto !important; }}
+  .{ANSWERS}, .mantine-Button-root {{ print-color-adjust: exact; }}
   .{ANSWERS} {{ display: block; height: 12em;
     background: repeating-linear-gradient(transparent 0 1.9em, #999 1.9em calc(1.9em + 1px)); }}
 }}
@@ -223,7 +225,7 @@ STYLE = f"""<style>
 
 CLASS_STYLE = f"""<style>
 :root {{ --mantine-scale: 1.25; }}
-[role="tablist"] {{ display: none !important; }}
+[role="tablist"]:has(> :first-child[aria-selected="true"]) {{ display: none !important; }}
 .{MARK} {{ white-space: normal; }}
 .{MARK} b {{ font-size: 1.7em; }}
 {_BAR} .mantine-Button-root {{ padding-inline: 0.2em; }}

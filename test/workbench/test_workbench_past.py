@@ -96,6 +96,17 @@ def test_going_on_from_the_past_moves_neither_the_camera_nor_the_reference_of_si
     assert not looks and np.array_equal(flown.page.backend.origin, seen)
 
 
+def test_an_answer_to_a_lessons_question_returns_from_the_past_to_the_motion(flown: FlownPage) -> None:
+    flown.set("Lesson", lesson("book").title)
+    flown.until(lambda: flown.page.lessons._asked, "question")
+    flown.fly(0.0)
+    look_back(flown, 1.0)
+    flown.do(lambda: flown.page.lessons.answer(0))
+    flown.fly(0.5)
+    assert not flown.live.paused and flown.page.flight.moment_ns is None
+    flown.until(lambda: flown.page.state.time_ns == 500_000_000, "motion")
+
+
 @pytest.mark.parametrize("paused", [False, True])
 def test_a_step_returns_from_the_past_to_the_present_and_time_stands_there(flown: FlownPage, paused: bool) -> None:
     flown.do(lambda: flown.page.flight.pause(paused))
