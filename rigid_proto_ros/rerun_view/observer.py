@@ -62,9 +62,6 @@ FLUSH_PERIOD_S = 0.5
 FLUSH_TIMEOUT_S = 5.0
 """A disk that takes longer than this to take half a second of data counts as lost."""
 
-STALLED_S = 0.9
-"""A flush that takes longer is told of: a report comes once a second, and a stalled file is to be told within two."""
-
 REACH_PER_TIP = 1.7
 """A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
 
@@ -93,7 +90,6 @@ class RerunObserver(Observer):
         self._rows: dict[type, np.ndarray] = {}
         self._lines: dict[str, list[tuple[int, int, str]]] = {}
         self._commanded = False
-        self._flushing_since_s: float | None = None
         self._mailbox = Mailbox(lambda: self._lost("nothing can be written to the disk any more"))
         self._thread = Thread(target=self._flush_until_closed, name="rerun", daemon=True)
         self._thread.start()
@@ -135,7 +131,6 @@ class RerunObserver(Observer):
         closing = False
         while not closing:
             closing = self._mailbox.closed
-            self._flushing_since_s = time.monotonic()
             # Whatever goes wrong here must not reach the flight: it goes on without a recording.
             try:
                 self._flush()
@@ -148,7 +143,6 @@ class RerunObserver(Observer):
                 self._lost(f"{type(error).__name__}: {error}")
                 if stream is not None:
                     self._end(stream)
-            self._flushing_since_s = None
             if not closing:
                 self._mailbox.wait(FLUSH_PERIOD_S)
 
@@ -331,11 +325,9 @@ class FileRecorder(RerunObserver):
 
     @property
     def stalled(self) -> str:
-        """Says that the file hasn't taken what was sent for longer than STALLED_S; empty while it does."""
-        since_s = self._flushing_since_s
-        if since_s is None or self._stream is None or time.monotonic() < since_s + STALLED_S:
-            return ""
-        return f"recording {self.path}: nothing could be written for {time.monotonic() - since_s:.1f} s"
+        """Says that the file doesn't take what is sent; empty while it does."""
+        stalled = "" if self._stream is None else self._mailbox.stalled
+        return stalled and f"recording {self.path}: {stalled}"
 
     def _open(self, run_id: str, name: str) -> Stream:
         return FileStream(self.path, run_id, name)

@@ -18,6 +18,9 @@ faster than real time reaches: the file keeps every state, and memory stays boun
 BATCH = 4096
 """Events that are fetched at a time."""
 
+STALLED_S = 0.9
+"""A write that takes longer is told of: a report comes once a second, and a stalled file is to be told within two."""
+
 PATIENCE_S = 10.0
 """A writer that fetches nothing for so long, with all places taken or at the end, won't: the simulation goes on, or
 ends, and what waits is lost."""
@@ -80,9 +83,10 @@ class Mailbox:
         self._idle = False
 
     @property
-    def stuck_s(self) -> float:
-        """How long the consumer, unless it waits, has got nothing done [s]."""
-        return 0.0 if self._idle else time.monotonic() - self._moved_at
+    def stalled(self) -> str:
+        """Says that the consumer has got nothing done for longer than STALLED_S; empty while it does, or waits."""
+        stuck_s = 0.0 if self._idle else time.monotonic() - self._moved_at
+        return "" if stuck_s < STALLED_S else f"nothing could be written for {stuck_s:.1f} s"
 
     def wake(self) -> None:
         """End the consumer's ``wait``."""

@@ -48,9 +48,6 @@ if TYPE_CHECKING:
 FLUSH_PERIOD_S = 0.4
 """Longest part [s] of a recording that kill -9 loses."""
 
-STALLED_S = 0.9
-"""A write that takes longer is told of: a report comes once a second, and a stalled file is to be told within two."""
-
 CHUNK_NS = 500_000_000
 """Simulated time that a chunk holds at most: what a cut inside it loses, also in a run faster than the clock."""
 
@@ -104,11 +101,9 @@ class McapObserver(Observer):
 
     @property
     def stalled(self) -> str:
-        """Says that the file hasn't taken what was written for longer than STALLED_S; empty while it does."""
-        stuck_s = self._mailbox.stuck_s
-        if self._writer is None or stuck_s < STALLED_S:
-            return ""
-        return f"recording {self._path}: nothing could be written for {stuck_s:.1f} s"
+        """Says that the file doesn't take what is written; empty while it does."""
+        stalled = "" if self._writer is None else self._mailbox.stalled
+        return stalled and f"recording {self._path}: {stalled}"
 
     def close(self) -> None:
         """Write what is buffered and finish the file."""

@@ -16,9 +16,10 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.rerun_view.backend import ROS_TIME
-from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, STALLED_S, FileRecorder
+from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, FileRecorder
 from rigid_proto_ros.rerun_view.rrd_reading import FRAME_HEAD, read_session, record_batches, whole_bytes
 from rigid_proto_ros.rerun_view.session_files import read_runs, record
+from rigid_proto_ros.session.mailbox import STALLED_S
 from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.simulation.observer import (
     BodyChanged,
