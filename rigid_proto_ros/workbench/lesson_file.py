@@ -23,7 +23,7 @@ from .drawing import ViserBackend
 from .lessons import COURSES, Course
 from .panel import ALWAYS, PARTS, SEE_INTO
 from .room import Room
-from .server import stop_server
+from .server import PRINTED_PICTURE, stop_server
 
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
@@ -31,21 +31,26 @@ PAGE = """<!doctype html>
 html, body {{ margin: 0; height: 100%; }}
 body {{ display: flex; font: 1rem/1.5 system-ui, sans-serif; background: #fff; color: #222; }}
 iframe {{ flex: 1; border: 0; min-width: 0; min-height: 0; }}
-aside {{ width: 24rem; box-sizing: border-box; padding: 1.5rem; overflow: auto; border-left: 1px solid #ddd; }}
+aside {{ width: min(24rem, 45%); box-sizing: border-box; padding: 1.5rem; overflow: auto; }}
+aside {{ border-left: 1px solid #ddd; }}
 h1 {{ font-size: 1.35rem; line-height: 1.25; margin: 0 0 1rem; }}
 h2 {{ font-size: 1rem; margin: 1.5rem 0 0; }}
 summary {{ cursor: pointer; font-weight: 600; }}
 small {{ color: #666; }}
-@media (max-width: 60rem) {{
+@media (max-width: 60rem) and (orientation: portrait) {{
   body {{ flex-direction: column; }}
   aside {{ width: auto; height: 40%; border: 0; border-top: 1px solid #ddd; }}
+}}
+@media print {{
+  html, body, aside {{ display: block; width: auto; height: auto; overflow: visible; border: 0; }}
+  iframe {{ width: 100%; height: {height}; }}
 }}
 </style></head><body><iframe title="the motion" srcdoc="{player}"></iframe>
 <aside><h1>{title}</h1>{speed}<p>{question}</p><ol type="A">{choices}</ol>
 <details><summary>Show the answer</summary><p><b>{answer}</b> {reason}</p></details>
 <h2>To try yourself</h2>{sentences}<p><small>{commands}</small></p></aside></body></html>
 """
-"""The player beside the words; on a narrow screen above them."""
+"""The player beside the words; above them on a narrow screen that is higher than wide, and on paper."""
 
 
 def lesson_html(lesson: Lesson, record: FlightRecord) -> str:
@@ -62,6 +67,7 @@ def lesson_html(lesson: Lesson, record: FlightRecord) -> str:
     player = player.replace("</head>", "<style>canvas { opacity: 1 !important; }</style></head>", 1)
     return PAGE.format(
         title=escape(lesson.title),
+        height=PRINTED_PICTURE,
         player=escape(player),
         question=escape(lesson.question),
         choices="".join(f"<li>{escape(choice)}</li>" for choice in lesson.choices),

@@ -131,6 +131,12 @@ def test_in_a_browser_the_body_moves_without_a_server_and_without_the_network(tm
         # A light body on a light ground: steps of colour are small, and those of the compression none.
         until(lambda picture: (np.abs(picture - first).max(axis=2) > 15).mean() > 0.01, "nothing moves")
         assert float(slider.get_attribute("aria-valuemax")) == pytest.approx(2.0, abs=0.01)
+        # A narrow window that is wider than high has player and words side by side.
+        player_box, words = page.locator("iframe").bounding_box(), page.locator("aside")
+        assert player_box["height"] == 320 and words.bounding_box()["x"] >= player_box["x"] + player_box["width"]
+        page.emulate_media(media="print")
+        assert words.evaluate("aside => aside.scrollHeight - aside.clientHeight") <= 0, "words that paper cuts off"
+        assert re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4")) == [b"/Type /Page"], "more than a page"
         browser.close()
     assert {url.partition(":")[0] for url in asked} <= {"file", "data", "blob", "about"}, asked
 
