@@ -6,6 +6,7 @@ github.com/elalish/manifold), and a mesh's convex hull and bounding box.
 from __future__ import annotations
 
 import importlib.util
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,12 +14,16 @@ from ..base.errors import MeshError, is_missing
 from .intersection import Nesting, component_nesting
 from .topology import component_sums, fan, mesh_topology
 
+if TYPE_CHECKING:
+    import manifold3d
+
 MAX_UNITED = 300_000
 """Triangles up to which unions are computed: about two seconds of manifold3d's work."""
 SAME = 1e-9
 """Relative difference of a union's volume in another order of its parts and about another origin, up to which the union
 is taken: where faces lie on each other to rounding, manifold3d 3.5 makes some that are wrong by percents.
 """
+NOT_UNITED = "components that overlap can't be united"
 FLAT = 1e-12
 """Relative extent along an axis below which points count as lying in a plane: rounding has the same effect."""
 
@@ -37,7 +42,7 @@ def united_surface(
     Each component wound outward is a part. One wound inward is a cavity of the smallest part around it, and of no other
     one: what enters a cavity stays. Raises MeshError if that isn't possible, or would take too long.
     """
-    refusal = MeshError("mesh", "components that overlap can't be united")
+    refusal = MeshError("mesh", NOT_UNITED)
     if not can_unite() or len(triangles) > MAX_UNITED:
         raise refusal
     import manifold3d
@@ -58,26 +63,38 @@ def united_surface(
         if len(np.unique(steps)) < steps.size:  # faces that lie on each other, of which manifold3d makes a wrong union
             raise refusal
         faces.append(own[:, [0, 2, 1]] if cavity[c] else own)
-    volumes = []
-    for order, place in ((range(len(faces))[::-1], 0.137), (range(len(faces)), 0.5)):  # the second one is returned
-        origin = (1.0 - place) * points.min(axis=0) + place * points.max(axis=0)
-        parts: dict[int, manifold3d.Manifold] = {}
-        for c in sorted(order, key=lambda c: bool(cavity[c])):
-            used, local = np.unique(faces[c], return_inverse=True)
-            local = local.reshape(-1, 3).astype(np.uint64)
-            solid = manifold3d.Manifold(manifold3d.Mesh64(vert_properties=vertices[used] - origin, tri_verts=local))
-            if solid.status() != manifold3d.Error.NoError:
-                raise refusal
-            if cavity[c]:
-                parts[int(np.argmin(around[c]))] -= solid
-            else:
-                parts[c] = solid
-        union = sum(parts.values(), manifold3d.Manifold())
-        volumes.append(union.volume())
-    if not abs(volumes[0] - volumes[1]) <= SAME * abs(volumes[1]):
+    owner = np.where(cavity, np.argmin(around, axis=1), np.arange(topology.components))
+    low, high = points.min(axis=0), points.max(axis=0)
+    again = _united(vertices, faces, owner, np.argsort(~cavity, kind="stable")[::-1], 0.863 * low + 0.137 * high)
+    middle = 0.5 * low + 0.5 * high
+    parts = _united(vertices, faces, owner, np.argsort(cavity, kind="stable"), middle)
+    union = sum(parts, manifold3d.Manifold())
+    if not abs(sum(again, manifold3d.Manifold()).volume() - union.volume()) <= SAME * abs(union.volume()):
         raise refusal
-    mesh, volume = union.to_mesh64(), float(sum(part.volume() for part in parts.values()))
-    return np.asarray(mesh.vert_properties)[:, :3] + origin, np.asarray(mesh.tri_verts).astype(np.int64), volume
+    mesh, volume = union.to_mesh64(), float(sum(part.volume() for part in parts))
+    return np.asarray(mesh.vert_properties)[:, :3] + middle, np.asarray(mesh.tri_verts).astype(np.int64), volume
+
+
+def _united(
+    vertices: np.ndarray, faces: list[np.ndarray], owner: np.ndarray, order: np.ndarray, origin: np.ndarray
+) -> list[manifold3d.Manifold]:
+    """The parts, less their cavities, about an origin (3,), from the faces of each component; owner (c,): the part of
+    which each is a cavity, or itself; order: parts before cavities. Raises MeshError where one bounds no solid.
+    """
+    import manifold3d
+
+    parts: dict[int, manifold3d.Manifold] = {}
+    for c in order.tolist():
+        used, local = np.unique(faces[c], return_inverse=True)
+        local = local.reshape(-1, 3).astype(np.uint64)
+        solid = manifold3d.Manifold(manifold3d.Mesh64(vert_properties=vertices[used] - origin, tri_verts=local))
+        if solid.status() != manifold3d.Error.NoError:
+            raise MeshError("mesh", NOT_UNITED)
+        if owner[c] == c:
+            parts[c] = solid
+        else:
+            parts[int(owner[c])] -= solid
+    return list(parts.values())
 
 
 def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -180,7 +180,7 @@ class ScenarioRun:
         for command in commands:
             while changes and changes[0][0] <= command.stamp_ns:
                 with suppress(InputError):  # refused when it acts
-                    scenario = after_change(scenario, changes.popleft()[1], scenario.body_mesh)
+                    scenario = after_change(scenario, changes.popleft()[1])
             if isinstance(command, Change):
                 scenario = after_change(scenario, command)
             yield command, scenario

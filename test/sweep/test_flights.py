@@ -65,12 +65,15 @@ def test_numbers_and_arrays_of_numpy_are_numbers_and_lists(tmp_path, kind) -> No
             flight.command({"state": {"angular_velocity": numbers}})
             flight.command({"set": {"gravity": numbers, "density": number(500.0)}})
             flight.command({"string": {"target": numbers}})
+            flight.command({"thrusters": [*(abs(x) for x in numbers), number(0.0)]})
             return flight.step(number(0.125)).row.tobytes()
 
     recording = tmp_path / "flight.mcap"
     assert flown(kind, vector, Path, recording) == flown(float, tuple(vector.tolist()), str)
     (session,) = read_runs(recording)
     assert verify(session) is None
+    with pytest.raises(InputError, match="force: got True"):
+        Flight(load_scene("t_handle")).command({"force": [True, 0.0, 0.0]})
 
 
 def test_a_sample_is_the_callers_own() -> None:

@@ -23,6 +23,18 @@ from rigid_proto_ros.workbench.lessons import COURSES
 from rigid_proto_ros.workbench.room import Room
 
 
+def kept_of(kind: type, monkeypatch) -> list:
+    """What the writer of the file makes of this class from now on."""
+    made = []
+
+    def keep(*arguments):
+        made.append(kind(*arguments))
+        return made[-1]
+
+    monkeypatch.setattr(lesson_file, kind.__name__, keep)
+    return made
+
+
 def test_the_file_holds_the_lessons_words_and_refers_to_nothing_outside_it(tmp_path, capsys) -> None:
     file = tmp_path / "t_handle.html"
     assert main(["lesson", "t_handle", "--html", str(file), "--duration", "1"]) == 0
@@ -37,14 +49,7 @@ def test_the_file_holds_the_lessons_words_and_refers_to_nothing_outside_it(tmp_p
 
 @pytest.mark.parametrize("name", ["t_handle", "com_or_rim", "dropped_term", "spinning_top", "thrown_hammer"])
 def test_the_file_shows_the_parts_that_the_page_shows(name, tmp_path, monkeypatch) -> None:
-    made: list[ViserBackend] = []
-
-    class Kept(ViserBackend):
-        def __init__(self, *arguments) -> None:
-            super().__init__(*arguments)
-            made.append(self)
-
-    monkeypatch.setattr(lesson_file, "ViserBackend", Kept)
+    made = kept_of(ViserBackend, monkeypatch)
     assert main(["lesson", name, "--html", str(tmp_path / "a.html"), "--duration", "0.1"]) == 0
     (backend,) = made
     labels = COURSES[name].labels
@@ -55,14 +60,7 @@ def test_the_file_shows_the_parts_that_the_page_shows(name, tmp_path, monkeypatc
 
 
 def test_a_body_that_falls_is_followed_while_it_is_in_sight_and_no_longer(tmp_path, capsys, monkeypatch) -> None:
-    rooms: list[Room] = []
-
-    class Kept(Room):
-        def __init__(self, *arguments) -> None:
-            super().__init__(*arguments)
-            rooms.append(self)
-
-    monkeypatch.setattr(lesson_file, "Room", Kept)
+    rooms = kept_of(Room, monkeypatch)
     file = tmp_path / "a.html"
     assert main(["lesson", "thrown_hammer", "--html", str(file)]) == 0
     # The flight of 5 m/s up takes 2·5/9.81 s.
