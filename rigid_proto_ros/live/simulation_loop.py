@@ -180,9 +180,12 @@ class SimulationLoop(ScenarioRun):
             self.ghost.watch(observer)
 
     def pause(self, paused: bool) -> None:
-        """Stop or resume simulated time; what was sent while it stood is taken before it goes on."""
+        """Stop or resume simulated time; what was sent while it stood is taken before it goes on. Raises InputError where
+        the motion has failed.
+        """
         if paused != self.paused:
             if not paused:
+                self._refuse_failed("pause")
                 self.take_commands()
             self.paused = paused
             self._steps_left = self._steps_requested = 0
@@ -240,8 +243,11 @@ class SimulationLoop(ScenarioRun):
                 if self.step(periods):
                     break
             yield
+        self._refuse_failed("step")
+
+    def _refuse_failed(self, asked: str) -> None:
         if self.simulation.failure:
-            raise InputError("step", f"stopped in the last good state until a reset: {self.simulation.failure}")
+            raise InputError(asked, f"stopped in the last good state until a reset: {self.simulation.failure}")
 
     def request_step(self) -> None:
         """A wrench or thruster command has come: paused and in lockstep it is followed by a step."""

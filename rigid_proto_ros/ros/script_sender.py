@@ -92,7 +92,7 @@ class ScriptSender(Node):
             raise InputError("--node", node_name, "a node's name, such as /rigid_body or /lab/rigid_body") from None
         super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
         self._counters: dict[str, str] = {}
-        self._reports = 0
+        self._reported_s = 0.0
         self._restarted = False
         self._schedule = self.create_publisher(String, f"{self.target}/schedule", qos.COMMAND)
         self._get_parameters = self.create_client(GetParameters, f"{self.target}/get_parameters")
@@ -123,7 +123,7 @@ class ScriptSender(Node):
                 self._confirm(min(number, number + count - MAX_UNCONFIRMED))
             ahead_ns = horizon_ns if paused else min(horizon_ns, SEND_AHEAD_NS)
             while time_ns > self._reached_ns() + ahead_ns and not self._was_reset():
-                rclpy.spin_once(self, timeout_sec=0.5)
+                self._listen()
             if self._was_reset():
                 break
             self._schedule.publish(String(data=text))
@@ -172,7 +172,7 @@ class ScriptSender(Node):
                 before, self._counters = self._counters, {v.key: v.value for v in status.values}
                 received = [int(counters.get("commands_received", 0)) for counters in (before, self._counters)]
                 self._restarted |= received[1] < received[0]
-                self._reports += 1
+                self._reported_s = time.monotonic()
 
     def _present_ns(self) -> int:
         """Simulated time now: by the next state or, where states are rare or stamped by a /clock, the next report."""
@@ -182,13 +182,13 @@ class ScriptSender(Node):
             stamp = message.header.stamp
             stamps.append(stamp.sec * 1_000_000_000 + stamp.nanosec)
 
-        follows_clock, reports = self._parameter("use_sim_time"), self._reports
+        follows_clock, asked_s = self._parameter("use_sim_time"), time.monotonic()
         subscription = self.create_subscription(PoseStamped, f"{self.target}/pose", on_pose, 1)
         self._spin_until(
-            lambda: self._reports > reports or (stamps and not follows_clock), f"a state or a report of {self.target}"
+            lambda: self._reported_s > asked_s or (stamps and not follows_clock), f"a state or a report of {self.target}"
         )
         self.destroy_subscription(subscription)
-        return self._reached_ns() if self._reports > reports else stamps[0]
+        return self._reached_ns() if self._reported_s > asked_s else stamps[0]
 
     def _confirmed(self) -> int:
         return int(self._counters["commands_received"]) - self._received_before
@@ -199,18 +199,21 @@ class ScriptSender(Node):
 
     def _wait_until_acted(self, last_ns: int) -> None:
         """Until a report from after the last command: only there a ray meets the body or misses it. Not for ever where
-        simulated time doesn't get there; raises InputError where there are no reports any more.
+        simulated time doesn't get there.
         """
-        reached_ns, since, reports = -1, time.monotonic(), self._reports
+        reached_ns, since_s = -1, 0.0
         while self._reached_ns() <= last_ns and not self._was_reset():
-            rclpy.spin_once(self, timeout_sec=0.1)
-            stood_s = time.monotonic() - since
             if self._reached_ns() != reached_ns:
-                reached_ns, since, reports = self._reached_ns(), time.monotonic(), self._reports
-            elif stood_s > STANDSTILL_S and self._reports > reports:
+                reached_ns, since_s = self._reached_ns(), self._reported_s
+            elif self._reported_s > since_s + STANDSTILL_S:
                 return
-            elif stood_s > STALLED_S:
-                raise InputError("--node", self.target, f"a report within {STALLED_S:g} s")
+            self._listen()
+
+    def _listen(self) -> None:
+        """Wait a moment for the next report; raises InputError where there are none any more."""
+        rclpy.spin_once(self, timeout_sec=0.1)
+        if time.monotonic() > self._reported_s + STALLED_S:
+            raise InputError("--node", self.target, f"a report within {STALLED_S:g} s")
 
     def _reached_ns(self) -> int:
         """Simulated time of the last report."""

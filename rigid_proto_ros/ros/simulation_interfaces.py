@@ -8,6 +8,8 @@ and set. There is no world, so nothing is spawned, loaded or deleted.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rclpy.node import Node
@@ -41,7 +43,14 @@ class SimulationInterfaces:
     def offer(self, node: Node, services: Any) -> None:
         """Create the services, private to the node."""
         for service_type, name in SERVICES:
-            node.create_service(getattr(services, service_type), f"~/{name}", getattr(self, name))
+            node.create_service(getattr(services, service_type), f"~/{name}", partial(self.answer, getattr(self, name)))
+
+    def answer(self, serve: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """What serve(request, response) returns, or what was wrong."""
+        try:
+            return serve(request, response)
+        except InputError as error:
+            return self._failed(response, str(error))
 
     # The simulation
 
@@ -100,10 +109,7 @@ class SimulationInterfaces:
         """Step over publications, while paused."""
         if not 1 <= request.steps <= MAX_STEPS:
             return self._failed(response, f"{request.steps} steps: 1 to {MAX_STEPS}")
-        try:
-            self._live.step(request.steps)
-        except InputError as error:
-            return self._failed(response, str(error))
+        self._live.step(request.steps)
         return self._done(response)
 
     # The body

@@ -17,6 +17,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC, Writer
 
 from ..base.errors import InputError
+from ..base.files import whole_file
 from ..base.rotation import rotate, rotate_inverse
 from ..scene.scenario import mesh_sha256_of
 from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_state, read_string
@@ -77,29 +78,24 @@ def repair_mcap(path: Path, repaired: Path) -> None:
     """Write a finished file with all that is whole in a cut one; raises InputError where that can't be."""
     schemas: dict[int, int] = {0: 0}
     channels: dict[int, int] = {}
-    try:
-        with open(repaired, "wb") as stream:
-            writer = Writer(stream)
-            writer.start(profile=ROS_PROFILE)
-            for record in _whole_records(path):
-                if isinstance(record, records.Message):
-                    channel = channels[record.channel_id]
-                    writer.add_message(channel, record.log_time, record.data, record.publish_time, record.sequence)
-                elif isinstance(record, records.Schema) and record.id not in schemas:
-                    schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
-                elif isinstance(record, records.Channel) and record.id not in channels:
-                    channels[record.id] = writer.register_channel(
-                        record.topic, record.message_encoding, schemas[record.schema_id], record.metadata
-                    )
-                elif isinstance(record, records.Attachment):
-                    writer.add_attachment(
-                        record.create_time, record.log_time, record.name, record.media_type, record.data
-                    )
-                elif isinstance(record, records.Metadata):
-                    writer.add_metadata(record.name, record.metadata)
-            writer.finish()
-    except OSError as error:
-        raise InputError("--repair", str(repaired), f"a file that can be written ({error.strerror})") from None
+    with whole_file("--repair", repaired) as beside, open(beside, "wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile=ROS_PROFILE)
+        for record in _whole_records(path):
+            if isinstance(record, records.Message):
+                channel = channels[record.channel_id]
+                writer.add_message(channel, record.log_time, record.data, record.publish_time, record.sequence)
+            elif isinstance(record, records.Schema) and record.id not in schemas:
+                schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+            elif isinstance(record, records.Channel) and record.id not in channels:
+                channels[record.id] = writer.register_channel(
+                    record.topic, record.message_encoding, schemas[record.schema_id], record.metadata
+                )
+            elif isinstance(record, records.Attachment):
+                writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
+            elif isinstance(record, records.Metadata):
+                writer.add_metadata(record.name, record.metadata)
+        writer.finish()
 
 
 def _whole_records(path: Path) -> Iterator[records.McapRecord]:

@@ -26,7 +26,9 @@ PATIENCE_S = 10.0
 ends, and what waits is lost."""
 
 Noted = tuple[int, Event]
-"""An event and when it was told: the wall's time [ns]."""
+"""An event and when it was told: the wall's time [ns], as it goes on from when the mailbox was made. It is never set back,
+so that what is sorted by it keeps its order.
+"""
 
 
 class Mailbox:
@@ -41,6 +43,7 @@ class Mailbox:
         self._on_given_up = on_given_up
         self._given_up = False
         self._moved_at = time.monotonic()
+        self._wall_offset_ns = time.time_ns() - time.monotonic_ns()
         self._idle = False
         self._waiting: queue.Queue[Noted] = queue.Queue(MOST_WAITING)
         self._wake = threading.Event()
@@ -52,7 +55,7 @@ class Mailbox:
         if isinstance(event, Published | GhostPublished):
             event = type(event)(event.time_ns, event.row.copy())
         try:
-            self._waiting.put((time.time_ns(), event), timeout=PATIENCE_S)
+            self._waiting.put((time.monotonic_ns() + self._wall_offset_ns, event), timeout=PATIENCE_S)
         except queue.Full:
             self._given_up = True
             self._on_given_up()
@@ -62,13 +65,7 @@ class Mailbox:
     def take(self) -> list[Noted]:
         """The oldest events, BATCH at most; none when it is empty."""
         self.moved()
-        events: list[Noted] = []
-        while len(events) < BATCH:
-            try:
-                events.append(self._waiting.get_nowait())
-            except queue.Empty:
-                break
-        return events
+        return [self._waiting.get_nowait() for _ in range(min(BATCH, self._waiting.qsize()))]
 
     def moved(self) -> None:
         """The consumer got something done: as long as it does, a disk is slow, or the machine busy, and no more."""

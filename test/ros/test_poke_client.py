@@ -203,15 +203,24 @@ def test_commands_that_somebody_elses_reset_drops_are_reported_and_make_exit_1(r
     assert status == 1 and "the node was reset or restarted meanwhile: commands that hadn't acted were dropped" in said
 
 
-def test_a_node_that_is_gone_before_the_last_command_acts_is_reported(ros_environment, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("script", "options"),
+    [
+        ("- {t: 9, impulse: [1.0e-6, 0, 0]}\n", ["--reset"]),
+        # The last one lies too far ahead to be sent.
+        ("- {t: 1, impulse: [1.0e-6, 0, 0]}\n- {t: 100, impulse: [1.0e-6, 0, 0]}\n", []),
+    ],
+)
+def test_a_node_that_is_gone_before_the_last_command_acts_is_reported(
+    script, options, ros_environment, tmp_path, monkeypatch, capsys
+):
     monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
     monkeypatch.setattr(script_sender, "STALLED_S", 1.0)
     path = tmp_path / "poke.yaml"
-    path.write_text("- {t: 9, impulse: [1.0e-6, 0, 0]}\n")
+    path.write_text(script)
     with ThreadPoolExecutor() as other, SlowNode(ros_environment, 1) as gone:
-        words = [str(path), "--node", "tester", "--reset", "--timeout", "0"]
-        sending = other.submit(poke_client, words)
-        gone.until(lambda: "pauseFalse" in gone.calls, "the start")
+        sending = other.submit(poke_client, [str(path), "--node", "tester", *options, "--timeout", "0"])
+        gone.until(lambda: "pauseFalse" in gone.calls if options else gone.received, "the start")
         gone.close()
         assert sending.result() == 2
     assert capsys.readouterr().err.startswith("poke_client: --node: got '/tester'; accepted: ")

@@ -4,7 +4,10 @@ stood in for; the node, its thread and its clock are real."""
 
 from __future__ import annotations
 
+import functools
 import sys
+import threading
+from concurrent.futures import Future
 from types import SimpleNamespace
 
 import pytest
@@ -32,9 +35,9 @@ SCOPES = {"SCOPE_DEFAULT": 0, "SCOPE_TIME": 1, "SCOPE_STATE": 2, "SCOPE_SPAWNED"
 
 @pytest.fixture
 def services():
-    """The services of a flight on a real physics thread, without ROS."""
+    """The services of a flight on a real physics thread, as they are offered, without ROS; and the flight."""
     from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
-    from rigid_proto_ros.ros.simulation_interfaces import SimulationInterfaces
+    from rigid_proto_ros.ros.simulation_interfaces import SERVICES, SimulationInterfaces
     from rigid_proto_ros.scene.scenario import make_scenario
 
     values = {"initial.angular_velocity": [0.1, 3.0, 0.1], "start_paused": True, "world_frame": "map"}
@@ -42,7 +45,10 @@ def services():
     # As the node does: a kernel that compiles would hold the first request up for longer than it waits.
     warm_up(live.scenario.setup)
     live.start()
-    yield SimulationInterfaces(live, MESSAGES), live
+    offered = {}
+    node = SimpleNamespace(create_service=lambda _, name, answer: offered.update({name.removeprefix("~/"): answer}))
+    SimulationInterfaces(live, MESSAGES).offer(node, SimpleNamespace(**{name: name for name, _ in SERVICES}))
+    yield SimpleNamespace(**offered), live
     live.stop()
 
 
@@ -126,6 +132,23 @@ def test_it_plays_and_pauses(services):
         refused = answer.set_simulation_state(state(other), response())
         assert refused.result.result == UNSUPPORTED
         assert "signal" in refused.result.error_message
+
+
+def test_what_the_simulation_refuses_is_a_failed_operation_with_its_reason(services, monkeypatch):
+    answer, live = services
+    live.schedule("{t: 0, state: {linear_velocity: [9.9e99, 0, 0], position: [9.9e99, 0, 0]}}")
+    for refused in (
+        answer.step_simulation(SimpleNamespace(steps=100), response()),
+        answer.set_simulation_state(state(1), response()),
+    ):
+        assert refused.result.result == FAILED and "until a reset" in refused.result.error_message
+    monkeypatch.setattr(live, "call", functools.partial(live.call, timeout_s=0.0))
+    held = threading.Event()
+    live._requests.append((held.wait, Future()))
+    live._wake.set()
+    refused = answer.get_entity_state(asked(), SimpleNamespace(**vars(response()) | {"state": entity_state()}))
+    held.set()
+    assert refused.result.result == FAILED and "too busy" in refused.result.error_message
 
 
 def test_time_and_state_are_reset_together_or_not_at_all(services):

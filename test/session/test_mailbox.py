@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,16 @@ def test_events_come_out_in_the_order_in_which_they_went_in_and_states_are_copie
     assert [event.time_ns for event in events] == list(range(BATCH + 3))
     assert [event.time_ns for event in events if isinstance(event, Reset)] == [1, BATCH]
     assert all((event.row == event.time_ns).all() for event in events if isinstance(event, Published))
+
+
+def test_what_is_told_has_the_walls_time_in_the_order_in_which_it_was_told_though_that_clock_is_set_back(monkeypatch):
+    box, began_ns = Mailbox(), time.time_ns()
+    box.put(Reset(0))
+    monkeypatch.setattr(mailbox.time, "time_ns", lambda: began_ns - 10**12)
+    box.put(Reset(1))
+    (first_ns, first), (second_ns, second) = box.take()
+    assert (first.time_ns, second.time_ns) == (0, 1)
+    assert abs(first_ns - began_ns) < 10**10 and first_ns <= second_ns
 
 
 def test_a_recorder_that_is_stuck_is_given_up_and_what_waits_has_no_gap(monkeypatch):

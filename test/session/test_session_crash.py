@@ -129,13 +129,18 @@ def test_repair_is_refused_where_it_would_harm(recording, tmp_path, capsys):
 def test_damage_inside_is_refused_in_one_line(recording, tmp_path, capsys):
     data = recording.read_bytes()
     chunks = [at for at, opcode in records(data) if opcode == 0x06]
+    repaired = tmp_path / "repaired.mcap"
+    repaired.write_bytes(b"an earlier one")
     for offset in (chunks[2] + 60, chunks[3] + 30, chunks[4] + 200):
         damaged = bytearray(data)
         damaged[offset : offset + 16] = bytes(255 - b for b in damaged[offset : offset + 16])
         (tmp_path / "damaged.mcap").write_bytes(damaged)
-        assert main(["replay", str(tmp_path / "damaged.mcap")]) == 2
-        error = capsys.readouterr().err
-        assert len(error.splitlines()) == 1 and "damaged.mcap" in error
+        for options in ([], ["--repair", str(repaired)]):
+            assert main(["replay", str(tmp_path / "damaged.mcap"), *options]) == 2
+            error = capsys.readouterr().err
+            assert len(error.splitlines()) == 1 and "damaged.mcap" in error
+    assert repaired.read_bytes() == b"an earlier one"
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 @pytest.mark.parametrize(
