@@ -40,7 +40,7 @@ def count_calls(kind: type, method: str, counts: Counter[str], name) -> None:
 def fly(scenario: str) -> dict:
     """Fly for a moment, and count in the next half second."""
     node = RigidBodyNode(SCENARIOS[scenario])
-    node.states.pack_all(warm_up(node.loop.scenario.setup))
+    node.states.pack_all(warm_up(node.live.loop.scenario.setup))
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     other = rclpy.create_node("other")
@@ -56,8 +56,8 @@ def fly(scenario: str) -> dict:
 
     def look() -> tuple[int, int, Counter, int]:
         """Steps, time and counts of one moment: states are published by the physics thread."""
-        simulation, received = node.loop.simulation, node.live.commands.received
-        return node.call(lambda: (simulation.steps, simulation.time_ns, Counter(published), received["wrench"]))
+        simulation, received = node.live.loop.simulation, node.live.loop.commands.received
+        return node.live.call(lambda: (simulation.steps, simulation.time_ns, Counter(published), received["wrench"]))
 
     while look()[1] < 5e8:
         executor.spin_once(timeout_sec=0.05)

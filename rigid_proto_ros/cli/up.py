@@ -32,10 +32,9 @@ def run(args: argparse.Namespace) -> int:
     """Run the node in this process, so that signals reach it directly."""
     from ..scene.scenario import read_scene
     from ..scene.scene_file import scene_file
-    from .executables import as_typed, own_executable, text_parameter
+    from .executables import as_typed, check_rclpy, text_parameter
 
-    own_executable("rigid_body_node")
-
+    check_rclpy("rigid_body_node")
     overrides = text_parameter("mesh", args.mesh) if args.mesh else []
     scenario = read_scene(args.scene, {"mesh": args.mesh} if args.mesh else {})
     viewer = args.viewer

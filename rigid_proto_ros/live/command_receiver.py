@@ -19,17 +19,7 @@ from ..simulation.setup import Setup, check_command
 if TYPE_CHECKING:
     from .simulation_loop import SimulationLoop
 
-COUNTED_BY = {
-    "wrench": "wrench",
-    "thrusters": "thrusters",
-    "poke": "poke",
-    "string_target": "string",
-    "string_attach": "string",
-    "inertia": "inertia",
-}
-"""The counter of each kind of command; all others come by the schedule."""
-
-TOPICS = (*dict.fromkeys(COUNTED_BY.values()), "schedule")
+TOPICS = ("wrench", "thrusters", "poke", "string", "inertia", "schedule")
 """What received messages are counted by."""
 
 Submission = tuple[Command, int, Listed | None, tuple[bytes, Setup]]
@@ -135,8 +125,26 @@ class CommandReceiver:
         return taken, counted
 
     def _effective(self, stamp_ns: int, offset_ns: int) -> tuple[int, str]:
+        """Simulated time [ns] at which a command with this stamp acts, and the counter it goes to, if any.
+
+        Zero or past means now (past: ``late``); one up to the horizon ahead acts at exactly that time; one within a day
+        of the system clock comes from a tool that stamps by it: it means now (``wall_stamp``). Raises CommandRefused
+        (``stamp``). offset_ns: how far stamps are ahead of simulated time.
+        """
+        now_ns, time_ns = self._loop.simulation.time_ns, stamp_ns - offset_ns
+        if stamp_ns == 0:
+            return now_ns, ""
+        if time_ns <= now_ns:
+            return now_ns, "late" if time_ns < now_ns else ""
         horizon_ns = nanoseconds(self._loop.scenario.parameters.schedule_horizon)
-        return effective_time(stamp_ns, self._loop.simulation.time_ns, time.time_ns(), horizon_ns, offset_ns)
+        if time_ns <= now_ns + horizon_ns:
+            return time_ns, ""
+        if abs(stamp_ns - time.time_ns()) <= DAY_NS:
+            return now_ns, "wall_stamp"
+        accepted = (
+            f"0, or time up to {horizon_ns / 1e9:g} s (schedule_horizon) after {(now_ns + offset_ns) / 1e9:.9g} s"
+        )
+        raise CommandRefused("stamp", "header.stamp", f"{stamp_ns / 1e9:.9g} s", accepted)
 
     def _count(self, counter: str, count: int) -> None:
         if counter == "late":
@@ -148,27 +156,3 @@ class CommandReceiver:
                     "stamps of commands are simulated time"
                 )
             self.wall_stamp += count
-
-
-def effective_time(stamp_ns: int, now_ns: int, wall_ns: int, horizon_ns: int, offset_ns: int = 0) -> tuple[int, str]:
-    """Simulated time [ns] at which a command with this stamp acts, and the counter it goes to, if any.
-
-    Zero or past means now (past: ``late``); one up to the horizon ahead acts at exactly that time; one within a day of
-    the system clock comes from a tool that stamps by it: it means now (``wall_stamp``). Raises CommandRefused
-    (``stamp``). offset_ns: how far stamps are ahead of simulated time.
-    """
-    if stamp_ns == 0:
-        return now_ns, ""
-    time_ns = stamp_ns - offset_ns
-    if time_ns <= now_ns:
-        return now_ns, "late" if time_ns < now_ns else ""
-    if time_ns <= now_ns + horizon_ns:
-        return time_ns, ""
-    if abs(stamp_ns - wall_ns) <= DAY_NS:
-        return now_ns, "wall_stamp"
-    raise CommandRefused(
-        "stamp",
-        "header.stamp",
-        f"{stamp_ns / 1e9:.9g} s",
-        f"0, or time up to {horizon_ns / 1e9:g} s (schedule_horizon) after {(now_ns + offset_ns) / 1e9:.9g} s",
-    )

@@ -9,7 +9,6 @@ the interactive page uses it as it is.
 from __future__ import annotations
 
 import gc
-import json
 import threading
 import time
 import traceback
@@ -27,12 +26,10 @@ from ..scene.command_codec import frame_names
 from ..scene.parameters import with_mass_of_density
 from ..scene.scenario import Scenario
 from ..scene.scenario_run import notify_start
-from ..scene.script import entry_of
-from ..simulation.commands import Change, ClearWrench, Command, MoveString, ReleaseString, WrenchCommand
+from ..simulation.commands import Change, Command, MoveString, WrenchCommand
 from ..simulation.observer import Observer, Observers, SceneChanged
 from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
-from .command_receiver import COUNTED_BY, CommandReceiver
 from .pacing import Stamps, ask_for_short_slices
 from .simulation_loop import Endpoints, SimulationLoop
 
@@ -176,11 +173,6 @@ class LiveSimulation:
         return self.loop.simulation.state
 
     @property
-    def commands(self) -> CommandReceiver:
-        """What counts commands; used on the physics thread."""
-        return self.loop.commands
-
-    @property
     def paused(self) -> bool:
         """Whether simulated time is paused."""
         return self.loop.paused
@@ -188,31 +180,14 @@ class LiveSimulation:
     # Commands
 
     def submit(self, command: Command) -> None:
-        """Take a command as if its message had come now: it acts at its stamp, or now where that is 0; raises
-        CommandRefused, counted, for what can be checked now.
-        """
-        topic = COUNTED_BY.get(command.kind)
-        if topic is not None:
-            self.call(lambda: self.commands.receive(topic, lambda: command))
-            return
-        self.schedule(json.dumps({"t": command.stamp_ns / 1e9, **entry_of(command)}))
+        """Take a command of a service, which acts now and is counted by no topic."""
+        self.call(lambda: self.loop.simulation.submit(command))
 
     def schedule(self, text: str) -> None:
         """Take an entry of a script, or a list of entries, as YAML, ``t`` in simulated seconds; a list is taken or
         refused whole. Raises CommandRefused, counted.
         """
-        self.call(lambda: self.commands.receive_schedule(lambda: text))
-
-    def clear_wrench(self) -> None:
-        """End the held wrenches and the running pulses; scheduled ones stay."""
-        self._service(ClearWrench())
-
-    def release_string(self) -> None:
-        """Release the string."""
-        self._service(ReleaseString())
-
-    def _service(self, command: Command) -> None:
-        self.call(lambda: self.loop.simulation.submit(command))
+        self.call(lambda: self.loop.commands.receive_schedule(lambda: text))
 
     # Time
 

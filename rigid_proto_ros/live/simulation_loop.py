@@ -92,7 +92,7 @@ class SimulationLoop(ScenarioRun):
         self._paused_publication_ns = 0
         self._next_listener_check_ns = 0
         self._caught_up = True
-        self._end_ns: int | None = None
+        self._end_ns = LAST_STAMP_NS + 1
         self._on_end: Callable[[], None] = lambda: None
         self._waiting: list[Change] = []
         self._acting = scenario
@@ -180,8 +180,8 @@ class SimulationLoop(ScenarioRun):
             self.ghost.watch(observer)
 
     def pause(self, paused: bool) -> None:
-        """Stop or resume simulated time; what was sent while it stood is taken before it goes on. Raises InputError where
-        the motion has failed.
+        """Stop or resume simulated time; what was sent while it stood is taken before it goes on. Raises InputError
+        where the motion has failed.
         """
         if paused != self.paused:
             if not paused:
@@ -309,9 +309,8 @@ class SimulationLoop(ScenarioRun):
         if present_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
             return
-        ends = self._end_ns is not None and present_ns >= self._end_ns
-        if self._end_ns is not None:
-            present_ns = min(present_ns, self._end_ns)
+        ends = present_ns >= self._end_ns
+        present_ns = min(present_ns, self._end_ns)
         if not self._has_listeners and self._caught_up and (self.pace.factor > 0.0 or self.pace.followed):
             self.publications.pass_over(present_ns)
         due_ns = self.publications.next_ns
@@ -330,7 +329,7 @@ class SimulationLoop(ScenarioRun):
         rarely = self.publications.rate * self.pace.factor * RAREST_NS < 1e9
         if ends or rarely or not self._has_listeners or self.pace.followed or not self._caught_up:
             self.catch_up()
-        if ends and self._end_ns is not None and self.simulation.time_ns >= self._end_ns:
+        if self.simulation.time_ns >= self._end_ns:
             self.paused = True
             self._on_end()
 

@@ -202,14 +202,14 @@ class StepService:
         """Take what is asked for, one request after another, each for as long as a tick has time, and answer. Returns
         whether more is to be expected soon.
         """
+        loop, handle = self._live.loop, self._service.handle
         while True:
             if self._under_way is None:
-                handle = self._service.handle
                 with handle:
                     _, header = handle.service_take_request(Trigger.Request)
                 if header is None:
                     return wall_ns < self._expected_until_ns
-                self._under_way = header, self._live.loop.steps()
+                self._under_way = header, loop.steps()
             self._expected_until_ns = wall_ns + EXPECTED_NS
             header, steps = self._under_way
             answer = Trigger.Response(success=True)
@@ -217,7 +217,7 @@ class StepService:
                 next(steps)
                 return True
             except StopIteration:
-                time_s, received = self._live.loop.simulation.time_ns / 1e9, self._live.commands.received.total()
+                time_s, received = loop.simulation.time_ns / 1e9, loop.commands.received.total()
                 answer.message = f"simulated time is {time_s:.9g} s; {received} commands received"
             except InputError as error:
                 answer = Trigger.Response(success=False, message=str(error))

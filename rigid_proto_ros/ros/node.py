@@ -20,6 +20,7 @@ from ..live.live_simulation import LiveSimulation
 from ..live.simulation_loop import Endpoints
 from ..scene.command_codec import frame_names
 from ..scene.scenario import Scenario, make_scenario
+from ..simulation.commands import ClearWrench, ReleaseString
 from ..simulation.observer import Observer
 from .arguments import NODE_NAME
 from .commands import CommandSubscriber, StepService
@@ -46,8 +47,10 @@ def offer_services(node: Node, live: LiveSimulation) -> None:
         node.create_service(service_type, f"~/{name}", answer)
 
     offer(Trigger, "reset", lambda _: live.reset(), lambda _: "simulated time is 0")
-    offer(Trigger, "clear_wrench", lambda _: live.clear_wrench(), lambda _: "no wrench acts; scheduled ones stay")
-    offer(Trigger, "string/release", lambda _: live.release_string(), lambda _: "the string is released")
+    offer(
+        Trigger, "clear_wrench", lambda _: live.submit(ClearWrench()), lambda _: "no wrench acts; scheduled ones stay"
+    )
+    offer(Trigger, "string/release", lambda _: live.submit(ReleaseString()), lambda _: "the string is released")
     offer(SetBool, "pause", lambda request: live.pause(request.data), lambda r: "paused" if r.data else "running")
 
 
@@ -76,11 +79,10 @@ class RigidBodyNode(Node):
         # With its namespace: a recording has the node's own topics.
         name = self.get_fully_qualified_name().strip("/")
         self.live = LiveSimulation(scenario, name, [events, *filter(None, [viewer])], endpoints, clock)
-        self.loop, self.call = self.live.loop, self.live.call
         events.stamps = self.live.stamps
-        self.states = StatePublisher(self, frames, self.loop, self.live.stamps)
+        self.states = StatePublisher(self, frames, self.live.loop, self.live.stamps)
         self.states.configure(scenario.parameters)
-        subscriber = CommandSubscriber(self, self.live.commands, frames, bool(scenario.parameters.thrusters))
+        subscriber = CommandSubscriber(self, self.live.loop.commands, frames, bool(scenario.parameters.thrusters))
         self._parameters_in_flight = LiveParameters(self, super().set_parameters_atomically, self.live, self.states)
         endpoints.publish = self.states.publish
         endpoints.has_subscribers = self.states.find_subscribers

@@ -39,9 +39,8 @@ _ROS_TYPES = {name: RosParameter.Type(value) for name, value in _TYPES.items()}
 
 def descriptor(parameter: Parameter) -> ParameterDescriptor:
     """The ROS descriptor of a declared parameter."""
-    when = {READ_ONLY: "Set at start only."}.get(parameter.changes, f"Changes take effect {parameter.changes}.")
-    if parameter.changes == LIVE:
-        when = "Can be changed while the simulation runs."
+    told = {READ_ONLY: "Set at start only.", LIVE: "Can be changed while the simulation runs."}
+    when = told.get(parameter.changes, f"Changes take effect {parameter.changes}.")
     result = ParameterDescriptor(
         name=parameter.name,
         type=_TYPES[parameter.type],
@@ -71,9 +70,9 @@ def declare_parameters(node: Node, given: Mapping[str, object]) -> dict[str, Any
     return values
 
 
-def ros_parameter(parameter: Parameter, value: object) -> RosParameter:
+def ros_parameter(name: str, value: object) -> RosParameter:
     """A converted value as rclpy's parameter."""
-    return RosParameter(parameter.name, _ROS_TYPES[parameter.type], value)
+    return RosParameter(name, _ROS_TYPES[parameter_named(name).type], value)
 
 
 def converted(changes: list[RosParameter]) -> list[RosParameter]:
@@ -85,8 +84,7 @@ def converted(changes: list[RosParameter]) -> list[RosParameter]:
                 raise InputError(change.name, change.value, "true or false")
             result.append(change)
             continue
-        parameter = parameter_named(change.name)
-        result.append(ros_parameter(parameter, parameter.convert(change.value)))
+        result.append(ros_parameter(change.name, parameter_named(change.name).convert(change.value)))
     return result
 
 
@@ -125,7 +123,7 @@ class LiveParameters:
             return SetParametersResult(successful=False, reason=str(error))
         named = {p.name: p for p in parameters}
         for name in with_mass_of_density(named).keys() - named.keys():
-            named |= {p.name: p for p in _as_ros({name: 0.0})}
+            named[name] = ros_parameter(name, 0.0)
         # What is so already is no change: a dump of this very node can be loaded. But a command that acts before may
         # change it: one that waits, or comes while time stands.
         ahead = {name for _, change in self._live.loop.simulation.waiting_changes for name in change.content}
@@ -138,13 +136,12 @@ class LiveParameters:
             return SetParametersResult(successful=False, reason=f"{', '.join(fixed)}: can be set at start only")
         if not changed:
             return SetParametersResult(successful=True)
-        changes = {p.name: p.value for p in changed}
         try:
-            self._live.set_parameters(changes)
+            self._live.set_parameters({p.name: p.value for p in changed})
         except InputError as error:
             return SetParametersResult(successful=False, reason=str(error))
         self._states.configure(self._live.scenario.parameters)
-        return self._store(changed, changes)
+        return self._store(changed)
 
     def _follow(self) -> None:
         """Set the ROS parameters to what scheduled commands and inertia messages have changed, and to no recording
@@ -152,20 +149,17 @@ class LiveParameters:
         """
         self._live.give_up_failed_recording()
         now = self._live.scenario.parameters
-        behind = {
-            name: value
-            for name, value in now.named().items()
-            if not is_read_only(name) and not self._is_in_force(_as_ros({name: value})[0])
-        }
+        named = [ros_parameter(name, value) for name, value in now.named().items() if not is_read_only(name)]
+        behind = [p for p in named if not self._is_in_force(p)]
         if behind:
-            self._store(_as_ros(behind), behind)
+            self._store(behind)
             self._states.configure(now)
 
-    def _store(self, parameters: list[RosParameter], values: dict) -> SetParametersResult:
+    def _store(self, parameters: list[RosParameter]) -> SetParametersResult:
         """Into rclpy's table, which tells /parameter_events; a ballast that comes along in flight is declared."""
-        for name, value in values.items():
-            if not self._node.has_parameter(name):
-                self._node.declare_parameter(name, value, descriptor(parameter_named(name)), ignore_override=True)
+        for p in parameters:
+            if not self._node.has_parameter(p.name):
+                self._node.declare_parameter(p.name, p.value, descriptor(parameter_named(p.name)), ignore_override=True)
         return self._store_in_ros(parameters)
 
     def _is_in_force(self, parameter: RosParameter) -> bool:
@@ -174,10 +168,6 @@ class LiveParameters:
         return self._node.has_parameter(name) and _plain(self._node.get_parameter(name).value) == _plain(
             parameter.value
         )
-
-
-def _as_ros(values: dict) -> list[RosParameter]:
-    return [ros_parameter(parameter_named(name), value) for name, value in values.items()]
 
 
 def _plain(value: Any) -> Any:

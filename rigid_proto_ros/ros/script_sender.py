@@ -185,7 +185,8 @@ class ScriptSender(Node):
         follows_clock, asked_s = self._parameter("use_sim_time"), time.monotonic()
         subscription = self.create_subscription(PoseStamped, f"{self.target}/pose", on_pose, 1)
         self._spin_until(
-            lambda: self._reported_s > asked_s or (stamps and not follows_clock), f"a state or a report of {self.target}"
+            lambda: self._reported_s > asked_s or (stamps and not follows_clock),
+            f"a state or a report of {self.target}",
         )
         self.destroy_subscription(subscription)
         return self._reached_ns() if self._reported_s > asked_s else stamps[0]

@@ -157,7 +157,7 @@ class SimulationInterfaces:
             failed = self._messages.Result.RESULT_OPERATION_FAILED
             return _ended(response, getattr(response, "INVALID_POSE", failed), str(refusal))
         if values:
-            self._live.call(lambda: self._loop.simulation.submit(command))
+            self._live.submit(command)
         return self._done(response)
 
     def _is_known(self, entity: str, response: Any) -> bool:

@@ -26,8 +26,8 @@ PATIENCE_S = 10.0
 ends, and what waits is lost."""
 
 Noted = tuple[int, Event]
-"""An event and when it was told: the wall's time [ns], as it goes on from when the mailbox was made. It is never set back,
-so that what is sorted by it keeps its order.
+"""An event and when it was told: the wall's time [ns], as it goes on from when the mailbox was made. It is never set
+back, so that what is sorted by it keeps its order.
 """
 
 

@@ -124,7 +124,6 @@ class McapObserver(Observer):
         schemas = {
             message_type: writer.register_schema(message_type, "ros2msg", definition.encode())
             for message_type, definition in DEFINITIONS.items()
-            if message_type in TOPICS.values()
         }
         self._channels = {
             name: writer.register_channel(f"/{node_name.strip('/')}/{name}", "cdr", schemas[message_type])

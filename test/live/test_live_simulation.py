@@ -64,6 +64,11 @@ def live(watcher):
     live.stop()
 
 
+def submit(live: LiveSimulation, command: WrenchCommand | ThrusterCommand) -> None:
+    """As if its message had come now."""
+    live.call(lambda: live.loop.commands.receive(command.kind, lambda: command))
+
+
 def test_it_flies_where_rclpy_cannot_be_imported():
     code = """
 import sys
@@ -87,16 +92,16 @@ print(live.state.linear_velocity[0] > 0.0)
 
 def test_commands_act_and_are_counted_and_a_refusal_is_raised(live):
     mass = live.scenario.setup.body.mass
-    live.submit(WrenchCommand(False, parse_frame("world;impulse"), (mass, 0.0, 0.0), ZERO))
+    submit(live, WrenchCommand(False, parse_frame("world;impulse"), (mass, 0.0, 0.0), ZERO))
     live.schedule(f"[{{t: 0, impulse: [0, {mass!r}, 0]}}, {{t: 0, set: {{gravity: [0, 0, -1]}}}}]")
     live.step(10)
     assert live.state.time_ns == 10 * PERIOD_NS
     assert live.state.linear_velocity == pytest.approx([1.0, 1.0, -0.1], abs=1e-12)
     with pytest.raises(CommandRefused, match="nowhere"):
-        live.submit(WrenchCommand(True, parse_frame("world@nowhere"), (1.0, 0.0, 0.0), ZERO))
+        submit(live, WrenchCommand(True, parse_frame("world@nowhere"), (1.0, 0.0, 0.0), ZERO))
     with pytest.raises(CommandRefused, match="t"):
         live.schedule("[{t: -1, force: [1, 0, 0]}]")
-    assert live.commands.received == {"poke": 1, "wrench": 1, "schedule": 3}
+    assert live.loop.commands.received == {"poke": 1, "wrench": 1, "schedule": 3}
     # Too many forces and an attitude that is none aren't frames that are none.
     with pytest.raises(CommandRefused, match="2 numbers"):
         live.schedule("{t: 0, thrusters: [1, 0]}")
@@ -156,8 +161,8 @@ def test_commands_are_checked_in_the_scene_that_parameters_have_made(live):
     live.set_parameters({"integrator": "taylor", "mass": 1e-12})
     live.step()
     live.set_parameters({"integrator": "auto", "mass": 1.0})
-    live.submit(WrenchCommand(False, parse_frame("world@tip"), (0.0, 0.0, 0.01), ZERO))
-    live.submit(WrenchCommand(False, parse_frame("world;impulse"), (1e4, 0.0, 0.0), ZERO))
+    submit(live, WrenchCommand(False, parse_frame("world@tip"), (0.0, 0.0, 0.01), ZERO))
+    submit(live, WrenchCommand(False, parse_frame("world;impulse"), (1e4, 0.0, 0.0), ZERO))
     live.step()
     assert not live.loop.simulation.refused and live.state.linear_velocity[0] == pytest.approx(1e4, rel=1e-9)
 
@@ -169,7 +174,7 @@ def test_commands_are_checked_under_the_changes_that_wait_before_them(live):
     for entry in (*entries, {"t": 0.04, "set": {"angular_damping": 1e-6}}):
         live.schedule(json.dumps([entry]))
     held = WrenchCommand(True, parse_frame("world@tip"), (0.0, 0.01, 0.0), ZERO, stamp_ns=30_000_000)
-    live.submit(held)
+    submit(live, held)
     with pytest.raises(CommandRefused, match="free_body"):
         live.schedule(json.dumps([{**entries[1], "t": 0.015}]))
     live.step(5)
@@ -185,7 +190,7 @@ def test_in_lockstep_a_refused_message_steps_too(live):
     ):
         reached_ns = live.state.time_ns
         with pytest.raises(CommandRefused):
-            live.submit(command)
+            submit(live, command)
         deadline = time.monotonic() + 20.0
         while live.state.time_ns < reached_ns + PERIOD_NS:
             assert time.monotonic() < deadline, "no step within 20 s"
@@ -195,14 +200,14 @@ def test_in_lockstep_a_refused_message_steps_too(live):
 def test_two_simulations_in_one_process_have_nothing_in_common(live):
     other = LiveSimulation(make_scenario({"mesh": "hammer", "start_paused": True}), "other")
     other.start()
-    live.submit(WrenchCommand(False, parse_frame("world@tip;impulse"), (1.0, 0.0, 0.0), ZERO))
+    submit(live, WrenchCommand(False, parse_frame("world@tip;impulse"), (1.0, 0.0, 0.0), ZERO))
     with pytest.raises(CommandRefused):
         live.schedule("{t: -1, force: [1, 0, 0]}")
     live.step()
     other.step(2)
     assert live.state.linear_velocity[0] > 0.0 and live.state.time_ns == PERIOD_NS
     assert not other.state.row[7:13].any() and other.state.time_ns == 2 * PERIOD_NS
-    assert not other.commands.received and not other.loop.simulation.refused
+    assert not other.loop.commands.received and not other.loop.simulation.refused
     assert other.loop.simulation.events.count == 1, "its own step"
     other.stop()
 

@@ -332,8 +332,8 @@ def test_a_hand_that_stands_still_goes_on_holding_longer_than_the_strings_timeou
     place = flown.grab((0.0, 0.045, 0.0))
     flown.pull(place + [0.0, 0.0, 0.1])
     for _ in range(3):
-        said = flown.live.commands.received["schedule"]
-        flown.until(lambda said=said: flown.live.commands.received["schedule"] > said, "word of the hand")
+        said = flown.live.loop.commands.received["schedule"]
+        flown.until(lambda said=said: flown.live.loop.commands.received["schedule"] > said, "word of the hand")
         flown.fly(0.1)
     assert set(string_events(flown)) == {"string_attach", "string_target"}
     assert flown.live.loop.simulation.string is not None
