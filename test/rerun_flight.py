@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import subprocess
 import sys
@@ -53,8 +54,9 @@ def setup_of(mass: float = MASS, com=COM, inertia=INERTIA, scale=SCALE, gravity=
 
 
 SETUP = setup_of()
-SCENE = "rigid_body:\n  ros__parameters:\n    mesh: brick.obj\n"
-SHA256 = "5e" * 32
+FILE = "brick.obj", b"a brick, as its file has it"
+SHA256 = hashlib.sha256(FILE[1]).hexdigest()
+SCENE = f"# mesh_sha256: {SHA256}\nrigid_body:\n  ros__parameters:\n    mesh: brick.obj\n"
 
 POKE = ShownLoad("poke", "world", np.array([0.3, 0.0, 0.0]), np.array([0.0, 3.0, 0.0]), np.zeros(3))
 WRENCH = ShownLoad("wrench", "body", np.zeros(3), np.array([0.0, 0.0, 2.0]), np.array([0.5, 0.0, 0.0]))
@@ -139,6 +141,15 @@ def cells(path: Path, entity: str, name: str, timeline: str = "sim_time") -> tup
             times.extend(batch.column(timeline).to_numpy(zero_copy_only=False).astype(np.int64).tolist())
             found.extend(batch.column(name).to_pylist())
     return times, found
+
+
+def meshes(path: Path) -> int:
+    """How often the body's mesh was logged."""
+    from rigid_proto_ros.picture.style import BODY_MESH
+    from rigid_proto_ros.rerun_view.rrd_reading import record_batches
+
+    drawn = (batch for entity, _, batch in record_batches(path) if entity.startswith(BODY_MESH))
+    return sum("Mesh3D:vertex_positions" in batch.schema.names for batch in drawn)
 
 
 def child(code: str, *arguments: object) -> subprocess.Popen:

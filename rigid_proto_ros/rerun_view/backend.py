@@ -34,9 +34,9 @@ ROS_TIME = "ros_time"
 STATE = "state"
 """States, exactly."""
 SCENE = "session/scene"
-"""The parameters at the run's start."""
+"""The parameters in force."""
 SESSION_MESH = "session/mesh"
-"""The mesh that the run began with, exactly."""
+"""Files of the meshes that were flown, below this: name and data."""
 EVENTS = "events"
 """Event lines as logged."""
 REFUSALS = "log/refusals"
@@ -68,6 +68,8 @@ class Stream:
         self.recording.send_recording_name(name)
         made_with = [f"{package} {version}" for package, version in versions("rerun-sdk").items()]
         self.recording.send_property("made_with", rr.AnyValues(versions=made_with, cpu=cpu()))
+        for view in (style.WORLD, style.POINSOT):
+            self.log_static(view, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
 
     def send(self, entity: str, times: list[Any], *parts: Any) -> None:
         """Log columns of an entity at the given time columns."""

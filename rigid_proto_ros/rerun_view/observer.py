@@ -20,7 +20,7 @@ import shutil
 import struct
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Thread
 from typing import get_args
@@ -33,7 +33,9 @@ from ..base.files import output_file
 from ..base.rotation import matrix_from_quaternion
 from ..picture import style
 from ..picture.picture import Picture
+from ..scene.scenario import mesh_sha256_of
 from ..session.mailbox import BATCH, Mailbox, Noted
+from ..session.recorded_session import mesh_file
 from ..simulation.observer import (
     AccuracyFloor,
     Applied,
@@ -86,7 +88,7 @@ class RerunObserver(Observer):
         self._stream: Stream | None = self._open(uuid.uuid4().hex, name)
         self._backend = RerunBackend()
         self._picture = Picture(self._backend)
-        self._started: Started | None = None
+        self._scene = ""
         self._rows: dict[type, np.ndarray] = {}
         self._lines: dict[str, list[tuple[int, int, str]]] = {}
         self._commanded = False
@@ -183,17 +185,14 @@ class RerunObserver(Observer):
         self._rows, self._lines, self._commanded = {}, {}, False
         self._picture.restart()
         self._backend.restart()
-        self._send_scene(self._stream)
         self._describe(self._stream)
+        self._send_scene()
         if not stream.behind:
             forget_closed_recordings()
 
-    def _send_scene(self, stream: Stream) -> None:
-        """The scene as text, with which a run begins."""
-        stream.log_static(style.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        stream.log_static(style.POINSOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        if self._started is not None:
-            stream.log_static(e.SCENE, rr.TextDocument(self._started.scene, media_type="text/plain"))
+    def _send_scene(self) -> None:
+        """The parameters in force as text, at the time of the backend's ``begin``."""
+        self._backend.send(e.SCENE, rr.TextDocument.columns(text=[self._scene], media_type=["text/plain"]))
 
     def _describe(self, stream: Stream) -> None:
         """Tell a stream that knows nothing yet, or that has missed something, how things are now."""
@@ -240,8 +239,10 @@ class RerunObserver(Observer):
                     states.append((wall_ns, event))
                 case LoadBegan() | LoadEnded() | StringChanged():
                     self._picture.on(event)
-                case SceneChanged(_, scene) if self._started is not None:
-                    self._started = self._started._replace(scene=scene)
+                case SceneChanged(_, scene):
+                    self._scene = scene
+                    self._backend.begin(np.array([time_ns]), np.array([wall_ns]))
+                    self._send_scene()
                 case Logged(_, line):
                     self._lines.setdefault(e.EVENTS, []).append((time_ns, wall_ns, line))
                 case Refused(_, reason, message):
@@ -266,12 +267,8 @@ class RerunObserver(Observer):
         self._stay_in_place(Published, (style.BODY, style.CENTRE), before[0], self._picture.setup)
         self._stay_in_place(GhostPublished, (style.GHOST,), before[1], self._picture.ghost)
         if isinstance(event, Started):
-            self._started = event
-            if self._backend.stream is not None:
-                self._send_scene(self._backend.stream)
-        elif isinstance(event, MeshChanged) and self._started is not None:
-            vertices, triangles, sha256 = event.vertices, event.triangles, event.mesh_sha256
-            self._started = self._started._replace(vertices=vertices, triangles=triangles, mesh_sha256=sha256)
+            self._scene = event.scene
+            self._send_scene()
 
     def _stay_in_place(self, kind: type, frames: tuple[str, ...], before: Setup | None, after: Setup | None) -> None:
         """Move the frames of a body whose COM moves within its mesh: the mesh stays where it is, as it does in flight,
@@ -317,10 +314,21 @@ class RerunObserver(Observer):
 
 
 class FileRecorder(RerunObserver):
-    """Records to a file. Raises InputError for one that can't be written."""
+    """Records to a file. files (name, bytes): meshes at hand, whose own files may be gone. Raises InputError for a file
+    that can't be written.
+    """
 
-    def __init__(self, path: str, name: str = "rigid_body", on_error: Callable[[str], None] | None = None) -> None:
+    def __init__(
+        self,
+        path: str,
+        name: str = "rigid_body",
+        on_error: Callable[[str], None] | None = None,
+        files: Sequence[tuple[str, bytes]] = (),
+    ) -> None:
         self.path = Path(path)
+        self._files = files
+        self._mesh: tuple[str, tuple[str, bytes] | None] = "", None
+        self._meshes_sent: set[str] = set()
         super().__init__(name, on_error)
 
     @property
@@ -334,6 +342,7 @@ class FileRecorder(RerunObserver):
 
     def _open_next(self, before: Stream, run_id: str, name: str) -> Stream:
         self._end(before)
+        self._meshes_sent.clear()
         if self._last_time_ns > 0:
             self.path.rename(self.path.with_name(f"{self.path.stem}.run{self._run - 1}{self.path.suffix}"))
         return FileStream(self.path, run_id, name)
@@ -347,17 +356,19 @@ class FileRecorder(RerunObserver):
         self._mailbox.moved()
         self._stream = None
 
-    def _send_scene(self, stream: Stream) -> None:
-        """With the mesh's exact numbers."""
-        super()._send_scene(stream)
-        began = self._started
-        if began is not None and began.vertices is not None and began.triangles is not None:
-            numbers = rr.AnyValues(
-                sha256=began.mesh_sha256,
-                vertices=np.ascontiguousarray(began.vertices, dtype=np.float64).ravel(),
-                triangles=np.ascontiguousarray(began.triangles, dtype=np.int64).ravel(),
-            )
-            stream.log_static(e.SESSION_MESH, numbers)
+    def _send_scene(self) -> None:
+        """With the mesh's file, which may be gone at the next reset."""
+        super()._send_scene()
+        sha256 = mesh_sha256_of(self._scene)
+        if not sha256 or sha256 in self._meshes_sent or self._backend.stream is None:
+            return
+        if self._mesh[0] != sha256:
+            self._mesh = sha256, mesh_file(self._scene, self._files)
+        if (file := self._mesh[1]) is not None:
+            numbers = np.frombuffer(file[1], np.uint8)
+            entity = f"{e.SESSION_MESH}/{len(self._meshes_sent)}"
+            self._backend.stream.log_static(entity, rr.AnyValues(name=file[0], data=numbers))
+        self._meshes_sent.add(sha256)
 
 
 class FileStream(Stream):

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..picture.style import BODY_MESH
 from ..session.recorded_session import RecordedSession
 from .backend import EVENTS, REFUSALS, SCENE, SESSION_MESH, SIM_TIME, STATE
 from .observer import FRAME_HEAD, mark_end
@@ -43,12 +42,13 @@ def read_session(path: str | Path) -> RecordedSession:
         _, complete = whole_bytes(path)
     except OSError as error:
         raise InputError("session", str(path), f"a recording that can be read ({error.strerror})") from error
-    session = RecordedSession(complete=complete)
+    folder = path.absolute().parent
+    session = RecordedSession(complete=complete, folder=folder)
     try:
         _read(path, session)
     except RuntimeError:
         # Also a file whose index was cut: all frames are whole, but the reader wants none of it.
-        session = RecordedSession(complete=False)
+        session = RecordedSession(complete=False, folder=folder)
         with whole_part(path) as whole:
             try:
                 _read(whole, session)
@@ -77,7 +77,7 @@ def _read(path: Path, session: RecordedSession) -> None:
     times, rows = [], []
     events: list[tuple[int, str]] = []
     refusals: list[tuple[int, str]] = []
-    first_mesh: str | None = None
+    files: dict[str, dict[str, Any]] = {}
     for entity, _, batch in record_batches(path):
         if entity == STATE:
             times.append(_sim_times(batch))
@@ -89,19 +89,13 @@ def _read(path: Path, session: RecordedSession) -> None:
         elif entity.startswith(RECORDING):
             _read_properties(entity, batch, session)
         elif entity == SCENE:
-            session.scene = batch.column("TextDocument:text").to_pylist()[0][0]
-        elif entity.startswith(BODY_MESH) and "Mesh3D:vertex_positions" in batch.schema.names:
-            session.mesh_chunks += 1
-        elif entity.startswith(SESSION_MESH) and (first_mesh is None or entity <= first_mesh):
-            # A run may have had several; it began with the first.
-            first_mesh = entity
-            held = batch.schema.names
-            if "sha256" in held:
-                session.mesh_sha256 = batch.column("sha256").to_pylist()[0][0]
-            if "vertices" in held:
-                session.vertices = _flat(batch, "vertices").reshape(-1, 3)
-            if "triangles" in held:
-                session.triangles = _flat(batch, "triangles").reshape(-1, 3)
+            session.scenes += [cell[0] for cell in batch.column("TextDocument:text").to_pylist()]
+        elif entity.startswith(SESSION_MESH):
+            # Columns of one entity may lie in chunks of their own, as in a file that was mended.
+            held = {"name", "data"}.intersection(batch.schema.names)
+            files.setdefault(entity, {}).update({name: _flat(batch, name) for name in held})
+    session.attachments = [(str(file["name"][0]), file["data"].tobytes()) for file in files.values() if len(file) == 2]
+    session.scene = session.scenes[0] if session.scenes else ""
     session.events, session.refusals = events, refusals
     if times:
         session.times, session.rows = np.concatenate(times), np.concatenate(rows)

@@ -41,7 +41,7 @@ def make_recorder(
     """An observer that records to ``path``; raises InputError where it can't.
 
     parameters: the scene's, of which frames' names count. simulated_log: messages of an .mcap are logged at simulated
-    time, as suits a run without a clock; else at the wall's. files: meshes for an .mcap, as McapObserver has them.
+    time, as suits a run without a clock; else at the wall's. files (name, bytes): meshes whose own files may be gone.
     """
     if is_mcap(path):
         try:
@@ -54,7 +54,7 @@ def make_recorder(
         raise InputError("record", is_missing("rerun-sdk", "rerun"))
     from .observer import FileRecorder
 
-    return FileRecorder(path, node_name, on_error)
+    return FileRecorder(path, node_name, on_error, files)
 
 
 def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:

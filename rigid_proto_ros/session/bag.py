@@ -19,7 +19,6 @@ from mcap.writer import MCAP0_MAGIC, Writer
 from ..base.errors import InputError
 from ..base.files import whole_file
 from ..base.rotation import rotate, rotate_inverse
-from ..scene.scenario import mesh_sha256_of
 from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_state, read_string
 from .recorded_session import RecordedSession, StampedRows, decode_event
 
@@ -198,7 +197,6 @@ def session_runs(path: Path, node: str = "") -> list[RecordedSession]:
         in_force = [*at_reset[:1], *before[-1:], *(text for _, text in scenes[:1])]
         later = [text for log, text in scenes if begin is None or log >= begin]
         run = replace(whole, scene=in_force[0] if in_force else "", scenes=later)
-        run.mesh_sha256 = mesh_sha256_of(run.scene)
         run.accuracy_floor = content.metadata.get(FLOOR.format(k), {}).get("floor", "")
         run.events = [
             (time_ns, line)

@@ -8,7 +8,6 @@ disk then. All runs go into one file: a reset begins the next one, as in a bag o
 from __future__ import annotations
 
 import errno
-import hashlib
 import logging
 import os
 import threading
@@ -21,12 +20,10 @@ from typing import TYPE_CHECKING
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.provenance import cpu, versions
-from ..mesh.locate import resolve_mesh
 from ..scene import cdr
 from ..scene.command_codec import frame_names
 from ..scene.parameters import Parameters
 from ..scene.scenario import mesh_sha256_of
-from ..scene.scene_file import read_scene_text
 from ..simulation.observer import (
     AccuracyFloor,
     Applied,
@@ -41,6 +38,7 @@ from ..simulation.observer import (
 )
 from .mailbox import BATCH, Mailbox
 from .messages import DEFINITIONS, FLOOR, MADE_WITH, PROJECTIONS, TOPICS, applied_bytes, inertia_bytes
+from .recorded_session import mesh_file
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -206,17 +204,11 @@ class McapObserver(Observer):
         if not sha256 or sha256 in self._attached:
             return
         self._attached.add(sha256)
-        files = [*self._files]
-        with suppress(InputError, OSError):
-            path = resolve_mesh(str(read_scene_text(scene).values.get("mesh", "")))
-            files.append((path.name, path.read_bytes()))
-        for name, data in files:
-            # A file that was changed since it was loaded isn't the one that flies.
-            if hashlib.sha256(data).hexdigest() == sha256:
-                # The chunk before it declares the topics: from there on a cut file can be read.
-                writer.flush()
-                writer.add_attachment(0, log_time, name, "application/octet-stream", data)
-                return
+        found = mesh_file(scene, self._files)
+        if found is not None:
+            # The chunk before it declares the topics: from there on a cut file can be read.
+            writer.flush()
+            writer.add_attachment(0, log_time, found[0], "application/octet-stream", found[1])
 
     def _lost(self, reason: str) -> None:
         if self._writer is not None:

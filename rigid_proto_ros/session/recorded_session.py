@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError, MeshError
-from ..mass.from_mesh import PASSING
+from ..mesh.locate import resolve_mesh
 from ..mesh.reading import Mesh, load_mesh
 from ..scene.command_codec import frame_names, of_event
 from ..scene.parameters import Parameters, convert_all
@@ -51,9 +51,7 @@ class RecordedSession:
 
     scene: the parameters at the run's start as a params file. events: (time_ns, JSON line) in order, lines as logged.
     refusals: (time_ns, text). times (n,) int64 [ns, simulated] and rows (n, 13) float64, exactly the published states
-    in ``simulation/observer.py``'s ``STATE_FIELDS`` order. vertices (p, 3) float64 and triangles (m, 3) int64 as
-    loaded, None without a mesh; mesh_sha256 of the mesh file; mesh_chunks counts how often the drawn mesh was logged.
-    complete: the file was finished properly.
+    in ``simulation/observer.py``'s ``STATE_FIELDS`` order. complete: the file was finished properly.
 
     A bag holds no state rows but what the node published of them: ``published``, by topic; ``rows`` are then found from
     those, for the eye. scenes: the texts of the scene topic from the run's start on, in order. node_name: what stands
@@ -67,10 +65,6 @@ class RecordedSession:
     refusals: list[tuple[int, str]] = field(default_factory=list)
     times: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     rows: np.ndarray = field(default_factory=lambda: np.empty((0, 13)))
-    vertices: np.ndarray | None = None
-    triangles: np.ndarray | None = None
-    mesh_sha256: str = ""
-    mesh_chunks: int = 0
     complete: bool = True
     published: dict[str, StampedRows] = field(default_factory=dict)
     scenes: list[str] = field(default_factory=list)
@@ -85,6 +79,11 @@ class RecordedSession:
     def lines(self) -> list[str]:
         """The event lines as logged."""
         return [line for _, line in self.events]
+
+    @property
+    def mesh_sha256(self) -> str:
+        """Hash of the mesh's file that the run began with; empty without one."""
+        return mesh_sha256_of(self.scene)
 
     @property
     def end_ns(self) -> int:
@@ -132,6 +131,18 @@ def find_mesh(
     )
 
 
+def mesh_file(scene: str, at_hand: Iterable[tuple[str, bytes]] = ()) -> tuple[str, bytes] | None:
+    """Name and bytes of the mesh's file of a scene, for a recording, from where the scene says or from those at hand.
+    None where it has changed or gone since it was loaded, or is one of several files.
+    """
+    files = [*at_hand]
+    with suppress(InputError, OSError):
+        path = resolve_mesh(str(read_scene_text(scene).values.get("mesh", "")))
+        files.append((path.name, path.read_bytes()))
+    sha256 = mesh_sha256_of(scene)
+    return next(((name, data) for name, data in files if hashlib.sha256(data).hexdigest() == sha256), None)
+
+
 # Computed anew
 
 
@@ -149,16 +160,7 @@ def session_scenario(session: RecordedSession) -> Scenario:
     if not session.mesh_sha256:
         return make_scenario(values)
     name = str(values.get("mesh", ""))
-    if session.vertices is None or session.triangles is None:
-        return make_scenario(values, find_mesh(name, session.mesh_sha256, session.attachments, session.folder))
-    try:
-        mesh = load_mesh(name)
-    except InputError:
-        mesh = None
-    if mesh is None or mesh.sha256 != session.mesh_sha256:
-        # Recorded is the surface that was flown, repaired and wound outward: the cached verdict on its file isn't its.
-        mesh = Mesh(name, PASSING + name, session.vertices, session.triangles, None, session.mesh_sha256)
-    return make_scenario(values, mesh)
+    return make_scenario(values, find_mesh(name, session.mesh_sha256, session.attachments, session.folder))
 
 
 def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:

@@ -120,7 +120,6 @@ class RunMemory(Observer):
                 events=list(self._events),
                 times=np.array([time_ns for time_ns, _ in states], np.int64),
                 rows=np.array([row for _, row in states]).reshape(-1, 13),
-                mesh_sha256=mesh_sha256_of(self._scene),
                 node_name=self._name,
                 scenes=list(self._scenes),
             )

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rerun_flight import meshes
 from ros_process import SOURCE, from_source, run
 
 pytest.importorskip("rclpy")
@@ -32,7 +33,7 @@ def check_flown(capfd, monkeypatch, folder: Path, *arguments: str) -> None:
     assert ("domain 0 is in use; this one is in ROS_DOMAIN_ID=" in told) == ("ROS_DOMAIN_ID" not in os.environ)
     recorded, batches = read_session(SESSION), list(record_batches(SESSION))
     assert recorded.complete
-    assert recorded.mesh_chunks == 1
+    assert meshes(SESSION) == 1
     times = np.sort(recorded.times)
     assert times[0] == 0
     assert set(np.diff(times)) == {10_000_000}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import threading
 from pathlib import Path
 
@@ -41,7 +42,7 @@ def states() -> np.ndarray:
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory, states) -> Path:
     path = tmp_path_factory.mktemp("recording") / "session.rrd"
-    observer = FileRecorder(str(path))
+    observer = FileRecorder(str(path), files=[flight.FILE])
     flight.fly(observer, states)
     observer.close()
     assert observer.error == ""
@@ -53,9 +54,8 @@ def test_states_scene_mesh_and_event_lines_come_back_bit_for_bit(recording, stat
     assert session.complete
     assert np.array_equal(session.times, flight.PERIOD_NS * np.arange(COUNT))
     assert session.rows.tobytes() == states.tobytes()
-    assert (session.scene, session.mesh_sha256, session.mesh_chunks) == (flight.SCENE, flight.SHA256, 1)
-    assert np.array_equal(session.vertices, flight.VERTICES)
-    assert np.array_equal(session.triangles, flight.TRIANGLES)
+    assert (session.scene, session.mesh_sha256, flight.meshes(recording)) == (flight.SCENE, flight.SHA256, 1)
+    assert session.attachments == [flight.FILE]
     assert session.events == [
         (200_000_000, flight.event_line(200_000_000, "poke")),
         (305_000_000, flight.event_line(305_000_000, "wrench")),
@@ -130,8 +130,11 @@ def test_a_change_of_the_body_moves_the_mesh_from_that_time_on(tmp_path, states)
 
 def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
     path = tmp_path / "meshes.rrd"
-    observer = FileRecorder(str(path))
+    other = "other.obj", b"a larger brick"
+    changed = flight.SCENE.replace(flight.SHA256, hashlib.sha256(other[1]).hexdigest())
+    observer = FileRecorder(str(path), files=[flight.FILE, other])
     flight.fly(observer, states[:20])
+    observer.on(SceneChanged(200_000_000, changed))
     observer.on(MeshChanged(200_000_000, 2.0 * flight.VERTICES, flight.TRIANGLES, "ab" * 32))
     observer.on(BodyChanged(200_000_000, flight.SETUP))
     observer.on(Published(200_000_000, states[20]))
@@ -139,9 +142,9 @@ def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
     observer.on(Published(0, states[21]))
     observer.close()
     before, after = read_session(tmp_path / "meshes.run1.rrd"), read_session(path)
-    assert (before.mesh_chunks, after.mesh_chunks) == (2, 1)
-    assert np.array_equal(before.vertices, flight.VERTICES) and before.mesh_sha256 == flight.SHA256
-    assert np.array_equal(after.vertices, 2.0 * flight.VERTICES) and after.mesh_sha256 == "ab" * 32
+    assert (flight.meshes(tmp_path / "meshes.run1.rrd"), flight.meshes(path)) == (2, 1)
+    assert (before.scenes, before.attachments) == ([flight.SCENE, changed], [flight.FILE, other])
+    assert (after.scenes, after.attachments) == ([changed], [other])
     first = cells(tmp_path / "meshes.run1.rrd", style.BODY_MESH, "Transform3D:scale")
     second = cells(tmp_path / "meshes.run1.rrd", style.BODY_MESH + "_2", "Transform3D:scale")
     scale = flight.SCALE.tolist()
@@ -181,7 +184,7 @@ def test_a_reset_keeps_the_run_before_beside_the_new_one_which_begins_with_what_
     newest, before = read_session(path), read_session(tmp_path / "session.run1.rrd")
     assert newest.rows.tobytes() == states[50:60].tobytes()
     assert before.rows.tobytes() == states[:50].tobytes()
-    assert newest.mesh_chunks == before.mesh_chunks == 1
+    assert flight.meshes(path) == flight.meshes(tmp_path / "session.run1.rrd") == 1
     assert (before.scene, newest.scene) == (flight.SCENE, changed)
     assert newest.events == []
 

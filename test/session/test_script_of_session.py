@@ -14,7 +14,7 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.scene.command_codec import of_event
 from rigid_proto_ros.scene.parameters import with_mass_of_density
-from rigid_proto_ros.scene.scenario import make_scenario, mesh_sha256_of
+from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun, ScenarioRun
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule, schedules
@@ -69,7 +69,6 @@ class HandSession:
             events=list(self.log.timed),
             times=np.array([self.now_ns]),
             rows=self.simulation.state.row[None].copy(),
-            mesh_sha256=mesh_sha256_of(self.first.text),
         )
 
 

@@ -12,7 +12,7 @@ from flights import SECOND, EventLines
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.session_files import read_runs
-from rigid_proto_ros.scene.scenario import make_scenario, mesh_sha256_of, read_scene
+from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script, read_script
@@ -121,7 +121,6 @@ def flown(changes: dict, until_ns: int, script: str = ALL_KINDS) -> RecordedSess
         events=told.timed,
         times=np.array([until_ns]),
         rows=run.simulation.state.row[None].copy(),
-        mesh_sha256=mesh_sha256_of(scenario.text),
     )
 
 
