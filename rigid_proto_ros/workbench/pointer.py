@@ -24,8 +24,8 @@ USUAL_DELAY_S = 0.06
 """From a pose sent to a pointer message that saw it: a window of 1/60 s each way, a frame, and the way itself."""
 
 HOLD_S = 0.2
-"""A still hand says again where it is, for the string lets go ``string.timeout`` after the last word; sooner where that
-is short.
+"""A still hand repeats its target, since the string is released ``string.timeout`` after the last one; more often where
+that is short, or passes quickly.
 """
 
 FREQUENCY = 8.0
@@ -195,11 +195,12 @@ class Pointer:
             self._flight.do(_target(self._drag))
 
     def hold(self) -> None:
-        """To be called often: a hand that doesn't move goes on holding."""
+        """To be called often: repeats the target of a hand that doesn't move."""
         drag = self._drag
         if drag is None or self._flight.paused:
             return
-        timeout_s = float(self._flight.scenario.parameters.string.timeout)
+        parameters = self._flight.scenario.parameters
+        timeout_s = float(parameters.string.timeout) / (float(parameters.real_time_factor) or 1.0)
         hold_s = min(HOLD_S, timeout_s / 3.0) if timeout_s > 0.0 else HOLD_S
         if time.monotonic() >= drag.last_target_s + hold_s:
             self._flight.do(_target(drag))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,6 +24,7 @@ from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.simulation.observer import Published, SceneChanged
 from rigid_proto_ros.simulation.simulation import Simulation
+from rigid_proto_ros.workbench import pointer
 from rigid_proto_ros.workbench.flight import COMPILING, RunMemory
 from rigid_proto_ros.workbench.lessons import COURSES, FREE
 from rigid_proto_ros.workbench.page import CLASS_LABELS
@@ -337,6 +339,20 @@ def test_a_hand_that_stands_still_goes_on_holding_longer_than_the_strings_timeou
         flown.fly(0.1)
     assert set(string_events(flown)) == {"string_attach", "string_target"}
     assert flown.live.loop.simulation.string is not None
+    flown.let_go()
+
+
+@pytest.mark.parametrize("speed", [0.1, 5.0])
+def test_a_still_hand_says_where_it_is_within_the_strings_timeout_at_any_speed(
+    flown: FlownPage, monkeypatch: pytest.MonkeyPatch, speed: float
+) -> None:
+    flown.live.set_parameters({"real_time_factor": speed})
+    now_s = time.monotonic()
+    monkeypatch.setattr(pointer, "time", SimpleNamespace(monotonic=lambda: now_s))
+    flown.grab((0.0, 0.045, 0.0))
+    now_s += 0.5 * flown.scenario.parameters.string.timeout / speed
+    flown.do(flown.page.pointer.hold)
+    assert flown.page.pointer._drag.last_target_s == now_s
     flown.let_go()
 
 
