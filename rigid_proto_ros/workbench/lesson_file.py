@@ -23,7 +23,7 @@ from .drawing import ViserBackend
 from .lessons import COURSES, Course
 from .panel import ALWAYS, PARTS, SEE_INTO
 from .room import Room
-from .server import PRINTED_PICTURE, stop_server
+from .server import LANDSCAPE_PRINT, PRINTED_PICTURE, stop_server
 
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
@@ -45,6 +45,7 @@ small {{ color: #666; }}
   html, body, aside {{ display: block; width: auto; height: auto; overflow: visible; border: 0; }}
   iframe {{ width: 100%; height: {height}; }}
 }}
+{landscape}
 </style></head><body><iframe title="the motion" srcdoc="{player}"></iframe>
 <aside><h1>{title}</h1>{speed}<p>{question}</p><ol type="A">{choices}</ol>
 <details><summary>Show the answer</summary><p><b>{answer}</b> {reason}</p></details>
@@ -68,6 +69,7 @@ def lesson_html(lesson: Lesson, record: FlightRecord) -> str:
     return PAGE.format(
         title=escape(lesson.title),
         height=PRINTED_PICTURE,
+        landscape=LANDSCAPE_PRINT,
         player=escape(player),
         question=escape(lesson.question),
         choices="".join(f"<li>{escape(choice)}</li>" for choice in lesson.choices),

@@ -160,6 +160,9 @@ BESIDE_SHARE = 60
 PRINTED_PICTURE = "8cm"
 """Height of the picture on paper: below it the lesson has room for question, numbers and answers on the same page."""
 
+LANDSCAPE_PRINT = "@media print and (orientation: landscape) { body { zoom: 0.8; } }"
+"""Style rule for paper that is wider than high: the longest lesson fits on a page, too."""
+
 PANEL_PIXELS = 380
 """Width of the panel beside the picture, until a user drags its edge."""
 
@@ -210,6 +213,7 @@ STYLE = f"""<style>
   {_DOCK} {{ width: 100% !important; top: {PICTURE_SHARE}% !important; }}
   {_DOCKED_PICTURE} {{ inset: 0 0 {100 - PICTURE_SHARE}% 0 !important; }}
 }}
+{LANDSCAPE_PRINT}
 @media print {{
   html, body, #root, div:has({_SCROLLED}), div:has({_CANVAS}), .mantine-ScrollArea-root, {_SCROLLED} {{
     position: static !important; overflow: visible !important; flex: none !important;

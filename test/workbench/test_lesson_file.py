@@ -15,6 +15,7 @@ from PIL import Image
 pytest.importorskip("viser", reason="viser is not installed: no player")
 
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.workbench import lesson_file
@@ -92,7 +93,7 @@ def test_what_makes_no_file_is_refused_in_one_line(arguments, words, tmp_path, c
     assert not list(tmp_path.iterdir())
 
 
-def test_in_a_browser_the_body_moves_without_a_server_and_without_the_network(tmp_path) -> None:
+def test_in_a_browser_the_body_moves_without_a_server_and_without_the_network(tmp_path, monkeypatch) -> None:
     sync_api = pytest.importorskip("playwright.sync_api")
     from workbench_page import CHROMIUM, DRAWN_MS, FLAGS, NO_CHROMIUM, RARELY_DRAWN, SEE_THROUGH
 
@@ -135,6 +136,10 @@ def test_in_a_browser_the_body_moves_without_a_server_and_without_the_network(tm
         page.emulate_media(media="print")
         assert words.evaluate("aside => aside.scrollHeight - aside.clientHeight") <= 0, "words that paper cuts off"
         assert re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4")) == [b"/Type /Page"], "more than a page"
+        monkeypatch.setattr(lesson_file, "_recorded", lambda *_: "")
+        page.set_content(lesson_file.lesson_html(lesson("thrown_hammer"), FlightRecord()))
+        printed = page.pdf(format="A4", landscape=True)
+        assert re.findall(rb"/Type\s*/Page\b", printed) == [b"/Type /Page"], "more than a page"
         browser.close()
     assert {url.partition(":")[0] for url in asked} <= {"file", "data", "blob", "about"}, asked
 

@@ -320,8 +320,9 @@ def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_button
     assert labels.evaluate_all(cut) <= 0, "an answer that isn't to be read whole"
     uncut = "labels => labels.every(label => getComputedStyle(label).overflow === 'visible')"
     assert labels.evaluate_all(uncut), "the foot of a g may be cut off"
-    printed = page.page.pdf(format="A4")
-    assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 1, "a lesson is printed on one page"
+    for across in (True, False):
+        printed = page.page.pdf(format="A4", landscape=across)
+        assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 1, "a lesson is printed on one page"
     assert b"/ShadingType" in printed, "the lines for answers are a background, which browsers leave out unasked"
 
 
