@@ -117,8 +117,8 @@ def write_demo(mesh: str) -> tuple[Path, Path]:
     """
     import numpy as np
 
-    from ..scene.scenario import make_scenario
-    from ..scene.yaml_text import dump_yaml
+    from ..scene.scenario import make_scenario, scene_text
+    from ..scene.script import script_text
 
     scenario = make_scenario({"mesh": str(Path(mesh).resolve()) if Path(mesh).exists() else mesh})
     body, surface = scenario.setup.body, scenario.setup.surface
@@ -132,14 +132,7 @@ def write_demo(mesh: str) -> tuple[Path, Path]:
     push = body.mass * DRIFT * diagonal
     # A torque that would turn the body by its own spin in a second, about its stiffest axis.
     torque = 0.5 * SPIN * float(body.principal_moments[0])
-    scene = {
-        "rigid_body": {
-            "ros__parameters": {
-                "mesh": scenario.parameters.mesh,
-                "initial": {"angular_velocity": [float(w) for w in spin]},
-            }
-        }
-    }
+    scene = scene_text({"mesh": scenario.parameters.mesh, "initial.angular_velocity": spin.tolist()})
     script = [
         {"t": 1.0, "at": "com", "impulse": [push, 0.0, 0.0]},
         {"t": 2.5, "at": {"vertex": farthest}, "push": 0.5 * push, "duration": 0.3},
@@ -147,8 +140,8 @@ def write_demo(mesh: str) -> tuple[Path, Path]:
         {"t": 6.5, "at": "com", "impulse": [-push, 0.0, 0.3 * push]},
     ]
     scene_path, script_path = OUT / "demo_scene.yaml", OUT / "demo_pokes.yaml"
-    scene_path.write_text(dump_yaml(scene), encoding="utf-8")
-    script_path.write_text(dump_yaml(script), encoding="utf-8")
+    scene_path.write_text(scene, encoding="utf-8")
+    script_path.write_text(script_text(script), encoding="utf-8")
     return scene_path, script_path
 
 

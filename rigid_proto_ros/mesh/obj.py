@@ -22,8 +22,8 @@ _FACE = "f with nonzero integer vertex numbers, negative ones counted back from 
 _BLANK = rb"[ \t\v\f]"
 _INDENTED = re.compile(rb"\n" + _BLANK + rb"+")
 _V = re.compile(rb"\nv" + _BLANK + rb"+(\S+" + _BLANK + rb"+\S+" + _BLANK + rb"+\S+)")
-_F = re.compile(rb"\nf" + _BLANK + rb"([^\n]*)")
-_EITHER = re.compile(rb"\n([vf])" + _BLANK)
+_F = re.compile(rb"\nf(?!\S)([^\n]*)")
+_EITHER = re.compile(rb"\n([vf])(?!\S)")
 
 
 def _error(text: bytes, letter: bytes, number: int, name: str, accepted: str) -> MeshError:
@@ -35,11 +35,10 @@ def _error(text: bytes, letter: bytes, number: int, name: str, accepted: str) ->
 def _vertices(text: bytes, name: str) -> np.ndarray:
     """Vertices (n, 3)."""
     found = _V.findall(text)
-    count = len(re.findall(rb"\nv" + _BLANK, text))
-    points, whole = as_numbers(b"\n".join(found), 3 * count)
-    if not whole or len(found) < count:
-        rows = [match.split()[1:4] for match in re.findall(rb"\nv" + _BLANK + rb"[^\n]*", text)]
-        bad = next(k for k, row in enumerate(rows) if not as_numbers(b" ".join(row), 3)[1])
+    lines = re.findall(rb"\nv(?!\S)[^\n]*", text)
+    points, whole = as_numbers(b"\n".join(found), 3 * len(lines))
+    if not whole or len(found) < len(lines):
+        bad = next(k for k, line in enumerate(lines) if not as_numbers(b" ".join(line.split()[1:4]), 3)[1])
         raise _error(text, b"v", bad, name, _VERTEX)
     return points.reshape(-1, 3)
 

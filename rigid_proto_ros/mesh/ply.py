@@ -98,11 +98,11 @@ def read_ply(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray
             word = next(iter(data[position:].split()[len(values) :]), b"")
             raise MeshError(name, excerpt(word, 0), "numbers in the body of a .ply file")
         data, position = values.astype("<f8").tobytes(), 0
-    places = [
-        {column for column, _, length in columns if not length} for label, _, columns in elements if label == "vertex"
-    ]
-    if len(places) != 1 or not {"x", "y", "z"} <= places[0]:
-        raise MeshError(name, "its header declares no vertices", "one element vertex with properties x, y, z")
+    declared = {label: {column for column, _, length in columns if not length} for label, _, columns in elements}
+    if len(declared) < len(elements):
+        raise MeshError(name, "its header declares an element twice", "each element once")
+    if not {"x", "y", "z"} <= declared.get("vertex", set()):
+        raise MeshError(name, "its header declares no vertices", "an element vertex with properties x, y, z")
     vertices, corners = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
     for element in elements:
         label, count, properties = element

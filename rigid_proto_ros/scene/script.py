@@ -32,7 +32,7 @@ from ..simulation.commands import (
     nanoseconds,
 )
 from .parameters import ZERO
-from .yaml_text import load_json, load_yaml, read_text
+from .yaml_text import flow, load_json, load_yaml, read_text
 
 Stamp = dict[str, Any]
 """A command's stamp_ns and entry."""
@@ -374,6 +374,11 @@ def _load_entry(command: WrenchCommand) -> dict:
     if frame.slot:
         entry["slot"] = frame.slot
     return entry
+
+
+def script_text(entries: Iterable[Mapping]) -> str:
+    """The text of a script file with these entries."""
+    return "".join(f"- {flow(entry)}\n" for entry in entries) or "[]\n"
 
 
 def schedules(script: list[Command], start_ns: int = 0) -> Iterator[tuple[int, int, str]]:

@@ -153,11 +153,6 @@ def refused(node: yaml.Node, name: str, accepted: str) -> InputError:
     return InputError(name if name.startswith("-") else f"{name}, line {node.start_mark.line + 1}", received, accepted)
 
 
-def dump_yaml(value: object) -> str:
-    """Values, lists and mappings as people would write them: the innermost on one line."""
-    return yaml.safe_dump(value, sort_keys=False, default_flow_style=None, width=120)
-
-
 def yaml_value(value: object) -> str:
     """A parameter's value as written to a YAML file, with all digits."""
     # JSON is YAML; repr keeps all digits, and a double keeps its point so that it is read back as one.

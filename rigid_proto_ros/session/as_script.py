@@ -23,8 +23,7 @@ from ..motion.loads import Load
 from ..scene.command_codec import MARKS, of_event
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, make_scenario, scene_text
-from ..scene.script import entry_of
-from ..scene.yaml_text import flow
+from ..scene.script import entry_of, script_text
 from ..simulation.commands import HELD_WRENCH, UNNAMED_SLOT, TieString, WrenchCommand, slot_name
 from ..simulation.flight import NEVER
 from ..simulation.observer import Applied, Event, Logged, Observer
@@ -49,7 +48,7 @@ class SceneAndScript:
     @property
     def script(self) -> str:
         """The entries as a poke script's text, an empty list where nothing acts."""
-        return "".join(f"- {flow(entry)}\n" for entry in self.entries) or "[]\n"
+        return script_text(self.entries)
 
 
 # The whole run

@@ -26,8 +26,8 @@ from ..motion.problem import ENVIRONMENT_NEEDS
 from ..scene.parameters import HUGE, Parameters, Value, parameter_named, with_mass_of_density
 from ..scene.scenario import BodyMesh, Scenario, build_scenario
 from ..scene.scenario_run import OfflineRun
-from ..scene.script import MAX_TIME_S, expand_script
-from ..scene.yaml_text import dump_yaml, plain
+from ..scene.script import MAX_TIME_S, expand_script, script_text
+from ..scene.yaml_text import plain
 from ..simulation import batch
 from ..simulation import flight as fl
 from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand
@@ -348,7 +348,7 @@ def write_scene(study: Study, row: int, file: Path) -> dict[str, Any]:
         words = ["rigid_proto", "simulate", str(file), "--duration", repr(study.duration_ns / 1e9)]
         if commands:
             script = file.with_name(f"{file.stem}_script.yaml")
-            script.write_text(dump_yaml(variation.script), encoding="utf-8")
+            script.write_text(script_text(variation.script), encoding="utf-8")
             words += ["--script", str(script)]
     except OSError as error:
         raise InputError("--as-scene", str(file), f"a file that can be written ({error.strerror})") from None

@@ -17,6 +17,7 @@ FLIPPED[::4] = FLIPPED[::4, ::-1]
 WITH_NAN = V.copy()
 WITH_NAN[3, 1] = np.nan
 TWO = np.vstack([V, V + 3.0])
+FACES_AGAIN = b"element face 6\nproperty list uchar int vertex_indices\nend_header"
 
 
 def replaced(data: bytes, old: bytes, new: bytes) -> bytes:
@@ -52,7 +53,10 @@ UNREADABLE = [
     ("index.off", replaced(off(), b"3 0 1 3", b"3 0 1 88"), "vertex numbers from 0 to 7"),
     ("index.ply", replaced(ply(), b"3 0 1 3", b"3 0 1 88"), "vertex 88"),
     ("two_corners.obj", replaced(obj(), b"f 1 2 4", b"f 1 2"), "three or more corners"),
+    ("no_corner.obj", obj() + b"f\n", "three or more corners"),
+    ("no_coordinate.obj", b"v\n" + obj(), "three coordinates"),
     ("two_corners.ply", ply(faces=[(0, 1)] * 3), "three or more"),
+    ("faces_twice.ply", replaced(ply(announced=6), b"end_header", FACES_AGAIN), "declares an element twice"),
     ("no_z.ply", replaced(ply(), b"property double z\n", b""), "x, y, z"),
     ("stl_named.obj", stl_text(), "no faces"),
     ("ply_named.stl", ply(), "announces"),

@@ -22,8 +22,8 @@ from rigid_proto_ros.scene.script import (
     parse_script,
     read_schedule,
     schedules,
+    script_text,
 )
-from rigid_proto_ros.scene.yaml_text import flow
 from rigid_proto_ros.simulation.commands import (
     Change,
     ClearWrench,
@@ -41,12 +41,12 @@ numbers = st.floats(-1e6, 1e6)
 triples = st.tuples(numbers, numbers, numbers)
 times = st.integers(0, 10**13)
 points = st.one_of(
-    st.sampled_from([("com",), ("origin",), ("contact", "tip"), ("contact", "left_end")]),
+    st.sampled_from([("com",), ("origin",), ("contact", "tip"), ("contact", "left_end"), ("contact", "n")]),
     st.tuples(st.just("vertex"), st.integers(0, 10**9)),
     st.tuples(st.just("point"), triples),
     st.tuples(st.just("ray"), triples, triples.filter(any)),
 )
-slots = st.sampled_from([{}, {"slot": "left"}, {"slot": "a_1"}])
+slots = st.sampled_from([{}, {"slot": "left"}, {"slot": "a_1"}, {"slot": "y"}])
 lasting = st.floats(1e-9, 1e9).map(lambda s: {"duration_s": s})
 options = st.one_of(slots, st.just({"impulse": True}), st.builds(lambda a, b: a | b, lasting, slots))
 values = st.one_of(numbers, st.booleans(), st.integers(-(10**9), 10**9), st.sampled_from(["rk4", "on", "1e3", ""]))
@@ -124,7 +124,7 @@ def test_a_message_and_the_line_that_tells_of_it_are_one_command(topic, time_ns,
 def test_a_command_comes_back_from_its_entry_in_a_script(command: Command) -> None:
     entry = {"t": command.stamp_ns / 1e9, **entry_of(command)}
     assert expand_script([entry]) == [command]
-    for text in (flow([entry]), json.dumps([entry])):
+    for text in (script_text([entry]), json.dumps([entry])):
         assert parse_script(text) == [command]
 
 
