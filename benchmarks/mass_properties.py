@@ -96,7 +96,7 @@ def ours() -> list[Tool]:
             "rigid_proto, second path",
             OURS,
             prepare,
-            lambda mesh: solid_moments(*mesh, path="compensated"),
+            lambda mesh: solid_moments(*mesh, compensated=True),
             read_moments,
         ),
     ]

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,48 +35,28 @@ ROUNDING_LIMIT = 5e-14
 """Estimated relative rounding error of the volume above which compensated sums are used. Below it the error of volume,
 centroid and tensor was at most 1.1e-14 for 3,000 random convex hulls, many of them thin, and 548 parts of robots.
 """
-PATHS = ("auto", "blocked", "compensated")
-"""Summation of a solid: in pairs of doubles only where needed, in doubles block by block, or always in pairs."""
 _BLOCK = 256
 """Triangles whose plain sum is added to the total without error; their corners, 18 KB, stay in the L1 cache."""
 _LANES = 8
 """Triangles processed together in vector registers; an order chosen by the compiler would depend on the processor."""
 _UNIT_ROUNDOFF = 2.0**-53
-_OUTSIDE, _NOT_FINITE, _ONE_POINT = 1, 2, 3
 
 _Pair = tuple[Packed, Packed]  # the nearest doubles, and their rounding errors
 _Point = tuple[float, float, float]
 
 
-class Moments(NamedTuple):
-    """Mass distribution at unit density; lengths in mesh units. numbers (16,): all properties below, in this order."""
+@dataclass(frozen=True)
+class Moments:
+    """Mass distribution at unit density; lengths in mesh units. measure: volume, area or number of points. reference
+    (3,): a point near the bounding box's centre. center (3,): centroid minus reference, and center_low (3,) its
+    rounding error, to be added to it. second (6,): ∫ x xᵀ about the centroid in the order xx, xy, xz, yy, yz, zz.
+    """
 
-    numbers: np.ndarray
-
-    @property
-    def measure(self) -> float:
-        """Volume, area or number of points."""
-        return float(self.numbers[0])
-
-    @property
-    def reference(self) -> np.ndarray:
-        """A point (3,) near the bounding box's centre."""
-        return self.numbers[1:4]
-
-    @property
-    def center(self) -> np.ndarray:
-        """Centroid (3,) minus reference."""
-        return self.numbers[4:7]
-
-    @property
-    def center_low(self) -> np.ndarray:
-        """The rounding error of ``center`` (3,), to be added to it."""
-        return self.numbers[7:10]
-
-    @property
-    def second(self) -> np.ndarray:
-        """∫ x xᵀ about the centroid (6,) in the order xx, xy, xz, yy, yz, zz."""
-        return self.numbers[10:]
+    measure: float
+    reference: np.ndarray
+    center: np.ndarray
+    center_low: np.ndarray
+    second: np.ndarray
 
     @property
     def centroid(self) -> np.ndarray:
@@ -85,14 +65,12 @@ class Moments(NamedTuple):
 
     def outward(self) -> Moments:
         """The moments of the same solid wound outward."""
-        if self.measure >= 0.0:
-            return self
-        return Moments(np.concatenate([-self.numbers[:1], self.numbers[1:10], -self.second]))
+        return self if self.measure >= 0.0 else replace(self, measure=-self.measure, second=-self.second)
 
 
 @njit(nogil=True)
-def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
-    """Lower and upper corner, and whether all coordinates are finite; otherwise the corners are meaningless."""
+def _bounds(points: np.ndarray) -> tuple[_Point, _Point]:
+    """Lower and upper corner; raises MeshError for coordinates that aren't finite."""
     x0 = y0 = z0 = np.inf
     x1 = y1 = z1 = -np.inf
     zero = 0.0  # or NaN
@@ -101,7 +79,9 @@ def _bounds(points: np.ndarray) -> tuple[_Point, _Point, bool]:
         x0, y0, z0 = x if x < x0 else x0, y if y < y0 else y0, z if z < z0 else z0
         x1, y1, z1 = x if x > x1 else x1, y if y > y1 else y1, z if z > z1 else z1
         zero += (x - x) + (y - y) + (z - z)
-    return (x0, y0, z0), (x1, y1, z1), zero == 0.0
+    if zero != 0.0:
+        raise MeshError("mesh", "a vertex coordinate is not finite")
+    return (x0, y0, z0), (x1, y1, z1)
 
 
 @njit(nogil=True)
@@ -113,44 +93,38 @@ def _leads_outside(triangles: np.ndarray, count: int) -> bool:
     return signs < 0
 
 
-def _arrays(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for an empty mesh."""
+def _checked(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for an empty mesh and for a
+    vertex number out of range.
+    """
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
     if triangles.shape[0] == 0 or vertices.shape[0] == 0:
         raise MeshError("mesh", "there are no faces; a surface has at least one triangle")
+    if _leads_outside(triangles, vertices.shape[0]):
+        raise MeshError("mesh", f"a face uses a vertex outside 0 to {vertices.shape[0] - 1}")
     return vertices, triangles
 
 
-def _refuse(flaw: int, count: int) -> None:
-    """Raise MeshError for a flaw, one of the numbers above, of a mesh of ``count`` vertices; 0 is no flaw."""
-    if flaw == _OUTSIDE:
-        raise MeshError("mesh", f"a face uses a vertex outside 0 to {count - 1}")
-    if flaw == _NOT_FINITE:
-        raise MeshError("mesh", "a vertex coordinate is not finite")
-    if flaw == _ONE_POINT:
-        raise MeshError("mesh", "all vertices lie in one point")
-
-
 @njit(nogil=True)
-def _exact_reference(vertices: np.ndarray) -> tuple[int, np.ndarray, float, float]:
+def _exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
     """A point near the bounding box's centre from which the differences of all vertices are exact in double precision.
 
     Per axis: the centre c if the box's half extent is below |c|/2, since v − c is then exact (Sterbenz), otherwise 0.
-    Returns (_NOT_FINITE, _ONE_POINT or 0, reference (3,), power of two that scales the largest |v − reference| to about
-    1, that largest).
+    Returns the reference (3,), the power of two that scales the largest |v − reference| to about 1, and that largest.
+    Raises MeshError for coordinates that aren't finite, and for vertices all in one point.
     """
-    lower, upper, finite = _bounds(vertices)
+    lower, upper = _bounds(vertices)
     reference, size = np.zeros(3), 0.0
-    if not finite or lower == upper:
-        return _ONE_POINT if finite else _NOT_FINITE, reference, 1.0, size
     for k in range(3):
         low, high = lower[k], upper[k]
         middle = 0.5 * low + 0.5 * high
         if 0.5 * high - 0.5 * low <= 0.49 * abs(middle):
             reference[k] = middle
         size = max(size, abs(low - reference[k]), abs(high - reference[k]))
-    return 0, reference, math.ldexp(1.0, -math.frexp(size)[1]), size
+    if lower == upper:
+        raise MeshError("mesh", "all vertices lie in one point")
+    return reference, math.ldexp(1.0, -math.frexp(size)[1]), size
 
 
 @njit(nogil=True)
@@ -189,9 +163,10 @@ def _central(
 
 
 def _moments(numbers: np.ndarray, no_measure: str) -> Moments:
+    """Of the numbers by ``_central``; raises MeshError, which says ``no_measure``, if the measure is 0."""
     if numbers[0] == 0.0:
         raise MeshError("mesh", no_measure)
-    return Moments(numbers)
+    return Moments(float(numbers[0]), numbers[1:4], numbers[4:7], numbers[7:10], numbers[10:])
 
 
 @njit(nogil=True)
@@ -345,53 +320,33 @@ def _compensated_sums(vertices: np.ndarray, triangles: np.ndarray, reference: np
 
 
 @njit(nogil=True)
-def _solid(vertices: np.ndarray, triangles: np.ndarray, path: int, numbers: np.ndarray) -> int:
-    """Compute the solid's ``numbers`` as in ``_central``, with the summation of that number in PATHS; returns the flaw
-    of the mesh, or 0.
-    """
-    if _leads_outside(triangles, vertices.shape[0]):
-        return _OUTSIDE
-    flaw, reference, factor, size = _exact_reference(vertices)
-    if flaw:
-        return flaw
-    pairs = path == 2 or (path == 0 and triangles.shape[0] <= SMALL_MESH)
+def _solid(vertices: np.ndarray, triangles: np.ndarray, chooses: bool, in_pairs: bool, numbers: np.ndarray) -> None:
+    """Compute the solid's ``numbers`` as in ``_central``, its sums in pairs of doubles or not, or as needed."""
+    reference, factor, size = _exact_reference(vertices)
     sums = np.zeros((10, 2))
-    if not pairs:
+    if chooses:
+        in_pairs = triangles.shape[0] <= SMALL_MESH
+    if not in_pairs:
         sums, edges = _blocked_sums(vertices, triangles, reference, factor)
         rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
-        pairs = path == 0 and not rounding <= ROUNDING_LIMIT * abs(sums[0, 0])
-    if pairs:
+        in_pairs = chooses and not rounding <= ROUNDING_LIMIT * abs(sums[0, 0])
+    if in_pairs:
         sums = _compensated_sums(vertices, triangles, reference, factor)
     _central(sums, reference, factor, (6.0, 24.0, 120.0), 3, numbers)
-    return 0
 
 
-def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, path: str = "auto") -> Moments:
+def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, compensated: bool | None = None) -> Moments:
     """Moments of the solid bounded by ``triangles`` (m, 3) over ``vertices`` (n, 3), accurate to about 1e-14.
 
     Signed: a surface wound inward gives a negative volume and negative second moments. One pass in plain doubles; where
     the estimated rounding ε·size·Σ|edge|²/V is too large (thin bodies, few triangles) a pass in pairs of doubles is
-    used. ``path``: one of PATHS. Raises MeshError for an empty or non-finite mesh, a vertex number out of range, or
-    zero volume.
+    used; always or never if ``compensated`` says so. Raises MeshError for an empty or non-finite mesh, a vertex number
+    out of range, or zero volume.
     """
-    vertices, triangles = _arrays(vertices, triangles)
+    vertices, triangles = _checked(vertices, triangles)
     numbers = np.zeros(16)
-    _refuse(_solid(vertices, triangles, PATHS.index(path), numbers), vertices.shape[0])
+    _solid(vertices, triangles, compensated is None, bool(compensated), numbers)
     return _moments(numbers, "the surface encloses no volume")
-
-
-def _surface(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """``_arrays``; also raises MeshError for a vertex number out of range."""
-    vertices, triangles = _arrays(vertices, triangles)
-    _refuse(_OUTSIDE if _leads_outside(triangles, vertices.shape[0]) else 0, vertices.shape[0])
-    return vertices, triangles
-
-
-def _reference(vertices: np.ndarray) -> tuple[np.ndarray, float]:
-    """Reference and factor of ``_exact_reference``; raises MeshError for coordinates not finite, or all equal."""
-    flaw, reference, factor, _ = _exact_reference(vertices)
-    _refuse(flaw, vertices.shape[0])
-    return reference, factor
 
 
 @njit(nogil=True)
@@ -443,11 +398,10 @@ def shell_moments(vertices: np.ndarray, triangles: np.ndarray, polygon_starts: n
     normal relative to the polygon's Newell normal. Raises MeshError for an empty mesh, non-finite vertices, or zero
     area.
     """
-    vertices, triangles = _surface(vertices, triangles)
-    reference, factor = _reference(vertices)
+    vertices, triangles = _checked(vertices, triangles)
+    reference, factor, _ = _exact_reference(vertices)
     starts = np.arange(len(triangles) + 1) if polygon_starts is None else np.asarray(polygon_starts, np.int64)
-    sums = _shell_sums((vertices - reference) * factor, triangles, starts)
-    numbers = np.zeros(16)
+    sums, numbers = _shell_sums((vertices - reference) * factor, triangles, starts), np.zeros(16)
     _central(sums, reference, factor, (1.0, 3.0, 12.0), 2, numbers)
     return _moments(numbers, "the surface has no area")
 
@@ -476,20 +430,18 @@ def _point_sums(points: np.ndarray) -> np.ndarray:
 
 def point_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     """Equal point masses at the referenced vertices, the measure being their number (the 2019 paper's eq. 7)."""
-    vertices, triangles = _surface(vertices, triangles)
+    vertices, triangles = _checked(vertices, triangles)
     points = referenced_vertices(vertices, triangles)
-    reference, factor = _reference(points)
-    sums = _point_sums((points - reference) * factor)
-    numbers = np.zeros(16)
+    reference, factor, _ = _exact_reference(points)
+    sums, numbers = _point_sums((points - reference) * factor), np.zeros(16)
     _central(sums, reference, factor, (1.0, 1.0, 1.0), 0, numbers)
     return _moments(numbers, "there are no points")
 
 
 def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     """The bounding box of the referenced vertices as a solid cuboid (the 2019 paper's eq. 8, centred on the box)."""
-    vertices, triangles = _surface(vertices, triangles)
-    lower, upper, finite = _bounds(referenced_vertices(vertices, triangles))
-    _refuse(0 if finite else _NOT_FINITE, vertices.shape[0])
+    vertices, triangles = _checked(vertices, triangles)
+    lower, upper = _bounds(referenced_vertices(vertices, triangles))
     low, high = np.array(lower), np.array(upper)
     side = high - low
     volume = float(side[0] * side[1] * side[2])
@@ -497,7 +449,7 @@ def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     # A flat box has no volume, but a mass distribution: its measure is then 1.
     measure = volume if volume > 0.0 else 1.0
     second[[0, 3, 5]] = measure * (side * side) / 12.0
-    return Moments(np.concatenate([[measure], 0.5 * low + 0.5 * high, np.zeros(6), second]))
+    return Moments(measure, 0.5 * low + 0.5 * high, np.zeros(3), np.zeros(3), second)
 
 
 MODELS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray | None], Moments]] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy as np
@@ -113,16 +113,16 @@ class MeshMoments:
         if key not in self._moments:
             vertices, triangles = self.solid_surface() if model == "solid" else (self.vertices, self.triangles)
             if np.all(stretch == 1.0):
-                self._moments[key] = MODELS[model](vertices, triangles, self.polygon_starts)
-                return self._moments[key]
-            # About a vertex: far from the origin the products would round.
-            base = vertices[triangles[0, 0]] if len(triangles) else np.zeros(3)
-            numbers = MODELS[model]((vertices - base) * stretch, triangles, self.polygon_starts).numbers.copy()
-            for k in range(3):
-                exact = Fraction(numbers[1 + k]) + Fraction(base[k]) * Fraction(stretch[k])
-                numbers[1 + k] = float(exact)
-                numbers[7 + k] += float(exact - Fraction(numbers[1 + k]))
-            self._moments[key] = Moments(numbers)
+                found = MODELS[model](vertices, triangles, self.polygon_starts)
+            else:  # about a vertex: far from the origin the products would round
+                base = vertices[triangles[0, 0]]
+                found = MODELS[model]((vertices - base) * stretch, triangles, self.polygon_starts)
+                parts = zip(found.reference, base, stretch, strict=True)
+                exact = [Fraction(r) + Fraction(b) * Fraction(s) for r, b, s in parts]
+                reference = np.array([float(place) for place in exact])
+                low = [float(place - Fraction(near)) for place, near in zip(exact, reference, strict=True)]
+                found = replace(found, reference=reference, center_low=found.center_low + low)
+            self._moments[key] = found
         return self._moments[key]
 
     def body_mass(self, *, scale: ArrayLike = (1.0, 1.0, 1.0), mass: float = 0.0, density: float = 1000.0) -> float:

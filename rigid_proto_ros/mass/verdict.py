@@ -301,7 +301,7 @@ def _no_volume(vertices: np.ndarray, triangles: np.ndarray, diagonal: float) -> 
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     area = 0.5 * float(np.sum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
     try:
-        volume = solid_moments(vertices, triangles, path="compensated").measure
+        volume = solid_moments(vertices, triangles, compensated=True).measure
     except MeshError:
         return True
     return abs(volume) <= NO_VOLUME * 1e-2 * area * diagonal

@@ -95,12 +95,12 @@ def test_far_from_the_origin_tensor_and_com_keep_their_digits():
 
 def test_thin_bodies_take_the_second_path_by_themselves_and_need_it():
     vertices, triangles = SOLIDS["plate 1 x 1 x 1e-6 of 4800, turned"]
-    own, pairs = solid_moments(vertices, triangles), solid_moments(vertices, triangles, path="compensated")
+    own, pairs = solid_moments(vertices, triangles), solid_moments(vertices, triangles, compensated=True)
     assert own.measure == pairs.measure
     exact = exact_solid_moments(vertices, triangles).volume
-    plain = solid_moments(vertices, triangles, path="blocked").measure
+    plain = solid_moments(vertices, triangles, compensated=False).measure
     assert abs(plain / float(exact) - 1.0) > 1e-13  # measured 4e-11: the plain sums would not do
-    assert solid_moments(*sphere(60)).measure == solid_moments(*sphere(60), path="blocked").measure
+    assert solid_moments(*sphere(60)).measure == solid_moments(*sphere(60), compensated=False).measure
 
 
 def test_a_vertex_that_is_not_there_is_refused():
