@@ -74,9 +74,9 @@ def bag_flight(path: Path, choice: Choice) -> ms.MeasuredFlight:
     chosen = _chosen_topics(path, choice)
     _check_clocks(chosen)
     begin = min(int(topic.times_ns[0]) for topic in chosen.values())
-    window = (begin + round(choice.first_s * 1e9), begin + round(min(choice.last_s, 1e9) * 1e9))
+    first, last = (begin + round(min(edge_s, 1e9) * 1e9) for edge_s in (choice.first_s, choice.last_s))
     series = [one for kind in ("pose", "imu") if kind in chosen for one in _series(kind, chosen[kind])]
-    series = [part for part in (one.within(*window) for one in series) if len(part.times_ns)]
+    series = [part for part in (one.within(first, last) for one in series) if len(part.times_ns)]
     if not series:
         raise InputError("--from", choice.first_s, f"a window with samples of {path} in it")
     loads = ms.load_history()

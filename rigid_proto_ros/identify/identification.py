@@ -8,15 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import Numbers
 from ..mass.export import urdf_inertial
 from ..mass.properties import MassProperties
 from ..mass.tensor import principal_axes, six_from_tensor
-from .fitting import USUAL, Estimate, fit_flights
+from .fitting import USUAL, CannotFlyError, Estimate, fit_flights
 from .measurements import ACCELERATION, RATE, MeasuredFlight, topics_of
 from .unknowns import DEFAULT_FIT, Values, make_unknowns, possible_tensor
 from .verdict import Identifiability, Quantity, ResidualCheck, Unidentified, check_residuals
@@ -71,35 +71,34 @@ class Identification:
     @property
     def mass(self) -> Quantity:
         """[kg]."""
-        return self._each(lambda values: np.array([values.mass]), 1, "mass")[0]
+        return self._each(lambda values: [values.mass], "mass")[0]
 
     @property
     def center_of_mass(self) -> list[Quantity]:
         """[m, tracked frame]."""
-        return self._each(lambda values: values.center_of_mass, 3, "com")
+        return self._each(lambda values: values.center_of_mass, "com")
 
     @property
     def inertia(self) -> list[Quantity]:
         """ixx ixy ixz iyy iyz izz [kg m², about the COM, axes of the tracked frame]."""
-        return self._whole(lambda values: np.array(six_from_tensor(values.inertia)), 6)
+        return self._whole(lambda values: six_from_tensor(values.inertia))
 
     @property
     def shape(self) -> list[Quantity]:
         """The same divided by the tensor's trace."""
-        return self._whole(lambda values: np.array(six_from_tensor(values.inertia)) / np.trace(values.inertia), 6)
+        return self._whole(lambda values: six_from_tensor(values.inertia / np.trace(values.inertia)))
 
     @property
     def moments(self) -> list[Quantity]:
         """Principal moments, ascending [kg m²]."""
-        return self._whole(lambda values: principal_axes(values.inertia)[0], 3)
+        return self._whole(lambda values: principal_axes(values.inertia)[0])
 
     @property
     def others(self) -> dict[str, Quantity]:
         """Whatever else was asked for, by name."""
-        unknowns, found = self.estimate.unknowns, {}
-        for slot in self._other_slots:
-            found[unknowns.name(slot)] = self.identifiability.quantity(partial(unknowns.read, slot=slot))
-        return found
+        unknowns, slots = self.estimate.unknowns, self._other_slots
+        found = self.identifiability.quantities(lambda values: [unknowns.read(values, slot) for slot in slots])
+        return dict(zip(map(unknowns.name, slots), found, strict=True))
 
     @property
     def units(self) -> dict[str, str]:
@@ -119,19 +118,14 @@ class Identification:
     def _other_slots(self) -> list[int]:
         return [k for k, (group, _) in enumerate(self.estimate.unknowns.slots) if group not in DEFAULT_FIT]
 
-    def _each(self, read: Callable[[Values], np.ndarray], count: int, group: str) -> list[Quantity]:
-        if group in self.guessed:
-            return [Quantity(None, None)] * count
+    def _each(self, read: Callable[[Values], Numbers], group: str) -> list[Quantity]:
+        found = self.identifiability.quantities(read)
+        return [Quantity(None, None)] * len(found) if group in self.guessed else found
 
-        def entry(values: Values, k: int) -> float:
-            return float(read(values)[k])
-
-        return [self.identifiability.quantity(partial(entry, k=k)) for k in range(count)]
-
-    def _whole(self, read: Callable[[Values], np.ndarray], count: int) -> list[Quantity]:
+    def _whole(self, read: Callable[[Values], Numbers]) -> list[Quantity]:
         """All of them or none: an entry that happens to be 0 has the size of the others."""
-        found = self._each(read, count, "inertia")
-        return found if all(one.value is not None for one in found) else [Quantity(None, None)] * count
+        found = self._each(read, "inertia")
+        return found if all(one.value is not None for one in found) else [Quantity(None, None)] * len(found)
 
 
 @dataclass(frozen=True)
@@ -145,6 +139,7 @@ class Known:
     length: float = GUESSED_RADIUS
 
 
+@np.errstate(all="ignore")  # of numbers that no flight has, which are refused
 def identify(
     flights: Sequence[MeasuredFlight],
     fit: Sequence[str] = DEFAULT_FIT,
@@ -164,7 +159,10 @@ def identify(
             raise InputError("--fit", f"{group} needs an Imu that measures {kind}: record one, or name it with --imu")
     unknowns = make_unknowns(fit, topics_of(flights))
     by_flight = frozenset({"gravity", "damping"} - set(fit))
-    estimate = fit_flights(flights, unknowns, replace(_first_values(flights[0], known), by_flight=by_flight))
+    try:
+        estimate = fit_flights(flights, unknowns, replace(_first_values(flights[0], known), by_flight=by_flight))
+    except np.linalg.LinAlgError:  # of numbers that overflow
+        raise CannotFlyError from None
     given = {"mass": known.mass is not None or known.body is not None}
     guessed = frozenset(name for name in DEFAULT_FIT if name not in fit and not given.get(name, known.body is not None))
     checks = check_residuals(flights, estimate)

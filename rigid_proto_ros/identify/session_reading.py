@@ -39,7 +39,7 @@ def session_flight(
     end_ns = round(min(last_s, 1e-9 * session.end_ns) * 1e9)
     frames = frame_names(scenario.parameters, session.node_name)
     loads = _load_history(session, setup, frames, name, end_ns)
-    series = [one.within(round(first_s * 1e9), end_ns) for one in _series(session)]
+    series = [one.within(round(min(first_s, 1e9) * 1e9), end_ns) for one in _series(session)]
     series = [one for one in series if len(one.times_ns)]
     if not series:
         raise InputError("--from", first_s, f"a time within {name}, which ends at {1e-9 * session.end_ns:g} s")

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtrc
 
+from ..base.vectors import Numbers
 from .fitting import Estimate, residuals_of
 from .initial_estimate import noise_by_differences
 from .measurements import ATTITUDE, UNITS, MeasuredFlight
@@ -109,21 +110,25 @@ class Identifiability:
             found.append(Unidentified(f"a mixture of {', '.join(largest)}", f"{TUMBLE}, {POKE}"))
         return found
 
-    def quantity(self, of: Callable[[Values], float]) -> Quantity:
-        """A function of the estimate with its standard deviation, or nothing where a direction that isn't
-        identified changes it.
+    def quantities(self, of: Callable[[Values], Numbers]) -> list[Quantity]:
+        """Numbers that the estimate gives with their standard deviations, or nothing where a direction that isn't
+        identified changes one.
         """
-        gradient = np.empty(len(self.unknowns))
+        numbers = of(self.values)
+        gradients = np.empty((len(numbers), len(self.unknowns)))
         for k, step in enumerate(GRADIENT_STEP * self.unknowns.scales(self.values)):
-            change = step * np.eye(len(gradient))[k]
-            sides = [of(self.unknowns.moved(self.values, sign * change)) for sign in (1.0, -1.0)]
-            gradient[k] = (sides[0] - sides[1]) / (2.0 * step)
-        along = self._directions.T @ (self._units * gradient)
-        size = float(np.linalg.norm(along))
-        if np.any(np.abs(along[self._unidentified]) > LEAST_SHARE * size):
-            return Quantity(None, None)
-        good = ~self._unidentified
-        return Quantity(float(of(self.values)), float(np.linalg.norm(along[good] / self.roots[good])))
+            change = step * np.eye(len(self.unknowns))[k]
+            sides = [np.asarray(of(self.unknowns.moved(self.values, sign * change))) for sign in (1.0, -1.0)]
+            gradients[:, k] = (sides[0] - sides[1]) / (2.0 * step)
+        found = []
+        for number, along in zip(numbers, (gradients * self._units) @ self._directions, strict=True):
+            good, hidden = along[~self._unidentified], np.abs(along[self._unidentified])
+            if np.any(hidden > LEAST_SHARE * np.linalg.norm(along)):
+                found.append(Quantity(None, None))
+            else:
+                sd = np.linalg.norm(good / self.roots[~self._unidentified])
+                found.append(Quantity(float(number), float(sd)))
+        return found
 
 
 def _coordinates(unknowns: Unknowns, values: Values, length: float) -> tuple[list[str], np.ndarray]:

@@ -117,7 +117,7 @@ class CommandReceiver:
             order, self._loop.planned([commands[k] for k in order], waiting), strict=True
         ):
             if isinstance(command, Change):
-                command = replace(command, apply=partial(self._loop.setup_of, command, scenario.body_mesh))
+                command = replace(command, apply=partial(self._loop.setup_of, command, scenario))
             checked = (check_command(command, scenario.setup), scenario.setup)
             when_ns, counter = self._effective(command.stamp_ns, 0)
             counted.setdefault(counter, set()).add(command.entry)

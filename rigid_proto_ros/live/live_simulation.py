@@ -242,7 +242,7 @@ class LiveSimulation:
             return
 
         def check() -> Scenario:
-            scenario = loop.scenario.with_changes(changes, at_hand=planned.body_mesh)
+            scenario = loop.scenario.with_changes(changes, at_hand=planned)
             try:
                 loop.check_change(scenario)
             except CommandRefused as refusal:

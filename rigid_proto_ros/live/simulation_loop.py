@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from ..base.errors import InputError
 from ..motion.state import State
-from ..scene.scenario import BodyMesh, Scenario
+from ..scene.scenario import Scenario
 from ..scene.scenario_run import ScenarioRun, after_change
 from ..simulation.commands import Change
 from ..simulation.observer import Observer, Published
@@ -135,13 +135,13 @@ class SimulationLoop(ScenarioRun):
         def apply() -> Setup:
             # Changes made by hand act in the order in which they came.
             self._waiting.pop(0)
-            return self.setup_of(change, scenario.body_mesh)
+            return self.setup_of(change, scenario)
 
         self.simulation.submit(replace(change, apply=apply))
 
-    def setup_of(self, command: Change, at_hand: BodyMesh | None = None) -> Setup:
+    def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
         """Put in force what a change says that acts now; returns the setup, without changes that still wait. Raises
-        InputError. at_hand: a mesh that may be its.
+        InputError. at_hand: a scenario whose mesh may be its.
         """
         acting = self._acting
         try:

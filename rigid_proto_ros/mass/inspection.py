@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -126,7 +126,7 @@ def inspect_mesh(
     scale: ArrayLike = 1.0,
     mass: float = 0.0,
     density: float = 1000.0,
-    ballast: Iterable = (),
+    ballast: Sequence[Sequence[float]] = (),
 ) -> Inspection:
     """Mass properties of every model that can be computed for ``body``, and the findings on them."""
     s = scale_vector(scale)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -42,10 +42,7 @@ class MassProperties:
 
 def scale_vector(scale: ArrayLike) -> np.ndarray:
     """One or three numbers as (3,); raises InputError unless each is nonzero with 1e-9 ≤ |s| ≤ 1e9."""
-    try:
-        s = [float(value) for value in np.ravel(scale).tolist()]
-    except (TypeError, ValueError):
-        s = []
+    s = [float(value) for value in np.ravel(scale).tolist()]
     if len(s) == 1:
         s = s * 3
     if len(s) != 3 or not all(SCALE_LIMITS[0] <= abs(value) <= SCALE_LIMITS[1] for value in s):
@@ -54,22 +51,12 @@ def scale_vector(scale: ArrayLike) -> np.ndarray:
     return np.array(s)
 
 
-def _checked_ballast(ballast: Iterable) -> np.ndarray:
+def _checked_ballast(ballast: Sequence[Sequence[float]]) -> np.ndarray:
     """Ballast entries with a mass above 0, (k, 4): m, x, y, z."""
-    checked = []
     for entry in ballast:
-        try:
-            row = [float(value) for value in entry]
-        except (TypeError, ValueError):
-            row = []
-        if len(row) != 4 or row[0] < 0.0 or not all(map(math.isfinite, row)):
+        if not entry[0] >= 0.0 or not all(map(math.isfinite, entry)):
             raise InputError("ballast", entry, "mass >= 0 [kg] and x, y, z, all finite")
-        if row[0] > 0.0:
-            checked.append(row)
-    return np.array(checked) if checked else _NO_BALLAST
-
-
-_NO_BALLAST = np.empty((0, 4))
+    return np.array([entry for entry in ballast if entry[0] > 0.0], dtype=float).reshape(-1, 4)
 
 
 @dataclass
@@ -145,7 +132,7 @@ class MeshMoments:
         scale: ArrayLike = (1.0, 1.0, 1.0),
         mass: float = 0.0,
         density: float = 1000.0,
-        ballast: Iterable = (),
+        ballast: Sequence[Sequence[float]] = (),
         com: str = "model",
     ) -> MassProperties:
         """Mass properties of ``model`` at any scale, mass, density and ballast, in closed form from its ten moments.
@@ -183,24 +170,16 @@ def explicit_mass_properties(
     mass: float,
     center_of_mass: ArrayLike,
     tensor6: Sequence[float],
-    ballast: Iterable = (),
+    ballast: Sequence[Sequence[float]] = (),
     scale: ArrayLike = (1.0, 1.0, 1.0),
 ) -> MassProperties:
     """Mass properties from given numbers: mass [kg], center_of_mass (3,) [mesh coordinates], tensor6 (ixx, ixy, ixz,
     iyy, iyz, izz) [kg m², about the COM]. ``scale`` moves COM and ballast with the mesh; mass and tensor are final.
     """
-    s = scale_vector(scale)
-    if not (0.0 < float(mass) < math.inf):
-        raise TensorError("explicit_inertia.mass", mass, "a finite number > 0 [kg]")
-    center = np.asarray(center_of_mass, dtype=np.float64)
-    if center.shape != (3,) or not np.all(np.isfinite(center)):
-        raise TensorError("explicit_inertia.center_of_mass", center.tolist(), "three finite numbers [mesh coordinates]")
-    if len(tuple(tensor6)) != 6:
-        raise TensorError("explicit_inertia.tensor", list(tensor6), "six numbers: ixx ixy ixz iyy iyz izz [kg m²]")
     inertia = tensor_from_six(tensor6)
     warnings = check_tensor(inertia, source="explicit_inertia.tensor")
-    points = _checked_ballast(ballast)
-    total, center_of_mass, inertia, _ = given_mass(float(mass), center, inertia, s, points)
+    points, center = _checked_ballast(ballast), np.array(center_of_mass, dtype=float)
+    total, center_of_mass, inertia, _ = given_mass(mass, center, inertia, scale_vector(scale), points)
     if len(points):
         warnings = check_tensor(inertia, source="explicit_inertia.tensor with ballast")
     return MassProperties(total, center_of_mass, inertia, warnings)

@@ -162,7 +162,7 @@ def _check_components(verdict: Verdict, topology: Topology, sums: Components, ve
             _check_winding(verdict, nesting, volume)
         else:
             verdict.add("components_unchecked", WARNING, "too many faces to check whether components overlap")
-        if nesting.crossing:
+        if nesting.crossing.any():
             _check_overlap(verdict, nesting, whole, vertices, topology.corners)
         if nesting.complete and not verdict.inward and not verdict.united:
             _check_nesting(verdict, nesting, volume)
@@ -230,7 +230,8 @@ def _check_overlap(
     Parts that overlap count twice in the sum, what cavities share is missing in it: the two may cancel in the volume
     and not in the tensor.
     """
-    overlap, whole, parts = f"{counted(len(nesting.crossing), 'pair')} of components overlap", 0.0, 0.0
+    pairs = int(np.count_nonzero(np.triu(nesting.crossing)))
+    overlap, whole, parts = f"{counted(pairs, 'pair')} of components overlap", 0.0, 0.0
     if verdict.inward:
         volume, triangles = -volume, triangles[:, [0, 2, 1]]
     if verdict.closed:

@@ -317,11 +317,11 @@ def _sides(
 
 @dataclass(frozen=True)
 class Nesting:
-    """inside (k, k) bool: component i lies in component j. crossing: pairs (i, j) whose surfaces intersect. within:
+    """inside (k, k) bool: component i lies in component j. crossing (k, k) bool: their surfaces intersect. within:
     pairs of triangles of one component that intersect. complete: False if the work limit was reached before."""
 
     inside: np.ndarray
-    crossing: tuple[tuple[int, int], ...]
+    crossing: np.ndarray
     within: int
     complete: bool
 
@@ -333,9 +333,7 @@ class Nesting:
     @property
     def crosses(self) -> np.ndarray:
         """Which components intersect another one, (k,) bool."""
-        crosses = np.zeros(len(self.inside), dtype=bool)
-        crosses[np.array(self.crossing, dtype=np.int64).ravel()] = True
-        return crosses
+        return np.asarray(self.crossing.any(axis=1))
 
 
 def component_nesting(vertices: np.ndarray, topology: Topology, sums: Components) -> Nesting:
@@ -359,5 +357,4 @@ def component_nesting(vertices: np.ndarray, topology: Topology, sums: Components
         found = found | on_both_sides | on_both_sides.T
         inside = inner & ~outside & ~found
         complete = complete and decided
-    pairs = tuple((int(i), int(j)) for i, j in np.argwhere(np.triu(found)))
-    return Nesting(inside, pairs, int(within), bool(complete))
+    return Nesting(inside, found, int(within), bool(complete))

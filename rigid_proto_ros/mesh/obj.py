@@ -20,6 +20,7 @@ from .ascii_floats import as_numbers, error_at
 _VERTEX = "v with three coordinates"
 _FACE = "f with nonzero integer vertex numbers, negative ones counted back from the last vertex"
 _BLANK = rb"[ \t\v\f]"
+_CONTINUED = b" \v"  # blanks, from which the end of the line can be told
 _INDENTED = re.compile(rb"\n" + _BLANK + rb"+")
 _V = re.compile(rb"\nv" + _BLANK + rb"+(\S+" + _BLANK + rb"+\S+" + _BLANK + rb"+\S+)")
 _F = re.compile(rb"\nf(?!\S)([^\n]*)")
@@ -29,7 +30,8 @@ _EITHER = re.compile(rb"\n([vf])(?!\S)")
 def _error(text: bytes, letter: bytes, number: int, name: str, accepted: str) -> MeshError:
     """The error for a line: the one with this number, from 0 on, among those that begin with ``letter``."""
     lines = (match.start() + 1 for match in _EITHER.finditer(text) if match[1] == letter)
-    return error_at(text, next(itertools.islice(lines, number, None), 0), name, accepted, first_line=0)
+    place = next(itertools.islice(lines, number, None), 0)
+    return error_at(text.replace(_CONTINUED, b" \n"), place, name, accepted, first_line=0)
 
 
 def _vertices(text: bytes, name: str) -> np.ndarray:
@@ -81,7 +83,7 @@ def read_obj(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray
     if b"#" in text:
         text = re.sub(rb"#[^\n]*", b"", text)
     if b"\\\n" in text:  # after the comments: one that ends with a backslash, as paths do, continues nowhere
-        text = text.replace(b"\\\n", b"  ")
+        text = text.replace(b"\\\n", _CONTINUED)
     text = _INDENTED.sub(b"\n", text)
     vertices = _vertices(text, name)
     numbers, sizes = _faces(text, name)

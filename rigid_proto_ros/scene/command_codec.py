@@ -29,26 +29,25 @@ from .script import MESH_FRAME
 MARKS = ("reset", "pause", "step", "timeout", "clock")
 """Events that stand in the log and don't act on the body."""
 
-_KINDS = {
-    "wrench": "wrench",
-    "poke": "poke",
-    "string/target": "string_target",
-    "string/attach": "string_attach",
-    "inertia/set": "inertia",
-}
-"""The kind of event that a topic below the node's name makes."""
+_WRENCH: dict[str, int | slice] = {"force": slice(0, 3), "torque": slice(3, 6)}
+_POINT: dict[str, int | slice] = {"point": slice(0, 3)}
+_INERTIA: dict[str, int | slice] = {"mass": 0, "com": slice(1, 4), "tensor": slice(4, 10)}
 
-EVENT_KINDS = (*_KINDS.values(), "thrusters", "state", "set", "clear_wrench", "string_release")
+_MESSAGES = {
+    "wrench": ("wrench", 6, _WRENCH),
+    "poke": ("poke", 6, _WRENCH),
+    "string/target": ("string_target", 3, _POINT),
+    "string/attach": ("string_attach", 3, _POINT),
+    "inertia/set": ("inertia", 10, _INERTIA),
+}
+"""By topic below the node's name: the kind of event that a message makes, how many doubles it has, and where they stand
+in the event's content; ixx ixy ixz iyy iyz izz is the tensor."""
+
+EVENT_KINDS = (
+    *(kind for kind, *_ in _MESSAGES.values()),
+    *("thrusters", "state", "set", "clear_wrench", "string_release"),
+)
 """Events that a command is behind."""
-
-_FIELDS: dict[str, dict[str, int | slice]] = {
-    "wrench": {"force": slice(0, 3), "torque": slice(3, 6)},
-    "poke": {"force": slice(0, 3), "torque": slice(3, 6)},
-    "string_target": {"point": slice(0, 3)},
-    "string_attach": {"point": slice(0, 3)},
-    "inertia": {"mass": 0, "com": slice(1, 4), "tensor": slice(4, 10)},
-}
-"""Where the doubles of a message stand in the content of its event: ixx ixy ixz iyy iyz izz is the tensor."""
 
 Names = tuple[str, str]
 """Names of the world frame and the body frame."""
@@ -75,13 +74,12 @@ def of_message(topic: str, data: bytes, names: Names = WORDS) -> Command:
 
     Raises ValueError for bytes that are no such message, CommandRefused for what no command says.
     """
-    kind = _KINDS[topic]
-    count = {"wrench": 6, "poke": 6, "inertia": 10}.get(kind, 3)
+    kind, count, fields = _MESSAGES[topic]
     seconds, nanoseconds, frame_id, numbers = cdr.read_stamped_doubles(data, count)
     if nanoseconds >= 1_000_000_000:
         raise CommandRefused("stamp", "header.stamp", f"{nanoseconds} nanosec", "nanosec below 1000000000")
     content = {"stamp_ns": seconds * 1_000_000_000 + nanoseconds, "frame_id": frame_id}
-    return _command(kind, content | {name: numbers[place] for name, place in _FIELDS[kind].items()}, names)
+    return _command(kind, content | {name: numbers[place] for name, place in fields.items()}, names)
 
 
 def of_event(kind: str, content: Mapping, names: Names = WORDS) -> Command | None:

@@ -17,7 +17,6 @@ from ..base.arithmetic import exact_quotient
 from ..base.errors import CommandRefused, InputError, MeshError
 from ..mass.from_mesh import mesh_body
 from ..mass.properties import MassProperties, MeshMoments, explicit_mass_properties, scale_vector
-from ..mass.tensor import check_tensor
 from ..mesh.reading import Mesh
 from ..motion.body import make_body
 from ..motion.integrators import integrator_named
@@ -37,14 +36,11 @@ _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class BodyMesh:
-    """A mesh with what is computed from it once: its moments, and its surface wound outward. made_of: what of the
-    parameters it was loaded for (``_made_of``).
-    """
+    """A mesh with what is computed from it once: its moments, and its surface wound outward."""
 
     mesh: Mesh
     moments: MeshMoments
     surface: Surface
-    made_of: tuple[str, bool | str, str]
 
 
 @dataclass(frozen=True)
@@ -65,12 +61,12 @@ class Scenario:
         return _of_parameters, (self.parameters, self.body_mesh.mesh if self.body_mesh else None)
 
     def with_changes(
-        self, changes: Mapping[str, object], mesh: Mesh | None = None, at_hand: BodyMesh | None = None
+        self, changes: Mapping[str, object], mesh: Mesh | None = None, at_hand: Scenario | None = None
     ) -> Scenario:
         """The scenario with these parameters changed, checked together; raises InputError and leaves this one as it is.
 
-        mesh: a mesh at hand, used instead of loading the one that the parameter names. at_hand: a loaded one, used
-        where it is the one that the parameters ask for.
+        mesh: a mesh at hand, used instead of loading the one that the parameter names. at_hand: a scenario whose mesh
+        is used where it is the one that the parameters ask for.
         """
         for name, value in convert_all(changes).items():
             if parameter_named(name).changes == READ_ONLY:
@@ -78,12 +74,10 @@ class Scenario:
                     name, value, "a parameter that can be changed while running; this one is set at start only"
                 )
         parameters = self.parameters.replaced(changes)
-        if mesh is None:
-            if _made_of(parameters) == _made_of(self.parameters):
-                return build_scenario(parameters, self.body_mesh)
-            if at_hand is not None and at_hand.made_of == _made_of(parameters):
-                return build_scenario(parameters, at_hand)
-        return build_scenario(parameters, load_body_mesh(parameters, mesh))
+        for one in (self, at_hand):
+            if mesh is None and one is not None and _made_of(one.parameters) == _made_of(parameters):
+                return build_scenario(parameters, one.body_mesh)
+        return _of_parameters(parameters, mesh)
 
     def with_inertia(self, mass: float, com: Sequence[float], tensor6: Sequence[float], relative: bool) -> Scenario:
         """The scenario with an explicit inertia, as a message gives it; raises InputError.
@@ -154,15 +148,15 @@ def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh
     body = mesh_body(mesh or parameters.mesh, repair=parameters.mesh_repair, fallback=parameters.mesh_fallback)
     if not body.verdict.usable:
         raise MeshError(f"mesh {parameters.mesh}", body.verdict.reason or "the surface has no extent")
-    surface = Surface(body.vertices, body.triangles)
-    return BodyMesh(body.mesh, body.moments, surface, _made_of(parameters))
+    return BodyMesh(body.mesh, body.moments, Surface(body.vertices, body.triangles))
 
 
 def _no_mesh() -> InputError:
     return InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
 
 
-def _made_of(parameters: Parameters) -> tuple[str, bool | str, str]:
+def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
+    """What of the parameters a mesh is loaded for."""
     return parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback
 
 
@@ -193,7 +187,6 @@ def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | 
 def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, tuple[str, ...]]:
     scale = scale_vector(list(parameters.scale))
     properties = _mass_properties(parameters, body_mesh, scale)
-    check_tensor(properties.inertia)
     # Within an ulp of where it is, at a product of mesh coordinate and scale: so it survives being sent back by
     # message.
     center_of_mass = [exact_quotient(c, s) * s for c, s in zip(properties.center_of_mass, scale, strict=True)]

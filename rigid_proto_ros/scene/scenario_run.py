@@ -34,7 +34,7 @@ from ..simulation.observer import (
 )
 from ..simulation.setup import Setup, check_command
 from ..simulation.simulation import Simulation
-from .scenario import BodyMesh, Scenario, check_inertia, publication_ns
+from .scenario import Scenario, check_inertia, publication_ns
 from .script import with_contacts
 
 Value = TypeVar("Value")
@@ -133,7 +133,7 @@ class Publications:
             self._number += 1
 
 
-def after_change(scenario: Scenario, change: Change, at_hand: BodyMesh | None = None) -> Scenario:
+def after_change(scenario: Scenario, change: Change, at_hand: Scenario | None = None) -> Scenario:
     """The scenario that a change makes of this one; raises InputError. at_hand: as in ``Scenario.with_changes``."""
     if change.kind == "inertia":
         return check_inertia(scenario, change.content)

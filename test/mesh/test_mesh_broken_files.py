@@ -47,6 +47,7 @@ UNREADABLE = [
     ("negative.ply", replaced(ply(), b"element face 12", b"element face -12"), "element face -12"),
     ("word.obj", replaced(obj(), b"v 0.0 0.0 1.0", b"v 0.0 zero 1.0"), "zero"),
     ("word.ply", replaced(ply(), b"0.0 0.0 1.0", b"0.0 zero 1.0"), "zero"),
+    ("continued.obj", b"v 0 \\\n0 0\nv 1 0 \\\n0\nv 0 one 0\nf 1 2 3\n", "line 5: got 'v 0 one 0'"),
     ("index.obj", replaced(obj(), b"f 1 2 4", b"f 1 2 99"), "vertex 99"),
     ("index_zero.obj", replaced(obj(), b"f 1 2 4", b"f 0 2 4"), "nonzero"),
     ("index_back.obj", replaced(obj(), b"f 1 2 4", b"f -1 -2 -99"), "counted back"),
