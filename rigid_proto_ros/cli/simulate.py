@@ -19,7 +19,6 @@ from .exports import add_exports, asked, check_exports, write_exports
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
     from ..rerun_view.session_files import Recorder
-    from ..scene.parameters import Parameters
 
 DURATION_NS = 10_000_000_000
 AFTER_SCRIPT_NS = 1_000_000_000
@@ -68,6 +67,7 @@ def _instead_of(option: str) -> str:
 
 def run(args: argparse.Namespace) -> int:
     """Run the scene and print its end."""
+    from ..rerun_view.session_files import make_recorder
     from ..scene.scenario import read_scene
     from ..scene.scenario_run import OfflineRun, run_with_progress, summary
     from ..scene.script import read_script
@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     recorders: dict[str, Recorder] = {}
     with ExitStack() as closing:
         for file in files:
-            recorders[file] = _recorder(file, scenario.parameters)
+            recorders[file] = make_recorder(file, parameters=scenario.parameters, on_error=_warn, simulated_log=True)
             closing.callback(recorders[file].close)
         watching = [*recorders.values(), *filter(None, [record])]
         # The ghost is simulated only if something is recorded.
@@ -145,12 +145,6 @@ def _check_places(files: list[str], args: argparse.Namespace) -> None:
         check_writable("--bag" if file == args.bag else "--record" if args.record else "record", file)
     if len({Path(file).resolve() for file in files}) < len(files):
         raise InputError("--bag", files[-1], "another file than that of --record")
-
-
-def _recorder(file: str, parameters: Parameters) -> Recorder:
-    from ..rerun_view.session_files import make_recorder
-
-    return make_recorder(file, parameters=parameters, on_error=_warn, simulated_log=True)
 
 
 def _warn(message: str) -> None:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The command line of the node, read before rcl reads it, so that a mistake gives one line with a remedy instead of a
-stack of errors.
+stack of errors; and the beginning of ROS with what it leaves.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ import argparse
 import textwrap
 from collections.abc import Callable, Iterator
 
+import rclpy
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from ..base.command_line import Parser, number_from
@@ -49,6 +51,16 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
     if own and not any(word.startswith("-") for word in own):
         raise InputError(own[0], f"not an option; a scene is given by --ros-args --params-file {own[0]}")
     return parser.parse_args(own)
+
+
+def begin_ros(argv: list[str]) -> None:
+    """Initialize rclpy without its handlers of signals, since it must outlive all that is closed after one. Raises
+    InputError for arguments that it refuses.
+    """
+    try:
+        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # rclpy's own error types differ between versions
+        raise InputError("ROS arguments", " ".join(str(error).split())) from None
 
 
 def _parameter_help() -> str:

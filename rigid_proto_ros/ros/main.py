@@ -79,21 +79,16 @@ class NodeProcess(threading.Thread):
 
     def _begin(self, given: Mapping[str, object], until_s: float | None) -> None:
         """Make the node, which may compile for minutes, and let it run. Raises InputError."""
-        import rclpy
         from rclpy.exceptions import ParameterException
         from rclpy.executors import SingleThreadedExecutor
-        from rclpy.signals import SignalHandlerOptions
 
         from ..base.compilation import notify_when_compiling
         from ..live.live_simulation import warm_up
         from ..scene.scenario import nanoseconds
+        from .arguments import begin_ros
         from .node import RigidBodyNode
 
-        try:
-            # The middleware must outlive the physics thread, so rclpy's own handlers of signals stay out.
-            rclpy.init(args=self._argv, signal_handler_options=SignalHandlerOptions.NO)
-        except Exception as error:  # rclpy's own error types differ between versions
-            raise InputError("ROS arguments", " ".join(str(error).split())) from None
+        begin_ros(self._argv)
         with notify_when_compiling(lambda: _tell("compiling kernels, at the first start only; a minute or two ...")):
             try:
                 node = self._node = RigidBodyNode(given, make_viewer)

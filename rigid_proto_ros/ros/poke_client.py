@@ -138,20 +138,9 @@ def _three(text: str) -> list[float]:
 
 
 def _send(script: list[Command], args: argparse.Namespace, argv: list[str]) -> int:
-    import rclpy
-    from rclpy.signals import SignalHandlerOptions
+    from .script_sender import ros_context, send_script
 
-    from .script_sender import ScriptSender
-
-    # The middleware's own signal handler would close the context during the clean-up.
-    rclpy.init(args=[sys.argv[0], *argv], signal_handler_options=SignalHandlerOptions.NO)
-    sender = None
-    try:
-        sender = ScriptSender(args.node, args.timeout)
-        report = sender.send(script, reset=args.reset, lead_s=args.lead)
-    finally:
-        if sender is not None:
-            sender.destroy_node()
-        rclpy.try_shutdown()
+    with ros_context(*argv):
+        report = send_script(script, args.node, args.timeout, args.reset, args.lead)
     print(report.text)
     return 0 if report.all_in_time else 1

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import numpy as np
 from geometry_msgs.msg import InertiaStamped, PoseStamped, TransformStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
@@ -122,13 +121,6 @@ class StatePublisher:
         # An Odometry's twist is in the child frame: body axes.
         return cdr.odometry(time_ns + self._stamps.offset_ns, self._frames, PROJECTIONS["odom"](row))
 
-    def _specific_force(self, contact: str) -> np.ndarray:
-        """At the contact that ~/imu is mounted at, or the COM; on the physics thread."""
-        simulation = self._run.simulation
-        body = simulation.setup.body
-        point = body.point(simulation.setup.contacts[contact]).tolist() if contact else (0.0, 0.0, 0.0)
-        return simulation.specific_force(point)
-
     def _imu_message(self, time_ns: int, row: list[float]) -> Imu:
         """Attitude, angular velocity and specific force, both in body axes, at the contact that was chosen."""
         parameters = self._run.scenario.parameters
@@ -141,7 +133,9 @@ class StatePublisher:
         message.header.frame_id = self._imu_frame
         o, rate, felt = message.orientation, message.angular_velocity, message.linear_acceleration
         o.x, o.y, o.z, o.w = row[3:7]
-        noise, turns, force = self._noise, row[10:13], self._specific_force(contact).tolist()
+        setup = self._run.simulation.setup
+        point = setup.body.point(setup.contacts[contact]).tolist() if contact else (0.0, 0.0, 0.0)
+        noise, turns, force = self._noise, row[10:13], self._run.simulation.specific_force(point).tolist()
         if noise is not None:
             turns, force = noise.measured(time_ns + self._stamps.offset_ns, turns, force)
             covariances = (message.angular_velocity_covariance, message.linear_acceleration_covariance)

@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import rclpy
@@ -14,7 +11,6 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from ..base.errors import InputError
@@ -25,7 +21,7 @@ from ..session.as_script import script_of_session
 from ..session.messages import PROJECTIONS
 from ..session.recorded_session import RecordedSession, StampedRows, recorded_parameters
 from . import qos
-from .script_sender import ScriptSender
+from .script_sender import ros_context, send_script
 
 WAIT_FOR_NODE_S = 10.0
 
@@ -41,12 +37,8 @@ def publish_commands(session: RecordedSession, node_name: str) -> int:
     late. Raises InputError when no such node answers, and for a session that holds no whole run.
     """
     commands = parse_script(script_of_session(session).script)
-    with _context():
-        sender = ScriptSender(node_name, WAIT_FOR_NODE_S)
-        try:
-            report = sender.send(commands, reset=True)
-        finally:
-            sender.destroy_node()
+    with ros_context():
+        report = send_script(commands, node_name, WAIT_FOR_NODE_S, reset=True)
     print(f"  {report.text}")
     return 0 if report.all_in_time else 1
 
@@ -55,7 +47,7 @@ def publish_states(session: RecordedSession, speed: float) -> int:
     """Publish the recorded states on their topics, with their stamps, which go out on /clock, too; the exit status."""
     if not len(session.times):
         raise InputError("session", "the session has no states to publish")
-    with _context():
+    with ros_context():
         node = rclpy.create_node("replay", start_parameter_services=False, enable_rosout=False)
         try:
             _send_states(node, session, speed)
@@ -103,12 +95,3 @@ def _wait_for_subscribers(node: Node, publishers: list[Publisher]) -> None:
         found = [publisher.get_subscription_count() for publisher in publishers]
         if found != counts:
             counts, since = found, time.monotonic()
-
-
-@contextmanager
-def _context() -> Iterator[None]:
-    rclpy.init(args=[sys.argv[0]], signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        yield
-    finally:
-        rclpy.try_shutdown()

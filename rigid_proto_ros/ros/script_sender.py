@@ -5,9 +5,11 @@ counted at the end.
 
 from __future__ import annotations
 
+import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +29,7 @@ from ..base.errors import InputError
 from ..scene.script import schedules
 from ..simulation.commands import Command, nanoseconds
 from . import qos
+from .arguments import begin_ros
 
 MAX_UNCONFIRMED = 500
 """Commands sent beyond what the node has reported as received: far below what its queues hold."""
@@ -79,6 +82,27 @@ class Report:
         return text
 
 
+@contextmanager
+def ros_context(*arguments: str) -> Iterator[None]:
+    """ROS with these arguments; raises InputError for those that it refuses."""
+    begin_ros([sys.argv[0], *arguments])
+    try:
+        yield
+    finally:
+        rclpy.try_shutdown()
+
+
+def send_script(
+    script: list[Command], node_name: str, timeout_s: float, reset: bool = False, lead_s: float = 0.2
+) -> Report:
+    """Send a script's commands to the node of this name, and wait until all have acted; within a ``ros_context``."""
+    sender = ScriptSender(node_name, timeout_s)
+    try:
+        return sender.send(script, reset, lead_s)
+    finally:
+        sender.destroy_node()
+
+
 class ScriptSender(Node):
     """A client of the node with this name. Raises InputError when it doesn't answer within timeout_s; 0
     waits for ever.
@@ -101,7 +125,7 @@ class ScriptSender(Node):
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
         self._wait_for_node(timeout_s)
 
-    def send(self, script: list[Command], reset: bool = False, lead_s: float = 0.2) -> Report:
+    def send(self, script: list[Command], reset: bool, lead_s: float) -> Report:
         """Send all commands, each for the simulated time at which it acts, and wait until all have acted."""
         before = dict(self._counters)
         self._received_before = int(before["commands_received"])

@@ -87,7 +87,7 @@ class _Writer(Observer):
 
     again: Resimulation
     last: Scenario
-    _applied: tuple[WrenchCommand, Load, Body]
+    _applied: tuple[Load, Body]
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -96,7 +96,7 @@ class _Writer(Observer):
     def on(self, event: Event) -> None:
         """A wrench or poke takes effect, and its line follows; or anything else has acted."""
         if isinstance(event, Applied):
-            self._applied = event.command, event.load, event.body
+            self._applied = event.load, event.body
         elif isinstance(event, Logged):
             self._write(event.time_ns, event.line)
 
@@ -111,7 +111,7 @@ class _Writer(Observer):
         command = of_event(kind, content, self.again.frames)
         assert command is not None
         if isinstance(command, WrenchCommand):
-            command = _forward(command, self._applied)
+            command = _forward(command, *self._applied)
         elif isinstance(command, TieString):
             # In mesh coordinates, not yet taken onto the surface: that happens again.
             simulation = self.again.simulation
@@ -132,9 +132,8 @@ class _Writer(Observer):
         self.entries.append({"t": time_ns / 1e9, "set": changes})
 
 
-def _forward(command: WrenchCommand, applied: tuple[WrenchCommand, Load, Body]) -> WrenchCommand:
+def _forward(command: WrenchCommand, load: Load, body: Body) -> WrenchCommand:
     """The command as an entry can say it: a push is a force, so an impulse along a normal is given in body axes."""
-    _, load, body = applied
     if command.frame.axes != "normal" or not command.frame.impulse:
         return command
     frame = Frame("body", ("point", load.mesh_point), impulse=True)

@@ -241,6 +241,14 @@ def test_a_name_that_no_node_can_have_is_refused_in_one_line(name, ros_environme
     assert capsys.readouterr().err.startswith(f"poke_client: --node: got {name!r}; accepted: a node's name")
 
 
+@pytest.mark.parametrize("argument", ["--bad", "-r", "-p x"])
+def test_ros_arguments_that_are_none_are_refused_in_one_line(argument, capsys):
+    words = ["poke", "--at", "tip", "--push", "1", "--ros-args", *argument.split()]
+    assert poke_client(words) == 2
+    (line,) = capsys.readouterr().err.splitlines()  # rcl writes one of its own beside it
+    assert line.startswith("poke_client: ROS arguments: ")
+
+
 class SlowNode(RosClient):
     """Stands in for a node that is slow to confirm: not before 500 wait for it, or all of ``count`` have come; its
     simulated time stands.
