@@ -63,11 +63,16 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         raise InputError("--verify", f"a recording without {', '.join(session.missing)}", accepted)
     first_ns, recorded = states[0][0], session.lines
     began_later = NotVerifiableError(
-        "--verify", f"a recording that begins at {first_ns / 1e9:.9g} s", "one that begins at a start or a reset"
+        "--verify",
+        f"a recording that begins at {first_ns / 1e9:.9g} s, in the middle of a run",
+        "one that begins at a start or a reset",
     )
-    times_ns = [decode_event(line, number)[0] for number, line in enumerate(recorded, 1)]
+    decoded = [decode_event(line, number) for number, line in enumerate(recorded, 1)]
+    times_ns = [time_ns for time_ns, _, _ in decoded]
     if (broken := broken_link(recorded)) is not None:
-        if broken == 1 and first_ns > 0:
+        # The change that begins a recording is told in it: at time 0 too, behind what was done before.
+        switched_on = any(kind == "set" and told.get("record") and not time_ns for time_ns, kind, told in decoded)
+        if broken == 1 and (first_ns > 0 or switched_on):
             raise began_later
         what = f"command {broken} doesn't match its hash: {recorded[broken - 1]}"
         return Difference(times_ns[broken - 1], what, tampered=True)

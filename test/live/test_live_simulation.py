@@ -263,6 +263,28 @@ def test_a_recording_begins_and_ends_in_flight(live, tmp_path):
     assert (np.asarray(run.times) // PERIOD_NS).tolist() == [3, 4, 5]
 
 
+def test_a_recording_that_begins_at_time_0_after_other_commands_is_not_taken_for_a_changed_one(live, tmp_path):
+    from rigid_proto_ros.rerun_view.session_files import read_runs
+    from rigid_proto_ros.session.check import NotVerifiableError, verify
+
+    path = tmp_path / "flight.mcap"
+    live.reset()
+    live.schedule("{t: 0, impulse: [1, 0, 0]}")
+    live.set_parameters({"record": str(path)})
+    live.pause(False)
+    while not live.state.time_ns:
+        time.sleep(0.01)
+    live.reset()
+    live.pause(True)
+    live.step(3)
+    live.stop()
+    first, second = read_runs(path)
+    assert first.times[0] == 0 and json.loads(first.lines[0])["kind"] == "pause"
+    with pytest.raises(NotVerifiableError, match="begins at 0 s, in the middle of a run"):
+        verify(first)
+    assert verify(second) is None
+
+
 def test_a_recording_that_is_lost_while_time_stands_can_be_begun_again(live, tmp_path):
     from rigid_proto_ros.rerun_view.session_files import read_runs
 
