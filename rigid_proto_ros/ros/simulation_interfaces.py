@@ -37,7 +37,7 @@ class SimulationInterfaces:
     def __init__(self, live: LiveSimulation, messages: Any) -> None:
         self._live = live
         self._loop = live.loop
-        self._messages = messages
+        self._messages, self._results = messages, messages.Result
         self._entity = live.name.rpartition("/")[2]
 
     def offer(self, node: Node, services: Any) -> None:
@@ -50,7 +50,7 @@ class SimulationInterfaces:
         try:
             return serve(request, response)
         except InputError as error:
-            return self._failed(response, str(error))
+            return _ended(response, self._results.RESULT_OPERATION_FAILED, str(error))
 
     # The simulation
 
@@ -80,9 +80,10 @@ class SimulationInterfaces:
         """Time and state together: SCOPE_ALL, or both scopes; nothing was spawned."""
         both = request.SCOPE_TIME | request.SCOPE_STATE
         if request.scope not in (request.SCOPE_DEFAULT, request.SCOPE_ALL) and request.scope & both != both:
-            return self._unsupported(response, f"scope {request.scope}: time and state are reset together")
+            unsupported = self._results.RESULT_FEATURE_UNSUPPORTED
+            return _ended(response, unsupported, f"scope {request.scope}: time and state are reset together")
         self._live.reset()
-        return self._done(response)
+        return _ended(response, self._results.RESULT_OK)
 
     def _simulation_state(self) -> int:
         states = self._messages.SimulationState
@@ -91,7 +92,7 @@ class SimulationInterfaces:
     def get_simulation_state(self, _: Any, response: Any) -> Any:
         """Playing or paused."""
         response.state.state = self._simulation_state()
-        return self._done(response)
+        return _ended(response, self._results.RESULT_OK)
 
     def set_simulation_state(self, request: Any, response: Any) -> Any:
         """Play or pause."""
@@ -99,18 +100,18 @@ class SimulationInterfaces:
         wanted = request.state.state
         if wanted not in (states.STATE_PLAYING, states.STATE_PAUSED):
             accepted = "1 playing or 2 paused; reset_simulation for time 0, and a signal ends the node"
-            return self._unsupported(response, f"state {wanted}: {accepted}")
+            return _ended(response, self._results.RESULT_FEATURE_UNSUPPORTED, f"state {wanted}: {accepted}")
         if wanted == self._simulation_state():
             return _ended(response, response.ALREADY_IN_TARGET_STATE)
         self._live.pause(wanted == states.STATE_PAUSED)
-        return self._done(response)
+        return _ended(response, self._results.RESULT_OK)
 
     def step_simulation(self, request: Any, response: Any) -> Any:
         """Step over publications, while paused."""
         if not 1 <= request.steps <= MAX_STEPS:
-            return self._failed(response, f"{request.steps} steps: 1 to {MAX_STEPS}")
+            raise InputError("steps", request.steps, f"1 to {MAX_STEPS}")
         self._live.step(request.steps)
-        return self._done(response)
+        return _ended(response, self._results.RESULT_OK)
 
     # The body
 
@@ -143,7 +144,7 @@ class SimulationInterfaces:
         accelerates = getattr(request, "set_acceleration", False)
         if accelerates or frame not in ("", "world", world):
             what = "set_acceleration" if accelerates else f"frame {frame!r}"
-            return self._unsupported(response, f"{what}: pose and twist in {world}")
+            return _ended(response, self._results.RESULT_FEATURE_UNSUPPORTED, f"{what}: pose and twist in {world}")
         values: dict[str, tuple[float, ...]] = {}
         if getattr(request, "set_pose", True):
             p, q = request.state.pose.position, request.state.pose.orientation
@@ -154,30 +155,19 @@ class SimulationInterfaces:
         try:
             command = SetState(values)
         except CommandRefused as refusal:
-            failed = self._messages.Result.RESULT_OPERATION_FAILED
-            return _ended(response, getattr(response, "INVALID_POSE", failed), str(refusal))
+            invalid = getattr(response, "INVALID_POSE", self._results.RESULT_OPERATION_FAILED)
+            return _ended(response, invalid, str(refusal))
         if values:
             self._live.submit(command)
-        return self._done(response)
+        return _ended(response, self._results.RESULT_OK)
 
     def _is_known(self, entity: str, response: Any) -> bool:
         if entity == self._entity:
-            self._done(response)
+            _ended(response, self._results.RESULT_OK)
             return True
         message = f"there is no {entity!r}; the only entity is {self._entity!r}"
-        _ended(response, self._messages.Result.RESULT_NOT_FOUND, message)
+        _ended(response, self._results.RESULT_NOT_FOUND, message)
         return False
-
-    # Answers
-
-    def _done(self, response: Any) -> Any:
-        return _ended(response, self._messages.Result.RESULT_OK)
-
-    def _failed(self, response: Any, message: str) -> Any:
-        return _ended(response, self._messages.Result.RESULT_OPERATION_FAILED, message)
-
-    def _unsupported(self, response: Any, message: str) -> Any:
-        return _ended(response, self._messages.Result.RESULT_FEATURE_UNSUPPORTED, message)
 
 
 def _ended(response: Any, result: int, message: str = "") -> Any:

@@ -21,10 +21,13 @@ from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
 from rigid_proto_ros.live.pacing import SLICE_NS
 from rigid_proto_ros.motion.frames import parse_frame
+from rigid_proto_ros.rerun_view.session_files import read_runs, record
 from rigid_proto_ros.scene.parameters import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.session.as_script import script_of_session
+from rigid_proto_ros.session.check import NotVerifiableError, verify
 from rigid_proto_ros.simulation.commands import ThrusterCommand, WrenchCommand
 from rigid_proto_ros.simulation.observer import BodyChanged, Logged, Observer, Published
 
@@ -251,8 +254,6 @@ def test_an_observer_that_comes_in_flight_is_told_and_one_that_leaves_is_not(liv
 
 
 def test_a_recording_begins_and_ends_in_flight(live, tmp_path):
-    from rigid_proto_ros.rerun_view.session_files import read_runs
-
     path = tmp_path / "flight.mcap"
     live.step(2)
     live.set_parameters({"record": str(path)})
@@ -264,9 +265,6 @@ def test_a_recording_begins_and_ends_in_flight(live, tmp_path):
 
 
 def test_a_recording_that_begins_at_time_0_after_other_commands_is_not_taken_for_a_changed_one(live, tmp_path):
-    from rigid_proto_ros.rerun_view.session_files import read_runs
-    from rigid_proto_ros.session.check import NotVerifiableError, verify
-
     path = tmp_path / "flight.mcap"
     live.reset()
     live.schedule("{t: 0, impulse: [1, 0, 0]}")
@@ -286,8 +284,6 @@ def test_a_recording_that_begins_at_time_0_after_other_commands_is_not_taken_for
 
 
 def test_a_recording_that_is_lost_while_time_stands_can_be_begun_again(live, tmp_path):
-    from rigid_proto_ros.rerun_view.session_files import read_runs
-
     path = tmp_path / "flight.mcap"
     live.set_parameters({"record": str(path)})
     path.unlink()
@@ -308,10 +304,6 @@ def test_a_recording_that_is_lost_while_time_stands_can_be_begun_again(live, tmp
 @needs_rerun
 @pytest.mark.parametrize("ending", ["rrd", "mcap"])
 def test_what_was_done_behind_the_last_state_is_in_a_converted_session_too(live, tmp_path, ending):
-    from rigid_proto_ros.rerun_view.session_files import read_runs, record
-    from rigid_proto_ros.session.as_script import script_of_session
-    from rigid_proto_ros.session.check import verify
-
     path, converted = tmp_path / f"flight.{ending}", tmp_path / f"converted.{ending}"
     live.set_parameters({"record": str(path), "wrench_timeout": 0.05})
     live.schedule("{t: 0, wrench: {force: [1, 0, 0]}}")
@@ -332,8 +324,6 @@ def test_what_was_done_behind_the_last_state_is_in_a_converted_session_too(live,
 
 
 def test_the_file_that_is_being_recorded_is_refused_for_a_second_recording_by_any_name(live, tmp_path):
-    from rigid_proto_ros.rerun_view.session_files import read_runs
-
     path = tmp_path / "flight.mcap"
     live.set_parameters({"record": str(path)})
     live.step(3)
@@ -362,9 +352,6 @@ def test_a_step_of_a_motion_that_has_failed_is_refused_with_the_reason(live):
 @pytest.mark.parametrize("behind", ["", "{t: 0.156, force: [0, 0, 1]}"])
 def test_a_recording_of_a_motion_that_failed_is_verified_with_what_was_asked_for_afterwards(live, tmp_path, behind):
     """It fails at 0.156 s, where a command acts or none."""
-    from rigid_proto_ros.rerun_view.session_files import read_runs
-    from rigid_proto_ros.session.check import verify
-
     path = tmp_path / "flight.mcap"
     live.set_parameters({"record": str(path), "integrator": "euler", "publish_rate": 10.0})
     live.schedule(f"[{{t: 0.15, state: {{angular_velocity: [1e4, 2e4, 3e4]}}}}, {behind}]")
@@ -382,9 +369,6 @@ def test_a_recording_of_a_motion_that_failed_is_verified_with_what_was_asked_for
 @needs_rerun
 @pytest.mark.parametrize("ending", ["rrd", "mcap"])
 def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_verified(live, tmp_path, ending):
-    from rigid_proto_ros.rerun_view.session_files import read_runs
-    from rigid_proto_ros.session.check import verify
-
     path = tmp_path / f"flight.{ending}"
     live.set_parameters({"record": str(path)})
     live.step(2)
@@ -433,8 +417,6 @@ def test_a_reset_tells_of_the_body_anew_with_its_own_time(live):
 
 @pytest.mark.parametrize("end", ["stop", "reset", "another recording"])
 def test_a_floor_of_the_accuracy_that_arises_in_the_last_moments_is_in_the_recording(live, tmp_path, end):
-    from rigid_proto_ros.rerun_view.session_files import read_runs
-
     path = tmp_path / "flight.mcap"
     live.set_parameters({"record": str(path), "accuracy": 1e-12})
     live.step()
