@@ -35,7 +35,7 @@ def main() -> None:
     flown = Flown("t_handle", port=any_free_port())
     shown = flown.page
     shown._words = lambda: motion_words(
-        shown._scenario, len(shown._loads), flown.live.loop.simulation.string is not None, False, False
+        shown._scenario, len(shown.picture.loads.acting), flown.live.loop.simulation.string is not None, False, False
     )
     try:
         with chromium(SOFTWARE_GL) as started:

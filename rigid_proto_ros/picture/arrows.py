@@ -53,7 +53,7 @@ class ArrowScales:
 
 
 @dataclass
-class _Acting:
+class Acting:
     """A load from begin_ns to end_ns. shown: whether some state showed it. pushes: its force pushes into the body,
     decided at the first state.
     """
@@ -66,30 +66,33 @@ class _Acting:
 
 
 class Loads:
-    """The loads of one run, by when they act; a load that ends before any state shows it is shown at the next one."""
+    """The loads of one run, by when they act; a load that ends before any state shows it is shown at the next one.
+
+    acting: those that haven't ended, by number, without impulses.
+    """
 
     def __init__(self) -> None:
-        self._acting: dict[int, _Acting] = {}
-        self._ended: list[_Acting] = []
+        self.acting: dict[int, Acting] = {}
+        self._ended: list[Acting] = []
         self._drawn: set[str] = set()
 
     def began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
         """A load begins to act."""
         if load.kind == "impulse":
-            self._ended.append(_Acting(load, time_ns, time_ns + IMPULSE_SHOWN_NS))
+            self._ended.append(Acting(load, time_ns, time_ns + IMPULSE_SHOWN_NS))
         else:
-            self._acting[load_id] = _Acting(load, time_ns)
+            self.acting[load_id] = Acting(load, time_ns)
 
     def ended(self, time_ns: int, load_id: int) -> None:
         """A load acts no longer."""
-        acting = self._acting.pop(load_id, None)
+        acting = self.acting.pop(load_id, None)
         if acting is not None:
             acting.end_ns = time_ns
             self._ended.append(acting)
 
     def body_changed(self, before: Body, after: Body) -> None:
         """Points of attack stay where they are in the mesh; one at the COM stays there."""
-        for acting in (*self._acting.values(), *self._ended):
+        for acting in (*self.acting.values(), *self._ended):
             if acting.load.point.any():
                 point = before.mesh_point(acting.load.point) * after.scale - after.center_of_mass
                 acting.load = replace(acting.load, point=point)
@@ -109,7 +112,7 @@ class Loads:
         weight on earth [N]: none, once, where they ended.
         """
         found: dict[str, list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, str]]] = {}
-        for acting in (*self._acting.values(), *self._ended):
+        for acting in (*self.acting.values(), *self._ended):
             present = (times_ns >= acting.begin_ns) & (times_ns < acting.end_ns)
             if not present.any() and not acting.shown and acting.end_ns < np.inf:
                 present[np.searchsorted(times_ns, acting.begin_ns) :][:1] = True
@@ -134,7 +137,7 @@ class Loads:
 
 
 def _arrows(
-    acting: _Acting,
+    acting: Acting,
     present: np.ndarray,
     rows: np.ndarray,
     R: np.ndarray,

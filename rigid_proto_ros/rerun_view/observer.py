@@ -44,7 +44,6 @@ from ..simulation.observer import (
     LoadBegan,
     LoadEnded,
     Logged,
-    MeshChanged,
     Observer,
     Published,
     Refused,
@@ -97,10 +96,7 @@ class RerunObserver(Observer):
         self._thread.start()
 
     def on(self, event: Event) -> None:
-        """Take an event from the stepping thread; states and meshes are copied."""
-        if isinstance(event, (Started, MeshChanged)):
-            vertices, triangles = (None if a is None else np.array(a) for a in (event.vertices, event.triangles))
-            event = event._replace(vertices=vertices, triangles=triangles)
+        """Take an event from the stepping thread; states are copied."""
         if type(event) in self.takes:
             self._mailbox.put(event)
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -145,6 +144,10 @@ def record(
             resimulation(session)
     total = sum(len(session.times) for session in runs)
     told, last = 0, runs[-1]
+
+    def so_far(done: float, _: float) -> None:
+        progress(told + done, total)
+
     recorder = make_recorder(
         str(path),
         last.node_name or "rigid_body",
@@ -157,11 +160,7 @@ def record(
         for number, session in enumerate(runs):
             if number:
                 recorder.on(Reset())
-            play(session, recorder, given, partial(_after, told, total, progress), all_events=True)
+            play(session, recorder, given, so_far, all_events=True)
             told += len(session.times)
     if recorder.error:
         raise InputError("--record", str(path), f"a file that can be written ({recorder.error})")
-
-
-def _after(told: int, total: int, progress: Callable[[float, float], None], done: float, _: float) -> None:
-    progress(told + done, total)

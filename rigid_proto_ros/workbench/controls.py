@@ -64,9 +64,7 @@ class Controls:
         for control in self._controls:
             if at_once or time.monotonic() > control.touched_s + TOUCHED_S:
                 control.touched_s, control.waits = -1e9, False
-                shown = control.shown(values)
-                if not _same(shown, control.handle.value):
-                    control.handle.value = shown
+                control.handle.value = control.shown(values)
 
     def settle(self) -> None:
         """Take what was typed last as it stands, before something else is done."""
@@ -225,9 +223,3 @@ def parse_numbers(text: object, length: int) -> list[float] | None:
     except ValueError:
         return None
     return numbers if len(numbers) == length and all(abs(x) < 1e308 for x in numbers) else None
-
-
-def _same(a: object, b: object) -> bool:
-    if isinstance(a, tuple) and isinstance(b, tuple):
-        return len(a) == len(b) and all(map(_same, a, b))
-    return abs(a - b) < 1e-9 if isinstance(a, float) and isinstance(b, float) else a == b

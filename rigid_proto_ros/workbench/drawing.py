@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from ..base.rotation import rotate
 from ..picture import style
 from ..picture.backend import Backend, DrawnMesh
 
@@ -115,10 +116,8 @@ class ViserBackend(Backend):
         return {"shaft_radius": radius, "head_radius": HEAD * radius, "head_length": 2.0 * HEAD * radius}
 
     def _show(self, name: str) -> None:
-        node = self._nodes[name]
-        visible = name in (style.BODY, style.CENTRE, style.GHOST) or (name in self._there and self.wanted(name))
-        if node.visible != visible:
-            node.visible = visible
+        always = name in (style.BODY, style.CENTRE, style.GHOST)
+        self._nodes[name].visible = always or (name in self._there and self.wanted(name))
 
     def _set_there(self, name: str, there: bool) -> None:
         (self._there.add if there else self._there.discard)(name)
@@ -301,8 +300,7 @@ class ViserBackend(Backend):
                 if node.text != text:
                     node.text = text
                 move(node, self._in_the_picture(name, position))
-            if node.visible != (k < len(labels)):
-                node.visible = k < len(labels)
+            node.visible = k < len(labels)
 
     def _in_the_picture(self, name: str, position: np.ndarray) -> np.ndarray:
         """A label stands in the world, whatever frame it belongs to: its size doesn't turn with that."""
@@ -311,9 +309,7 @@ class ViserBackend(Backend):
         if frame is None:
             return point
         w, x, y, z = self._nodes[frame].wxyz
-        vector = np.array([x, y, z])
-        turned = point + 2.0 * np.cross(vector, np.cross(vector, point) + w * point)
-        return np.asarray(self._nodes[frame].position) + turned
+        return np.asarray(self._nodes[frame].position) + rotate(x, y, z, w, *point)
 
 
 def move(node: Any, position: np.ndarray) -> None:

@@ -35,8 +35,6 @@ from .server import ANSWERS
 
 TURN = "set initial.angular_velocity"
 
-USUAL_NUMBERS = (SPEED, SPIN, ENERGY, MOMENTUM, DRIFT)
-
 ALONE = "watch 1"
 
 
@@ -52,7 +50,7 @@ class Course:
     """
 
     steps: tuple[tuple[str, ...], ...]
-    numbers: tuple[str, ...] = USUAL_NUMBERS
+    numbers: tuple[str, ...] = (SPIN, SPINS, ENERGY, MOMENTUM, DRIFT)
     shows: tuple[str, ...] = ()
     labels: tuple[str, ...] = (style.MOMENTUM,)
     speed: float = 1.0
@@ -65,10 +63,9 @@ THREE_THROWS = (("watch 3",), (TURN, "reset", "watch 2"), (TURN, "set gyroscopic
 COURSES = {
     "ballast_stops_flip": Course(
         (("watch 4",), ("set ballast.tip", "watch 4"), ("set ballast.tip", "watch 4")),
-        (SPIN, SPINS, ENERGY, MOMENTUM, DRIFT),
         labels=(style.MOMENTUM, "tip"),
     ),
-    "book": Course(THREE_THROWS, (SPIN, SPINS, ENERGY, MOMENTUM, DRIFT)),
+    "book": Course(THREE_THROWS),
     "com_or_rim": Course((("poke com",), ("reset", "poke away"), (ALONE,)), PUSHED, (CENTRE_OF_MASS,), labels=("rim",)),
     "dropped_term": Course(
         (("watch 2",), ("set gyroscopic", "watch 2"), ("set gyroscopic", "watch 2")),
@@ -108,13 +105,12 @@ COURSES = {
     ),
     "t_handle": Course(
         (("watch 4",), ("poke", "watch 2"), ("drag", ALONE)),
-        (SPIN, SPINS, ENERGY, MOMENTUM, DRIFT),
         labels=(style.MOMENTUM, "tip"),
     ),
     "teapot": Course(
         (("poke",), ("reset", "poke", "reset", "poke"), ("reset", "poke com")), PUSHED, (CENTRE_OF_MASS, SEE_INTO), ()
     ),
-    "tennis_racket": Course(THREE_THROWS, (SPIN, SPINS, ENERGY, MOMENTUM, DRIFT)),
+    "tennis_racket": Course(THREE_THROWS),
     "thrown_hammer": Course(
         (("watch 0.5",), (TURN, "reset", "watch 0.5"), ("set gravity", "watch 0.2")),
         (COM_PLACE, SPEED, SPIN, ENERGY, MOMENTUM),
@@ -375,6 +371,4 @@ class LessonPanel:
         if now_s >= self._due_s:
             self._due_s = now_s + NUMBERS_S
             values = self._readings.values
-            content = html_table((name, values[name]) for name in self.course.numbers if name in values)
-            if self._numbers.content != content:
-                self._numbers.content = content
+            self._numbers.content = html_table((name, values[name]) for name in self.course.numbers if name in values)

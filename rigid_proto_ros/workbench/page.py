@@ -45,10 +45,10 @@ from .drawing import ViserBackend
 from .flight import SCENE, Flight
 from .lessons import Course, LessonPanel
 from .panel import ALWAYS, CENTRE_OF_MASS, ForcesTab, SessionTab, ShowTab, TimeBar, motion_words
-from .pointer import DrawnPose, DrawnPoses, Pointer, Tools, suggested_force
+from .pointer import DrawnPose, Pointer, suggested_force
 from .readouts import Readings, ReadoutTab
 from .room import Room, fall_s
-from .server import ClassMode
+from .server import CLASS_STYLE
 
 FRAME_S = 0.02
 """[s] Between two looks at what the simulation has told."""
@@ -133,14 +133,12 @@ class Page:
         self._com = server.scene.add_icosphere(
             f"/{style.CENTRE}/com", COM_SIZE, (30, 30, 30), cast_shadow=False, visible=False
         )
-        self.poses, self.tools = DrawnPoses(), Tools()
-        self.pointer = Pointer(self.flight, self.poses, self.tools)
+        self.pointer = Pointer(self.flight)
         self.pointer.attach_com(self._com)
         self.flight.before_jump = self.pointer.let_go
         # What is known of the motion.
         self.state = live.state
         self._scenario = live.scenario
-        self._loads: dict[int, LoadBegan] = {}
         self._strings: list[StringChanged] = []
         self._ghost_row: np.ndarray | None = None
         self._drawn_moment_ns: int | None = None
@@ -168,7 +166,7 @@ class Page:
         self.controls = Controls(gui, flight)
         flight.refused = self.controls.show_again
         self.bar = TimeBar(gui, self.controls, flight)
-        self._class_mode = ClassMode(self.server)
+        self._class_style = gui.add_html("", order=-9.0)
         tabs = gui.add_tab_group()
         self.lessons = LessonPanel(
             gui,
@@ -180,7 +178,7 @@ class Page:
             self._for_class,
         )
         self.body_tab = BodyTab(gui, tabs, self.controls, flight, self._fly)
-        self.forces_tab = ForcesTab(gui, tabs, self.controls, self.tools, flight)
+        self.forces_tab = ForcesTab(gui, tabs, self.controls, self.pointer, flight)
         self.readout_tab = ReadoutTab(gui, tabs, self.readings)
         self.session_tab = SessionTab(gui, tabs, flight)
         self.show_tab = ShowTab(
@@ -258,7 +256,7 @@ class Page:
         state, setup = self.state, self.picture.setup
         if setup is not None:
             place = self.backend.origin.copy(), self.backend.unit
-            self.poses.add(DrawnPose(now_s, state.position, state.orientation_xyzw, *place, setup))
+            self.pointer.drawn(DrawnPose(now_s, state.position, state.orientation_xyzw, *place, setup))
         self.pointer.hold()
         self.lessons.draw(now_s)
         self.readout_tab.draw(now_s)
@@ -270,7 +268,8 @@ class Page:
     def _words(self) -> str:
         simulation = self.live.loop.simulation
         tied = simulation.string is not None
-        return motion_words(self._scenario, len(self._loads), tied, simulation.at_rest, self.live.paused)
+        loads = len(self.picture.loads.acting)
+        return motion_words(self._scenario, loads, tied, simulation.at_rest, self.live.paused)
 
     def _take(self, events: list[tuple[Event, str]]) -> None:
         times: list[int] = []
@@ -298,7 +297,7 @@ class Page:
         match event:
             case Started() | MeshChanged():
                 self.picture.on(event)
-                self.poses.forget()
+                self.pointer.forget_poses()
                 # A run that continues from its past has its mesh read anew.
                 self._new_scene |= event.mesh_sha256 != self._mesh_sha256
                 self._mesh_sha256 = event.mesh_sha256
@@ -335,7 +334,7 @@ class Page:
             self._new_scene = False
             self._furnish(scenario.setup)
             size = self.picture.shape.size if self.picture.shape else 1.0
-            self.tools.usual_force = self.tools.force = suggested_force(scenario, size)
+            self.pointer.usual_force = self.pointer.force = suggested_force(scenario, size)
             self.forces_tab.show_force()
         elif self.backend.unit != self._unit:
             self._furnish(scenario.setup)
@@ -343,15 +342,13 @@ class Page:
 
     def _load_changed(self, event: LoadBegan | LoadEnded) -> None:
         if isinstance(event, LoadBegan):
-            if event.load.kind != "impulse":
-                self._loads[event.load_id] = event
             if event.load.kind in ("poke", "impulse"):
                 self._poked(event.load)
         else:
-            began = self._loads.pop(event.load_id, None)
-            if began is not None and began.load.kind == "poke":
+            acting = self.picture.loads.acting.get(event.load_id)
+            if acting is not None and acting.load.kind == "poke":
                 factor = float(self._scenario.parameters.real_time_factor) or 1.0
-                event = event._replace(time_ns=max(event.time_ns, began.time_ns + round(SEEN_NS * factor)))
+                event = event._replace(time_ns=max(event.time_ns, acting.begin_ns + round(SEEN_NS * factor)))
         self.picture.on(event)
 
     def _poked(self, load: ShownLoad) -> None:
@@ -374,7 +371,7 @@ class Page:
 
     def _reset(self, jump: str) -> None:
         self._forget_drawn()
-        self.poses.forget()
+        self.pointer.forget_poses()
         self.pointer.forget()
         self.readings.restart()
         self._strings.clear()
@@ -385,7 +382,6 @@ class Page:
     def _forget_drawn(self) -> None:
         self.picture.restart()
         self.backend.forget()
-        self._loads.clear()
         self._dragged = False
 
     # Drawing
@@ -503,7 +499,7 @@ class Page:
     # What the panel asks for
 
     def _for_class(self, on: bool) -> None:
-        self._class_mode.switch(on)
+        self._class_style.content = CLASS_STYLE if on else ""
         self.backend.scale_labels(CLASS_LABELS if on else 1.0)
         self.bar.speed.visible = not on
 

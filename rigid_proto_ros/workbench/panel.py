@@ -31,7 +31,7 @@ from ..session.recorded_session import play
 from .body_tab import shown_name
 from .controls import Changes, Controls, log_slider, on_slider
 from .flight import Flight
-from .pointer import Tools
+from .pointer import Pointer
 from .server import MARK
 
 SPEEDS = {"1/100": 0.01, "1/20": 0.05, "1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0}
@@ -131,9 +131,7 @@ class TimeBar:
         if words == self._words and now_s < self._due_s:
             return
         self._words, self._due_s = words, now_s + TIME_S
-        content = f'<div class="{MARK}"><b>{time_s:.2f} s</b> <span>{words}</span></div>'
-        if self._line.content != content:
-            self._line.content = content
+        self._line.content = f'<div class="{MARK}"><b>{time_s:.2f} s</b> <span>{words}</span></div>'
 
 
 def motion_words(scenario: Scenario, loads: int, tied: bool, at_rest: bool, paused: bool) -> str:
@@ -160,9 +158,9 @@ class ForcesTab:
     """Loads on the body: the force of a click, initial spin, gravity, and any parameter by its name."""
 
     def __init__(
-        self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle, controls: Controls, tools: Tools, flight: Flight
+        self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle, controls: Controls, pointer: Pointer, flight: Flight
     ) -> None:
-        self._tools = tools
+        self._pointer = pointer
         with tabs.add_tab("Forces"):
             with gui.add_folder("By hand"):
                 suits = "Force of a click, relative to a force that suits the body's mass and size"
@@ -180,7 +178,7 @@ class ForcesTab:
         @force.on_update
         async def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
-                tools.force = float(f"{tools.usual_force * 10.0 ** force.value[0]:.3g}")
+                pointer.force = float(f"{pointer.usual_force * 10.0 ** force.value[0]:.3g}")
                 self.show_force()
 
         @gravity.on_click
@@ -189,11 +187,9 @@ class ForcesTab:
 
     def show_force(self) -> None:
         """The poke's force, as it is now."""
-        tools = self._tools
-        self._force.content = f'<div style="padding: 0 1em; font-size: 0.85em">{tools.force:.3g} N</div>'
-        place = on_slider(tools.force / tools.usual_force, FORCE_DECADES)
-        if self._slider.value != place:
-            self._slider.value = place
+        pointer = self._pointer
+        self._force.content = f'<div style="padding: 0 1em; font-size: 0.85em">{pointer.force:.3g} N</div>'
+        self._slider.value = on_slider(pointer.force / pointer.usual_force, FORCE_DECADES)
 
 
 class SessionTab:

@@ -38,14 +38,6 @@ MODIFIERS: tuple[Any, ...] = (None, "shift")
 """With which keys a click is heard, as viser names them."""
 
 
-@dataclass
-class Tools:
-    """What the panel says about the pointer. force [N], usual_force: one that suits the body."""
-
-    force: float = 1.0
-    usual_force: float = 1.0
-
-
 @dataclass(frozen=True)
 class DrawnPose:
     """time_s: by the monotonic clock. The picture shows the world point ``origin`` (3,) at its middle, ``unit`` metres
@@ -71,30 +63,6 @@ class DrawnPose:
         return np.array(list(direction)) @ matrix_from_quaternion(self.orientation_xyzw)
 
 
-class DrawnPoses:
-    """The poses drawn lately, and which of them a pointer event belongs to."""
-
-    def __init__(self) -> None:
-        self._drawn: deque[DrawnPose] = deque()
-
-    def add(self, pose: DrawnPose) -> None:
-        """A pose went to the pages; the last one that is old enough to be seen by now is kept with those after it."""
-        self._drawn.append(pose)
-        while len(self._drawn) > 1 and self._drawn[1].time_s <= pose.time_s - USUAL_DELAY_S:
-            self._drawn.popleft()
-
-    def forget(self) -> None:
-        """Another body, or another flight: old poses mean nothing."""
-        self._drawn.clear()
-
-    def usual(self, now_s: float) -> DrawnPose | None:
-        """The pose that an event arriving now has most likely seen."""
-        return next(
-            (pose for pose in reversed(self._drawn) if pose.time_s <= now_s - USUAL_DELAY_S),
-            self._drawn[0] if self._drawn else None,
-        )
-
-
 @dataclass
 class _Drag:
     client_id: int
@@ -104,18 +72,38 @@ class _Drag:
 
 
 class Pointer:
-    """Turns pointer events of any page into commands. One string, so one drag at a time: the first page has it."""
+    """Turns pointer events of any page into commands. One string, so one drag at a time: the first page has it.
 
-    def __init__(self, flight: Flight, poses: DrawnPoses, tools: Tools) -> None:
+    force [N]: of a click; usual_force: one that suits the body.
+    """
+
+    def __init__(self, flight: Flight) -> None:
+        self.force = self.usual_force = 1.0
         self._flight = flight
-        self._poses = poses
-        self._tools = tools
+        self._poses: deque[DrawnPose] = deque()
         self._drag: _Drag | None = None
 
     @property
     def dragging(self) -> bool:
         """Whether somebody holds the string."""
         return self._drag is not None
+
+    def drawn(self, pose: DrawnPose) -> None:
+        """A pose went to the pages; the last one that is old enough to be seen by now is kept with those after it."""
+        self._poses.append(pose)
+        while len(self._poses) > 1 and self._poses[1].time_s <= pose.time_s - USUAL_DELAY_S:
+            self._poses.popleft()
+
+    def forget_poses(self) -> None:
+        """Another body, or another run: earlier poses mean nothing."""
+        self._poses.clear()
+
+    def _seen(self, now_s: float) -> DrawnPose | None:
+        """The pose that an event arriving now has most likely seen."""
+        return next(
+            (pose for pose in reversed(self._poses) if pose.time_s <= now_s - USUAL_DELAY_S),
+            self._poses[0] if self._poses else None,
+        )
 
     def attach(self, node: Any) -> None:
         """React to the pointer on this node of the picture."""
@@ -132,7 +120,7 @@ class Pointer:
         async def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
             if event.ray_direction is not None:
                 direction = np.array(event.ray_direction, dtype=float)
-                self._flight.do({"force": numbers(self._tools.force * direction / np.linalg.norm(direction))})
+                self._flight.do({"force": numbers(self.force * direction / np.linalg.norm(direction))})
 
         for modifier in MODIFIERS:
             node.on_click(modifier=modifier)(clicked)
@@ -140,13 +128,13 @@ class Pointer:
     # Click
 
     async def _on_click(self, event: viser.SceneNodePointerEvent[Any]) -> None:
-        seen = self._poses.usual(time.monotonic())
+        seen = self._seen(time.monotonic())
         if seen is not None and event.ray_origin is not None and event.ray_direction is not None:
             self.click(event.ray_origin, event.ray_direction, seen, event.modifier == "shift")
 
     def click(self, ray_origin: Iterable[float], ray_direction: Iterable[float], seen: DrawnPose, push: bool) -> bool:
         """Poke where the ray of the picture meets the body as it was ``seen``; whether it meets it."""
-        body, surface, force = seen.setup.body, seen.setup.surface, self._tools.force
+        body, surface, force = seen.setup.body, seen.setup.surface, self.force
         direction = np.array(list(ray_direction), dtype=float)
         direction /= np.linalg.norm(direction)
         if surface is None:
@@ -176,7 +164,7 @@ class Pointer:
         if self.dragging or self._flight.refuses_in_past():
             return
         now = time.monotonic()
-        seen = self._poses.usual(now)
+        seen = self._seen(now)
         if seen is None:
             return
         body, surface = seen.setup.body, seen.setup.surface

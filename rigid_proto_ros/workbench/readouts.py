@@ -16,7 +16,7 @@ import viser
 from ..mass.tensor import principal_axes
 from ..motion.state import State
 from ..picture import style
-from ..picture.picture import angle_to
+from ..picture.picture import angle_to, energies
 from ..simulation.quantities import attitude_angle
 from ..simulation.setup import Setup
 
@@ -146,8 +146,7 @@ class LivePlot:
 
     @shown.setter
     def shown(self, shown: bool) -> None:
-        if self._handle.visible != shown:
-            self._handle.visible = shown
+        self._handle.visible = shown
 
     @property
     def _scales(self) -> Any:
@@ -160,9 +159,7 @@ class LivePlot:
             # The page makes the plot anew for these, so they change in steps.
             self._range = suited
             self._handle.scales = self._scales
-            title = suited.title(self._title, self._unit)
-            if self._handle.title != title:
-                self._handle.title = title
+            self._handle.title = suited.title(self._title, self._unit)
         self._handle.data = (ages_s, *(values / 10.0**suited.exponent).T)
 
 
@@ -247,11 +244,8 @@ class Readings:
 
 def _energies(setup: Setup, state: State, string_energy: float) -> tuple[float, ...]:
     """Energies [J]: translational, rotational, of gravity, total, of the string."""
-    body = setup.body
-    kinetic = state.kinetic_energy(body.mass, body.inertia)
-    translational = 0.5 * body.mass * float(state.linear_velocity @ state.linear_velocity)
-    gravity = -body.mass * float(setup.gravity @ state.position)
-    return translational, kinetic - translational, gravity, kinetic + gravity + string_energy, string_energy
+    own = energies(state.row[np.newaxis], setup)[0].tolist()
+    return *own, sum(own) + string_energy, string_energy
 
 
 class ReadoutTab:
@@ -279,9 +273,7 @@ class ReadoutTab:
         readings = self._readings
         if now_s >= self._numbers_due_s:
             self._numbers_due_s = now_s + NUMBERS_S
-            content = html_table(readings.values.items())
-            if self._numbers.content != content:
-                self._numbers.content = content
+            self._numbers.content = html_table(readings.values.items())
         if now_s >= self._plots_due_s:
             self._plots_due_s = now_s + PLOTS_S
             samples = readings.samples

@@ -235,13 +235,4 @@ CLASS_STYLE = f"""<style>
 {_BAR} .mantine-Button-root {{ padding-inline: 0.2em; }}
 </style>"""
 
-
-class ClassMode:
-    """Large letters, and nothing but picture, lesson and three buttons."""
-
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._sheet = server.gui.add_html("", order=-9.0)
-
-    def switch(self, on: bool) -> None:
-        """On or off."""
-        self._sheet.content = CLASS_STYLE if on else ""
+"""Class mode: large letters, and nothing but picture, lesson and three buttons."""

@@ -391,9 +391,9 @@ def test_a_factor_is_ten_to_its_slider_that_of_the_mass_without_the_ballast(
     assert flown.scenario.parameters.named()[parameter] == pytest.approx(10.0 * own, rel=1e-12)
     assert flown.scenario.setup.body.mass == pytest.approx(10.0 * own + 0.6)
     assert flown.widget("Mass ×").value == (1.0,)
-    tools = flown.page.tools
+    hand = flown.page.pointer
     flown.set("Force ×", (-0.5,))
-    assert tools.force == pytest.approx(10.0**-0.5 * tools.usual_force, rel=5e-3)
+    assert hand.force == pytest.approx(10.0**-0.5 * hand.usual_force, rel=5e-3)
 
 
 def test_the_status_line_says_in_plain_words_what_the_body_does() -> None:

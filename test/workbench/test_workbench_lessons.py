@@ -39,7 +39,7 @@ class User(FlownPage):
         """A click on the mark of the centre of mass, which may lie where there is no body."""
         mark = self.page._com
         assert mark.visible and mark._impl.click_cb and mark._impl.drag_cb, "it lies before the body"
-        self.do(lambda: self.page.flight.do({"force": [0.0, 0.0, -self.page.tools.force]}))
+        self.do(lambda: self.page.flight.do({"force": [0.0, 0.0, -self.page.pointer.force]}))
         self.fly(0.06)
 
     def drag(self, *point: float) -> None:

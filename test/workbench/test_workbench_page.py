@@ -132,7 +132,7 @@ def test_a_click_pokes_where_it_points_and_a_shift_click_pushes_inward(page) -> 
         # The force pushes into the body, so its arrow's tip stands at the point that was clicked.
         tail, tip = np.array(arrow.points).reshape(-1, 2, 3)[0]
         assert apart(page.pixel(tip), (x + 30.0, y + 5.0)) < NEAR
-        (load,) = (began.load for began in page.flown.page._loads.values())
+        (load,) = (acting.load for acting in page.flown.page.picture.loads.acting.values())
         point = np.asarray(load.point) / page.flown.page.backend.unit
         assert apart(page.pixel(point), (x + 30.0, y + 5.0)) < NEAR
         force = np.asarray(load.force) / np.linalg.norm(load.force)
