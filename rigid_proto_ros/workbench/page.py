@@ -8,6 +8,7 @@ no browser is connected the page isn't told anything.
 from __future__ import annotations
 
 import asyncio
+import logging
 import threading
 import time
 from collections import deque
@@ -78,6 +79,8 @@ CONTACTS = f"{style.BODY}/contacts"
 
 CLASS_LABELS = 1.6
 """Size of the picture's labels in class mode, in their usual one."""
+
+_logger = logging.getLogger(__name__)
 
 
 class Told(Observer):
@@ -192,10 +195,17 @@ class Page:
 
     async def run(self) -> None:
         """Draw for as long as the server runs."""
+        told = ""
         while True:
             await self._open.wait()
             started = time.monotonic()
-            self.tick(started)
+            try:
+                self.tick(started)
+            except Exception as error:
+                # The next states may be drawn all the same.
+                if repr(error) != told:
+                    told = repr(error)
+                    _logger.exception("the page could not be drawn")
             await asyncio.sleep(max(0.002, started + FRAME_S - time.monotonic()))
 
     def close(self) -> None:

@@ -71,7 +71,7 @@ DARK = Theme((44, 47, 52), (36, 38, 43), (58, 62, 68), (72, 77, 84), (26, 28, 32
 def fall_s(setup: Setup) -> float:
     """How long [s] a body that falls stays in sight: until it is as high as at first."""
     rise, pull = -float(setup.initial[7:10] @ setup.gravity), float(setup.gravity @ setup.gravity)
-    return min(max(2.0 * rise / pull, LEAST_FALL_S), LONGEST_FALL_S)
+    return min(max(2.0 * rise / pull, LEAST_FALL_S), LONGEST_FALL_S) if pull else LONGEST_FALL_S
 
 
 def distance_to_see(half_sides: np.ndarray) -> float:

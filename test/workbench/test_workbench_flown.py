@@ -591,6 +591,26 @@ def test_a_lesson_that_is_picked_while_kernels_are_compiled_begins_when_they_are
     assert flown.fly(0.5)[-1][0] == 500_000_000
 
 
+def test_a_gravity_whose_square_is_0_is_no_reason_not_to_draw(flown: FlownPage) -> None:
+    assert flown.do(lambda: flown.page.flight.fly({"mesh": "hammer", "gravity": [1e-300, 0.0, 0.0]}))
+    flown.fly(0.1)
+    assert flown.page.picture.setup is flown.scenario.setup
+
+
+def test_an_error_in_drawing_is_told_once_and_does_not_end_the_page(flown: FlownPage, monkeypatch, caplog) -> None:
+    draw, failures = flown.page.backend.finish, iter("123")
+
+    def finish(now_s: float) -> None:
+        if next(failures, ""):
+            raise ValueError("not drawn")
+        draw(now_s)
+
+    monkeypatch.setattr(flown.page.backend, "finish", finish)
+    flown.fly(0.5)
+    flown.until(lambda: f"{0.5:.2f} s" in flown.page.bar._line.content, "time on the bar")
+    assert [record.exc_info[0] for record in caplog.records if record.exc_info] == [ValueError]
+
+
 def test_light_is_left_to_viser(flown: FlownPage) -> None:
     # The player of a recording goes back to viser's own at every loop: with any other light the picture would change.
     told = {type(m).__name__ for m in flown.server._websock_server._broadcast_buffer.message_from_id.values()}
