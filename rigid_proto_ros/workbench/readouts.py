@@ -222,16 +222,17 @@ class Readings:
         body = setup.body
         momentum = state.angular_momentum(body.inertia)
         w = principal_axes(body.inertia)[1].T @ state.angular_velocity_body
-        spin = float(np.linalg.norm(w))
-        spins = " ".join(f"{style.without_rounding(x, spin):.3g}" for x in w)
+        spin = style.without_rounding(float(np.linalg.norm(w)))
+        speed = style.without_rounding(float(np.linalg.norm(state.linear_velocity)))
+        spins = " ".join(f"{style.without_rounding(x, spin or math.inf):.3g}" for x in w)
         translational, rotational, _, total, _ = _energies(setup, state, string_energy)
         values = {
-            SPEED: f"{style.without_rounding(float(np.linalg.norm(state.linear_velocity))):.4g} m/s",
-            SPIN: f"{style.without_rounding(spin):.4g} {style.OMEGA_UNIT}",
+            SPEED: f"{speed:.4g} m/s",
+            SPIN: f"{spin:.4g} {style.OMEGA_UNIT}",
             SPINS: f"{spins} {style.OMEGA_UNIT}",
             ENERGY: f"{total:.5g} {style.ENERGY_UNIT}",
-            TRANSLATIONAL: f"{style.without_rounding(translational):.4g} {style.ENERGY_UNIT}",
-            ROTATIONAL: f"{style.without_rounding(rotational):.4g} {style.ENERGY_UNIT}",
+            TRANSLATIONAL: f"{translational if speed else 0.0:.4g} {style.ENERGY_UNIT}",
+            ROTATIONAL: f"{rotational if spin else 0.0:.4g} {style.ENERGY_UNIT}",
             MOMENTUM: f"{float(np.linalg.norm(momentum)):.5g} {style.MOMENTUM_UNIT}",
             DRIFT: f"{style.without_rounding(self._turned(momentum)):.3g}{style.ANGLE_UNIT}",
             COM_PLACE: " ".join(f"{style.without_rounding(x):.4g}" for x in state.position) + " m",

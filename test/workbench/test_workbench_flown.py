@@ -29,7 +29,7 @@ from rigid_proto_ros.workbench.flight import COMPILING, RunMemory
 from rigid_proto_ros.workbench.lessons import COURSES, FREE
 from rigid_proto_ros.workbench.page import CLASS_LABELS
 from rigid_proto_ros.workbench.panel import CENTRE_OF_MASS, SEE_INTO, motion_words
-from rigid_proto_ros.workbench.readouts import DRIFT, ENERGY, PLOTTED_S, SPEED
+from rigid_proto_ros.workbench.readouts import DRIFT, ENERGY, PLOTTED_S, ROTATIONAL, SPEED, TRANSLATIONAL
 
 
 def test_a_lesson_that_asks_begins_at_its_time_0_with_its_ghost_however_fast_time_goes(
@@ -185,6 +185,18 @@ def test_a_take_is_saved_as_gltf_with_a_key_for_each_frame(flown: FlownPage) -> 
     assert document["meshes"] and len(document["animations"]) == 1
     keys = document["accessors"][document["animations"][0]["samplers"][0]["input"]]
     assert keys["count"] == 26 and keys["max"] == [pytest.approx(1.0)]
+
+
+def test_the_energies_of_a_spinning_nut_are_read_off_and_those_that_rounding_leaves_are_not(flown: FlownPage) -> None:
+    nut = {"mesh": "", "inertia_model": "explicit", "explicit_inertia.mass": 3e-4}
+    nut |= {
+        "explicit_inertia.tensor": [1e-9, 0.0, 0.0, 1.1e-9, 0.0, 1.2e-9],
+        "initial.angular_velocity": [0.0, 0.0, 1.0],
+    }
+    flown.do(lambda: flown.page.flight.fly({**nut, "initial.linear_velocity": [1e-10, 0.0, 0.0]}))
+    flown.fly(0.1)
+    values = flown.page.readings.values
+    assert (values[ROTATIONAL], values[TRANSLATIONAL]) == ("6e-10 J", "0 J")
 
 
 def test_plots_are_drawn_against_seconds_before_now_also_after_a_jump_of_time(flown: FlownPage) -> None:
