@@ -10,6 +10,7 @@ import math
 import os
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -130,11 +131,9 @@ def scalar(text: str) -> bool | int | float | str:
     if _INTEGER.match(text):
         digits = text.lstrip("+-")
         base = 16 if digits[:2] in ("0x", "0X") else 8 if digits[0] == "0" and len(digits) > 1 else 10
-        try:
+        with suppress(ValueError, OverflowError):  # 09 is no octal number; strtod then reads it as 9.0
             value = int(digits, base) * (-1 if text[0] == "-" else 1)
-        except ValueError:  # 09 is no octal number; strtod then reads it as 9.0
-            return float(text)
-        return value if -(1 << 63) <= value < 1 << 63 else float(value)
+            return value if -(1 << 63) <= value < 1 << 63 else float(value)
     if _DOUBLE.match(text):
         value = float(text)
         return text if math.isinf(value) else value  # out of a double's range: rcl keeps the text

@@ -20,7 +20,7 @@ TEXTS = "true True TRUE yes no y N on Off false tRUE ja .inf -.inf .nan .NaN inf
 SCALARS = (
     *NUMBERS.split(),
     *TEXTS.split(),
-    *("9223372036854775807", "-9223372036854775808", '"1"', "'true'", '"a b"'),
+    *("9223372036854775807", "-9223372036854775808", "9" * 400, "9" * 5000, '"1"', "'true'", '"a b"'),
     *("[1, 2]", "[1.0, 2.0]", "[a, b]", "[true, false]", '["1", "2"]'),
 )
 
