@@ -101,20 +101,20 @@ def moved_starts(starts: np.ndarray, changes: np.ndarray) -> np.ndarray:
 
 
 def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
-    """Rows of ``trajectories.fly_rows`` (n, FLOWN): starts (n, 13) of the tracked frame as those of the
-    centre of mass.
-    """
-    rows = np.zeros((len(values), tr.FLOWN))
+    """Bodies for ``trajectories.fly_rows`` (n,): starts (n, 13) of the tracked frame as those of the centre of mass."""
+    rows = np.zeros(len(values), tr.FLOWN)
     for row, v in zip(rows, values, strict=True):
-        row[tr.MASS] = v.mass
-        row[tr.COM : tr.COM + 3] = v.center_of_mass
-        row[tr.INERTIA : tr.INERTIA + 9] = v.inertia.ravel()
-        row[tr.GRAVITY : tr.GRAVITY + 3] = v.gravity
-        row[tr.LINEAR_DAMPING], row[tr.ANGULAR_DAMPING] = v.damping
-    com, q, w = rows[:, tr.COM : tr.COM + 3], starts[:, 3:7], starts[:, 10:STATE]
-    rows[:, tr.START :] = starts[:, :STATE]
-    rows[:, tr.START : tr.START + 3] += rot.turned(q, com)
-    rows[:, tr.START + 7 : tr.START + 10] += rot.turned(q, rot.cross(w, com))
+        row["mass"], row["center_of_mass"], row["inertia"], row["gravity"] = (
+            v.mass,
+            v.center_of_mass,
+            v.inertia,
+            v.gravity,
+        )
+        row["linear_damping"], row["angular_damping"] = v.damping
+    com, q, w, moved = rows["center_of_mass"], starts[:, 3:7], starts[:, 10:STATE], rows["start"]
+    moved[:] = starts[:, :STATE]
+    moved[:, :3] += rot.turned(q, com)
+    moved[:, 7:10] += rot.turned(q, rot.cross(w, com))
     return rows
 
 
@@ -207,7 +207,7 @@ class Variations:
         self._changes[1 : 1 + START] = np.diag(start_steps)
 
     def rows(self, flight: ms.MeasuredFlight, start: np.ndarray) -> np.ndarray:
-        """Variations of a flight from about ``start`` as ``trajectories.fly_rows`` takes them (f, FLOWN)."""
+        """Variations of a flight from about ``start`` as ``trajectories.fly_rows`` takes them (f,)."""
         starts = moved_starts(np.repeat(start[None, :STATE], len(self._flown), axis=0), self._changes)
         return flown_rows(starts, [flight.own(values) for values in self._flown])
 

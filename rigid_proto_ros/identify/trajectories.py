@@ -12,28 +12,30 @@ from functools import cache, cached_property
 import numpy as np
 from numba import from_dtype, int64, types
 
-from ..base.compilation import copy_numbers, entry_of, njit
+from ..base.compilation import copy_numbers, entry_of, njit, record_type
 from ..base.rotation import rotate_inverse
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import BODY, fill_body
 from ..motion.integrators.auto import AUTO
 from ..motion.integrators.integrator import METHOD, method_table, provide_kernel, workspace_size
 from ..motion.integrators.series_steps import degree_for
-from ..motion.problem import ENVIRONMENT, PROBLEM, VARIABLES, begin_body
+from ..motion.problem import ENVIRONMENT_FIELDS, PROBLEM, VARIABLES, begin_body
 from ..simulation import flight as fl
 from ..simulation.commands import NO_SLOT
 
 ACCURACY = 1e-11
 """Local error rate: differences over steps of 1e-5 then keep five digits, more than an estimate needs."""
 
-# A row of a body to fly: what of it varies.
-MASS = 0
-COM = 1  # (3,) [m, tracked frame]
-INERTIA = 4  # (9,) [kg m²]
-GRAVITY = 13  # (3,) [m/s²]
-LINEAR_DAMPING, ANGULAR_DAMPING = 16, 17
-START = 18  # (13,) state of the COM at the segment's start
-FLOWN = 31
+FLOWN = record_type(
+    [
+        ("mass", np.float64),  # [kg]
+        ("center_of_mass", np.float64, 3),  # [m, tracked frame]
+        ("inertia", np.float64, (3, 3)),  # [kg m²]
+        *ENVIRONMENT_FIELDS,
+        ("start", np.float64, 13),  # state of the COM at the segment's start
+    ]
+)
+"""A body to fly: what of it varies."""
 
 # A row of what is known at a sample: the state (13,), and
 STATE = 13
@@ -69,7 +71,7 @@ def _fly_all(
     samples: np.ndarray,
     good: np.ndarray,
 ) -> int:
-    """Each row of flown (n, FLOWN) through times_ns (m,) ascending from 0: samples (n, m, SAMPLE); good (n,) whether it
+    """Each of flown (n,), FLOWN, through times_ns (m,) ascending from 0: samples (n, m, SAMPLE); good (n,) whether it
     came through. tables: methods, one flight, loads with room for all commands, events and workspace, as
     simulation/flight.py takes them.
 
@@ -77,26 +79,23 @@ def _fly_all(
     """
     methods, flights, rows, events, room = tables
     count, flight = commands.shape[0], flights[0]
-    body, environment, scale = np.zeros(BODY), np.zeros(1, ENVIRONMENT)[0], np.ones(3)
+    body, scale = np.zeros(BODY), np.ones(3)
     problem, variables = np.zeros(1, PROBLEM), np.zeros(VARIABLES)
     for i in range(flown.shape[0]):
         own = flown[i]
         good[i] = 0
-        inertia = own[INERTIA : INERTIA + 9].copy().reshape(3, 3)
+        inertia = own.inertia.copy()
         principal = principal_axes_kernel(inertia)
-        fill_body(own[MASS], own[COM : COM + 3], inertia, principal, scale, body)
-        if not (principal[0][0] > 0.0 and np.isfinite(principal[0][2]) and own[MASS] > 0.0):
+        fill_body(own.mass, own.center_of_mass, inertia, principal, scale, body)
+        if not (principal[0][0] > 0.0 and np.isfinite(principal[0][2]) and own.mass > 0.0):
             continue
         fl.begin_flight(flight)
         flight.method, flight.chooses, flight.step_ns = -1, True, 1_000_000
         flight.timeout_ns, flight.poke_ns = 0, 0
-        copy_numbers(own[START:], flight.row)
+        copy_numbers(own.start, flight.row)
         copy_numbers(flight.row, flight.start)
         copy_numbers(body, flight.body)
-        for k in range(3):
-            environment.gravity[k] = own[GRAVITY + k]
-        environment.linear_damping, environment.angular_damping = own[LINEAR_DAMPING], own[ANGULAR_DAMPING]
-        begin_body(flight.common, body, environment, 1.0)
+        begin_body(flight.common, body, own, 1.0)
         flight.accuracy, flight.degree = ACCURACY, degree
         for c in range(count):
             row = rows[c]
@@ -115,7 +114,7 @@ def _fly_all(
             sample = samples[i, k]
             copy_numbers(flight.row, sample[:STATE])
             rates = fl.accelerations_now(flight, problem, variables)
-            g, q = environment.gravity, sample[3:7]
+            g, q = own.gravity, sample[3:7]
             felt = rotate_inverse(q[0], q[1], q[2], q[3], rates[0] - g[0], rates[1] - g[1], rates[2] - g[2])
             for j in range(3):
                 sample[SPECIFIC_FORCE + j], sample[ANGULAR_ACCELERATION + j] = felt[j], rates[3 + j]
@@ -126,17 +125,17 @@ def _fly_all(
 def _compiled() -> tuple[Callable[..., int], np.ndarray, int]:
     """``_fly_all`` compiled, or loaded from the cache, the table of the methods, and the degree of their series."""
     flat, table, cube = types.float64[:, ::1], types.int64[:, ::1], types.float64[:, :, ::1]
-    records = tuple(from_dtype(kind)[::1] for kind in (METHOD, fl.FLIGHT, fl.LOAD_ROW, fl.EVENT))
+    bodies, *records = (from_dtype(kind)[::1] for kind in (FLOWN, METHOD, fl.FLIGHT, fl.LOAD_ROW, fl.EVENT))
     tables = types.Tuple((*records, types.float64[::1]))
-    signature = int64(flat, types.int64[::1], table, flat, int64, tables, cube, types.int64[::1])
+    signature = int64(bodies, types.int64[::1], table, flat, int64, tables, cube, types.int64[::1])
     degree = degree_for(ACCURACY)
     methods = method_table(AUTO, degree)
     return entry_of(njit(nogil=True, error_model="numpy")(_fly_all), signature), methods, degree
 
 
 def fly_rows(flown: np.ndarray, times_ns: np.ndarray, wrenches: Wrenches) -> tuple[np.ndarray, np.ndarray]:
-    """Samples (n, m, SAMPLE) of each row of ``flown`` (n, FLOWN) at times_ns (m,) ascending from 0, and
-    whether it came through (n,).
+    """Samples (n, m, SAMPLE) of each body in ``flown`` (n,), FLOWN, at times_ns (m,) ascending from 0, and whether it
+    came through (n,).
     """
     kernel, methods, degree = _compiled()
     samples = np.empty((len(flown), len(times_ns), SAMPLE))
