@@ -84,8 +84,8 @@ class SimulationLoop(ScenarioRun):
         self._budget = WorkBudget()
         self.pace = Pace(scenario.parameters.real_time_factor, self.stamps.clock)
         self.resets = 0
-        self._steps_left = 0
-        self._steps_requested = 0
+        self._steps_left = self._steps_requested = 0
+        self._steps_begun = self._given_up = 0
         self._commands_come = self._steps_expected = False
         self._present_ns = 0
         self._last_drain_ns = 0
@@ -188,7 +188,7 @@ class SimulationLoop(ScenarioRun):
                 self._refuse_failed("pause")
                 self.take_commands()
             self.paused = paused
-            self._steps_left = self._steps_requested = 0
+            self._give_up_steps()
             self.simulation.log("pause", {"data": paused})
             self.simulation.notify_floor()
             self._anchor(stamps_stay=paused)
@@ -218,6 +218,7 @@ class SimulationLoop(ScenarioRun):
         self._check_listeners()
         self.publications.find_after(self.simulation.time_ns)
         self._steps_left = periods
+        self._steps_begun += 1
         self._budget.begin_tick()
         self._step_on()
         return not self.stepping
@@ -225,13 +226,13 @@ class SimulationLoop(ScenarioRun):
     def steps(self, periods: int = 1) -> Iterator[None]:
         """While paused, advance over so many publications; yields while the thread's ticks make them.
 
-        Raises InputError while time runs, where the motion has failed, and when it takes longer than STEP_PATIENCE_S;
-        the step goes on by itself then.
+        Raises InputError while time runs, where the motion has failed, where the step is given up since time is resumed
+        or reset, and when it takes longer than STEP_PATIENCE_S; the step goes on by itself then.
         """
         if not self.paused:
             raise InputError("step", "the simulation is running; pause it first")
         end = time.monotonic() + STEP_PATIENCE_S
-        begun = False
+        begun = 0
         # One after another: a step that somebody else has begun is made first.
         while self.stepping or not begun:
             if time.monotonic() > end:
@@ -239,11 +240,19 @@ class SimulationLoop(ScenarioRun):
                 text = f"{reached_s:.9g} s reached after {STEP_PATIENCE_S:g} s of computing; the step continues"
                 raise InputError("step", text)
             if not self.stepping:
-                begun = True
-                if self.step(periods):
+                made, begun = self.step(periods), self._steps_begun
+                if made:
                     break
             yield
         self._refuse_failed("step")
+        if self._given_up == begun:
+            raise InputError("step", "given up, since simulated time was resumed or reset meanwhile")
+
+    def _give_up_steps(self) -> None:
+        """Of the step under way, and of those requested, no more publications are made."""
+        if self.stepping:
+            self._given_up = self._steps_begun
+        self._steps_left = self._steps_requested = 0
 
     def _refuse_failed(self, asked: str) -> None:
         if self.simulation.failure:
@@ -269,7 +278,7 @@ class SimulationLoop(ScenarioRun):
         if self.ghost is not None or Published in self.observer.takes:
             self.begin_ghost()
         self.publications.restart()
-        self._steps_left = self._steps_requested = 0
+        self._give_up_steps()
         self._anchor()
         # Stamped anew: the message that is latched is from before.
         self.simulation.announce()
@@ -341,7 +350,7 @@ class SimulationLoop(ScenarioRun):
         while self._steps_left and self._publish_next():
             self._steps_left -= 1
         if self.simulation.failure:
-            self._steps_left = self._steps_requested = 0
+            self._give_up_steps()
 
     def _tick_paused(self) -> None:
         if self.stepping:
@@ -381,7 +390,6 @@ class SimulationLoop(ScenarioRun):
         self.simulation.failure = (
             f"simulated time beyond {LAST_STAMP_NS // 1_000_000_000} s, the largest that a stamp can hold"
         )
-        self._steps_left = self._steps_requested = 0
         self._check_failure()
 
     def _check_failure(self) -> bool:

@@ -9,9 +9,11 @@ import time
 import pytest
 from flights import SECOND, wrench
 
+from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.live.pacing import WorkBudget
 from rigid_proto_ros.live.simulation_loop import Endpoints, SimulationLoop
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.simulation.commands import Change
 
 ENDLESS = {
     "integrator": "rk4",
@@ -79,6 +81,23 @@ def test_a_step_that_takes_years_goes_on_tick_by_tick_and_is_given_up_by_resumin
     assert set(rig.published) <= {0}, "a state of the middle of a step"
     rig.loop.pause(False)
     assert not rig.loop.stepping
+
+
+@pytest.mark.parametrize("end", [lambda loop: loop.pause(False), lambda loop: loop.reset()], ids=["resumed", "reset"])
+def test_who_waits_for_a_step_that_is_given_up_is_told_and_who_has_got_one_is_not(end) -> None:
+    rig = Rig({**ENDLESS, "start_paused": True})
+    rig.loop.tick()
+    steps = rig.loop.steps()
+    next(steps)
+    rig.loop.tick()
+    end(rig.loop)
+    with pytest.raises(InputError, match="given up"):
+        next(steps)
+    rig.loop.pause(True)
+    rig.loop.setup_of(Change({"publish_rate": 1000.0, "step": 0.001}))
+    rig.loop.reset()
+    rig.loop.tick()
+    assert next(rig.loop.steps(), "made") == "made"
 
 
 def test_a_step_asked_for_while_another_is_made_follows_it(monkeypatch) -> None:
