@@ -33,6 +33,9 @@ from ..simulation.simulation import Simulation
 from .pacing import Stamps, ask_for_short_slices
 from .simulation_loop import Endpoints, SimulationLoop
 
+BUSY_S = 10.0
+"""How long a request waits to be begun [s]."""
+
 LOOK_S = 0.002
 """Between looks whether a step is made [s]."""
 
@@ -106,11 +109,11 @@ class LiveSimulation:
         self.loop.simulation.notify_floor(at_end=True)
         self.loop.observer.close()
 
-    def call(self, function: Callable[[], Any], timeout_s: float = 10.0) -> Any:
+    def call(self, function: Callable[[], Any]) -> Any:
         """Run a function on the physics thread between two ticks and return what it returns, or raise what it raises;
         at once, before the thread is started.
 
-        Raises InputError when the thread is too busy to begin it within timeout_s; then it is never run.
+        Raises InputError when the thread is too busy to begin it within BUSY_S; then it is never run.
         """
         if self._thread is None:
             return function()
@@ -118,10 +121,10 @@ class LiveSimulation:
         self._requests.append((function, future))
         self._wake.set()
         try:
-            return future.result(timeout_s)
+            return future.result(BUSY_S)
         except TimeoutError:
             if future.cancel():
-                text = f"the simulation was too busy to start this request within {timeout_s:g} s"
+                text = f"the simulation was too busy to start this request within {BUSY_S:g} s"
                 raise InputError("request", text) from None
         # It has begun, so it will end.
         return future.result()

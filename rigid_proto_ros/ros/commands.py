@@ -138,7 +138,7 @@ class CommandSubscriber:
         """How many messages the middleware has said to be lost."""
         return sum(queue.messages_lost for queue in self._queues)
 
-    def take(self, wall_ns: int, at_once: bool = False) -> bool:
+    def take(self, wall_ns: int, at_once: bool) -> bool:
         """Take every message that has arrived, convert it, and submit its command; what is refused is counted and
         notified of, and the rest goes on. Returns whether something has arrived within the last ACTIVE_NS. Quiet topics
         are read every QUIET_NS, or now if ``at_once``.

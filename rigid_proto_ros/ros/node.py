@@ -65,9 +65,8 @@ class RigidBodyNode(Node):
         self,
         values: Mapping[str, object],
         make_viewer: Callable[[Scenario, str], Observer | None] = lambda *_: None,
-        node_name: str = NODE_NAME,
     ) -> None:
-        super().__init__(node_name)
+        super().__init__(NODE_NAME)
         scenario = make_scenario(declare_parameters(self, values))
         for warning in scenario.warnings:
             self.get_logger().warning(warning)

@@ -103,15 +103,13 @@ def decode_event(line: str, number: int) -> tuple[int, str, dict]:
     raise InputError(f"event {number}", line[:80], "a JSON line with time_ns, kind and content")
 
 
-def find_mesh(
-    name: str, sha256: str, attachments: Iterable[tuple[str, bytes]] = (), folder: Path | None = None
-) -> Mesh:
+def find_mesh(session: RecordedSession, name: str, sha256: str) -> Mesh:
     """The mesh whose file has this hash: by its name, beside the session, or from the session's attachments. Raises
     MeshError naming it.
     """
     places = [name]
-    if folder is not None:
-        places.append(str(folder / Path(name).name))
+    if session.folder is not None:
+        places.append(str(session.folder / Path(name).name))
     for place in places:
         try:
             mesh = load_mesh(place)
@@ -119,7 +117,7 @@ def find_mesh(
             continue
         if mesh.sha256 == sha256:
             return mesh
-    for file_name, data in attachments:
+    for file_name, data in session.attachments:
         if hashlib.sha256(data).hexdigest() == sha256:
             # Loaded through a file: what a mesh is depends on its ending, too.
             with tempfile.TemporaryDirectory(prefix="rigid_proto_") as temporary:
@@ -160,7 +158,7 @@ def session_scenario(session: RecordedSession) -> Scenario:
     if not session.mesh_sha256:
         return make_scenario(values)
     name = str(values.get("mesh", ""))
-    return make_scenario(values, find_mesh(name, session.mesh_sha256, session.attachments, session.folder))
+    return make_scenario(values, find_mesh(session, name, session.mesh_sha256))
 
 
 def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
@@ -186,7 +184,7 @@ def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
             place = later[0]
         elif place not in places:
             place = places[-1]
-        return find_mesh(name, flown[place][1], session.attachments, session.folder)
+        return find_mesh(session, name, flown[place][1])
 
     return find
 

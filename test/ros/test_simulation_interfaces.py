@@ -4,7 +4,6 @@ stood in for; the node, its thread and its clock are real."""
 
 from __future__ import annotations
 
-import functools
 import sys
 import threading
 from concurrent.futures import Future
@@ -142,7 +141,7 @@ def test_what_the_simulation_refuses_is_a_failed_operation_with_its_reason(servi
         answer.set_simulation_state(state(1), response()),
     ):
         assert refused.result.result == FAILED and "until a reset" in refused.result.error_message
-    monkeypatch.setattr(live, "call", functools.partial(live.call, timeout_s=0.0))
+    monkeypatch.setattr("rigid_proto_ros.live.live_simulation.BUSY_S", 0.0)
     held = threading.Event()
     live._requests.append((held.wait, Future()))
     live._wake.set()
