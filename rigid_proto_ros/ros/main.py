@@ -62,6 +62,7 @@ class NodeProcess(threading.Thread):
         self._domain = hold_own_domain()
         self._crashed = self._ending = False
         self._node: RigidBodyNode | None = None
+        self._viewer: Observer | None = None
         self._close_page: Callable[[], None] = lambda: None
         self._leave_executor: Callable[[], None] = lambda: None
 
@@ -91,7 +92,7 @@ class NodeProcess(threading.Thread):
         begin_ros(self._argv)
         with notify_when_compiling(lambda: _tell("compiling kernels, at the first start only; a minute or two ...")):
             try:
-                node = self._node = RigidBodyNode(given, make_viewer)
+                node = self._node = RigidBodyNode(given, self._make_viewer)
             except (ParameterException, RuntimeError) as error:
                 # rclpy's own parameters: its text says which, and what is accepted.
                 if isinstance(error, RuntimeError) and "QoS override" not in str(error):
@@ -118,6 +119,10 @@ class NodeProcess(threading.Thread):
             f"{node.get_fully_qualified_name()} is simulating {mesh}: {body.mass:.6g} kg, "
             f"integrator {scenario.setup.integrator.name}"
         )
+
+    def _make_viewer(self, scenario: Scenario, node_name: str) -> Observer | None:
+        self._viewer = make_viewer(scenario, node_name)
+        return self._viewer
 
     def _spin(self, spin: Callable[[], None]) -> None:
         from rclpy.executors import ExternalShutdownException
@@ -148,6 +153,9 @@ class NodeProcess(threading.Thread):
         self._close_page()
         if self._node is not None:
             self._node.live.stop()
+        elif self._viewer is not None:
+            # What the node was refused for came behind it.
+            self._viewer.close()
         status = 1 if self._crashed else 0
         if self._error is None and not self.is_alive():
             begin_teardown(status)

@@ -3,13 +3,15 @@
 and the node with 0. ``up`` is among the commands of the README that stay up, in test_readme.py.
 """
 
+import re
 import signal
+import socket
 import time
 
 import pytest
 from conftest import needs_rerun
 from rerun_flight import meshes
-from ros_process import RosProcess, alive, catches, descendants, start_node
+from ros_process import READY_S, RosProcess, alive, catches, descendants, start_node
 
 from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.rerun_view.rrd_reading import read_session
@@ -61,6 +63,16 @@ def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environm
     assert "Traceback" not in demo.errors
     assert not [pid for pid in children if alive(pid)]
     assert read_session(session).complete
+
+
+@needs_rerun
+def test_a_node_that_is_refused_behind_its_viewer_leaves_none(ros_environment, tmp_path):
+    node = start_node(ros_environment, tmp_path / "node", {"viewer": "web", "record": "/proc/flight.mcap"})
+    assert node.process.wait(READY_S) == 2
+    assert "rigid_body_node: record: got '/proc/flight.mcap'" in node.errors and "Traceback" not in node.errors
+    port = int(re.search(r"viewer: http://127\.0\.0\.1:(\d+)", node.errors)[1])
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", port))
 
 
 @BOTH
