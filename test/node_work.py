@@ -52,6 +52,7 @@ def fly(scenario: str) -> dict:
         own = [publisher for publisher in node.publishers if publisher.topic_name.rpartition("/")[2] in LISTENED]
         while not (wrench.get_subscription_count() and all(p.get_subscription_count() for p in own)):
             time.sleep(0.02)
+    node.live.announce()
     node.live.start()
 
     def look() -> tuple[int, int, Counter, int]:

@@ -47,8 +47,8 @@ class LiveSimulation:
     """A simulation on a thread of its own. Methods may be called from any thread, except where they say otherwise.
 
     name: the body's, and a recording's. endpoints: what it publishes to and takes commands from beside these methods.
-    clock: simulated time follows this one [ns] instead of the wall's. Raises InputError when the recording that the
-    scenario asks for can't be written.
+    clock: simulated time follows this one [ns] instead of the wall's. Raises InputError for contacts that no command
+    could name.
     """
 
     def __init__(
@@ -68,8 +68,6 @@ class LiveSimulation:
         self._recording_error = ""
         self._recorder: Observer | None = None
         self.loop = SimulationLoop(scenario, Observers(*observers), self.endpoints, self.stamps)
-        self._recorder = self._open_recorder(scenario)
-        self._watch()
         self._requests: list[tuple[Callable[[], Any], Future]] = []
         self._wake = threading.Event()
         self._stopping = False
@@ -86,7 +84,11 @@ class LiveSimulation:
     # The physics thread
 
     def announce(self) -> None:
-        """Tell the observers what is going to fly; once, before ``start``."""
+        """Begin the recording that the scenario asks for, and tell the observers what is going to fly; once, before
+        ``start``, when nothing else can be refused any more. Raises InputError when the recording can't be written.
+        """
+        self._recorder = self._open_recorder(self.scenario)
+        self._watch()
         self._introduce(self.loop.observer)
 
     def start(self, on_crash: Callable[[], None] = lambda: None) -> None:

@@ -82,6 +82,7 @@ class NodeProcess(threading.Thread):
         """Make the node, which may compile for minutes, and let it run. Raises InputError."""
         from rclpy.exceptions import ParameterException
         from rclpy.executors import SingleThreadedExecutor
+        from rclpy.qos_overriding_options import InvalidQosOverridesError
 
         from ..base.compilation import notify_when_compiling
         from ..live.live_simulation import warm_up
@@ -93,13 +94,14 @@ class NodeProcess(threading.Thread):
         with notify_when_compiling(lambda: _tell("compiling kernels, at the first start only; a minute or two ...")):
             try:
                 node = self._node = RigidBodyNode(given, self._make_viewer)
-            except (ParameterException, RuntimeError) as error:
+            except (ParameterException, InvalidQosOverridesError, RuntimeError) as error:
                 # rclpy's own parameters: its text says which, and what is accepted.
                 if isinstance(error, RuntimeError) and "QoS override" not in str(error):
                     raise
                 raise InputError("ROS arguments", " ".join(str(error).split())) from None
             node.states.pack_all(warm_up(node.live.scenario.setup))
         self._close_page = open_page(node)
+        node.live.announce()
         if until_s is not None:
             node.live.loop.end_at(nanoseconds(until_s), self._request_end)
         executor = SingleThreadedExecutor()

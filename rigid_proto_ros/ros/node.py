@@ -56,7 +56,7 @@ def offer_services(node: Node, live: LiveSimulation) -> None:
 
 class RigidBodyNode(Node):
     """values: parameters by name as scene files give them, the others at their defaults. make_viewer(scenario, node
-    name) gives an observer that shows the body, or None. ``live`` flies once it is started.
+    name) gives an observer that shows the body, or None. ``live`` flies once it is announced and started.
 
     Raises InputError when a parameter given at start is refused.
     """
@@ -91,7 +91,6 @@ class RigidBodyNode(Node):
         offer_services(self, self.live)
         offer_simulation_interfaces(self, self.live)
         Diagnostics(self, self.live, subscriber)
-        self.live.announce()
 
     def _followed_clock(self, scenario: Scenario) -> Callable[[], int] | None:
         """/clock, when use_sim_time asks for it and it isn't our own."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 from copy import copy
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.qos_overriding_options import QosCallbackResult, QoSOverridingOptions
 
 COMMAND_DEPTH = 5000
 """Commands kept until the next drain; Fast DDS holds no more in its history."""
@@ -24,7 +24,13 @@ EVENT = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST, reliability=Reli
 CLOCK = QoSProfile(depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.BEST_EFFORT)
 TF = QoSProfile(depth=100, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)
 
-OVERRIDABLE = QoSOverridingOptions.with_default_policies()
+
+def _check(profile: QoSProfile) -> QosCallbackResult:
+    """Whether the middleware has no objection to what a user overrides, for which it gives no reason."""
+    return QosCallbackResult(successful=profile.depth >= 0, reason=f"depth {profile.depth}; 0 or more is accepted")
+
+
+OVERRIDABLE = QoSOverridingOptions.with_default_policies(callback=_check)
 
 
 def own(profile: QoSProfile) -> QoSProfile:

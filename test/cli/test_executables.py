@@ -123,14 +123,18 @@ def test_an_output_in_an_encoding_without_the_units_is_written_nevertheless():
     [
         *("use_sim_time:=1", "start_type_description_service:=3"),
         "qos_overrides./rigid_body/pose.publisher.reliability:=bestfort",
+        "qos_overrides./rigid_body/wrench.subscription.depth:=-3",
     ],
 )
-def test_a_wrong_value_of_a_parameter_of_every_ros_node_is_told_in_one_line(argument, ros_environment):
+def test_a_wrong_value_of_a_parameter_of_every_ros_node_is_told_in_one_line(argument, ros_environment, tmp_path):
     pytest.importorskip("rclpy")
-    words = command("rigid_body_node", "--ros-args", "-p", argument)
+    earlier = tmp_path / "flight.mcap"
+    earlier.write_bytes(b"an earlier flight")
+    words = command("rigid_body_node", "--ros-args", "-p", f"record:={earlier}", "-p", argument)
     done = subprocess.run(words, env=ros_environment, capture_output=True, text=True, check=False)
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
     assert done.stderr.startswith("rigid_body_node: ROS arguments: ")
+    assert earlier.read_bytes() == b"an earlier flight"
 
 
 FULL_BYTES = 2_000_000

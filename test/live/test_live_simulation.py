@@ -380,6 +380,16 @@ def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_
     assert verify(read_runs(path)[-1]) is None
 
 
+def test_a_recording_is_begun_when_nothing_else_can_be_refused_any_more(tmp_path):
+    path = tmp_path / "flight.mcap"
+    path.write_bytes(b"an earlier flight")
+    live = LiveSimulation(make_scenario({"mesh": "t_handle", "record": str(path)}))
+    assert path.read_bytes() == b"an earlier flight"
+    live.announce()
+    live.stop()
+    assert read_runs(path)[0].complete
+
+
 @needs_rerun
 def test_a_recording_from_the_start_shows_the_string_that_is_tied_from_the_start(tmp_path):
     from rerun_flight import cells
