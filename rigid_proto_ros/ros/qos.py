@@ -11,6 +11,8 @@ from rclpy.qos_overriding_options import QosCallbackResult, QoSOverridingOptions
 COMMAND_DEPTH = 5000
 """Commands kept until the next drain; Fast DDS holds no more in its history."""
 
+LARGEST_DEPTH = 2**31 - 1
+
 STATE = QoSProfile(depth=10, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)
 COMMAND = QoSProfile(depth=COMMAND_DEPTH, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(
@@ -26,8 +28,9 @@ TF = QoSProfile(depth=100, history=HistoryPolicy.KEEP_LAST, reliability=Reliabil
 
 
 def _check(profile: QoSProfile) -> QosCallbackResult:
-    """Whether the middleware has no objection to what a user overrides, for which it gives no reason."""
-    return QosCallbackResult(successful=profile.depth >= 0, reason=f"depth {profile.depth}; 0 or more is accepted")
+    """Whether the middleware takes what a user overrides; it gives no reason itself."""
+    reason = f"depth: got {profile.depth}; accepted: 0 to {LARGEST_DEPTH}"
+    return QosCallbackResult(successful=0 <= profile.depth <= LARGEST_DEPTH, reason=reason)
 
 
 OVERRIDABLE = QoSOverridingOptions.with_default_policies(callback=_check)

@@ -124,6 +124,7 @@ def test_an_output_in_an_encoding_without_the_units_is_written_nevertheless():
         *("use_sim_time:=1", "start_type_description_service:=3"),
         "qos_overrides./rigid_body/pose.publisher.reliability:=bestfort",
         "qos_overrides./rigid_body/wrench.subscription.depth:=-3",
+        "qos_overrides./rigid_body/pose.publisher.depth:=100000000000",
     ],
 )
 def test_a_wrong_value_of_a_parameter_of_every_ros_node_is_told_in_one_line(argument, ros_environment, tmp_path):
