@@ -395,21 +395,8 @@ def _angle(less: float, more: float, octant: int) -> float:
 
 
 @njit(error_model="numpy")
-def inverse_tangent(x: float) -> float:
-    """arctan x."""
-    size = abs(x)
-    if size < _AS_ITSELF:
-        return x
-    if size > 1e17:
-        return math.copysign(0.5 * math.pi, x)
-    if size != size:
-        return x
-    return math.copysign(_angle(size, 1.0, 0) if size <= 1.0 else _angle(1.0, size, 1), x)
-
-
-@njit(error_model="numpy")
 def inverse_tangent_of(y: float, x: float) -> float:
-    """The angle of (x, y) from the x axis, −π to π; signs of zeros count as in C's atan2."""
+    """The angle of (x, y) from the x axis, −π to π, and so arctan y for x = 1; signs of zeros count as in C's atan2."""
     if not (abs(x) < math.inf and abs(y) < math.inf):
         if x != x or y != y:
             return math.nan

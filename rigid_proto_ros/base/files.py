@@ -97,6 +97,8 @@ def whole_file(option: str, file: str | Path) -> Iterator[Path]:
 def _beside(option: str, file: str | Path) -> Iterator[Path]:
     """A new file beside ``file``; removed when the block ends, if it is still there."""
     path = output_file(option, file)
+    if path.exists() and not path.is_file():
+        raise InputError(option, str(file), "the name of a file; this is a device or a pipe")
     beside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         beside.touch()

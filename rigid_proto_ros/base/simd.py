@@ -42,13 +42,13 @@ class _DoublesModel(models.PrimitiveModel):
         initialize(manager, kind, ir.VectorType(_DOUBLE, kind.count))
 
 
-def aligned(shape: tuple[int, int], before: int = 0) -> np.ndarray:
-    """Zeros whose first number, or the one with index ``before``, is aligned to a cache line: a vector that crosses two
-    lines takes twice as long.
+def aligned(count: int, before: int = 0) -> np.ndarray:
+    """Memory for ``count`` doubles of which the first, or the one with index ``before``, is aligned to a cache line: a
+    vector that crosses two lines takes twice as long.
     """
-    whole = np.zeros(shape[0] * shape[1] + LINE)
+    whole = np.empty(count + LINE)
     first = -(whole.__array_interface__["data"][0] // 8 + before) % LINE
-    return whole[first : first + shape[0] * shape[1]].reshape(shape)
+    return whole[first : first + count]
 
 
 def _operation_on_vectors(plain: Callable[..., Any], **options: bool) -> Callable[[Any], Callable[..., Any]]:
@@ -108,18 +108,6 @@ def filled(_typing_context: Any, _x: Any, count: Any) -> Emitted:
     )
 
 
-@_operation_on_vectors(lambda *parts: np.concatenate(parts))
-def joined(_typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Emitted:
-    """Concatenation of a, b, c and d, which have equal lengths."""
-
-    def code(_context: Any, builder: ir.IRBuilder, _signature: Any, arguments: Any) -> Any:
-        n = a.count
-        first, second = (_shuffled(builder, a, b, list(range(2 * n))) for a, b in (arguments[:2], arguments[2:]))
-        return _shuffled(builder, first, second, list(range(4 * n)))
-
-    return Doubles(4 * a.count)(a, b, c, d), code
-
-
 @_operation_on_vectors(lambda a, b: np.concatenate([a, b]))
 def paired(_typing_context: Any, a: Any, b: Any) -> Emitted:
     """Concatenation of a and b, which have equal lengths."""
@@ -128,6 +116,12 @@ def paired(_typing_context: Any, a: Any, b: Any) -> Emitted:
         return _shuffled(builder, arguments[0], arguments[1], list(range(2 * a.count)))
 
     return Doubles(2 * a.count)(a, b), code
+
+
+@njit(error_model="numpy", allocates=False)
+def joined(a: Packed, b: Packed, c: Packed, d: Packed) -> Packed:
+    """Concatenation of a, b, c and d, which have equal lengths."""
+    return paired(paired(a, b), paired(c, d))
 
 
 @_operation_on_vectors(lambda vector, number: vector.reshape(2, -1)[number], prefer_literal=True)

@@ -198,8 +198,6 @@ class Load(NamedTuple):
 
     def check_magnitude(self, body: Body) -> None:
         """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION."""
-        if _is_light(self.force, self.torque, self.mesh_point or _ORIGIN, body):
-            return
         row = self.row
         if not is_within_magnitude(row, body.row):
             linear, angular = magnitudes(row, body.row)
@@ -211,11 +209,6 @@ class Load(NamedTuple):
             )
 
 
-def load_of_row(row: np.ndarray) -> Load:
-    """The load with this row (LOAD,)."""
-    return load_of_bytes(row.tobytes())
-
-
 def load_of_bytes(row: bytes) -> Load:
     """The load whose row has these bytes."""
     axes, has_point, *numbers = _ROW.unpack(row)
@@ -224,28 +217,27 @@ def load_of_bytes(row: bytes) -> Load:
     return Load(named, point if has_point else None, force, torque, normal if named == "normal" else None)
 
 
-def light_row(frame: Frame, force: Numbers, torque: Numbers, body: Body) -> bytes:
-    """Fast path for most loads: the row of a load in world or body axes, at the COM or at a given point, that is far
-    below the magnitude limit. Empty for any other load, which ``resolve_load`` resolves or refuses.
+def light_row(frame: Frame, force: Numbers, torque: Numbers, body: Body, contacts: Mapping[str, Vector]) -> bytes:
+    """Fast path for most loads: the row of a load in world or body axes, at the COM, a contact or a given point, that
+    is far below the magnitude limit. Empty for any other load, which ``resolve_load`` resolves or refuses.
     """
     word, axes = frame.point[0], frame.axes
-    if axes == "normal" or word not in ("com", "point"):
+    if word == "com":
+        point = _ORIGIN
+    elif word == "point":
+        point = frame.point[1]
+    elif word == "contact" and frame.point[1] in contacts:
+        point = contacts[frame.point[1]]
+    else:
         return b""
-    point = frame.point[1] if word == "point" else _ORIGIN
-    if _is_light(force, torque, point, body):
-        return _ROW.pack(_AXES_NUMBERS[axes], word == "point", *point, *force, *torque, *_ORIGIN)
-    return b""
-
-
-def _is_light(force: Numbers, torque: Numbers, point: Numbers, body: Body) -> bool:
-    """Whether a load at a point in mesh coordinates is far below the magnitude limit, at a glance. False for numbers
-    that aren't finite.
-    """
     fx, fy, fz = force
     tx, ty, tz = torque
     x, y, z = point
     amount = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz)
-    return amount * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light
+    # False for numbers that aren't finite.
+    if axes != "normal" and amount * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light:
+        return _ROW.pack(_AXES_NUMBERS[axes], word != "com", x, y, z, fx, fy, fz, tx, ty, tz, *_ORIGIN)
+    return b""
 
 
 def resolve_load(
@@ -307,4 +299,4 @@ def _mesh_point(
     hit = surface.ray_hit(origin, direction)
     if hit is None:
         raise CommandRefused("ray_miss", "frame_id", frame.text, "a ray that meets the body")
-    return vector(hit[0])
+    return vector(hit)

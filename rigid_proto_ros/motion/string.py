@@ -162,12 +162,12 @@ class StringState:
     end_ns: int
     last_target_ns: int
     release_ns: int | None
-    effective_mass: float
-    stiffness: float
-    damping: float
-    frequency: float
-    rest_length: float
-    bilateral: bool
+    effective_mass: float = 0.0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    frequency: float = 0.0
+    rest_length: float = 0.0
+    bilateral: bool = False
 
     @property
     def row(self) -> np.ndarray:
@@ -182,10 +182,6 @@ class StringState:
     def free_end(self, time_ns: int) -> np.ndarray:
         """Position of the free end (3,) [m, world]."""
         return np.array(free_end_at(time_ns, self.origin, self.target, self.begin_ns, self.end_ns)[0])
-
-    def span(self, body: Body, state: State) -> np.ndarray:
-        """Vector from the free end to the knot (3,) [m, world]."""
-        return np.array(self._span(body, state))
 
     def _span(self, body: Body, state: State) -> Vector:
         rx, ry, rz = self.arm(body)
@@ -243,21 +239,7 @@ def tie(
 
     timeout_ns: 0 for no release. mass: see ``with_spring``.
     """
-    now_ns = state.time_ns
-    point = np.asarray(target, dtype=float)
-    tied = StringState(
-        attach=vector(attach),
-        origin=point,
-        target=point,
-        begin_ns=now_ns,
-        end_ns=now_ns,
-        last_target_ns=now_ns,
-        release_ns=now_ns + timeout_ns if timeout_ns else None,
-        effective_mass=0.0,
-        stiffness=0.0,
-        damping=0.0,
-        frequency=0.0,
-        rest_length=settings.rest_length,
-        bilateral=settings.bilateral,
-    )
+    now_ns, point = state.time_ns, np.asarray(target, dtype=float)
+    release_ns = now_ns + timeout_ns if timeout_ns else None
+    tied = StringState(vector(attach), point, point, now_ns, now_ns, now_ns, release_ns)
     return tied.with_spring(settings, body, state, mass)

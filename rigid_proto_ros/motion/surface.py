@@ -16,7 +16,7 @@ import numpy as np
 from ..base.arithmetic import inverse_tangent_of
 from ..base.compilation import njit
 from ..base.rotation import length, norm
-from ..base.vectors import Numbers
+from ..base.vectors import Numbers, Vector, vector
 from ..mass.moments import referenced_vertices
 
 
@@ -33,19 +33,16 @@ class Surface:
         sides: np.ndarray = np.ptp(referenced_vertices(self.vertices, self.triangles), axis=0)
         return sides
 
-    def ray_hit(self, origin: Numbers, direction: Numbers) -> tuple[np.ndarray, int] | None:
-        """First point (3,) where the ray meets the surface from either side, and its triangle; None for a miss."""
-        direction = np.asarray(direction, dtype=float)
+    def ray_hit(self, origin: Numbers, direction: Numbers) -> np.ndarray | None:
+        """First point (3,) where the ray meets the surface from either side; None for a miss."""
+        origin, direction = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
         direction = direction / np.abs(direction).max()
-        distance, triangle = _first_hit(self.vertices, self.triangles, np.asarray(origin, dtype=float), direction)
-        if triangle < 0:
-            return None
-        return np.asarray(origin, dtype=float) + distance * direction, int(triangle)
+        distance = _first_hit(self.vertices, self.triangles, origin, direction)
+        return origin + distance * direction if distance < math.inf else None
 
     def nearest_point(self, point: Numbers) -> np.ndarray:
         """The point (3,) of the surface nearest to ``point`` (3,)."""
-        nearest, _, _ = _nearest(self.vertices, self.triangles, np.asarray(point, dtype=float))
-        return np.array(nearest)
+        return np.array(_nearest(self.vertices, self.triangles, vector(point)))
 
     def inward_normal(self, point: Numbers) -> np.ndarray:
         """Unit inward normal (3,) of the surface where it is nearest to ``point`` (3,).
@@ -53,18 +50,16 @@ class Surface:
         On an edge or at a vertex it is the angle-weighted mean of the normals of adjacent faces (Baerentzen & Aanaes
         2005), which doesn't depend on how the faces are triangulated. Zero where they cancel.
         """
-        point = np.asarray(point, dtype=float)
-        outward = np.array(_pseudo_normal(self.vertices, self.triangles, point, 1e-9 * length(self.extent)))
+        tolerance = 1e-9 * length(self.extent)
+        outward = np.array(_pseudo_normal(self.vertices, self.triangles, vector(point), tolerance))
         size = length(outward)
         return -outward / size if size > 1e-12 else np.zeros(3)
 
 
 @njit()
-def _first_hit(
-    vertices: np.ndarray, triangles: np.ndarray, origin: np.ndarray, direction: np.ndarray
-) -> tuple[float, int]:
-    """Distance along ``direction`` and triangle of the first hit: Woop, Benthin and Wald (2013),
-    watertight at edges.
+def _first_hit(vertices: np.ndarray, triangles: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> float:
+    """Distance along ``direction`` of the first hit, infinite for none: Woop, Benthin and Wald (2013), watertight at
+    edges.
     """
     kz = 0
     if abs(direction[1]) > abs(direction[kz]):
@@ -76,7 +71,6 @@ def _first_hit(
     sx = direction[kx] / direction[kz]
     sy = direction[ky] / direction[kz]
     best = math.inf
-    best_triangle = -1
     for i in range(triangles.shape[0]):
         a, b, c = triangles[i, 0], triangles[i, 1], triangles[i, 2]
         az = vertices[a, kz] - origin[kz]
@@ -99,26 +93,49 @@ def _first_hit(
         distance = (u * az + v * bz + w * cz) / direction[kz] / determinant
         if 0.0 <= distance < best:
             best = distance
-            best_triangle = i
-    return best, best_triangle
+    return best
 
 
 @njit()
-def _nearest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Nearest point of a triangle, squared distance, and the angle of the triangle at that point: the corner's angle, π
-    on an edge, 2π inside. After Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+def _corners(vertices: np.ndarray, triangle: np.ndarray) -> tuple[Vector, Vector, Vector]:
+    i, j, k = triangle[0], triangle[1], triangle[2]
+    return (
+        (vertices[i, 0], vertices[i, 1], vertices[i, 2]),
+        (vertices[j, 0], vertices[j, 1], vertices[j, 2]),
+        (vertices[k, 0], vertices[k, 1], vertices[k, 2]),
+    )
+
+
+@njit()
+def _less(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit()
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit()
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit()
+def _angle(a: Vector, b: Vector) -> float:
+    return inverse_tangent_of(norm(*_cross(a, b)), _dot(a, b))
+
+
+@njit()
+def _nearest_on_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> tuple[Vector, float, float, float]:
+    """Nearest point of a triangle to p, squared distance, and its coordinates u, v along the edges ab and ac. After
+    Ericson, Real-Time Collision Detection (2005), section 5.1.5.
     """
-    ab = b - a
-    ac = c - a
-    ap = p - a
-    d1 = (ab * ap).sum()
-    d2 = (ac * ap).sum()
-    bp = p - b
-    d3 = (ab * bp).sum()
-    d4 = (ac * bp).sum()
-    cp = p - c
-    d5 = (ab * cp).sum()
-    d6 = (ac * cp).sum()
+    ab, ac = _less(b, a), _less(c, a)
+    ap, bp, cp = _less(p, a), _less(p, b), _less(p, c)
+    d1, d2 = _dot(ab, ap), _dot(ac, ap)
+    d3, d4 = _dot(ab, bp), _dot(ac, bp)
+    d5, d6 = _dot(ab, cp), _dot(ac, cp)
     va = d3 * d6 - d5 * d4
     vb = d5 * d2 - d1 * d6
     vc = d1 * d4 - d3 * d2
@@ -138,63 +155,52 @@ def _nearest_on_triangle(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndar
     else:
         total = va + vb + vc
         u, v = vb / total, vc / total
+    nearest = (
+        a[0] + u * ab[0] + v * ac[0],
+        a[1] + u * ab[1] + v * ac[1],
+        a[2] + u * ab[2] + v * ac[2],
+    )
+    gap = _less(p, nearest)
+    return nearest, _dot(gap, gap), u, v
+
+
+@njit()
+def _angle_at(u: float, v: float, a: Vector, b: Vector, c: Vector) -> float:
+    """The angle of a triangle at a point of it: the corner's angle, π on an edge, 2π inside."""
     tolerance = 1e-9
     if u <= tolerance and v <= tolerance:
-        angle = _angle(ab, ac)
-    elif u >= 1.0 - tolerance:
-        angle = _angle(a - b, c - b)
-    elif v >= 1.0 - tolerance:
-        angle = _angle(a - c, b - c)
-    elif u <= tolerance or v <= tolerance or u + v >= 1.0 - tolerance:
-        angle = math.pi
-    else:
-        angle = 2.0 * math.pi
-    nearest = a + u * ab + v * ac
-    gap = p - nearest
-    return nearest, (gap * gap).sum(), angle
+        return _angle(_less(b, a), _less(c, a))
+    if u >= 1.0 - tolerance:
+        return _angle(_less(a, b), _less(c, b))
+    if v >= 1.0 - tolerance:
+        return _angle(_less(a, c), _less(b, c))
+    if u <= tolerance or v <= tolerance or u + v >= 1.0 - tolerance:
+        return math.pi
+    return 2.0 * math.pi
 
 
 @njit()
-def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit()
-def _angle(a: np.ndarray, b: np.ndarray) -> float:
-    x, y, z = _cross(a, b)
-    return inverse_tangent_of(norm(x, y, z), (a * b).sum())
-
-
-@njit()
-def _nearest(vertices: np.ndarray, triangles: np.ndarray, point: np.ndarray) -> tuple[tuple[float, ...], float, int]:
+def _nearest(vertices: np.ndarray, triangles: np.ndarray, point: Vector) -> Vector:
     best = math.inf
-    best_point = (0.0, 0.0, 0.0)
-    best_triangle = -1
+    found = (0.0, 0.0, 0.0)
     for i in range(triangles.shape[0]):
-        nearest, squared, _ = _nearest_on_triangle(
-            point, vertices[triangles[i, 0]], vertices[triangles[i, 1]], vertices[triangles[i, 2]]
-        )
+        a, b, c = _corners(vertices, triangles[i])
+        nearest, squared, _, _ = _nearest_on_triangle(point, a, b, c)
         if squared < best:
-            best = squared
-            best_point = (nearest[0], nearest[1], nearest[2])
-            best_triangle = i
-    return best_point, best, best_triangle
+            best, found = squared, nearest
+    return found
 
 
 @njit()
-def _pseudo_normal(
-    vertices: np.ndarray, triangles: np.ndarray, point: np.ndarray, tolerance: float
-) -> tuple[float, float, float]:
-    nearest, squared, _ = _nearest(vertices, triangles, point)
-    foot = np.array(nearest)
+def _pseudo_normal(vertices: np.ndarray, triangles: np.ndarray, point: Vector, tolerance: float) -> Vector:
+    foot = _nearest(vertices, triangles, point)
     nx, ny, nz = 0.0, 0.0, 0.0
     for i in range(triangles.shape[0]):
-        a = vertices[triangles[i, 0]]
-        b = vertices[triangles[i, 1]]
-        c = vertices[triangles[i, 2]]
-        _, gap, angle = _nearest_on_triangle(foot, a, b, c)
+        a, b, c = _corners(vertices, triangles[i])
+        _, gap, u, v = _nearest_on_triangle(foot, a, b, c)
         if gap <= tolerance * tolerance:
-            x, y, z = _cross(b - a, c - a)
+            angle = _angle_at(u, v, a, b, c)
+            x, y, z = _cross(_less(b, a), _less(c, a))
             area = norm(x, y, z)
             if area > 0.0:
                 nx += angle * x / area

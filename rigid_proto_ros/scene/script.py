@@ -109,8 +109,9 @@ def expand_script(
         key = ""
         try:
             times_ns = _times_ns(entry, number, max_commands)
-            key = min(entry.keys() & _READERS.keys(), default="")
-            _check_keys(entry, _TIMING_KEYS | {key} if key else _POKE_KEYS, set() if key else _READERS.keys())
+            if not entry.keys() <= _POKE_KEYS:
+                key = min(entry.keys() & _READERS.keys(), default="")
+                _check_keys(entry, _TIMING_KEYS | {key} if key else _POKE_KEYS, set() if key else _READERS.keys())
             for t_ns in times_ns:
                 stamp = {"stamp_ns": start_ns + t_ns, "entry": number}
                 commands += _READERS[key](entry[key], stamp) if key else [_load(False, entry, stamp)]

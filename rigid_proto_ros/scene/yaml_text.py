@@ -34,6 +34,8 @@ _SPECIAL = re.compile(r"[+-]?\.?(inf|infinity|nan)\Z", re.IGNORECASE)
 _WORD = re.compile(r"(?!null\Z)[a-z_]{3,}\Z")
 """Text that needs no quotes in YAML, unless it means true or false."""
 
+_PLAIN = (float, int, str, bool, type(None))
+
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """libyaml's, ten times as fast, where it is installed."""
 
@@ -176,6 +178,8 @@ def flow(value: object) -> str:
 
 def plain(value: object) -> Any:
     """A value as YAML has it, from NumPy's numbers and arrays, tuples and paths, also within lists and mappings."""
+    if type(value) in _PLAIN:
+        return value
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     if isinstance(value, Mapping):

@@ -102,11 +102,8 @@ class Batch:
     def arrays(self) -> _Side:
         """Arguments of the compiled call."""
         start = self.setup.flight_start
-        integrator = self.setup.integrator
-        strings = bool(self.rows["string_attached"].any())
-        for number, method in enumerate(integrator.methods):
-            if strings or not method.on_string:
-                provide_kernel(integrator, start.methods, number)
+        for number in range(len(start.methods)):
+            provide_kernel(self.setup.integrator, start.methods, number)
         return self.rows, self.ballast, start.flight, start.methods, np.ascontiguousarray(self.commands)
 
 
@@ -343,7 +340,7 @@ def fly_rows(
     filled = results.status, results.measured, results.floors
     loads = max(side.commands.shape[1] for side in sides) + 1
     # The workspace is aligned to a cache line.
-    work = aligned((1, max(1, *(side.setup.flight_start.room for side in sides))))[0]
+    work = aligned(max(1, *(side.setup.flight_start.room for side in sides)))
     tables = np.zeros(loads, fl.LOAD_ROW), np.zeros(4 * loads + 4, fl.EVENT), work
     states, others = (np.zeros((len(sample_ns), STATE)) for _ in range(2))
     room = np.zeros(CONTEXT), np.zeros(1, fl.FLIGHT), tables, states, others

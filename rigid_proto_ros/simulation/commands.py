@@ -25,7 +25,7 @@ HELD_WRENCH, PULSE, IMPULSE, CLEAR = range(4)
 """Kinds of commands in the tables of a flight."""
 
 FARTHEST = 1e100
-"""Largest coordinate of a point [m]; the squared distance of such a point still fits a double."""
+"""Largest coordinate of a point [m], or number of a state; its square still fits a double."""
 
 
 def nanoseconds(seconds: float) -> int:
@@ -155,7 +155,7 @@ class SetState(Stamped):
             if name not in STATE_VALUES or len(numbers) != STATE_VALUES[name]:
                 accepted = ", ".join(f"{name} of {count} numbers" for name, count in STATE_VALUES.items())
                 raise CommandRefused("state", "state", f"{name} of {len(numbers)} numbers", accepted)
-            _check_point(f"state, {name}", numbers)
+            _check_numbers(f"state, {name}", numbers)
         if not any(self.values.get("orientation_xyzw", (1.0,))):
             raise CommandRefused("state", "state, orientation_xyzw", [0.0] * 4, "four numbers, not all zero")
 
@@ -215,7 +215,7 @@ class TieString(Stamped):
     def __post_init__(self) -> None:
         if self.axes not in ("mesh", "body", "world"):
             raise CommandRefused("frame", "frame_id", self.frame_id or self.axes, "axes mesh, body or world")
-        _check_point("string attach", self.point)
+        _check_numbers("string attach", self.point)
 
     @property
     def content(self) -> dict[str, Any]:
@@ -233,7 +233,7 @@ class MoveString(Stamped):
     rank = Rank.STRING_TARGET
 
     def __post_init__(self) -> None:
-        _check_point("string target", self.point)
+        _check_numbers("string target", self.point)
 
     @property
     def content(self) -> dict[str, Any]:
@@ -274,11 +274,11 @@ def slot_name(number: int) -> str:
     return name
 
 
-def _check_point(field: str, point: Sequence[float]) -> None:
-    if not all(math.isfinite(x) for x in point):
-        raise CommandRefused("nonfinite", field, list(point), "three finite numbers")
-    if not all(abs(x) <= FARTHEST for x in point):
-        raise CommandRefused("magnitude", field, list(point), f"at most {FARTHEST:g} m")
+def _check_numbers(field: str, numbers: Sequence[float]) -> None:
+    if not all(math.isfinite(x) for x in numbers):
+        raise CommandRefused("nonfinite", field, list(numbers), f"{len(numbers)} finite numbers")
+    if not all(abs(x) <= FARTHEST for x in numbers):
+        raise CommandRefused("magnitude", field, list(numbers), f"numbers of at most {FARTHEST:g}")
 
 
 def order_of(command: Command, listed: Listed | None, arrival: int) -> tuple[int, int, int, int]:

@@ -18,7 +18,7 @@ from ..base.compilation import copy_numbers, copy_record, njit, record_type
 from ..base.rotation import norm
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
-from ..motion.integrators.integrator import ADAPTIVE, CONTROL, FIXED_STEPS, commit, is_provided, reach
+from ..motion.integrators.integrator import ADAPTIVE, CONTROL, FIXED_STEPS, NOTHING, commit, reach
 from ..motion.integrators.series_steps import FLOOR, begin_control
 from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
 from ..motion.problem import (
@@ -192,10 +192,7 @@ def begin_variables(flight: np.record, methods: np.ndarray, room: np.ndarray) ->
         y[k] = 0.0
     to_variables(flight.start, p, y)
     before = flight.method
-    if flight.chooses:
-        flight.method = kind_of_segment(p, y)
-    else:
-        flight.method = 1 if p.has_string and methods.shape[0] > 1 else 0
+    flight.method = kind_of_segment(p, y) if flight.chooses else 0
     method = methods[flight.method]
     if flight.method != before and method.way == ADAPTIVE:
         # Kernels rely on zeros in elements that they never write; another method may have written there.
@@ -247,7 +244,8 @@ def sample(flight: np.record, methods: np.ndarray, room: np.ndarray, at_ns: int,
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def advance_segment(flight: np.record, methods: np.ndarray, room: np.ndarray, until_ns: int) -> int:
     """Advance within the segment to ``until_ns``: full steps, then one shorter step on a copy, which ends there."""
-    flight.waits = not is_provided(methods[flight.method])
+    method = methods[flight.method]
+    flight.waits = method.way != NOTHING and method.address == 0
     if flight.waits:
         return NO_KERNEL
     if not (commit_until(flight, methods, room, until_ns) and sample(flight, methods, room, until_ns, flight.row)):
@@ -280,15 +278,13 @@ def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> 
 @njit(error_model="numpy", allocates=False)
 def stop_in_last_good_state(flight: np.record) -> None:
     """Set the state to the end of the last good step, or leave it at now_ns if that is later."""
-    row = flight.trial
+    row, good = flight.trial[:13], True
     if flight.committed_ns == flight.start_ns:
-        copy_numbers(flight.start, row[:13])
+        copy_numbers(flight.start, row)
     else:
-        to_good_row(flight.variables, flight.problem, (flight.committed_ns - flight.start_ns) * 1e-9, row, MAX_SPEED)
-    good = flight.committed_ns >= flight.now_ns
-    for k in range(13):
-        good = good and np.isfinite(row[k])
-    if good:
+        elapsed = (flight.committed_ns - flight.start_ns) * 1e-9
+        good = to_good_row(flight.variables, flight.problem, elapsed, row, MAX_SPEED)
+    if good and flight.committed_ns >= flight.now_ns:
         copy_numbers(row, flight.row)
         flight.now_ns = flight.committed_ns
 

@@ -14,7 +14,7 @@ from numba import float64, from_dtype, int64, types
 from ..base.compilation import entry_of, njit, place_of
 from ..base.simd import aligned
 from ..motion.integrators.integrator import METHOD, provide_kernel
-from ..motion.loads import Load, load_of_row
+from ..motion.loads import Load, load_of_bytes
 from ..motion.state import State
 from ..motion.string import StringState
 from . import flight as fl
@@ -127,15 +127,16 @@ class FlightArrays:
         self._call = _entry()
         self.integrator, self.methods = setup.integrator, setup.flight_start.methods
         self._allocate(FIRST_ROWS, setup.flight_start.room)
+        self.integers[_LOAD_IDS] = 0
 
     def _allocate(self, rows: int, room: int) -> None:
-        """Memory, all zero, for the flight, tables with this number of rows and a workspace of so many doubles."""
+        """Memory for the flight, tables with this number of rows and a workspace of so many doubles."""
         # In one piece: allocating five arrays of records takes twice as long.
         events = 4 * rows + 4
         loads_at = _FLIGHT_BYTES
         events_at = loads_at + rows * _ROW_BYTES
         room_at = events_at + events * _EVENT_BYTES
-        memory = aligned((1, room_at // 8 + room), before=room_at // 8)[0].view(np.int64)
+        memory = aligned(room_at // 8 + room, before=room_at // 8).view(np.int64)
         self.integers = memory[: _FLIGHT_BYTES // 8].data
         self._flights = np.ndarray(1, FLIGHT, memory)
         self.row = np.ndarray(13, np.float64, memory, _STATE_AT)
@@ -171,7 +172,6 @@ class FlightArrays:
         """
         self.call(CUT)
         self._take_methods(setup)
-        self.room[:] = 0.0
         flight = self.flight
         flight.method = 0  # a number in the present table, which may be shorter
         new = setup.flight_start.flight[0]
@@ -263,5 +263,5 @@ class FlightArrays:
     def acting(self) -> Iterator[ActingLoad]:
         """The active loads, in the order in which they began."""
         for row in self._loads[: self.integers[_ACTING]]:
-            load = load_of_row(row.load)
+            load = load_of_bytes(row.load.tobytes())
             yield ActingLoad(load, int(row.at_ns), int(row.end_ns), int(row.id), int(row.kind), int(row.slot))

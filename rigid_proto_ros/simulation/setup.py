@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.compilation import new_record
 from ..base.errors import CommandRefused
 from ..base.rotation import length, transposed_times
 from ..base.vectors import Vector
@@ -31,7 +30,7 @@ from ..motion.integrators.integrator import (
 )
 from ..motion.integrators.series_steps import degree_for
 from ..motion.loads import Load, light_row, resolve_load
-from ..motion.problem import ENVIRONMENT_NEEDS, PROBLEM, Environment, begin_body
+from ..motion.problem import ENVIRONMENT_NEEDS, Environment, begin_body
 from ..motion.state import State
 from ..motion.string import StringSettings, most_yielding
 from ..motion.surface import Surface
@@ -86,20 +85,14 @@ class Setup(Environment):
         return 0.5 * length(diagonal)
 
     @cached_property
-    def body_row(self) -> np.ndarray:
-        """The body with its length, as compiled functions read it (BODY,)."""
-        row = self.body.row.copy()
-        row[LENGTH] = self.length
-        return row
-
-    @cached_property
     def flight_start(self) -> FlightStart:
         """What flights under this setup begin with."""
         start, degree = np.zeros(1, FLIGHT), degree_for(self.accuracy)
         flight = start[0]
         flight.row[:] = flight.start[:] = self.initial
-        flight.body[:] = self.body_row
-        flight.common = self.problem
+        flight.body[:] = self.body.row
+        flight.body[LENGTH] = self.length
+        begin_body(flight.common, flight.body, self.environment, float(self.gyroscopic))
         flight.accuracy, flight.degree, flight.step_ns = self.accuracy, degree, self.step_ns
         flight.timeout_ns, flight.poke_ns = self.wrench_timeout_ns, self.poke_duration_ns
         flight.chooses = self.integrator.chooses
@@ -114,13 +107,6 @@ class Setup(Environment):
         """What thrusters ask of the integrator."""
         loads = [thruster.load(1.0) for thruster in self.thrusters.values()]
         return frozenset().union(*map(needs_of_load, loads))
-
-    @cached_property
-    def problem(self) -> np.record:
-        """What all segments under this setup have in common (motion/problem.py)."""
-        problem = new_record(PROBLEM)
-        begin_body(problem, self.body_row, self.environment, float(self.gyroscopic))
-        return problem
 
 
 # What its body and integrator can take
@@ -158,7 +144,7 @@ def load_row(command: WrenchCommand, setup: Setup, state: State | None) -> bytes
     """The row of the command's load; raises CommandRefused where body or integrator can't take it."""
     frame, force, torque, body = command.frame, command.force, command.torque, setup.body
     if setup.integrator.supports_loads or frame.impulse:
-        row = light_row(frame, force, torque, body)
+        row = light_row(frame, force, torque, body, setup.contacts)
         if row:
             return row
     load = resolve_load(frame, force, torque, body, setup.surface, setup.contacts, state)

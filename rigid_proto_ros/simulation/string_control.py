@@ -13,7 +13,7 @@ from ..base.vectors import vector
 from ..motion.body import Body
 from ..motion.loads import MAX_ACCELERATION
 from ..motion.state import State
-from ..motion.string import StringState, tie
+from ..motion.string import StringState, span_of, tie
 from .commands import MoveString, TieString
 from .setup import Setup, check_rates
 
@@ -97,14 +97,10 @@ def mesh_point(command: TieString, body: Body, state: State) -> np.ndarray:
 
 def _checked(tied: StringState, body: Body, state: State) -> StringState:
     """The string; raises CommandRefused (``magnitude``) when its pull would exceed MAX_ACCELERATION."""
+    rx, ry, rz = tied.arm(body)
     # Both ends of the free end's path count, not only its current position.
-    farthest = max(
-        float(np.abs(replace(tied, origin=end, target=end).span(body, state)).max())
-        for end in (tied.target, tied.origin)
-    )
-    with np.errstate(over="ignore"):
-        acceleration = tied.frequency * tied.frequency * farthest
-    if not acceleration <= MAX_ACCELERATION:
+    farthest = max(abs(x) for end in (tied.target, tied.origin) for x in span_of(rx, ry, rz, state.row, *end))
+    if not tied.frequency * tied.frequency * farthest <= MAX_ACCELERATION:
         raise CommandRefused(
             "magnitude",
             "string target",

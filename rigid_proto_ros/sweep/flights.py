@@ -14,7 +14,6 @@ replays to the bit. msg_examples/06_python_flight.py tunes a controller.
 from __future__ import annotations
 
 import multiprocessing
-import multiprocessing.connection
 import os
 import signal
 import sys
@@ -91,11 +90,12 @@ class Flight:
         until_ns = simulation.time_ns + nanoseconds(seconds)
         if until_ns > nanoseconds(MAX_TIME_S):
             raise InputError("step", seconds, f"a step that ends by {MAX_TIME_S:g} s of simulated time")
-        refused = simulation.refused.total()
+        before = dict(simulation.refused)
         if not self._run.advance(until_ns):
             raise InputError("step", simulation.failure)
-        if simulation.refused.total() > refused:
-            counts = ", ".join(f"{count} {reason}" for reason, count in simulation.refused.items())
+        new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
+        if any(new.values()):
+            counts = ", ".join(f"{count} {reason}" for reason, count in new.items() if count)
             raise CommandRefused("schedule", "command", f"refused when it was due to act ({counts})")
         return self.sample()
 
@@ -140,5 +140,5 @@ def _depend_on_the_parent() -> None:
 def _end_with_the_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
-        multiprocessing.connection.wait([parent.sentinel])
+        parent.join()
     os._exit(1)

@@ -86,9 +86,10 @@ def _flips(value: Any, field: str) -> list[float]:
     margin = number(spec.get("margin", 0.5), f"{field}, margin", 0.0, 0.99)
     if axis == "spin":
         return [margin, 0.0, 0.0, 0.0]
-    if not isinstance(axis, list) or len(axis) != 3 or not any(axis):
+    direction = [number(x, f"{field}, axis") for x in axis] if isinstance(axis, list) else []
+    if len(direction) != 3 or not any(direction):
         raise InputError(f"{field}, axis", axis, "spin, or a direction [x, y, z] of the body")
-    return [margin, *(number(x, f"{field}, axis") for x in axis)]
+    return [margin, *direction]
 
 
 def _conditions(spec: Any, field: str) -> dict[str, list[float]]:

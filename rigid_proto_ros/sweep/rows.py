@@ -152,7 +152,7 @@ Place = tuple[int, str, slice | int]
 def _place_of(vary: Vary, script: list[Any], entries: list[int]) -> Place:
     """Where the numbers of what varies in the script stand in its table of commands."""
     target: Target = vary.target
-    is_number = isinstance(vary.form, Draw) or vary.form.taken(np.zeros(1, np.int64)).dtype == np.float64
+    is_number = isinstance(vary.form, Draw) or vary.form.array.dtype == np.float64
     if entries.count(target.entry) != 1 or "jitter" in script[target.entry - 1] or not is_number:
         raise NotBatchable
     name, *component = target.path[1:] if target.path[0] == "wrench" else target.path

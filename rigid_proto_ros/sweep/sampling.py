@@ -12,6 +12,7 @@ import json
 import math
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -51,15 +52,16 @@ class Points:
         every = max(1, len(self.values) // 1000)
         return [*self.values[::every], self.values[-1]]
 
-    def taken(self, indices: NDArray[np.int64]) -> NDArray[Any]:
-        """The values at these indices (n,): numbers as float64 (n,) or (n, k), the rest as objects (n,)."""
+    @cached_property
+    def array(self) -> NDArray[Any]:
+        """The values: numbers as float64 (n,) or (n, k), the rest as objects (n,). There may be a million."""
         rows = [value if isinstance(value, list) else [value] for value in self.values]
         alike = len({(type(value) is list, len(row)) for value, row in zip(self.values, rows, strict=True)}) == 1
         if alike and all(isinstance(x, (int, float)) and not isinstance(x, bool) for row in rows for x in row):
-            return np.take(np.array(self.values, dtype=float), indices, axis=0)
+            return np.array(self.values, dtype=float)
         objects = np.empty(len(self.values), dtype=object)
         objects[:] = [tuple(v) if isinstance(v, list) else v for v in self.values]
-        return np.take(objects, indices)
+        return objects
 
 
 @dataclass(frozen=True)
@@ -127,9 +129,12 @@ def _points(value: Any, field: str) -> list[Any]:
         spec = mapping(value, field, ("from", "to", "count", "log"), ("from", "to", "count"))
         a, b = number(spec["from"], f"{field}, from"), number(spec["to"], f"{field}, to")
         count = whole(spec["count"], f"{field}, count", 2, MAX_POINTS)
+        log = spec.get("log", False)
+        if not isinstance(log, bool):
+            raise InputError(f"{field}, log", log, "true or false")
         if a == b:
             raise InputError(field, [a, b], "a range whose ends differ")
-        if spec.get("log", False) is True:
+        if log:
             if not (a > 0.0 and b > 0.0):
                 raise InputError(field, [a, b], "ends above 0 on a logarithmic grid")
             return _geometric(a, b, count)

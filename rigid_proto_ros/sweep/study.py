@@ -123,7 +123,7 @@ class Study:
                 found.append(vary.form.shaped(drawn[:, at : at + vary.form.uniforms]))
                 at += vary.form.uniforms
             else:
-                found.append(vary.form.taken(index))
+                found.append(vary.form.array[index])
         return found
 
     def _points(self, rows: np.ndarray) -> list[Any]:

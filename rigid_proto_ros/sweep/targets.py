@@ -117,7 +117,7 @@ def _script_target(name: str, field: str, entries: list[Any]) -> Target:
     accepted = f"script.<entry>.<field>, entries 1 to {len(entries)}"
     if not entries:
         raise InputError(field, name, "a study with a script")
-    if not number.isdigit() or not 1 <= int(number) <= len(entries) or not keys:
+    if not number.isdecimal() or not 1 <= int(number) <= len(entries) or not keys:
         raise InputError(field, name, accepted)
     if keys[0] not in _SCRIPT_FIELDS:
         raise InputError(field, keys[0], one_of(keys[0], _SCRIPT_FIELDS))

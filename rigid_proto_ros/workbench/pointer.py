@@ -144,7 +144,7 @@ class Pointer:
         hit = surface.ray_hit(origin, seen.body_direction(direction) / body.scale)
         if hit is None:
             return False
-        at = {"point": numbers(hit[0])}
+        at = {"point": numbers(hit)}
         self._flight.do({"at": at, "push": force} if push else {"at": at, "force": numbers(force * direction)})
         return True
 

@@ -17,10 +17,6 @@ def angle(a, b):
     return np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)
 
 
-def test_the_contract_names_four():
-    assert sorted(WITHOUT) == ["auto", "euler", "midpoint", "rk4"]
-
-
 @pytest.mark.parametrize("name", WITHOUT)
 def test_without_the_term_energy_and_size_of_momentum_stay_but_its_direction_turns(name):
     simulation = flight(bundled_body("t_handle"), integrator=name, initial=spinning(SPIN), gyroscopic=False)
@@ -45,6 +41,6 @@ def test_with_the_term_momentum_is_fixed_in_the_world(name):
 
 @pytest.mark.parametrize("name", sorted(set(INTEGRATORS) - set(WITHOUT)))
 def test_others_refuse_to_drop_the_term_and_name_those_that_can(name):
-    with pytest.raises(CommandRefused, match="auto, euler, midpoint, rk4") as refusal:
+    with pytest.raises(CommandRefused, match="gyroscopic: false: auto, euler, midpoint, rk4$") as refusal:
         flight(bundled_body("t_handle"), integrator=name, initial=spinning(SPIN), gyroscopic=False)
     assert (refusal.value.field, refusal.value.reason) == ("integrator", "integrator")

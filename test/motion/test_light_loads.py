@@ -12,6 +12,8 @@ from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.loads import light_row, resolve_load
 
+CONTACTS = {"tip": (0.2, -3.0, 4e4)}
+
 
 def test_a_light_load_is_resolved_as_any_other_and_none_too_strong_is_light() -> None:
     rng = np.random.default_rng(1)
@@ -21,11 +23,11 @@ def test_a_light_load_is_resolved_as_any_other_and_none_too_strong_is_light() ->
         moments = mass * size[0] ** 2 * np.array([1.0, 1.5, 2.0])
         body = make_body(mass, rng.normal(size=3) * size[1], np.diag(moments), rng.choice([-1.0, 1.0], 3) * size[1:])
         numbers = (10.0 ** rng.uniform(-5, 18) * rng.normal(size=6)).tolist()
-        frame = parse_frame(f"{rng.choice(['world', 'body'])}@{rng.choice(['com', 'point/0.1,-0.2,3e5'])}")
-        row = light_row(frame, numbers[:3], numbers[3:], body)
+        frame = parse_frame(f"{rng.choice(['world', 'body'])}@{rng.choice(['com', 'tip', 'point/0.1,-0.2,3e5'])}")
+        row = light_row(frame, numbers[:3], numbers[3:], body, CONTACTS)
         if row:
             light += 1
-            load = resolve_load(frame, numbers[:3], numbers[3:], body, None, {}, None)
+            load = resolve_load(frame, numbers[:3], numbers[3:], body, None, CONTACTS, None)
             load.check_magnitude(body)
             assert row == load.packed
     assert light > 200

@@ -55,7 +55,7 @@ def test_a_ray_hits_where_every_triangle_by_itself_says(seed):
         if hit is None:
             assert expected == np.inf
             continue
-        distance = np.linalg.norm(hit[0] - origin) / np.linalg.norm(direction)
+        distance = np.linalg.norm(hit - origin) / np.linalg.norm(direction)
         assert distance == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
@@ -80,7 +80,7 @@ def test_a_ray_along_the_axes_hits_the_diagonal_that_two_triangles_share():
         direction[axis] = -sign
         hit = CUBE.ray_hit(origin, direction)
         assert hit is not None
-        assert hit[0][axis] == (1.0 if sign > 0 else 0.0)
+        assert hit[axis] == (1.0 if sign > 0 else 0.0)
 
 
 def test_a_ray_behind_or_beside_the_body_misses():
@@ -91,7 +91,7 @@ def test_a_ray_behind_or_beside_the_body_misses():
 def test_the_size_of_the_direction_does_not_matter():
     for size in (1e-300, 1.0, 1e300):
         hit = CUBE.ray_hit([0.25, 0.5, 2.0], [0.0, 0.0, -size])
-        assert hit[0].tolist() == [0.25, 0.5, 1.0]
+        assert hit.tolist() == [0.25, 0.5, 1.0]
 
 
 @pytest.mark.parametrize(

@@ -173,7 +173,7 @@ def arguments() -> tuple[np.ndarray, np.ndarray]:
 OF_ONE = {
     "sine": (lambda x: el.sine_cosine(x)[0], 0),
     "cosine": (lambda x: el.sine_cosine(x)[1], 0),
-    "inverse_tangent": (el.inverse_tangent, 0),
+    "inverse_tangent": (lambda x: el.inverse_tangent_of(x, 1.0), 0),
     "logarithm": (el.logarithm, 0),
     "exponential_of": (el.exponential_of, 1),
     "expm1": (el.expm1, 1),

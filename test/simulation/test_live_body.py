@@ -10,7 +10,7 @@ from flights import SECOND
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
-from rigid_proto_ros.simulation.commands import Change
+from rigid_proto_ros.simulation.commands import Change, SetState
 from rigid_proto_ros.simulation.simulation import Simulation
 
 SCENE = {
@@ -159,6 +159,20 @@ def test_an_impossible_inertia_is_refused_with_its_reason(mass, com, tensor, rea
     with pytest.raises(CommandRefused) as refused:
         check_inertia(make_scenario(SCENE), {"relative": False, "mass": mass, "com": com, "tensor": tensor})
     assert refused.value.reason == reason
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"orientation_xyzw": (math.nan, 0.0, 0.0, 1.0)}, "accepted: 4 finite numbers"),
+        ({"orientation_xyzw": (0.0, 0.0, 0.0, 0.0)}, "four numbers, not all zero"),
+        ({"angular_velocity": (0.0, 0.0, 1e101)}, "accepted: numbers of at most 1e.100$"),
+        ({"position": (0.0, 0.0)}, "position of 3 numbers"),
+    ],
+)
+def test_an_impossible_state_is_refused_with_what_is_accepted(values, words):
+    with pytest.raises(CommandRefused, match=words):
+        SetState(values)
 
 
 def test_density_set_wins_over_mass_and_mass_over_density():

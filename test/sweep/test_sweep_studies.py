@@ -58,6 +58,9 @@ TWELVE = {"from": 1, "to": 2, "count": 10**6}
         ({"script": [{"t": 0.1, "at": "tip", "froce": [0, 0, 1]}]}, "entry 1", "force"),
         ({**NUDGE, "vary": {"script.1.at.vertex": {"grid": [0, 0.5]}}}, "vary.script.1.at.vertex", "{vertex: i}"),
         ({"script": [{"t": 0, "set": {"mass": date(2020, 1, 1)}}], "vary": {"script.1.t": {"grid": [1]}}}, "", "mass"),
+        ({"vary": {"mass": {"grid": {"from": 1, "to": 9, "count": 3, "log": 1}}}}, "mass.grid, log", "true or false"),
+        ({"measure": {"flips": {"axis": ["0", "0", "0"]}}}, "measure.flips, axis", "a direction"),
+        ({**NUDGE, "vary": {"script.².t": {"grid": [1.0]}}}, "vary", "entries 1 to 1"),
         ({**NUDGE, "vary": {"script.1.at.vertex": {"uniform": [0, 5]}}, "samples": 2}, "vertex", "random_vertex"),
     ],
 )

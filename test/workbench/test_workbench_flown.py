@@ -550,7 +550,7 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
         towards = (page.state.position - backend.origin) / backend.unit - flown.server.initial_camera.position
         eye = -backend.unit * towards @ page.state.rotation
         hit = setup.surface.ray_hit(setup.body.mesh_point(eye), -eye / setup.body.scale)
-        nearer = hit is not None and np.linalg.norm(eye - setup.body.point(hit[0])) < np.linalg.norm(eye)
+        nearer = hit is not None and np.linalg.norm(eye - setup.body.point(hit)) < np.linalg.norm(eye)
         assert not nearer, "the body hides the mark of the centre of mass"
     axes = backend._nodes.get(style.PRINCIPAL_AXES)
     is_round = name in ("spinning_top", "top_on_string")

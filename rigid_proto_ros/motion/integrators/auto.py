@@ -105,9 +105,9 @@ _SERIES = Method(
 )
 
 
-def _spin_workspace(degree: int) -> np.ndarray:
+def _spin_workspace(degree: int) -> tuple[int, int]:
     """Workspace for the series of the spin alone, cleared when the method changes; a fifth of the other's size."""
-    return np.zeros((degree + 1, SPIN_COLUMNS))
+    return degree + 1, SPIN_COLUMNS
 
 
 _BY_KIND = {
@@ -124,12 +124,10 @@ _BY_KIND = {
         None,
         "auto: sleeping, the string is slack and nothing moves",
         sleeps=True,
-        on_string=True,
     ),
     ON_STRING: replace(
         _SERIES,
         choice="auto: taylor of degree {degree_of_motion}, a string of up to {swing:.3g} rad/s",
-        on_string=True,
     ),
 }
 

@@ -36,7 +36,7 @@ import math
 
 import numpy as np
 
-from ...base.arithmetic import inverse_tangent, pair_add, pair_multiply, sine_cosine, two_product, two_sum
+from ...base.arithmetic import inverse_tangent_of, pair_add, pair_multiply, sine_cosine, two_product, two_sum
 from ...base.compilation import njit
 from ...base.rotation import multiply, norm, normalize, rotate
 from ...base.vectors import Quaternion, Vector
@@ -157,7 +157,7 @@ def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector
     product = x0 * x * x1 / (1.0 + nu * x1 * x1 - nu * x0 * x * y1 * d1)
     root = math.sqrt(nu * (1.0 + nu) * (nu + kappa * kappa))
     angle = root * product
-    integral += product if abs(angle) < 1e-9 else inverse_tangent(angle) / root
+    integral += product if abs(angle) < 1e-9 else inverse_tangent_of(angle, 1.0) / root
     psi = f_a * h + f_b * (1.0 + kappa) / rate * integral
     s, c = sine_cosine(0.5 * psi)
     turned = multiply(-M2, M1, 0.0, L + M3, 0.0, 0.0, s, c)
@@ -341,7 +341,7 @@ def _rc_of_one(e: float) -> float:
         # Σ (−e)ᵏ/(2k + 1), six terms.
         return 1.0 - e * (1.0 / 3.0 - e * (0.2 - e * (1.0 / 7.0 - e * (1.0 / 9.0 - e / 11.0))))
     root = math.sqrt(e)
-    return inverse_tangent(root) / root
+    return inverse_tangent_of(root, 1.0) / root
 
 
 @njit(error_model="numpy")

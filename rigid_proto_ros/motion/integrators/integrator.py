@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -67,17 +67,16 @@ class Method:
     kernel: a Kernel, or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps, or
     samples; control: CONTROL. choice: description and reason, a format string with {step_s}, {degree} and
     {degree_of_motion} of series, and {swing}, the string's highest frequency [rad/s]. evaluations: of the equations of
-    motion per step; adaptive kernels count their own. workspace(degree): memory for the kernel. sleeps: nothing moves.
-    on_string: only for segments with a string.
+    motion per step; adaptive kernels count their own. workspace(degree): rows and columns of the kernel's memory.
+    sleeps: nothing moves.
     """
 
     way: int
     kernel: Callable[..., Any] | None
     choice: str
     evaluations: int = 0
-    workspace: Callable[[int], np.ndarray] | None = None
+    workspace: Callable[[int], tuple[int, int]] | None = None
     sleeps: bool = False
-    on_string: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,17 +99,14 @@ class Integrator:
 
     @property
     def chooses(self) -> bool:
-        """Whether the method depends on all loads of a segment (auto), not only on whether a string is tied."""
+        """Whether the method is chosen for each segment (auto)."""
         return self.kernel is None
 
     @cached_property
     def methods(self) -> tuple[Method, ...]:
-        """Its methods, in the order of auto's kinds of segments, or without and with a string."""
-        if self.ways:
-            return self.ways
+        """Its methods, in the order of auto's kinds of segments."""
         choice = f"{self.name}: fixed steps of {{step_s:g}} s"
-        without = Method(FIXED_STEPS, self.kernel, choice, self.evaluations)
-        return without, replace(without, on_string=True)
+        return self.ways or (Method(FIXED_STEPS, self.kernel, choice, self.evaluations),)
 
     @cached_property
     def supports_loads(self) -> bool:
@@ -209,7 +205,7 @@ def method_table(integrator: Integrator, degree: int) -> np.ndarray:
     """
     table = np.zeros(len(integrator.methods), METHOD)
     for number, method in enumerate(integrator.methods):
-        rows, columns = method.workspace(degree).shape if method.workspace else (0, 0)
+        rows, columns = method.workspace(degree) if method.workspace else (0, 0)
         table[number] = method.way, 0, method.evaluations, method.sleeps, rows, columns
     return table
 
@@ -224,12 +220,6 @@ def provide_kernel(integrator: Integrator, table: np.ndarray, number: int) -> No
     kernel, method = integrator.methods[number].kernel, table[number]
     if kernel is not None and method["address"] == 0:
         method["address"] = address_of(kernel, ADAPTIVE_STEPS if method["way"] == ADAPTIVE else STEPS)
-
-
-@njit(error_model="numpy", allocates=False, forceinline=True)
-def is_provided(method: np.record) -> bool:
-    """Whether the method's kernel can be called."""
-    return bool(method.way == NOTHING or method.address != 0)
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)

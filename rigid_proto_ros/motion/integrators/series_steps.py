@@ -27,7 +27,7 @@ import numpy as np
 from ...base.arithmetic import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of, logarithm
 from ...base.compilation import copy_numbers, njit
 from ...base.rotation import norm
-from ...base.simd import Packed, aligned, filled, four, joined, largest, load
+from ...base.simd import Packed, filled, four, joined, largest, load
 from ..problem import ATTITUDE, HEAT, VARIABLES, damping_functions, is_good
 from ..string import most_yielding
 from .series import (
@@ -285,11 +285,11 @@ def _count(control: np.record) -> None:
     control.series = False
 
 
-def series_workspace(degree: int) -> np.ndarray:
+def series_workspace(degree: int) -> tuple[int, int]:
     """Workspace for the coefficients of the step's first series and of its last one, and for the initial variables of
     the last one. They are kept until the step is committed, because samples within the step evaluate them.
     """
-    return aligned((2 * (degree_of_motion(degree) + 2) + 1, MOTION_COLUMNS))
+    return 2 * (degree_of_motion(degree) + 2) + 1, MOTION_COLUMNS
 
 
 @njit(error_model="numpy", allocates=False)

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: MIT
+"""Files are written whole, and nothing but a file gives its name to one."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.base.files import check_whole_file, whole_file
+
+
+def test_a_pipe_or_a_device_is_left_as_it_is(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.csv"
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match="--csv: .*a device or a pipe"):
+        check_whole_file("--csv", pipe)
+    with pytest.raises(InputError, match="--csv: .*a device or a pipe"), whole_file("--csv", pipe) as beside:
+        beside.write_text("x")
+    assert pipe.is_fifo() and list(tmp_path.iterdir()) == [pipe]
