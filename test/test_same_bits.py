@@ -40,7 +40,6 @@ IN_AN_ORDER_OF_THEIR_OWN = {
 
 FRACTIONS = "of fractions or whole numbers, exact"
 ALLOWED = {
-    ("motion/surface.py", ".sum"): "of three numbers in compiled code: one after the other",
     ("motion/loads.py", "sum"): "asked only whether it is finite",
     ("mass/exact_moments.py", "sum"): FRACTIONS,
     ("mass/exact_moments.py", "**"): FRACTIONS,

@@ -596,7 +596,7 @@ class Simulation:
     def at_rest(self) -> bool:
         """Whether nothing moves, no load acts and no command is pending."""
         still = not (self.state.row[7:].any() or self.setup.gravity.any())
-        return still and not self.acting and self.string is None and not self._pending
+        return still and not self.flight.acting and self.string is None and not self._pending
 
     def accelerations(self) -> tuple[np.ndarray, np.ndarray]:
         """Current acceleration of the COM (3,) [m/s²] and angular acceleration (3,) [rad/s²], both in world axes."""
