@@ -377,18 +377,11 @@ def accelerations(
 
 
 @njit(error_model="numpy", allocates=False)
-def knot_of(y: np.ndarray, p: np.record) -> tuple[Vector, Vector]:
-    """``knot`` at variables y."""
-    q, w, d, u = parts_of(y)
-    return knot(q, w, d, u, p)
-
-
-@njit(error_model="numpy", allocates=False)
 def stretch(y: np.ndarray, p: np.record) -> tuple[float, float]:
     """x = l − rest length, and its rate, of variables y; (1, 0) for a string whose law never changes."""
     if p.bilateral or not p.has_string:
         return 1.0, 0.0
-    a, v = knot_of(y, p)
+    a, v = knot(*parts_of(y), p)
     length = norm(*a)
     if length == 0.0:
         return -p.rest_length, 0.0

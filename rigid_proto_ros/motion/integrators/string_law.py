@@ -22,7 +22,7 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import norm
-from ..problem import knot_of, stretch
+from ..problem import knot, parts_of, stretch
 from ..string import NO_DIRECTION
 from .series import A_KNOT, DISTANCE, STRETCH, TENSION, Knot, distance_series, stretch_at
 
@@ -54,7 +54,7 @@ def knot_at(y: np.ndarray, p: np.record) -> Knot:
     """The knot of the string at variables y; zeros without a string."""
     if not p.has_string:
         return 0.0, 0.0, 0.0, 0.0, 0.0
-    a, _ = knot_of(y, p)
+    a, _ = knot(*parts_of(y), p)
     length = norm(*a)
     return *a, length, length - p.rest_length
 
