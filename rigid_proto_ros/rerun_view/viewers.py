@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import Future
 from pathlib import Path
 from urllib.parse import quote
 
@@ -37,24 +38,36 @@ def has_display() -> bool:
     return sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
+def _run(command: list[str], log: int, started: Future[subprocess.Popen]) -> None:
+    # RERUN_APP_ONLY: no analytics question on the terminal of a program that only wants a picture.
+    environment = {**os.environ, "RERUN_APP_ONLY": "true"}
+    try:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            env=environment,
+            preexec_fn=end_with_this_thread(),
+        )
+    except OSError as error:
+        started.set_exception(error)
+        return
+    started.set_result(process)
+    process.wait()
+
+
 class ViewerProcess:
-    """A viewer that was started here, and that ends with ``stop``."""
+    """A viewer that was started here, and that ends with ``stop``, or with this process."""
 
     def __init__(self, *arguments: str, log: int = subprocess.DEVNULL) -> None:
         program = viewer_program()
         if program is None:
             raise FileNotFoundError(is_missing("rerun-sdk", "rerun"))
-        in_main_thread = threading.current_thread() is threading.main_thread()
-        # RERUN_APP_ONLY: no analytics question on the terminal of a program that only wants a picture.
-        environment = {**os.environ, "RERUN_APP_ONLY": "true"}
-        self.process = subprocess.Popen(
-            [program, *arguments],
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=log,
-            env=environment,
-            preexec_fn=end_with_this_thread() if in_main_thread else None,  # another one may end before the viewer
-        )
+        started: Future[subprocess.Popen] = Future()
+        # On a thread that waits for it: the one that calls this may end before the viewer.
+        threading.Thread(target=_run, args=([program, *arguments], log, started), name="viewer", daemon=True).start()
+        self.process = started.result()
 
     @property
     def running(self) -> bool:

@@ -75,6 +75,18 @@ def test_a_node_that_is_refused_behind_its_viewer_leaves_none(ros_environment, t
         socket.create_connection(("127.0.0.1", port))
 
 
+@needs_rerun
+def test_a_node_that_is_killed_takes_its_viewer_with_it(ros_environment, tmp_path):
+    node = start_node(ros_environment, tmp_path / "node", {"viewer": "web"})
+    node.wait_for("is simulating")
+    (viewer,) = descendants(node.pid)
+    node.process.kill()
+    deadline = time.monotonic() + READY_S
+    while alive(viewer):
+        assert time.monotonic() < deadline, "the viewer goes on"
+        time.sleep(0.02)
+
+
 @BOTH
 def test_a_node_that_compiles_its_kernels_ends_at_once(ros_environment, tmp_path, number):
     """From an empty cache they take a minute or two, and nothing interrupts a compiler."""
