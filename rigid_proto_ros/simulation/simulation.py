@@ -84,9 +84,9 @@ class Simulation:
     """Simulation of one body under commands.
 
     Not thread-safe: a single owner submits and advances. ``time_ns`` and ``state`` are those of the last advance.
-    ``refused`` counts refusals by reason; ``failure`` says why the motion stopped, or is empty. ``listed``: place in
-    its list of the command being applied, if it is an entry of one. ``logs_timeouts``: whether the timeout of a held
-    wrench is logged.
+    ``refused`` counts refusals by reason, ``refusals`` has the text of the last one of each; ``failure`` says why the
+    motion stopped, or is empty. ``listed``: place in its list of the command being applied, if it is an entry of one.
+    ``logs_timeouts``: whether the timeout of a held wrench is logged.
     """
 
     time_ns: int
@@ -97,6 +97,7 @@ class Simulation:
         self.follower: Callable[[Command, int, Listed | None], None] | None = None
         self.events = EventLog()
         self.refused: Counter[str] = Counter()
+        self.refusals: dict[str, str] = {}
         self._arrivals = 0
         self.listed: Listed | None = None
         self.logs_timeouts = True
@@ -194,7 +195,8 @@ class Simulation:
     def refuse(self, error: CommandRefused, count: int = 1) -> None:
         """Count the refusal of ``count`` commands and notify the observer."""
         self.refused[error.reason] += count
-        self.observer.on(Refused(self.time_ns, error.reason, str(error)))
+        self.refusals[error.reason] = text = str(error)
+        self.observer.on(Refused(self.time_ns, error.reason, text))
 
     def check_change(self, new: Setup) -> None:
         """Raises CommandRefused (``integrator``) when the new integrator can't handle current or future loads."""

@@ -95,8 +95,8 @@ class Flight:
             raise InputError("step", simulation.failure)
         new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
         if any(new.values()):
-            counts = ", ".join(f"{count} {reason}" for reason, count in new.items() if count)
-            raise CommandRefused("schedule", "command", f"refused when it was due to act ({counts})")
+            texts = [f"{count} {reason}, {simulation.refusals[reason]}" for reason, count in new.items() if count]
+            raise CommandRefused("schedule", "command", f"refused when it was due to act: {'; '.join(texts)}")
         return self.sample()
 
     def sample(self) -> State:

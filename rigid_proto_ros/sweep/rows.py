@@ -281,8 +281,9 @@ def _simulate(
         _fill(simulation, state)
     if simulation.refused:
         # A row whose commands were refused in flight isn't the row that was asked for.
-        counts = (f"{count} commands refused: {reason}" for reason, count in simulation.refused.items())
-        raise FailedFlight("; ".join(counts))
+        refused = simulation.refused.items()
+        texts = (f"{count} commands refused: {reason}, {simulation.refusals[reason]}" for reason, count in refused)
+        raise FailedFlight("; ".join(texts))
     return simulation
 
 

@@ -56,8 +56,8 @@ class Target:
         return bool(self.entry) and self.path[-1] == "vertex"
 
     def component_names(self, count: int) -> list[str]:
-        """Names of ``count`` columns for a vector value."""
-        labels = component_labels(self.parameter, count)
+        """Names of ``count`` columns for a vector value; forces of thrusters have numbers."""
+        labels = map(str, range(count)) if self.path == ("thrusters",) else component_labels(self.parameter, count)
         return [f"{self.name}.{label}" for label in labels]
 
 

@@ -172,8 +172,13 @@ def test_the_batch_reads_every_parameter_that_decides_how_a_row_begins() -> None
 
 
 def test_a_row_that_is_too_fast_for_auto_is_refused_with_what_its_body_takes() -> None:
-    for vary in ({"angular_damping": {"list": [1e-3, 1e6]}}, {"string.frequency": {"list": [10.0, 1e7]}}):
-        own = study({**HUNG, "samples": 1, "vary": vary})
+    changed = [{"t": 0.1, "set": {"angular_damping": 0.0}}]
+    for name, values, script in (
+        ("angular_damping", [1e-3, 1e6], []),
+        ("string.frequency", [10.0, 1e7], []),
+        ("script.1.set.angular_damping", [1e-3, 1e6], changed),
+    ):
+        own = study({**HUNG, "samples": 1, "vary": {name: {"list": values}}, "script": script})
         reasons = run_chunk(own, 0, own.rows).columns["failure"].tolist()
         assert reasons[0] is None and "for this body: auto follows rates up to" in reasons[1]
 

@@ -88,6 +88,12 @@ def test_names_that_are_numbers_are_names() -> None:
     assert study(PLAIN, measure={"first": conditions}).measures.columns == ("first.1", "first.half")
 
 
+def test_forces_of_thrusters_have_columns_by_number() -> None:
+    forces = {"script.1.thrusters": {"grid": [[0.1, 0.0, 0.0, 0.0], [0.0, 0.1, 0.0, 0.0]]}}
+    own = study(PLAIN, script=[{"t": 0.1, "thrusters": [0.0, 0.0, 0.0, 0.0]}], vary=forces)
+    assert own.vary[0].target.component_names(4) == [f"script.1.thrusters.{k}" for k in range(4)]
+
+
 def numpys(seed: int, row: int, count: int) -> np.ndarray:
     """The same by numpy's own generator."""
     key = np.random.SeedSequence(seed).generate_state(2, np.uint64)
