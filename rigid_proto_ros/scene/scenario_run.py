@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from heapq import heappop, heappush
 from typing import TypeVar
 
 import numpy as np
@@ -247,6 +248,7 @@ class OfflineRun(ScenarioRun):
         super().__init__(scenario, observer)
         self._is_observed = observer is not None
         self._submitted = 0
+        self._rates_ns: list[int] = []  # when the publication rate changes, a heap
         if observer is not None:
             self.announce()
             self.begin_ghost()
@@ -261,7 +263,9 @@ class OfflineRun(ScenarioRun):
         taken = self.accepted(lambda waiting: self._checked(commands, waiting))
         self._submitted += len(taken)
         for command, number, checked in taken:
-            self.simulation.submit(command, command.stamp_ns, (0, number), checked)
+            when_ns = self.simulation.submit(command, command.stamp_ns, (0, number), checked)
+            if isinstance(command, Change) and "publish_rate" in command.content:
+                heappush(self._rates_ns, when_ns)
 
     def _checked(
         self, commands: Sequence[Command], waiting: Sequence[tuple[int, Change]]
@@ -280,6 +284,13 @@ class OfflineRun(ScenarioRun):
 
     def advance(self, until_ns: int) -> bool:
         """Advance the body to ``until_ns``, notifying the observer every publication; False when the motion failed."""
+        while self._rates_ns and self._rates_ns[0] < until_ns:
+            # The new rate counts from there, however far the next publication of the old one was.
+            if not self._advance_evenly(heappop(self._rates_ns) + 1):
+                return False
+        return self._advance_evenly(until_ns)
+
+    def _advance_evenly(self, until_ns: int) -> bool:
         simulation, publications = self.simulation, self.publications
         while self._is_observed and publications.next_ns <= until_ns:
             state = simulation.advance(publications.next_ns)

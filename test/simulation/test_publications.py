@@ -39,12 +39,27 @@ def test_publication_times_of_well_known_rates():
     assert publication_ns(10**9 * 60, 60.0) == 10**18
 
 
-@pytest.mark.parametrize(("rate", "after"), [(20.0, [1.0, 1.05, 1.1, 1.15, 1.2]), (5.0, [1.0, 1.2])])
-def test_a_rate_that_a_script_changes_holds_from_the_publication_after_that(rate: float, after: list[float]) -> None:
+@pytest.mark.parametrize("portions", [1, 100])
+@pytest.mark.parametrize(
+    ("before", "rate", "after"),
+    [
+        (10.0, 20.0, [1.0, 1.05, 1.1, 1.15, 1.2]),
+        (10.0, 5.0, [1.0, 1.2]),
+        (10.0, 50.0, [0.96 + 0.02 * k for k in range(13)]),
+        (0.5, 10.0, [1.0, 1.1, 1.2]),
+        (10.0, 1000.0, [0.951 + 0.001 * k for k in range(250)]),
+    ],
+)
+def test_a_rate_that_a_script_changes_holds_from_then_on(
+    before: float, rate: float, after: list, portions: int
+) -> None:
     told = Told()
     script = expand_script([{"t": 0.95, "set": {"publish_rate": rate}}])
-    assert OfflineRun(read_scene("t_handle", {"publish_rate": 10.0}), script, told).advance(12 * SECOND // 10)
-    assert [time_ns * 1e-9 for time_ns in told.times_ns] == pytest.approx([0.1 * k for k in range(10)] + after)
+    run = OfflineRun(read_scene("t_handle", {"publish_rate": before}), script, told)
+    for k in range(1, portions + 1):
+        assert run.advance(12 * SECOND // 10 * k // portions)
+    until = [k / before for k in range(10) if k / before < 0.95]
+    assert [time_ns * 1e-9 for time_ns in told.times_ns] == pytest.approx(until + after)
 
 
 def test_the_quaternion_is_never_flipped():
