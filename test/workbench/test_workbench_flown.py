@@ -497,6 +497,7 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
     flown.until(lambda: flown.page.lessons._asked and not flown.page._undrawn, "question")
     page, setup = flown.page, flown.scenario.setup
     backend = page.backend
+    flown.do(lambda: page.tick(time.monotonic()))  # with the labels of this lesson
 
     def seen(points) -> np.ndarray:
         """World points (n, 3) [m] in half heights of the picture, across and up."""
