@@ -139,7 +139,6 @@ class Picture:
             # Single precision has no digits for a mesh far from its origin.
             self._middle = 0.5 * (self._vertices.min(axis=0) + self._vertices.max(axis=0))
             self._mesh = shaded_surface(self._vertices - self._middle, triangles)
-        self.scales.forget()
         self.backend.begin(np.array([time_ns]))
         self._describe_mesh(self.backend)
 
@@ -148,6 +147,8 @@ class Picture:
         size = 0.0 if self.shape is None else self.shape.size
         if self.setup is not None:
             self.loads.body_changed(self.setup.body, setup.body)
+            if setup.surface is not self.setup.surface:
+                self.scales.forget()
         self.setup = setup
         self.shape = Shape(self._vertices, setup.body)
         self._poinsot.set_body(self.shape.moments, self.shape.axes)

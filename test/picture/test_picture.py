@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import rerun_flight as flight
@@ -15,6 +17,7 @@ from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.motion.string import StringSettings, tie
+from rigid_proto_ros.motion.surface import Surface
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.picture.arrows import FIRST, LONGEST, ArrowScales
 from rigid_proto_ros.picture.picture import Picture, Shape, angle_to
@@ -26,6 +29,7 @@ from rigid_proto_ros.simulation.observer import (
     GhostChanged,
     LoadBegan,
     LoadEnded,
+    MeshChanged,
     ShownLoad,
     Started,
     StringChanged,
@@ -123,6 +127,16 @@ def test_arrows_are_as_long_as_their_values_through_all_runs_of_a_body():
     for found in lengths.values():
         assert np.allclose(np.divide(found, found[0]), [1.0, 2.0, 4.0], rtol=1e-12)
     assert lengths[style.OMEGA][0] == pytest.approx(FIRST * picture.shape.size)
+
+
+def test_a_state_drawn_between_another_mesh_and_its_body_sets_no_scale_for_that_body():
+    picture, drawn = pictured(WEIGHTLESS)
+    picture.draw(times(5), spinning(60.0, 5))
+    picture.on(MeshChanged(50_000_000, 2.0 * flight.VERTICES, flight.TRIANGLES, ""))
+    picture.draw(times(5, 5), spinning(60.0, 5))
+    picture.on(BodyChanged(100_000_000, replace(WEIGHTLESS, surface=Surface(2.0 * flight.VERTICES, flight.TRIANGLES))))
+    picture.draw(times(5, 10), spinning(2.0, 5))
+    assert np.linalg.norm(drawn.at_end(style.OMEGA)[0]) == pytest.approx(FIRST * picture.shape.size)
 
 
 def test_of_a_body_at_rest_no_arrow_and_no_label_is_drawn():
