@@ -112,10 +112,8 @@ class Picture:
     def on(self, event: Event) -> None:
         """Take an event of the flight; states are drawn in batches by ``draw``, so that they are none."""
         match event:
-            case Started(time_ns=time_ns, vertices=vertices, triangles=triangles):
-                self._set_mesh(time_ns, vertices, triangles)
-            case MeshChanged(time_ns=time_ns, vertices=vertices, triangles=triangles):
-                self._set_mesh(time_ns, vertices, triangles)
+            case Started() | MeshChanged():
+                self._set_mesh(event.time_ns, event.vertices, event.triangles)
             case BodyChanged(time_ns, setup):
                 self._set_body(time_ns, setup)
             case GhostChanged(time_ns, setup):
