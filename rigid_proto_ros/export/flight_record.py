@@ -18,6 +18,7 @@ from ..simulation.observer import (
     GhostChanged,
     GhostPublished,
     LoadBegan,
+    LoadEnded,
     MeshChanged,
     Observer,
     Published,
@@ -42,7 +43,10 @@ class FlightRecord(Observer):
     """
 
     takes = frozenset(
-        {*(Started, MeshChanged, BodyChanged, GhostChanged, StringChanged, LoadBegan), *(Published, GhostPublished)}
+        {
+            *(Started, MeshChanged, BodyChanged, GhostChanged, StringChanged, LoadBegan, LoadEnded),
+            *(Published, GhostPublished),
+        }
     )
 
     def __init__(self) -> None:

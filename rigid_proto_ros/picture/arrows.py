@@ -83,11 +83,12 @@ class Loads:
         else:
             self.acting[load_id] = Acting(load, time_ns)
 
-    def ended(self, time_ns: int, load_id: int) -> None:
-        """A load acts no longer."""
+    def ended(self, time_ns: int, load_id: int, poke_shown_ns: int) -> None:
+        """A load acts no longer; of a poke the arrow stays for so long at least."""
         acting = self.acting.pop(load_id, None)
         if acting is not None:
-            acting.end_ns = time_ns
+            least_ns = poke_shown_ns if acting.load.kind == "poke" else 0
+            acting.end_ns = max(time_ns, acting.begin_ns + least_ns)
             self._ended.append(acting)
 
     def body_changed(self, before: Body, after: Body) -> None:

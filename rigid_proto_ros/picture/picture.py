@@ -76,7 +76,8 @@ class Shape:
 
 class Picture:
     """Told of what changes, and given states, it calls its backend. wanted(name) says whether a part is to be drawn;
-    nothing is computed for those that aren't.
+    nothing is computed for those that aren't. poke_shown_ns [ns, simulated]: how long the arrow of a poke stays at
+    least.
     """
 
     def __init__(self, backend: Backend, wanted: Callable[[str], bool] = lambda _: True, rate: int = RATE) -> None:
@@ -85,6 +86,7 @@ class Picture:
         self.ghost: Setup | None = None
         self.shape: Shape | None = None
         self.scales = ArrowScales()
+        self.poke_shown_ns = 0
         self._wanted = wanted
         self._period_ns = 1_000_000_000 // rate
         self._vertices: np.ndarray | None = None
@@ -121,7 +123,7 @@ class Picture:
             case LoadBegan(time_ns, load_id, load):
                 self.loads.began(time_ns, load_id, load)
             case LoadEnded(time_ns, load_id):
-                self.loads.ended(time_ns, load_id)
+                self.loads.ended(time_ns, load_id, self.poke_shown_ns)
             case StringChanged():
                 self.string.change(event)
 

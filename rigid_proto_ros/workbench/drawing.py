@@ -30,6 +30,9 @@ TRAIL_S = 0.1
 
 MOST_LABELS = 3
 
+POKE_SHOWN_NS = 800_000_000
+"""[ns, of a body that flies in real time] A poke is over before it has been drawn twice; its arrow stays so long."""
+
 ZOOM = (0.15, 1.6)
 """Body sizes in the picture's units between which a body may grow or shrink before the picture is scaled anew."""
 

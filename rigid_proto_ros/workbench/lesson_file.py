@@ -19,7 +19,7 @@ from ..picture import style
 from ..picture.picture import Picture
 from ..scene.lessons import Lesson
 from ..simulation.observer import BodyChanged, Event, StringChanged
-from .drawing import ViserBackend
+from .drawing import POKE_SHOWN_NS, ViserBackend
 from .lessons import COURSES, Course
 from .panel import ALWAYS, PARTS, SEE_INTO
 from .room import Room
@@ -94,6 +94,7 @@ def _recorded(server: viser.ViserServer, record: FlightRecord, course: Course) -
     backend.labelled.update(course.labels)
     backend.see_into(SEE_INTO in course.shows)
     picture = Picture(backend, backend.wanted, rate=1_000_000_000)
+    picture.poke_shown_ns = round(POKE_SHOWN_NS * course.speed)
     backend.origin = rows[0, 0:3].copy()
     waiting = list(changes)
     serializer = None

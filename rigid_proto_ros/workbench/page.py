@@ -42,7 +42,7 @@ from ..simulation.setup import Setup
 from ..simulation.simulation import Simulation
 from .body_tab import BodyTab
 from .controls import Controls
-from .drawing import ViserBackend
+from .drawing import POKE_SHOWN_NS, ViserBackend
 from .flight import SCENE, Flight
 from .lessons import Course, LessonPanel
 from .panel import ALWAYS, CENTRE_OF_MASS, ForcesTab, SessionTab, ShowTab, TimeBar, motion_words
@@ -56,9 +56,6 @@ FRAME_S = 0.02
 
 GRACE_S = 2.0
 """[s] After the last browser left: a page that is loaded anew finds what it showed."""
-
-SEEN_NS = 800_000_000
-"""[ns, of a body that flies in real time] A poke is over before a page has drawn it twice; its arrow stays so long."""
 
 TRAIL_NS = 4_000_000_000
 """[ns] Of the past that is drawn with a moment of it."""
@@ -325,7 +322,11 @@ class Page:
             case Reset():
                 self._reset(jump)
             case LoadBegan() | LoadEnded():
-                self._load_changed(event)
+                factor = float(self._scenario.parameters.real_time_factor) or 1.0
+                self.picture.poke_shown_ns = round(POKE_SHOWN_NS * factor)
+                self.picture.on(event)
+                if isinstance(event, LoadBegan) and event.load.kind in ("poke", "impulse"):
+                    self._poked(event.load)
             case StringChanged():
                 self._strings.append(event)
                 self.picture.on(event)
@@ -349,17 +350,6 @@ class Page:
         elif self.backend.unit != self._unit:
             self._furnish(scenario.setup)
         self._unit = self.backend.unit
-
-    def _load_changed(self, event: LoadBegan | LoadEnded) -> None:
-        if isinstance(event, LoadBegan):
-            if event.load.kind in ("poke", "impulse"):
-                self._poked(event.load)
-        else:
-            acting = self.picture.loads.acting.get(event.load_id)
-            if acting is not None and acting.load.kind == "poke":
-                factor = float(self._scenario.parameters.real_time_factor) or 1.0
-                event = event._replace(time_ns=max(event.time_ns, acting.begin_ns + round(SEEN_NS * factor)))
-        self.picture.on(event)
 
     def _poked(self, load: ShownLoad) -> None:
         size = self.picture.shape.size if self.picture.shape else 1.0

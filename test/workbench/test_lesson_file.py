@@ -60,6 +60,21 @@ def test_the_file_shows_the_parts_that_the_page_shows(name, tmp_path, monkeypatc
     assert backend.wanted(style.TRAIL) == (name == "thrown_hammer")
 
 
+def test_the_arrow_of_a_poke_is_seen_for_most_of_a_second(tmp_path, monkeypatch) -> None:
+    seen: list[float] = []
+
+    class Backend(ViserBackend):
+        def finish(self, now_s: float) -> None:
+            super().finish(now_s)
+            arrow = self._nodes.get(style.load_part("poke", "force"))
+            seen.extend([now_s] if arrow is not None and arrow.visible else [])
+
+    monkeypatch.setattr(lesson_file, "ViserBackend", Backend)
+    assert main(["lesson", "weigh_by_throwing", "--html", str(tmp_path / "a.html"), "--duration", "4"]) == 0
+    # It lasts 0.05 s.
+    assert seen[-1] - seen[0] == pytest.approx(0.8, abs=0.07)  # two frames
+
+
 def test_a_body_that_falls_is_followed_while_it_is_in_sight_and_no_longer(tmp_path, capsys, monkeypatch) -> None:
     rooms = kept_of(Room, monkeypatch)
     file = tmp_path / "a.html"
