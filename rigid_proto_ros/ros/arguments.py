@@ -41,6 +41,10 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
     )
     seconds = number_from(1e-9, MAX_TIME_S)
     parser.add_argument("--until", type=seconds, metavar="S", help="end when simulated time reaches this many seconds")
+    for word in argv[1 : argv.index("--ros-args")] if "--ros-args" in argv else argv[1:]:
+        if ":=" in word and word.partition(":=")[0] in PARAMETERS:
+            # To rcl, which removes it, it renames a topic.
+            raise InputError(word, f"not an option; a parameter is given by --ros-args -p {word}")
     try:
         own = remove_ros_args(argv)[1:]
     except Exception as error:  # rclpy's own error types differ between versions

@@ -259,6 +259,7 @@ def test_the_node_refuses_a_slip_before_ros_sees_it(arguments, part, capfd):
         (["--untl", "3"], "did you mean --until?"),
         (["--recrd"], "no option --recrd"),
         (["hammer"], "--ros-args --params-file hammer"),
+        (["mesh:=hammer", "--until", "1"], "--ros-args -p mesh:=hammer"),
         (["--until"], "--until"),
         (["--ros-args", "--parms-file", "x.yaml"], "accepted: --params-file FILE"),
         (["--ros-args", "mesh:=book"], "-p NAME:=VALUE"),
