@@ -11,7 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ..base.errors import CommandRefused, InputError
-from ..scene.scenario import check_inertia, nanoseconds
+from ..scene.scenario import nanoseconds, with_inertia
 from ..scene.script import expand_schedule, read_schedule, with_contacts
 from ..simulation.commands import Change, Command, Listed
 from ..simulation.setup import Setup, check_command
@@ -54,7 +54,7 @@ class CommandReceiver:
         try:
             sent = command()
             if isinstance(sent, Change):
-                check_inertia(loop.scenario, sent.content)
+                with_inertia(loop.scenario, sent.content)
                 sent = loop.bound(sent)
             when_ns, counter = self._effective(sent.stamp_ns, loop.stamps.offset_ns)
             self._count(counter, 1)

@@ -7,7 +7,7 @@ The node, the offline run and replay all come through here, so that one scene me
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -78,24 +78,6 @@ class Scenario:
             if mesh is None and one is not None and _made_of(one.parameters) == _made_of(parameters):
                 return build_scenario(parameters, one.body_mesh)
         return _of_parameters(parameters, mesh)
-
-    def with_inertia(self, mass: float, com: Sequence[float], tensor6: Sequence[float], relative: bool) -> Scenario:
-        """The scenario with an explicit inertia, as a message gives it; raises InputError.
-
-        com (3,): scaled mesh coordinates, or metres from the present COM when ``relative``. tensor6: ixx ixy ixz iyy
-        iyz izz about it. It stands for the whole body, so every ballast mass becomes 0.
-        """
-        scale = self.setup.body.scale
-        center = np.asarray(com, dtype=float) + (self.setup.body.center_of_mass if relative else 0.0)
-        changes: dict[str, object] = {
-            "inertia_model": "explicit",
-            "explicit_inertia.mass": mass,
-            "explicit_inertia.center_of_mass": [exact_quotient(c, s) for c, s in zip(center, scale, strict=True)],
-            "explicit_inertia.tensor": list(tensor6),
-        }
-        for name, (_, *place) in self.parameters.ballast.items():
-            changes[f"ballast.{name}"] = [0.0, *place]
-        return self.with_changes(changes)
 
     @property
     def text(self) -> str:
@@ -262,13 +244,27 @@ def _mass_properties(parameters: Parameters, body_mesh: BodyMesh | None, scale: 
     )
 
 
-def check_inertia(scenario: Scenario, content: Mapping) -> Scenario:
-    """The scenario with the inertia of an event's content; raises CommandRefused (``nonfinite``, ``tensor``)."""
+def with_inertia(scenario: Scenario, content: Mapping) -> Scenario:
+    """The scenario with the explicit inertia of an event's content; raises CommandRefused (``nonfinite``, ``tensor``).
+
+    com (3,): scaled mesh coordinates, or metres from the present COM when ``relative``. It stands for the whole body,
+    so every ballast mass becomes 0.
+    """
     numbers = [content["mass"], *content["com"], *content["tensor"]]
     if not np.isfinite(numbers).all():
         raise CommandRefused("nonfinite", "inertia", numbers, "finite numbers")
+    body = scenario.setup.body
+    center = np.array(content["com"], dtype=float) + (body.center_of_mass if content["relative"] else 0.0)
+    changes: dict[str, object] = {
+        "inertia_model": "explicit",
+        "explicit_inertia.mass": content["mass"],
+        "explicit_inertia.center_of_mass": [exact_quotient(c, s) for c, s in zip(center, body.scale, strict=True)],
+        "explicit_inertia.tensor": list(content["tensor"]),
+    }
+    for name, (_, *place) in scenario.parameters.ballast.items():
+        changes[f"ballast.{name}"] = [0.0, *place]
     try:
-        return scenario.with_inertia(content["mass"], content["com"], content["tensor"], content["relative"])
+        return scenario.with_changes(changes)
     except InputError as error:
         raise CommandRefused("tensor", error.field, error.received, error.accepted) from None
 

@@ -35,7 +35,7 @@ from ..simulation.observer import (
 )
 from ..simulation.setup import Setup, check_command
 from ..simulation.simulation import Simulation
-from .scenario import Scenario, check_inertia, publication_ns
+from .scenario import Scenario, publication_ns, with_inertia
 from .script import with_contacts
 
 Value = TypeVar("Value")
@@ -137,7 +137,7 @@ class Publications:
 def after_change(scenario: Scenario, change: Change, at_hand: Scenario | None = None) -> Scenario:
     """The scenario that a change makes of this one; raises InputError. at_hand: as in ``Scenario.with_changes``."""
     if change.kind == "inertia":
-        return check_inertia(scenario, change.content)
+        return with_inertia(scenario, change.content)
     return scenario.with_changes(change.content, at_hand=at_hand)
 
 

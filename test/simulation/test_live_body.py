@@ -9,7 +9,7 @@ from flights import SECOND
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.scene.scenario import check_inertia, make_scenario
+from rigid_proto_ros.scene.scenario import make_scenario, with_inertia
 from rigid_proto_ros.simulation.commands import Change, SetState
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -121,7 +121,7 @@ def test_sending_back_the_inertia_that_was_received_changes_nothing(scene):
     }
 
     def apply():
-        flight.scenario = check_inertia(flight.scenario, content)
+        flight.scenario = with_inertia(flight.scenario, content)
         return flight.scenario.setup
 
     flight.simulation.submit(Change(content, apply, "inertia"))
@@ -139,7 +139,8 @@ def test_sending_back_the_inertia_that_was_received_changes_nothing(scene):
 
 def test_an_inertia_in_the_body_frame_counts_from_the_present_centre_of_mass():
     scenario = make_scenario({**SCENE, "scale": [2.0, 2.0, 2.0]})
-    new = scenario.with_inertia(2.0, [0.01, 0.0, -0.02], [1.0, 0, 0, 1.5, 0, 2.0], True).setup.body
+    content = {"mass": 2.0, "com": [0.01, 0.0, -0.02], "tensor": [1.0, 0, 0, 1.5, 0, 2.0], "relative": True}
+    new = with_inertia(scenario, content).setup.body
     assert new.center_of_mass == pytest.approx(scenario.setup.body.center_of_mass + [0.01, 0.0, -0.02], abs=1e-15)
     assert new.mass == 2.0
 
@@ -157,7 +158,7 @@ def test_an_inertia_in_the_body_frame_counts_from_the_present_centre_of_mass():
 )
 def test_an_impossible_inertia_is_refused_with_its_reason(mass, com, tensor, reason):
     with pytest.raises(CommandRefused) as refused:
-        check_inertia(make_scenario(SCENE), {"relative": False, "mass": mass, "com": com, "tensor": tensor})
+        with_inertia(make_scenario(SCENE), {"relative": False, "mass": mass, "com": com, "tensor": tensor})
     assert refused.value.reason == reason
 
 

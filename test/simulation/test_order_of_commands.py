@@ -7,7 +7,7 @@ import pytest
 from flights import SECOND, wrench
 
 from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario import make_scenario, with_inertia
 from rigid_proto_ros.simulation.commands import (
     Change,
     ClearWrench,
@@ -41,6 +41,7 @@ def mixed(commands: list, topic_of, seed: int) -> list:
 def core_commands() -> list:
     """Of every rank some, as the node makes them from messages."""
     scenario = make_scenario(SCENE)
+    inertia = {"mass": 0.02, "com": (0, 0, 0), "tensor": (1e-5, 0, 0, 2e-5, 0, 2.5e-5), "relative": False}
     numbers = random.Random(8)
     commands = [
         ClearWrench(),
@@ -49,7 +50,7 @@ def core_commands() -> list:
     commands.append(
         Change(
             {"i": 1},
-            lambda: scenario.with_inertia(0.02, (0, 0, 0), (1e-5, 0, 0, 2e-5, 0, 2.5e-5), False).setup,
+            lambda: with_inertia(scenario, inertia).setup,
             "inertia",
         )
     )
