@@ -21,18 +21,9 @@ from . import measurements as ms
 
 EARTH = (0.0, 0.0, -9.81)
 
+KINDS = ("pose", "imu", "wrench")
+"""Options that name a topic."""
 TRANSFORMS = ("geometry_msgs/msg/TransformStamped", "tf2_msgs/msg/TFMessage")
-KINDS = {
-    "pose": (
-        "geometry_msgs/msg/PoseStamped",
-        "geometry_msgs/msg/PoseWithCovarianceStamped",
-        "nav_msgs/msg/Odometry",
-        *TRANSFORMS,
-    ),
-    "imu": ("sensor_msgs/msg/Imu",),
-    "wrench": ("geometry_msgs/msg/WrenchStamped",),
-}
-"""Options, and the types of message that each takes."""
 
 WRENCH_TIMEOUT_NS = 1_500_000_000
 """A wrench holds until the next message, and at most as long as the node's own default."""
@@ -115,18 +106,18 @@ def _chosen_topics(path: Path, choice: Choice) -> dict[str, _Topic]:
 def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str, tuple[str, str]]:
     """(topic, frame) by option: the given one, else the only one of its types."""
     found = {}
-    for kind, text in given.items():
-        topic, _, frame = text.partition("@")
-        fitting = ", ".join(sorted(name for name, its_type in types.items() if its_type in KINDS[kind]))
-        if types.get(topic) not in KINDS[kind]:
-            raise InputError(f"--{kind}", topic, f"a topic of the bag: {fitting or 'it has no topic of such a type'}")
-        found[kind] = (topic, frame)
-    for kind in [kind for kind in KINDS if kind not in given]:
-        topics = sorted(topic for topic, its_type in types.items() if its_type in KINDS[kind])
-        if len(topics) > 1:
+    for kind in KINDS:
+        topics = sorted(topic for topic, its_type in types.items() if _READ.get(its_type, ("",))[0] == kind)
+        if kind in given:
+            topic, _, frame = given[kind].partition("@")
+            if topic not in topics:
+                accepted = f"a topic of the bag: {', '.join(topics) or 'it has no topic of such a type'}"
+                raise InputError(f"--{kind}", topic, accepted)
+            found[kind] = (topic, frame)
+        elif len(topics) > 1:
             several = f"{path} has several {kind} topics, {', '.join(topics)}"
             raise InputError("session", f"{several}; say which with --{kind}")
-        if topics:
+        elif topics:
             found[kind] = (topics[0], "")
     if "pose" not in found:
         known = ", ".join(f"{t} ({k})" for t, k in sorted(types.items())[:6]) or "nothing"
@@ -148,30 +139,34 @@ def _imu(m: Any) -> tuple[float, ...]:
     return (numbers[:3] if has_rate else none) + (numbers[3:] if has_felt else none)
 
 
-_NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
-    "geometry_msgs/msg/PoseStamped": lambda m: _pair(m.pose.position, m.pose.orientation),
-    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pair(m.pose.pose.position, m.pose.pose.orientation),
-    "geometry_msgs/msg/TransformStamped": lambda m: _pair(m.transform.translation, m.transform.rotation),
-    "tf2_msgs/msg/TFMessage": lambda m: _pair(m.transform.translation, m.transform.rotation),
-    "geometry_msgs/msg/WrenchStamped": lambda m: _pair(m.wrench.force, m.wrench.torque),
-    "nav_msgs/msg/Odometry": lambda m: _pair(m.pose.pose.position, m.pose.pose.orientation),
-    "sensor_msgs/msg/Imu": _imu,
+_READ: dict[str, tuple[str, Callable[[Any], tuple[float, ...]]]] = {
+    "geometry_msgs/msg/PoseStamped": ("pose", lambda m: _pair(m.pose.position, m.pose.orientation)),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": (
+        "pose",
+        lambda m: _pair(m.pose.pose.position, m.pose.pose.orientation),
+    ),
+    "nav_msgs/msg/Odometry": ("pose", lambda m: _pair(m.pose.pose.position, m.pose.pose.orientation)),
+    **dict.fromkeys(TRANSFORMS, ("pose", lambda m: _pair(m.transform.translation, m.transform.rotation))),
+    "geometry_msgs/msg/WrenchStamped": ("wrench", lambda m: _pair(m.wrench.force, m.wrench.torque)),
+    "sensor_msgs/msg/Imu": ("imu", _imu),
 }
+"""By the type of messages: the option that takes them, and the numbers of one."""
 
 
 def _topic(messages: list[tuple[int, Any]], name: str, message_type: str, frame: str) -> _Topic:
+    kind, numbers_of = _READ[message_type]
     if message_type in TRANSFORMS:
         messages, frame = _one_transform(messages, name, frame), ""
-    elif frame and message_type not in KINDS["wrench"]:
+    elif frame and kind != "wrench":
         raise InputError(name, f"{name}@{frame}", f"{name} alone, since a {message_type} has no choice of frames")
     stamps = [m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for _, m in messages]
     if not any(stamps):  # nobody set them; one alone may be the begin of simulated time
         stamps = [logged for logged, _ in messages]
     # Of messages with one stamp the first counts: a repeated one says nothing new.
     times, first = np.unique(np.array(stamps, np.int64), return_index=True)
-    numbers = np.array([_NUMBERS[message_type](message) for _, message in messages])[first]
+    numbers = np.array([numbers_of(message) for _, message in messages])[first]
     bad = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
-    if len(bad) and message_type not in KINDS["imu"]:
+    if len(bad) and kind != "imu":
         at = 1e-9 * (times[bad[0]] - times[0])
         raise InputError(name, f"the message {at:.6g} s after the first has a number that isn't finite")
     head = messages[0][1]

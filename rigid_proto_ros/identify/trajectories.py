@@ -24,7 +24,7 @@ from ..simulation import flight as fl
 from ..simulation.commands import NO_SLOT
 
 ACCURACY = 1e-11
-"""Local error rate: differences over steps of 1e-5 then keep five digits, more than an estimate needs."""
+"""Local error rate: differences over steps of 2e-6 then keep five digits, more than an estimate needs."""
 
 FLOWN = record_type(
     [
