@@ -21,8 +21,9 @@ from .ply import read_ply
 from .stl import read_stl
 from .threemf import add_threemf
 
-OWN_FORMATS = ("obj", "off", "ply", "stl")
-"""Formats of one surface. trimesh 5.2 silently misreads some files of each (benchmarks/mesh_readers.py)."""
+OWN_FORMATS = {"obj": read_obj, "off": read_off, "ply": read_ply, "stl": read_stl}
+"""Formats of one surface, and what gives vertices, polygons' corners and starts of a file's bytes and name. trimesh 5.2
+silently misreads some files of each (benchmarks/mesh_readers.py)."""
 FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae")
 """Formats read according to their specifications; those beyond OWN_FORMATS are scenes of placed parts. Other formats
 are read by trimesh."""
@@ -107,11 +108,8 @@ def read_mesh(data: bytes, path: Path) -> Mesh:
     if not data.strip():
         raise MeshError(path.name, "the file is empty")
     sha256, starts, unit = hashlib.sha256(data).hexdigest(), None, 1.0
-    if suffix == "stl":
-        vertices, triangles = read_stl(data, path.name)
-    elif suffix in OWN_FORMATS:
-        reader = {"obj": read_obj, "off": read_off, "ply": read_ply}[suffix]
-        vertices, corners, sides = reader(data, path.name)
+    if suffix in OWN_FORMATS:
+        vertices, corners, sides = OWN_FORMATS[suffix](data, path.name)
         triangles, starts = fan_polygons(corners, sides)
     else:
         vertices, triangles, unit, files = _read_scene(data, suffix, path)

@@ -27,11 +27,11 @@ _FACET_PART = re.compile(rb"\bfacet\s+normal|\bouter\s+loop|\bvertex(?:\s+[-+.\d
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def _merge(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and triangles (m, 3) of corner points (3m, 3)."""
+def _merge(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices (n, 3), corners (3m,) and their starts (m + 1,) of corner points (3m, 3)."""
     first = first_equal_rows(np.ascontiguousarray(points).view(np.int64))
     new = first == np.arange(len(first))
-    return points[new], (np.cumsum(new) - 1)[first].reshape(-1, 3)
+    return points[new], (np.cumsum(new) - 1)[first], np.arange(0, len(first) + 1, 3)
 
 
 def is_ascii_stl(data: bytes) -> bool:
@@ -43,8 +43,10 @@ def is_ascii_stl(data: bytes) -> bool:
     return head.startswith(b"solid") and (b"facet" in head or b"endsolid" in head) and b"\0" not in head
 
 
-def read_stl(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) float64 and triangles (m, 3) int64; raises MeshError for a file cut short or not STL."""
+def read_stl(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices (n, 3), triangles' corners (c,) and their starts (m + 1,); raises MeshError for a file cut short or not
+    STL.
+    """
     if is_ascii_stl(data):
         return _merge(_ascii_points(data.removeprefix(codecs.BOM_UTF8), name))
     if len(data) < 84:
