@@ -15,7 +15,7 @@ from ..base.errors import InputError
 from ..base.vectors import Numbers
 from ..mass.export import urdf_inertial
 from ..mass.properties import MassProperties
-from ..mass.tensor import principal_axes, six_from_tensor
+from ..mass.tensor import SIX, principal_axes, six_from_tensor
 from .fitting import USUAL, CannotFlyError, Estimate, fit_flights
 from .measurements import ACCELERATION, RATE, MeasuredFlight, topics_of
 from .unknowns import DEFAULT_FIT, Values, make_unknowns, possible_tensor
@@ -28,7 +28,6 @@ FEWEST = 8
 MISFIT = "the residuals are larger than the noise, so the errors may be larger than the standard deviations"
 OTHER_UNITS = {"gravity": "m/s²", "offset": "s", "gyro_bias": "rad/s", "accel_bias": "m/s²", "imu_place": "m"}
 DAMPING_UNITS = ("N s/m", "N m s")
-TENSOR_NAMES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 @dataclass(frozen=True)
@@ -212,8 +211,8 @@ def as_json(found: Identification) -> dict:
         "hidden": [asdict(one) for one in found.unidentified],
         "mass": pair(found.mass),
         "center_of_mass": [pair(one) for one in found.center_of_mass],
-        "inertia": dict(zip(TENSOR_NAMES, map(pair, found.inertia), strict=True)),
-        "inertia_over_trace": dict(zip(TENSOR_NAMES, map(pair, found.shape), strict=True)),
+        "inertia": dict(zip(SIX, map(pair, found.inertia), strict=True)),
+        "inertia_over_trace": dict(zip(SIX, map(pair, found.shape), strict=True)),
         "principal_moments": [pair(one) for one in found.moments],
         "others": {name: pair(one) for name, one in found.others.items()},
         "assumed": list(found.assumed),
@@ -233,7 +232,7 @@ def as_text(found: Identification) -> list[str]:
     units = found.units
     rows = [("mass", found.mass, "kg")]
     rows += [(f"centre of mass {axis}", one, "m") for axis, one in zip("xyz", found.center_of_mass, strict=True)]
-    rows += [(name, one, unit) for name, one in zip(TENSOR_NAMES, tensor, strict=True)]
+    rows += [(name, one, unit) for name, one in zip(SIX, tensor, strict=True)]
     rows += [(name, one, units[name]) for name, one in found.others.items()]
     lines += [f"{name:<18} {number(one)} {unit}" for name, one, unit in rows if one.value is not None]
     for check in found.checks:

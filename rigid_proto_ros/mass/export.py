@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from ..base.rotation import quaternion_from_matrix
 from .properties import MassProperties
-from .tensor import principal_axes, six_from_tensor
+from .tensor import SIX, principal_axes, six_from_tensor
 
 
 def _number(value: float) -> str:
@@ -23,19 +23,20 @@ def _numbers(values: Iterable[float]) -> str:
 
 def urdf_inertial(properties: MassProperties) -> str:
     """A URDF <inertial> element; the tensor is about the COM in the link's axes."""
-    ixx, ixy, ixz, iyy, iyz, izz = (_number(value) for value in six_from_tensor(properties.inertia))
+    six = zip(SIX, six_from_tensor(properties.inertia), strict=True)
+    entries = " ".join(f'{name}="{_number(value)}"' for name, value in six)
     return (
         "<inertial>\n"
         f'  <origin xyz="{_numbers(properties.center_of_mass)}" rpy="0 0 0"/>\n'
         f'  <mass value="{_number(properties.mass)}"/>\n'
-        f'  <inertia ixx="{ixx}" ixy="{ixy}" ixz="{ixz}" iyy="{iyy}" iyz="{iyz}" izz="{izz}"/>\n'
+        f"  <inertia {entries}/>\n"
         "</inertial>\n"
     )
 
 
 def sdf_inertial(properties: MassProperties) -> str:
     """An SDF <inertial> element; the tensor is about the COM in the link's axes."""
-    six = zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), six_from_tensor(properties.inertia), strict=True)
+    six = zip(SIX, six_from_tensor(properties.inertia), strict=True)
     entries = "".join(f"    <{name}>{_number(value)}</{name}>\n" for name, value in six)
     return (
         "<inertial>\n"

@@ -17,6 +17,8 @@ TRIANGLE_SLACK_COMPUTED = 1e-14
 """The same for tensors computed here, which satisfy A + B ≥ C to rounding."""
 MAX_MOMENT_RATIO = 1e12
 """Largest C/A: beyond it the body is a line to double precision, and its rotation about that line is undefined."""
+SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+"""Names of the entries of a tensor, in the order in which they are given everywhere."""
 _EQUAL_COMPONENT = 1e-9  # components closer than this count as equal; the first one then decides the column's sign
 
 

@@ -15,10 +15,9 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..mass.properties import MassProperties, MeshMoments
-from ..mass.tensor import six_from_tensor, tensor_from_six
+from ..mass.tensor import SIX, six_from_tensor, tensor_from_six
 from ..mesh.solids import convex_hull
 from .link_shapes import LinkShapes, parallel_axis
-from .reading import SIX
 
 LIMIT = 1e-3
 """Differences up to this are taken for rounding of printed numbers."""

@@ -12,13 +12,14 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.files import read_bounded
 from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
+from ..mass.tensor import SIX
 from ..mesh.locate import Search
 from .diagnosis import NOT_UNIFORM, UNIFORM, LinkDiagnosis, diagnose
 from .link_shapes import Meshes
 from .reading import MAX_BYTES, Link, parse_xml, robot_of
 
 _WRITERS = {"robot": urdf_inertial, "sdf": sdf_inertial, "mujoco": mjcf_inertial}
-_REPLACED = {"origin", "pose", "mass", "inertia", *("ixx", "ixy", "ixz", "iyy", "iyz", "izz")}
+_REPLACED = {"origin", "pose", "mass", "inertia", *SIX}
 """Elements of an <inertial> that the new one has, or needs no more."""
 _ATTRIBUTES = rb"""(?:"[^"]*"|'[^']*'|[^"'>])*"""  # a > between quotes ends no tag
 _INERTIAL = re.compile(

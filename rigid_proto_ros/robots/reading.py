@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from ..base.errors import InputError
 from ..base.files import read_bounded
 from ..base.rotation import matrix_from_quaternion
-from ..mass.tensor import tensor_from_six
+from ..mass.tensor import SIX, tensor_from_six
 
 VISUAL, COLLISION = "visual", "collision"
 NO_INERTIAL = "no <inertial>"
@@ -32,7 +32,6 @@ MAX_BYTES = 50_000_000
 LARGEST = 1e50
 """Of masses, lengths and moments [SI units]: the powers and products that are taken of them don't overflow."""
 ZEROS = "0 0 0"
-SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 SIZES = {
     "box": ("size", 3),
     "cylinder": ("radius length", 2),
