@@ -124,17 +124,11 @@ def read_scene(
 def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh | None:
     """The mesh that the parameters name (or the one at hand), with its moments; None without one. Raises MeshError."""
     if parameters.mesh == "":
-        if parameters.inertia_model != "explicit":
-            raise _no_mesh()
         return None
     body = mesh_body(mesh or parameters.mesh, repair=parameters.mesh_repair, fallback=parameters.mesh_fallback)
     if not body.verdict.usable:
-        raise MeshError(f"mesh {parameters.mesh}", body.verdict.reason or "the surface has no extent")
+        raise MeshError(f"mesh {parameters.mesh}", body.verdict.reason)
     return BodyMesh(body.mesh, body.moments, Surface(body.vertices, body.triangles))
-
-
-def _no_mesh() -> InputError:
-    return InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
 
 
 def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
@@ -195,9 +189,9 @@ def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, t
         gyroscopic=parameters.gyroscopic,
         **environment,
         integrator=integrator_named(parameters.integrator),
-        step_ns=max(1, nanoseconds(parameters.step)),
+        step_ns=nanoseconds(parameters.step),
         wrench_timeout_ns=_timeout_ns(parameters.wrench_timeout),
-        poke_duration_ns=max(1, nanoseconds(parameters.poke_duration)),
+        poke_duration_ns=nanoseconds(parameters.poke_duration),
         string=StringSettings(
             attached=string.attached,
             attach=string.attach,
@@ -233,7 +227,7 @@ def _mass_properties(parameters: Parameters, body_mesh: BodyMesh | None, scale: 
         given = parameters.explicit_inertia
         return explicit_mass_properties(given.mass, given.center_of_mass, given.tensor, ballast=ballast, scale=scale)
     if body_mesh is None:
-        raise _no_mesh()
+        raise InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
     return body_mesh.moments.mass_properties(
         parameters.inertia_model,
         scale=scale,

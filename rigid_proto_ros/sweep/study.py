@@ -172,14 +172,12 @@ def vertex_number(uniform: float, body_mesh: BodyMesh | None) -> int:
 
 def body_mesh_of(parameters: Parameters) -> BodyMesh | None:
     """The mesh that the parameters name, with its moments; read once in a process."""
-    # Only a body without a mesh asks for its model.
-    model = "solid" if parameters.mesh else parameters.inertia_model
-    return _body_mesh(parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback, model)
+    return _body_mesh(parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback)
 
 
 @lru_cache(maxsize=MESHES_KEPT)
-def _body_mesh(mesh: str, repair: bool, fallback: str, model: str) -> BodyMesh | None:
-    return load_body_mesh(Parameters(mesh=mesh, mesh_repair=repair, mesh_fallback=fallback, inertia_model=model))
+def _body_mesh(mesh: str, repair: bool, fallback: str) -> BodyMesh | None:
+    return load_body_mesh(Parameters(mesh=mesh, mesh_repair=repair, mesh_fallback=fallback))
 
 
 def study_file(name: str) -> Path:
