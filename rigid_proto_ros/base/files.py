@@ -84,22 +84,22 @@ def check_whole_file(option: str, file: str | Path) -> None:
 
 @contextmanager
 def whole_file(option: str, file: str | Path) -> Iterator[Path]:
-    """A path beside ``file``, with its ending, to write to: renamed to ``file`` when the block ends, and removed when
-    it fails or is interrupted, so that no half of a file is left. Raises InputError, which names ``option``, for a
-    place that can't be written to.
+    """A path beside ``file``, with its ending, to write to: renamed to ``file``, or to what that links to, when the
+    block ends, and removed when it fails or is interrupted, so that no half of a file is left. Raises InputError, which
+    names ``option``, for a place that can't be written to.
     """
     with _beside(option, file) as beside:
         yield beside
-        os.replace(beside, file)
+        os.replace(beside, Path(file).resolve())
 
 
 @contextmanager
 def _beside(option: str, file: str | Path) -> Iterator[Path]:
     """A new file beside ``file``; removed when the block ends, if it is still there."""
-    path = output_file(option, file)
+    path = output_file(option, file).resolve()
     if path.exists() and not path.is_file():
         raise InputError(option, str(file), "the name of a file; this is a device or a pipe")
-    beside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    beside = path.with_name(f".{path.stem}.{os.getpid()}{Path(file).suffix}")
     try:
         beside.touch()
         yield beside

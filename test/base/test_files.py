@@ -18,3 +18,15 @@ def test_a_pipe_or_a_device_is_left_as_it_is(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--csv: .*a device or a pipe"), whole_file("--csv", pipe) as beside:
         beside.write_text("x")
     assert pipe.is_fifo() and list(tmp_path.iterdir()) == [pipe]
+
+
+def test_a_link_stays_one_and_leads_to_the_new_file(tmp_path: Path) -> None:
+    """As /dev/stdout may be one."""
+    file, link = tmp_path / "folder" / "table.csv", tmp_path / "link.csv"
+    file.parent.mkdir()
+    file.write_text("old")
+    link.symlink_to(file)
+    with whole_file("--csv", link) as beside:
+        beside.write_text("new")
+        assert file.read_text() == "old"
+    assert link.is_symlink() and file.read_text() == "new" and list(file.parent.iterdir()) == [file]
