@@ -33,9 +33,8 @@ from ..base.files import output_file
 from ..base.rotation import matrix_from_quaternion
 from ..picture import style
 from ..picture.picture import Picture
-from ..scene.scenario import mesh_sha256_of
+from ..scene.scenario import mesh_file, mesh_sha256_of
 from ..session.mailbox import BATCH, Mailbox, Noted
-from ..session.recorded_session import mesh_file
 from ..simulation.observer import (
     AccuracyFloor,
     Applied,

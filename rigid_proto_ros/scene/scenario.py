@@ -6,8 +6,10 @@ The node, the offline run and replay all come through here, so that one scene me
 
 from __future__ import annotations
 
+import hashlib
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +19,7 @@ from ..base.arithmetic import exact_quotient
 from ..base.errors import CommandRefused, InputError, MeshError
 from ..mass.from_mesh import mesh_body
 from ..mass.properties import MassProperties, MeshMoments, explicit_mass_properties, scale_vector
+from ..mesh.locate import resolve_mesh
 from ..mesh.reading import Mesh
 from ..motion.body import make_body
 from ..motion.integrators import integrator_named
@@ -28,7 +31,7 @@ from ..simulation.commands import nanoseconds
 from ..simulation.setup import Setup, check_start
 from ..simulation.thrusters import make_thruster
 from .parameters import READ_ONLY, Parameters, Value, convert_all, parameter_named, with_mass_of_density
-from .scene_file import scene_file, scene_values
+from .scene_file import read_scene_text, scene_file, scene_values
 from .yaml_text import yaml_value
 
 _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
@@ -96,6 +99,18 @@ def mesh_sha256_of(scene: str) -> str:
     """The hash of the mesh's file that ``scene_text`` put into a comment, or ""."""
     found = _HASH.search(scene)
     return found.group(1) if found else ""
+
+
+def mesh_file(scene: str, at_hand: Iterable[tuple[str, bytes]] = ()) -> tuple[str, bytes] | None:
+    """Name and bytes of the mesh's file of a scene, for a recording, from where the scene says or from those at hand.
+    None where it has changed or gone since it was loaded, or is one of several files.
+    """
+    files = [*at_hand]
+    with suppress(InputError, OSError):
+        path = resolve_mesh(str(read_scene_text(scene).values.get("mesh", "")))
+        files.append((path.name, path.read_bytes()))
+    sha256 = mesh_sha256_of(scene)
+    return next(((name, data) for name, data in files if hashlib.sha256(data).hexdigest() == sha256), None)
 
 
 def make_scenario(values: Mapping[str, object], mesh: Mesh | None = None) -> Scenario:

@@ -23,7 +23,7 @@ from ..base.provenance import cpu, versions
 from ..scene import cdr
 from ..scene.command_codec import frame_names
 from ..scene.parameters import Parameters
-from ..scene.scenario import mesh_sha256_of
+from ..scene.scenario import mesh_file, mesh_sha256_of
 from ..simulation.observer import (
     AccuracyFloor,
     Applied,
@@ -38,7 +38,6 @@ from ..simulation.observer import (
 )
 from .mailbox import BATCH, Mailbox
 from .messages import DEFINITIONS, FLOOR, MADE_WITH, PROJECTIONS, TOPICS, applied_bytes, inertia_bytes
-from .recorded_session import mesh_file
 
 if TYPE_CHECKING:
     from mcap.writer import Writer

@@ -9,7 +9,7 @@ import hashlib
 import json
 import tempfile
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError, MeshError
-from ..mesh.locate import resolve_mesh
 from ..mesh.reading import Mesh, load_mesh
 from ..scene.command_codec import frame_names, of_event
 from ..scene.parameters import Parameters, convert_all
@@ -127,18 +126,6 @@ def find_mesh(session: RecordedSession, name: str, sha256: str) -> Mesh:
     raise MeshError(
         "mesh", name, f"the file with SHA-256 {sha256}, there or in the session's folder; the recording lacks it"
     )
-
-
-def mesh_file(scene: str, at_hand: Iterable[tuple[str, bytes]] = ()) -> tuple[str, bytes] | None:
-    """Name and bytes of the mesh's file of a scene, for a recording, from where the scene says or from those at hand.
-    None where it has changed or gone since it was loaded, or is one of several files.
-    """
-    files = [*at_hand]
-    with suppress(InputError, OSError):
-        path = resolve_mesh(str(read_scene_text(scene).values.get("mesh", "")))
-        files.append((path.name, path.read_bytes()))
-    sha256 = mesh_sha256_of(scene)
-    return next(((name, data) for name, data in files if hashlib.sha256(data).hexdigest() == sha256), None)
 
 
 # Computed anew
