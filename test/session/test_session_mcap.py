@@ -146,17 +146,19 @@ def test_a_session_is_read_back_and_verified(flown):
 @needs_rerun
 @pytest.mark.parametrize("ending", [".mcap", ".rrd"])
 def test_meshes_come_from_inside_where_their_files_are_gone_or_others(tmp_path, ending):
-    book, hammer = tmp_path / "book.obj", tmp_path / "hammer.obj"
-    for mesh in (book, hammer):
-        # Not a bundled one's bytes.
-        mesh.write_text("# mine\n" + resolve_mesh(mesh.stem).read_text())
+    prism, hammer = tmp_path / "prism.obj", tmp_path / "hammer.obj"
+    # A prism on a concave pentagon: its shell depends on which triangles are one polygon.
+    corners = ["2 0", "2 2", "1 0.5", "0 2", "0 0"]
+    faces = ["5 4 3 2 1", "6 7 8 9 10", *(f"{k} {k % 5 + 1} {k % 5 + 6} {k + 5}" for k in range(1, 6))]
+    prism.write_text("\n".join([*(f"v {c} {z}" for z in (0, 1) for c in corners), *(f"f {face}" for face in faces)]))
+    hammer.write_text("# mine\n" + resolve_mesh("hammer").read_text())
     session, script = str(tmp_path / f"session{ending}"), tmp_path / "script.yaml"
     script.write_text(f"- {{t: 0.2, set: {{mesh: {hammer}}}}}\n- {{t: 0.3, at: com, impulse: [1, 0, 0]}}\n")
-    # The shell of a file with polygons depends on where each begins.
-    flown = ["book", "--set", f"mesh={book}", "--set", "inertia_model=shell", "--set", "mass=1"]
+    flown = ["book", "--set", f"mesh={prism}", "--set", "inertia_model=shell", "--set", "mass=1"]
+    flown += ["--set", "initial.angular_velocity=[1, 2, 3]"]
     flown += ["--script", str(script), "--duration", "0.5", "--bag" if ending == ".mcap" else "--record", session]
     assert main(["simulate", *flown]) == 0
-    book.unlink()
+    prism.unlink()
     hammer.write_text("# another\n" + resolve_mesh("teapot").read_text())
     assert main(["replay", session, "--verify"]) == 0
     again = str(tmp_path / f"again{ending}")
