@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _whole(study: Study, args: argparse.Namespace) -> int:
     from ..base.compilation import notify_when_compiling
-    from ..sweep.table import Interrupted, run_study
+    from ..sweep.table import SweepInterrupted, run_study
 
     file = Path(args.output or Path(study.name).stem + ".parquet")
     if file.suffix != ".parquet":
@@ -51,7 +51,7 @@ def _whole(study: Study, args: argparse.Namespace) -> int:
     try:
         with notify_when_compiling(lambda: _print("kernels are being compiled, which takes a while the first time")):
             metadata = run_study(study, file)
-    except Interrupted as stopped:
+    except SweepInterrupted as stopped:
         if stopped.rows_done:
             _print(f"{stopped.rows_done} of {study.rows} rows are in {file}")
         raise

@@ -33,7 +33,7 @@ CHUNK_COMMANDS = 500_000
 """Commands of scripts that a chunk keeps in memory: with a long script it has fewer rows."""
 
 
-class Interrupted(KeyboardInterrupt):
+class SweepInterrupted(KeyboardInterrupt):
     """Stopped on request, with so many rows in the table; where that is 0 there is none."""
 
     def __init__(self, rows_done: int) -> None:
@@ -67,7 +67,7 @@ def cores() -> int:
 
 
 def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, Any]:
-    """Fly all rows and write the table, which has its name when it is whole; returns its metadata. Raises Interrupted
+    """Fly all rows and write the table, which has its name when it is whole; returns its metadata. Raises SweepInterrupted
     on Ctrl-C, with a readable table of the rows before.
     """
     pa, pq = arrow()
@@ -100,7 +100,7 @@ def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, A
         except KeyboardInterrupt as error:
             interrupt = error  # kept, by which it counts as handled (base/interrupts.py)
             if not done:
-                raise Interrupted(0) from error
+                raise SweepInterrupted(0) from error
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
         metadata = {
@@ -118,5 +118,5 @@ def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, A
         }
         writer.add_key_value_metadata({KEY: json.dumps(metadata).encode()})
     if interrupt is not None:
-        raise Interrupted(done) from interrupt
+        raise SweepInterrupted(done) from interrupt
     return metadata
