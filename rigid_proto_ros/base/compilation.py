@@ -29,7 +29,7 @@ _ABSENT: Any = None
 # measurements, scipy for its version and linear algebra, and cffi for C functions; no kernel here uses the last two.
 _HIDDEN = [name for name in ("coverage", "scipy", "cffi") if name not in sys.modules]
 sys.modules.update(dict.fromkeys(_HIDDEN, _ABSENT))
-# numba makes 100,000 objects that stay: the garbage collector would search them again and again.
+# numba makes 100,000 objects that stay: the garbage collector would search them again and again, now and later.
 _COLLECTED = gc.isenabled()
 gc.disable()
 try:
@@ -46,6 +46,7 @@ finally:
         del sys.modules[_name]
     if _COLLECTED:
         gc.enable()
+    gc.freeze()
 arraymath._HAVE_BLAS = importlib.util.find_spec("scipy") is not None  # noqa: SLF001  # for kernels of others
 
 _CONFIG: Any = config  # its attributes are set at import

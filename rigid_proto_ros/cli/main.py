@@ -8,7 +8,6 @@ SIGTERM).
 from __future__ import annotations
 
 import argparse
-import gc
 import importlib
 import io
 import sys
@@ -78,8 +77,6 @@ def _run(args: argparse.Namespace) -> int:
     from ..base.compilation import notify_when_compiling
 
     text = f"rigid_proto {args.command}: compiling kernels, at the first start only; a minute or two if all are missing"
-    # What was imported stays: the garbage collector needn't search it again and again.
-    gc.freeze()
     with notify_when_compiling(lambda: print(text, file=sys.stderr, flush=True)):
         status = args.run(args)
     print(end="", flush=True)  # inside _run, so that an output that can't be written is reported like any file
