@@ -67,8 +67,8 @@ def cores() -> int:
 
 
 def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, Any]:
-    """Fly all rows and write the table, which has its name when it is whole; returns its metadata. Raises SweepInterrupted
-    on Ctrl-C, with a readable table of the rows before.
+    """Fly all rows and write the table, which has its name when it is whole; returns its metadata. Raises
+    SweepInterrupted on Ctrl-C, with a readable table of the rows before.
     """
     pa, pq = arrow()
     threads = cores()
