@@ -46,6 +46,11 @@ ACCURACY = "log/accuracy"
 TAKEN_S = 0.05
 """A stream that hasn't taken half a second of data in this time is behind: some viewer doesn't read."""
 
+ONE_AT_A_TIME = threading.Lock()
+"""For who makes recordings and who gives closed ones back: some of these functions wait for the library's own lock
+without letting other threads of Python run, which its holder may wait for (seen once, of two files that were recorded).
+"""
+
 INVISIBLE = 1e-9
 """A scale that nobody sees; the viewer refuses 0, which has no inverse."""
 
@@ -63,7 +68,8 @@ class Stream:
         self.meshes: dict[str, tuple[int, DrawnMesh]] = {}
         self.styled: dict[str, float] = {}
         self.arranged = self.behind = self.missed = False
-        self.recording = rr.RecordingStream(application_id, recording_id=recording_id)
+        with ONE_AT_A_TIME:
+            self.recording = rr.RecordingStream(application_id, recording_id=recording_id)
         rr.set_sinks(sink, recording=self.recording)
         self.recording.send_recording_name(name)
         made_with = [f"{package} {version}" for package, version in versions("rerun-sdk").items()]
@@ -86,11 +92,11 @@ class Stream:
     def send_layout(self, layout: Any) -> None:
         """Make a viewer open with this blueprint."""
         self.arranged = True
-        stream = RecordingStream._from_native(  # noqa: SLF001 (see above)
-            rerun_bindings.new_blueprint(
+        with ONE_AT_A_TIME:
+            native = rerun_bindings.new_blueprint(
                 application_id=self.application_id, make_default=False, make_thread_default=False, default_enabled=True
             )
-        )
+        stream = RecordingStream._from_native(native)  # noqa: SLF001 (see above)
         stream.set_time("blueprint", sequence=0)
         layout._log_to_stream(stream)  # noqa: SLF001 (see above)
         messages = stream.memory_recording().storage
@@ -118,7 +124,8 @@ def forget_closed_recordings() -> None:
     """Give back threads and memory of recordings that are closed. Waits for all others to take what they were sent."""
     users_own = rr.get_global_data_recording()
     try:
-        rerun_bindings.flush_and_cleanup_orphaned_recordings()
+        with ONE_AT_A_TIME:
+            rerun_bindings.flush_and_cleanup_orphaned_recordings()
     except RuntimeError:
         # Some other recording of this process can't be flushed; another time.
         pass

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,9 @@ from rerun_flight import cells
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.picture import style
+from rigid_proto_ros.rerun_view import backend
 from rigid_proto_ros.rerun_view.backend import ROS_TIME
+from rigid_proto_ros.rerun_view.layout import Subject, blueprint
 from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, FileRecorder
 from rigid_proto_ros.rerun_view.rrd_reading import FRAME_HEAD, read_session, record_batches, whole_bytes
 from rigid_proto_ros.rerun_view.session_files import read_runs, record
@@ -309,3 +312,37 @@ def test_a_lost_file_stops_the_recording_and_is_reported(tmp_path, states):
         observer.on(Published(k * flight.PERIOD_NS, states[k]))
     observer.close()
     assert len(errors) == 1
+
+
+def test_recordings_are_made_and_given_back_one_at_a_time(tmp_path, monkeypatch):
+    """Two of the library's functions at once, each on a thread of its own, were seen to wait for each other for ever."""
+    within, together = threading.Lock(), []
+
+    def alone(function):
+        def call(*arguments, **options):
+            together.append(not within.acquire(blocking=False))
+            time.sleep(0.02)
+            try:
+                return function(*arguments, **options)
+            finally:
+                within.release()
+
+        return call
+
+    for name in ("new_blueprint", "flush_and_cleanup_orphaned_recordings"):
+        monkeypatch.setattr(backend.rerun_bindings, name, alone(getattr(backend.rerun_bindings, name)))
+    monkeypatch.setattr(backend.rr, "RecordingStream", alone(backend.rr.RecordingStream))
+
+    def fly(name: str) -> None:
+        for run in range(5):
+            stream = backend.Stream(rr.FileSink(str(tmp_path / f"{name}.rrd")), f"{name}{run}", name)
+            stream.send_layout(blueprint(Subject(), None))
+            stream.recording.disconnect()
+            backend.forget_closed_recordings()
+
+    recorders = [threading.Thread(target=fly, args=(name,)) for name in ("one", "two")]
+    for recorder in recorders:
+        recorder.start()
+    for recorder in recorders:
+        recorder.join()
+    assert together == [False] * 30
