@@ -58,6 +58,10 @@ class Push(NamedTuple):
     off_ns: int = NEVER
 
 
+OFF = Push()
+"""Of a thruster that is off."""
+
+
 class ThrusterControl:
     """The thrusters of a running simulation. pushes: the force of each, in the order of their names. due_ns: the next
     time at which a force changes without a command.
@@ -70,7 +74,7 @@ class ThrusterControl:
 
     def clear(self) -> None:
         """Switch all thrusters off at once."""
-        self.pushes = [Push()] * len(self.thrusters)
+        self.pushes = [OFF] * len(self.thrusters)
         self.due_ns, self.times_out = NEVER, False
 
     @property
@@ -100,7 +104,7 @@ class ThrusterControl:
         loads = []
         for number, (thruster, push) in enumerate(zip(self.thrusters.values(), self.pushes, strict=True)):
             if push.off_ns <= now_ns:
-                self.pushes[number] = Push()
+                self.pushes[number] = OFF
                 loads.append((number, thruster.load(0.0)))
         timed_out = self.times_out and now_ns >= self.last_ns + timeout_ns
         if timed_out:
