@@ -88,21 +88,21 @@ def whole_file(option: str, file: str | Path) -> Iterator[Path]:
     block ends, and removed when it fails or is interrupted, so that no half of a file is left. Raises InputError, which
     names ``option``, for a place that can't be written to.
     """
-    with _beside(option, file) as beside:
+    with _beside(option, file) as (beside, path):
         yield beside
-        os.replace(beside, Path(file).resolve())
+        os.replace(beside, path)
 
 
 @contextmanager
-def _beside(option: str, file: str | Path) -> Iterator[Path]:
-    """A new file beside ``file``; removed when the block ends, if it is still there."""
+def _beside(option: str, file: str | Path) -> Iterator[tuple[Path, Path]]:
+    """A new file beside ``file``, removed when the block ends if it is still there, and whose place it is to take."""
     path = output_file(option, file).resolve()
     if path.exists() and not path.is_file():
         raise InputError(option, str(file), "the name of a file; this is a device or a pipe")
     beside = path.with_name(f".{path.stem}.{os.getpid()}{Path(file).suffix}")
     try:
         beside.touch()
-        yield beside
+        yield beside, path
     except OSError as error:
         raise InputError(option, str(file), f"a file that can be written ({error.strerror or error})") from None
     finally:

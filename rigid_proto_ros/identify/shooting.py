@@ -104,12 +104,8 @@ def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
     """Bodies for ``trajectories.fly_rows`` (n,): starts (n, 13) of the tracked frame as those of the centre of mass."""
     rows = np.zeros(len(values), tr.FLOWN)
     for row, v in zip(rows, values, strict=True):
-        row["mass"], row["center_of_mass"], row["inertia"], row["gravity"] = (
-            v.mass,
-            v.center_of_mass,
-            v.inertia,
-            v.gravity,
-        )
+        row["mass"], row["center_of_mass"] = v.mass, v.center_of_mass
+        row["inertia"], row["gravity"] = v.inertia, v.gravity
         row["linear_damping"], row["angular_damping"] = v.damping
     com, q, w, moved = rows["center_of_mass"], starts[:, 3:7], starts[:, 10:STATE], rows["start"]
     moved[:] = starts[:, :STATE]

@@ -57,22 +57,26 @@ def _corner(vertices: np.ndarray, i: int) -> _Vector:
 
 
 @njit(nogil=True)
-def _triangle(vertices: np.ndarray, corners: np.ndarray, i: int) -> _Triangle:
+def corners_of(vertices: np.ndarray, corners: np.ndarray, i: int) -> _Triangle:
+    """The three corners of triangle i."""
     return _corner(vertices, corners[i, 0]), _corner(vertices, corners[i, 1]), _corner(vertices, corners[i, 2])
 
 
 @njit(nogil=True)
-def _minus(a: _Vector, b: _Vector) -> _Vector:
+def minus(a: _Vector, b: _Vector) -> _Vector:
+    """a − b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @njit(nogil=True)
-def _cross(a: _Vector, b: _Vector) -> _Vector:
+def cross(a: _Vector, b: _Vector) -> _Vector:
+    """a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(nogil=True)
-def _dot(a: _Vector, b: _Vector) -> float:
+def dot(a: _Vector, b: _Vector) -> float:
+    """a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -118,11 +122,11 @@ def _heights(triangle: _Triangle, other: _Triangle) -> tuple[_Vector, _Vector]:
     """Normal of a triangle, with a length of twice its area, and its scalar products with the corners of the other one
     relative to its first corner; 0 for corners in its plane to rounding.
     """
-    u, w = _minus(triangle[1], triangle[0]), _minus(triangle[2], triangle[0])
-    normal = _cross(u, w)
-    margin = TOUCHING * math.sqrt(_dot(normal, normal)) * 2.0 * (_largest(u) + _largest(w))
-    d, e, f = (_dot(_minus(other[0], triangle[0]), normal), _dot(_minus(other[1], triangle[0]), normal),
-               _dot(_minus(other[2], triangle[0]), normal))  # fmt: skip
+    u, w = minus(triangle[1], triangle[0]), minus(triangle[2], triangle[0])
+    normal = cross(u, w)
+    margin = TOUCHING * math.sqrt(dot(normal, normal)) * 2.0 * (_largest(u) + _largest(w))
+    d, e, f = (dot(minus(other[0], triangle[0]), normal), dot(minus(other[1], triangle[0]), normal),
+               dot(minus(other[2], triangle[0]), normal))  # fmt: skip
     return normal, (d if abs(d) > margin else 0.0, e if abs(e) > margin else 0.0, f if abs(f) > margin else 0.0)
 
 
@@ -144,14 +148,14 @@ def _piece(triangle: _Triangle, heights: _Vector, axis: int, origin: float) -> t
 @njit(nogil=True)
 def triangles_cross(vertices: np.ndarray, corners: np.ndarray, i: int, j: int) -> bool:
     """Whether triangles i and j of ``corners`` (m, 3) over vertices (n, 3) properly intersect."""
-    one, other = _triangle(vertices, corners, i), _triangle(vertices, corners, j)
+    one, other = corners_of(vertices, corners, i), corners_of(vertices, corners, j)
     normal, above = _heights(one, other)
     if not (min(above) < 0.0 < max(above)):
         return False
     across, heights = _heights(other, one)
     if not (min(heights) < 0.0 < max(heights)):
         return False
-    dx, dy, dz = _cross(normal, across)
+    dx, dy, dz = cross(normal, across)
     axis = 0 if abs(dx) >= max(abs(dy), abs(dz)) else (1 if abs(dy) >= abs(dz) else 2)
     origin = one[0][axis]
     low, high = _piece(one, heights, axis, origin)
@@ -214,16 +218,16 @@ def _hit(triangle: _Triangle, origin: _Vector, direction: _Vector, reach: float)
 
     The ray's sides of the three edges are triple products, which are also the weights of the corners in the hit point.
     """
-    a, b, c = _minus(triangle[0], origin), _minus(triangle[1], origin), _minus(triangle[2], origin)
-    u, v, w = _dot(direction, _cross(b, c)), _dot(direction, _cross(c, a)), _dot(direction, _cross(a, b))
-    size = max(_largest(_minus(b, a)), _largest(_minus(c, a)), _largest(_minus(c, b)))
+    a, b, c = minus(triangle[0], origin), minus(triangle[1], origin), minus(triangle[2], origin)
+    u, v, w = dot(direction, cross(b, c)), dot(direction, cross(c, a)), dot(direction, cross(a, b))
+    size = max(_largest(minus(b, a)), _largest(minus(c, a)), _largest(minus(c, b)))
     far = max(_largest(a), _largest(b), _largest(c))
     margin = NEAR * size * size + 1e-15 * far * far
     if (u < -margin or v < -margin or w < -margin) and (u > margin or v > margin or w > margin):
         return 0, True
     if abs(u) <= margin or abs(v) <= margin or abs(w) <= margin:
         return 0, False
-    distance = (u * _dot(a, direction) + v * _dot(b, direction) + w * _dot(c, direction)) / (u + v + w)
+    distance = (u * dot(a, direction) + v * dot(b, direction) + w * dot(c, direction)) / (u + v + w)
     if abs(distance) <= reach:
         return 0, False
     if distance < 0.0:
@@ -271,7 +275,7 @@ def _shoot(
         for i in range((node - inner) * LEAF, min((node - inner + 1) * LEAF, len(order))):
             other = component[order[i]]
             if other != own:
-                sign, certain = _hit(_triangle(vertices, corners, order[i]), origin, direction, reach)
+                sign, certain = _hit(corners_of(vertices, corners, order[i]), origin, direction, reach)
                 winding[other] += sign
                 sure[other] &= certain
     return visits
@@ -296,11 +300,11 @@ def _sides(
     visits = 0
     for sample in samples:
         own = component[sample]
-        a, b, c = _triangle(vertices, corners, sample)
+        a, b, c = corners_of(vertices, corners, sample)
         origin = (
-            _dot(_SAMPLE, (a[0], b[0], c[0])),
-            _dot(_SAMPLE, (a[1], b[1], c[1])),
-            _dot(_SAMPLE, (a[2], b[2], c[2])),
+            dot(_SAMPLE, (a[0], b[0], c[0])),
+            dot(_SAMPLE, (a[1], b[1], c[1])),
+            dot(_SAMPLE, (a[2], b[2], c[2])),
         )
         asked = near[own].copy()
         for direction in _DIRECTIONS:

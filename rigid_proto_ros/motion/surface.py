@@ -18,6 +18,7 @@ from ..base.compilation import njit
 from ..base.rotation import length, norm
 from ..base.vectors import Numbers, Vector, vector
 from ..mass.moments import referenced_vertices
+from ..mesh.intersection import corners_of, cross, dot, minus
 
 
 @dataclass(frozen=True)
@@ -97,33 +98,8 @@ def _first_hit(vertices: np.ndarray, triangles: np.ndarray, origin: np.ndarray, 
 
 
 @njit()
-def _corners(vertices: np.ndarray, triangle: np.ndarray) -> tuple[Vector, Vector, Vector]:
-    i, j, k = triangle[0], triangle[1], triangle[2]
-    return (
-        (vertices[i, 0], vertices[i, 1], vertices[i, 2]),
-        (vertices[j, 0], vertices[j, 1], vertices[j, 2]),
-        (vertices[k, 0], vertices[k, 1], vertices[k, 2]),
-    )
-
-
-@njit()
-def _less(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@njit()
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit()
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit()
 def _angle(a: Vector, b: Vector) -> float:
-    return inverse_tangent_of(norm(*_cross(a, b)), _dot(a, b))
+    return inverse_tangent_of(norm(*cross(a, b)), dot(a, b))
 
 
 @njit()
@@ -131,11 +107,11 @@ def _nearest_on_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> tuple[Ve
     """Nearest point of a triangle to p, squared distance, and its coordinates u, v along the edges ab and ac. After
     Ericson, Real-Time Collision Detection (2005), section 5.1.5.
     """
-    ab, ac = _less(b, a), _less(c, a)
-    ap, bp, cp = _less(p, a), _less(p, b), _less(p, c)
-    d1, d2 = _dot(ab, ap), _dot(ac, ap)
-    d3, d4 = _dot(ab, bp), _dot(ac, bp)
-    d5, d6 = _dot(ab, cp), _dot(ac, cp)
+    ab, ac = minus(b, a), minus(c, a)
+    ap, bp, cp = minus(p, a), minus(p, b), minus(p, c)
+    d1, d2 = dot(ab, ap), dot(ac, ap)
+    d3, d4 = dot(ab, bp), dot(ac, bp)
+    d5, d6 = dot(ab, cp), dot(ac, cp)
     va = d3 * d6 - d5 * d4
     vb = d5 * d2 - d1 * d6
     vc = d1 * d4 - d3 * d2
@@ -160,8 +136,8 @@ def _nearest_on_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> tuple[Ve
         a[1] + u * ab[1] + v * ac[1],
         a[2] + u * ab[2] + v * ac[2],
     )
-    gap = _less(p, nearest)
-    return nearest, _dot(gap, gap), u, v
+    gap = minus(p, nearest)
+    return nearest, dot(gap, gap), u, v
 
 
 @njit()
@@ -169,11 +145,11 @@ def _angle_at(u: float, v: float, a: Vector, b: Vector, c: Vector) -> float:
     """The angle of a triangle at a point of it: the corner's angle, π on an edge, 2π inside."""
     tolerance = 1e-9
     if u <= tolerance and v <= tolerance:
-        return _angle(_less(b, a), _less(c, a))
+        return _angle(minus(b, a), minus(c, a))
     if u >= 1.0 - tolerance:
-        return _angle(_less(a, b), _less(c, b))
+        return _angle(minus(a, b), minus(c, b))
     if v >= 1.0 - tolerance:
-        return _angle(_less(a, c), _less(b, c))
+        return _angle(minus(a, c), minus(b, c))
     if u <= tolerance or v <= tolerance or u + v >= 1.0 - tolerance:
         return math.pi
     return 2.0 * math.pi
@@ -184,7 +160,7 @@ def _nearest(vertices: np.ndarray, triangles: np.ndarray, point: Vector) -> Vect
     best = math.inf
     found = (0.0, 0.0, 0.0)
     for i in range(triangles.shape[0]):
-        a, b, c = _corners(vertices, triangles[i])
+        a, b, c = corners_of(vertices, triangles, i)
         nearest, squared, _, _ = _nearest_on_triangle(point, a, b, c)
         if squared < best:
             best, found = squared, nearest
@@ -196,11 +172,11 @@ def _pseudo_normal(vertices: np.ndarray, triangles: np.ndarray, point: Vector, t
     foot = _nearest(vertices, triangles, point)
     nx, ny, nz = 0.0, 0.0, 0.0
     for i in range(triangles.shape[0]):
-        a, b, c = _corners(vertices, triangles[i])
+        a, b, c = corners_of(vertices, triangles, i)
         _, gap, u, v = _nearest_on_triangle(foot, a, b, c)
         if gap <= tolerance * tolerance:
             angle = _angle_at(u, v, a, b, c)
-            x, y, z = _cross(_less(b, a), _less(c, a))
+            x, y, z = cross(minus(b, a), minus(c, a))
             area = norm(x, y, z)
             if area > 0.0:
                 nx += angle * x / area

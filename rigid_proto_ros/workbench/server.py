@@ -234,5 +234,4 @@ CLASS_STYLE = f"""<style>
 .{MARK} b {{ font-size: 1.7em; }}
 {_BAR} .mantine-Button-root {{ padding-inline: 0.2em; }}
 </style>"""
-
 """Class mode: large letters, and nothing but picture, lesson and three buttons."""
