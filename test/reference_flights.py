@@ -138,7 +138,9 @@ def _rates(Y, P, hand, time, loaded, pulls):
             l, _, tension = _law(P, a, rate)
             pull = -tension / l * a if l > 0.0 else np.zeros(3)
         force, torque = force + pull, torque + _cross(r, pull)
-    return np.concatenate((Y[7:10], _turning(w, Y[3:7]), force / P.mass, torque))
+    found = np.empty(13)
+    found[0:3], found[3:7], found[7:10], found[10:13] = Y[7:10], _turning(w, Y[3:7]), force / P.mass, torque
+    return found
 
 
 @njit(cache=True)
@@ -267,12 +269,11 @@ def _disturb(Y, P, size, ways):
 
 
 @njit(cache=True)
-def _fly(P, load, move, end, disturbance, ways, a, b, c):
+def _fly(P, load, move, end, cuts, disturbance, ways, a, b, c):
     Y, hand = P.row.copy(), np.zeros((2, 3))
     Y[3:7] /= math.sqrt(_dot(Y[3:6], Y[3:6]) + Y[6] * Y[6])
     # Angular momentum in world axes, until the end.
     Y[10:13] = _times(_rotation(Y[3:7]), _times(P.inertia, Y[10:13]))
-    cuts = np.sort(np.array([0.0, load[0], load[1], move[0], move[1], end]))
     for n in range(5):
         begin, span = cuts[n], cuts[n + 1] - cuts[n]
         if begin >= end or span <= 0.0:
@@ -297,7 +298,8 @@ def fly(
     Its wrench acts from load_s[0] to load_s[1], its free end moves evenly from move_s[0] to move_s[1], to zero of which it all counts.
     disturbance: rate [1/s] in the measure of ``error``, along ways (DIRECTIONS, 4, 3) of unit vectors.
     """
-    return _fly(P[0], np.array(load_s, float), np.array(move_s, float), float(end_s), disturbance, ways, A, B, C)
+    cuts = np.sort([0.0, *load_s, *move_s, end_s])
+    return _fly(P[0], load_s, move_s, float(end_s), cuts, disturbance, ways, A, B, C)
 
 
 def error(row, exact, length: float) -> float:
