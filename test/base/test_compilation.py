@@ -20,25 +20,24 @@ BROKEN = "numba no longer keeps kernels by Dispatcher._cache: base/compilation.p
 CALL = "from package.base.outer import outer; print(outer(1), sum(outer.stats.cache_hits.values()))"
 
 
-def called(folder: Path, place: Path) -> list[str]:
+def called(folder: Path, place: Path, locators: str) -> list[str]:
     """What the kernel says in a process of its own, with no kernel of an earlier run but those below ``place``."""
     # -B: Python takes bytecode of a source of the same length and second for this one's.
-    command, settings = [sys.executable, "-B", "-c", CALL], {**os.environ, "XDG_CACHE_HOME": str(place / "cache")}
+    command, places = [sys.executable, "-B", "-c", CALL], {"XDG_CACHE_HOME": str(place / "cache")}
+    settings = {**os.environ, **places, "NUMBA_CACHE_LOCATOR_CLASSES": locators}
     return subprocess.run(command, cwd=folder, env=settings, capture_output=True, text=True, check=True).stdout.split()
 
 
-@pytest.mark.parametrize("locators", ["", "InTreeCacheLocator"], ids=["", "with other locators named"])
-def test_a_kernel_on_disk_is_that_of_its_file_and_of_all_behind_its_imports(tmp_path, monkeypatch, locators):
-    monkeypatch.setenv("NUMBA_CACHE_LOCATOR_CLASSES", locators)
-    said = []
-    for checkout, added in (("one", 1), ("two", 1), ("two", 2), ("one", 1)):
+def test_a_kernel_on_disk_is_that_of_its_file_and_of_all_behind_its_imports_also_with_other_locators_named(tmp_path):
+    said, other = [], "InTreeCacheLocator"
+    for checkout, added, locators in (("one", 1, ""), ("two", 1, other), ("two", 2, ""), ("one", 1, other)):
         base = tmp_path / checkout / "package" / "base"
         base.mkdir(parents=True, exist_ok=True)
         shutil.copy(compilation.__file__, base)
         (base / "outer.py").write_text(OUTER)
         (base / "between.py").write_text("from .inner import inner\n")
         (base / "inner.py").write_text(INNER.format(added))
-        said.append(called(base.parents[1], tmp_path))
+        said.append(called(base.parents[1], tmp_path, locators))
     # Value, and whether it came from the disk: a copy elsewhere finds it, and neither of two versions drives out the other.
     assert said == [["2", "0"], ["2", "1"], ["3", "0"], ["2", "1"]], BROKEN
 
