@@ -13,9 +13,34 @@ from __future__ import annotations
 
 import math
 
+import numba
 import numpy as np
-from numba import njit
 from scipy.integrate import DOP853
+
+from rigid_proto_ros.base import compilation
+
+
+class _Kept(compilation.KernelLocator):
+    """Where the package's kernels are: another checkout compiles none of these, which takes half a minute."""
+
+    @classmethod
+    def from_function(cls, function, file):
+        return cls(file, function.__code__.co_firstlineno)
+
+
+class _Files(compilation.CompileResultCacheImpl):
+    _locator_classes = [_Kept]
+
+
+class _Cache(compilation.KernelCache):
+    _impl_class = _Files
+
+
+def kernel(function):
+    compiled = numba.njit(function)
+    compiled._cache = _Cache(function)
+    return compiled
+
 
 STAGES = 12
 A, B = DOP853.A.copy(), DOP853.B.copy()
@@ -60,27 +85,27 @@ def numbers(scene: dict) -> np.ndarray:
     return record
 
 
-@njit(cache=True)
+@kernel
 def _times(M, v):
     return np.array([_dot(M[0], v), _dot(M[1], v), _dot(M[2], v)])
 
 
-@njit(cache=True)
+@kernel
 def _cross(a, b):
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-@njit(cache=True)
+@kernel
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@kernel
 def _size(a):
     return math.sqrt(_dot(a, a))
 
 
-@njit(cache=True)
+@kernel
 def _rotation(q):
     """Body to world, of a quaternion xyzw of any length."""
     x, y, z, w = q[0], q[1], q[2], q[3]
@@ -94,20 +119,20 @@ def _rotation(q):
     )
 
 
-@njit(cache=True)
+@kernel
 def _world(R, tensor, v):
     """A tensor of body axes times v in world axes."""
     return _times(R, _times(tensor, _times(R.T, v)))
 
 
-@njit(cache=True)
+@kernel
 def _turning(w, q):
     """q' of a spin w in world axes."""
     e = _cross(w, q)
     return 0.5 * np.array([q[3] * w[0] + e[0], q[3] * w[1] + e[1], q[3] * w[2] + e[2], -_dot(w, q)])
 
 
-@njit(cache=True)
+@kernel
 def _knot(Y, P, hand, time):
     """R, ω, the arm, the way from the free end to the knot and its rate, in world axes."""
     R = _rotation(Y[3:7])
@@ -115,7 +140,7 @@ def _knot(Y, P, hand, time):
     return R, w, r, Y[0:3] + r - (hand[0] + time * hand[1]), Y[7:10] + _cross(w, r) - hand[1]
 
 
-@njit(cache=True)
+@kernel
 def _law(P, a, rate):
     """l, l² − rest² and the tension k x + c l' of a knot at a from the free end."""
     l = _size(a)
@@ -123,7 +148,7 @@ def _law(P, a, rate):
     return l, (l - P.rest_length) * (l + P.rest_length), P.stiffness * (l - P.rest_length) + P.damping * speed
 
 
-@njit(cache=True)
+@kernel
 def _rates(Y, P, hand, time, loaded, pulls):
     R, w, r, a, rate = _knot(Y, P, hand, time)
     force, torque = P.mass * P.gravity - P.linear_damping * Y[7:10], -P.angular_damping * w
@@ -143,7 +168,7 @@ def _rates(Y, P, hand, time, loaded, pulls):
     return found
 
 
-@njit(cache=True)
+@kernel
 def _step(Y, P, hand, time, h, loaded, pulls, a, b, c):
     """Y after h seconds."""
     K = np.zeros((STAGES, 13))
@@ -159,7 +184,7 @@ def _step(Y, P, hand, time, h, loaded, pulls, a, b, c):
     return Y + h * Z
 
 
-@njit(cache=True)
+@kernel
 def _step_size(Y, P, hand, time, pulls):
     _, w, r, a, along = _knot(Y, P, hand, time)
     softest = P.inverse[0, 0] + P.inverse[1, 1] + P.inverse[2, 2]
@@ -178,7 +203,7 @@ DIFFERENCE_S = 1e-7
 """Over which the law's rate is taken, of a flight's shortest time scale a small part."""
 
 
-@njit(cache=True)
+@kernel
 def _guard(Y, P, hand, time, loaded, state, second):
     """What ends a state by rising above zero, and its rate: slack, pulls, shortens (of two: it pulls again, or its stretch is gone)."""
     found = np.zeros(3)
@@ -191,7 +216,7 @@ def _guard(Y, P, hand, time, loaded, state, second):
     return found[0], (found[2] - found[1]) / (2.0 * DIFFERENCE_S)
 
 
-@njit(cache=True)
+@kernel
 def _hidden(g0, r0, g1, r1, h):
     """Where the cubic through both ends of a step has its top, if it rises above zero between two ends below it; else 0."""
     if not (r0 > 0.0 and r1 < 0.0):
@@ -206,7 +231,7 @@ def _hidden(g0, r0, g1, r1, h):
     return s * h if 0.0 < s < 1.0 and top > 0.0 else 0.0
 
 
-@njit(cache=True)
+@kernel
 def _end_of_state(Y, P, hand, time, h, loaded, state, a, b, c):
     """When within a step of h seconds the string's law changes, and the state that follows; h and the same for never."""
     after = state
@@ -238,7 +263,7 @@ def _end_of_state(Y, P, hand, time, h, loaded, state, a, b, c):
     return h, after
 
 
-@njit(cache=True)
+@kernel
 def _fly_span(Y, P, hand, begin, span, loaded, disturbance, ways, a, b, c):
     """Y after ``span`` seconds."""
     may, time, state = P.tied and P.one_sided, 0.0, PULLS
@@ -257,7 +282,7 @@ def _fly_span(Y, P, hand, begin, span, loaded, disturbance, ways, a, b, c):
     return Y
 
 
-@njit(cache=True)
+@kernel
 def _disturb(Y, P, size, ways):
     """Move Y by an error of this size in the measure of ``error``."""
     R = _rotation(Y[3:7])
@@ -268,7 +293,7 @@ def _disturb(Y, P, size, ways):
     Y[3:7] += _turning(size * ways[3], Y[3:7])
 
 
-@njit(cache=True)
+@kernel
 def _fly(P, load, move, end, cuts, disturbance, ways, a, b, c):
     Y, hand = P.row.copy(), np.zeros((2, 3))
     Y[3:7] /= math.sqrt(_dot(Y[3:6], Y[3:6]) + Y[6] * Y[6])
