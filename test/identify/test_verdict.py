@@ -115,7 +115,8 @@ def _with(flight, kinds, convert):
 def test_a_unit_or_an_axis_that_was_taken_for_another_is_named(kinds, convert, gravity, cause) -> None:
     truth = mf.values_of(0.5, (0.01, -0.02, 0.03), INERTIA, (0.0, 0.0, -9.81))
     rng = np.random.default_rng(1)
-    flight = mf.with_imu(truth, mf.tumbling((1.0, 6.0, 2.0)), rng, 1.0, mf.load_history(POKE), bias=(0.02, 0.1))
+    load = mf.load_history((0.2, *POKE[1:]))
+    flight = mf.with_imu(truth, mf.tumbling((1.0, 6.0, 2.0)), rng, 0.5, load, bias=(0.02, 0.1))
     fit = ("mass", "com", "inertia", "gyro_bias", "accel_bias")
     flight = replace(_with(flight, kinds, convert), gravity=gravity)
     found = identify([flight], fit)
