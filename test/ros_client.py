@@ -98,9 +98,11 @@ class _Taken(MutuallyExclusiveCallbackGroup):
 
 
 class RosClient:
-    """Short ways to talk to one node. Topics and services are names of that node's own, or begin with a slash."""
+    """Short ways to talk to one node. Topics and services are names of that node's own, or begin with a slash. in_order: of
+    several topics, too, messages are heard as they come, with those of other subscriptions of ``own``.
+    """
 
-    def __init__(self, environment: dict[str, str], node: str = "/rigid_body") -> None:
+    def __init__(self, environment: dict[str, str], node: str = "/rigid_body", in_order: bool = False) -> None:
         self.environment, self.node = environment, node
         self._context = rclpy.Context()
         domain, no_handlers = int(environment["ROS_DOMAIN_ID"]), SignalHandlerOptions.NO
@@ -110,12 +112,13 @@ class RosClient:
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.own)
-        self._taken = _Taken()
+        self._group = None if in_order else _Taken()
         self._received: dict[str, list] = {}
         self._subscriptions: dict[str, Any] = {}
         self._taking = threading.Lock()
         self._ended = threading.Event()
-        self._threads = [threading.Thread(target=run, name="client", daemon=True) for run in (self._spin, self._take)]
+        work = [self._spin] if in_order else [self._spin, self._take]
+        self._threads = [threading.Thread(target=run, name="client", daemon=True) for run in work]
         for thread in self._threads:
             thread.start()
         self._publishers: dict[str, Any] = {}
@@ -174,7 +177,7 @@ class RosClient:
             messages = self._received.setdefault(name, [])
             profile = _profile(latched=topic in LATCHED, best_effort=best_effort)
             subscription = self.own.create_subscription(
-                TOPICS[topic], name, messages.append, profile, callback_group=self._taken
+                TOPICS[topic], name, messages.append, profile, callback_group=self._group
             )
             with self._taking:
                 if name in self._subscriptions:

@@ -157,11 +157,6 @@ class Browser:
         path = f'xpath=//p[label[normalize-space()="{label}"]]/../following-sibling::div//input[not(@type="hidden")]'
         return self.page.locator(path).first
 
-    def choose(self, label: str, option: str) -> None:
-        """Take an option of a dropdown."""
-        self.input(label).click()
-        self.page.get_by_role("option", name=option, exact=True).click()
-
     # The picture
 
     @property

@@ -54,7 +54,7 @@ class BagRecorder(RosClient):
     """A client that subscribes to a node's topics before the node is there, and keeps every message's bytes."""
 
     def __init__(self, environment: dict[str, str]) -> None:
-        super().__init__(environment)
+        super().__init__(environment, in_order=True)
         self.messages: list[Logged] = []
         for topic in RECORDED:
             latched = DurabilityPolicy.TRANSIENT_LOCAL if topic in LATCHED else DurabilityPolicy.VOLATILE
