@@ -259,7 +259,7 @@ class OfflineRun(ScenarioRun):
         checked in the scene that those before it in the script have made by then. Takes all, or none and raises
         InputError.
         """
-        commands = list(with_contacts(script, self.scenario.setup.contacts))
+        commands = with_contacts(script, self.scenario.setup.contacts)
         taken = self.accepted(lambda waiting: self._checked(commands, waiting))
         self._submitted += len(taken)
         for command, number, checked in taken:

@@ -180,10 +180,10 @@ def plain(value: object) -> Any:
     """A value as YAML has it, from NumPy's numbers and arrays, tuples and paths, also within lists and mappings."""
     if type(value) in _PLAIN:
         return value
-    if isinstance(value, (np.ndarray, np.generic)):
-        return value.tolist()
-    if isinstance(value, Mapping):
-        return {key: plain(of_key) for key, of_key in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
+    if isinstance(value, (dict, Mapping)):
+        return {key: plain(of_key) for key, of_key in value.items()}
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
     return os.fspath(value) if isinstance(value, os.PathLike) else value

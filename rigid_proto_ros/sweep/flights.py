@@ -85,16 +85,16 @@ class Flight:
         """
         simulation = self._run.simulation
         # A difference of two times may be a rounding below 0.
-        if not (isinstance(seconds, Real) and abs(seconds) <= MAX_TIME_S and nanoseconds(seconds) >= 0):
+        if not (isinstance(seconds, (float, Real)) and abs(seconds) <= MAX_TIME_S and nanoseconds(seconds) >= 0):
             raise InputError("step", seconds, f"a number of seconds from 0 to {MAX_TIME_S:g}")
         until_ns = simulation.time_ns + nanoseconds(seconds)
-        if until_ns > nanoseconds(MAX_TIME_S):
+        if until_ns > MAX_TIME_S * 1e9:
             raise InputError("step", seconds, f"a step that ends by {MAX_TIME_S:g} s of simulated time")
         before = dict(simulation.refused)
         if not self._run.advance(until_ns):
             raise InputError("step", simulation.failure)
-        new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
-        if any(new.values()):
+        if simulation.refused.total() > sum(before.values()):
+            new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
             texts = [f"{count} {reason}, {simulation.refusals[reason]}" for reason, count in new.items() if count]
             raise CommandRefused("schedule", "command", f"refused when it was due to act: {'; '.join(texts)}")
         return self.sample()
