@@ -110,7 +110,7 @@ def _print_session(name: str, session: RecordedSession) -> None:
         print(f"  the accuracy asked for is not held throughout: {session.accuracy_floor}")
     if session.refusals:
         time_ns, line = session.refusals[-1]
-        print(f"  {len(session.refusals)} commands refused, the last at {time_ns / 1e9:.9g} s: {line}")
+        print(f"  commands refused: {len(session.refusals)}, the last at {time_ns / 1e9:.9g} s: {line}")
 
 
 def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:

@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
         result = summary(flight, wall_time)
     recorded = [file for file, recorder in recorders.items() if not recorder.error]
     for reason, count in flight.simulation.refused.items():
-        _warn(f"{count} commands refused: {reason}, {flight.simulation.refusals[reason]}")
+        _warn(f"commands refused: {count}, {reason}: {flight.simulation.refusals[reason]}")
     if flight.ghost is not None and flight.ghost.refusal:
         _warn(flight.ghost.refusal)
     if args.json:

@@ -282,7 +282,7 @@ def _simulate(
     if simulation.refused:
         # A row whose commands were refused in flight isn't the row that was asked for.
         refused = simulation.refused.items()
-        texts = (f"{count} commands refused: {reason}, {simulation.refusals[reason]}" for reason, count in refused)
+        texts = (f"commands refused: {count}, {reason}: {simulation.refusals[reason]}" for reason, count in refused)
         raise FailedFlight("; ".join(texts))
     return simulation
 

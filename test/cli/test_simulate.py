@@ -143,4 +143,4 @@ def test_a_command_that_is_refused_as_it_acts_fails_the_run_as_poke_client_says_
     assert main(["simulate", "book", "--script", str(script), "--duration", "0.2", "--json"]) == 1
     said = capsys.readouterr()
     assert json.loads(said.out)["time_ns"] == 200_000_000
-    assert "1 commands refused: ray_miss" in said.err and "accepted: a ray that meets the body" in said.err
+    assert "commands refused: 1, ray_miss" in said.err and "accepted: a ray that meets the body" in said.err
