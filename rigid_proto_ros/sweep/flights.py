@@ -93,8 +93,8 @@ class Flight:
         before = dict(simulation.refused)
         if not self._run.advance(until_ns):
             raise InputError("step", simulation.failure)
-        if simulation.refused.total() > sum(before.values()):
-            new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
+        new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
+        if any(new.values()):
             texts = [f"{count} {reason}, {simulation.refusals[reason]}" for reason, count in new.items() if count]
             raise CommandRefused("schedule", "command", f"refused when it was due to act: {'; '.join(texts)}")
         return self.sample()
