@@ -595,6 +595,11 @@ class Simulation:
         return [(t, p.command) for t, _, p in sorted(self._pending) if isinstance(p.command, Change)]
 
     @property
+    def commands_wait(self) -> bool:
+        """Whether a command is due that time has to go on for."""
+        return any(time_ns <= self.time_ns for time_ns, *_ in self._pending[:1])
+
+    @property
     def at_rest(self) -> bool:
         """Whether nothing moves, no load acts and no command is pending."""
         still = not (self.state.row[7:].any() or self.setup.gravity.any())

@@ -30,7 +30,7 @@ from ..mass.tensor import principal_axes, six_from_tensor
 from ..mesh.reading import OWN_FORMATS, load_mesh
 from ..picture.style import without_rounding
 from ..scene.scenario import Scenario
-from .controls import TYPING_S, Controls, parse_numbers
+from .controls import NOTE, TYPING_S, Controls, parse_numbers
 from .flight import Flight
 
 OWN_FILE = "(a file)"
@@ -57,9 +57,11 @@ class BodyTab:
                 controls.factor("Size ×", "Factor on all three scales (scale)", 1.0, self._size_factor, self._set_size)
                 hint = "Factor on the original mass, without ballast (mass)"
                 controls.factor("Mass ×", hint, 2.0, self._mass_factor, self._set_mass)
+                self._size_and_mass = gui.add_html("")
                 controls.numbers("density", "Density [kg/m³]", check=self._check_density)
             with gui.add_folder("Inertia"):
                 controls.choice("inertia_model", "Model")
+                controls.choice("ghost.inertia_model", "Ghost")
                 self._table = gui.add_markdown("")
                 hint = "ixx ixy ixz iyy iyz izz [kg m²], about the COM, mesh axes (explicit_inertia.tensor)"
                 tensor = gui.add_text("Tensor", "", hint=hint)
@@ -76,16 +78,14 @@ class BodyTab:
         controls.bind(mesh, named, lambda name: None if name == OWN_FILE else {"mesh": name})
         controls.bind(tensor, self._tensor_text, self._set_tensor, TYPING_S)
 
-    @property
-    def table(self) -> str:
-        """The table that compares the true tensor with another one, as shown."""
-        return str(self._table.content)
-
     def changed(self, scenario: Scenario, another: bool) -> None:
         """Show the results of the parameters in force; with ``another``, this body is the new reference of factors."""
         if another:
             self._base_scale = float(np.prod(np.abs(scenario.setup.body.scale))) ** (1.0 / 3.0)
             self._base_mass = _own_mass(scenario)
+        body, surface = scenario.setup.body, scenario.setup.surface
+        sides = [] if surface is None else [_sides(surface.extent * np.abs(body.scale))]
+        self._size_and_mass.content = NOTE.format(", ".join((*sides, f"{body.mass:.4g} kg")))
         self._table.content = comparison(scenario)
 
     def show_verdict(self, lines: Sequence[str]) -> None:
@@ -134,6 +134,10 @@ class BodyTab:
         for name, (_, *place) in scenario.parameters.ballast.items():
             changes[f"ballast.{name}"] = [0.0, *place]
         return changes
+
+
+def _sides(sides_m: np.ndarray) -> str:
+    return f"{' × '.join(f'{side:.3g}' for side in sides_m)} m"
 
 
 def _own_mass(scenario: Scenario) -> float:
@@ -271,11 +275,10 @@ class Upload:
     def size_and_mass(self, unit: str) -> str:
         """Size and mass in one line, for coordinates in this unit and SENSIBLE_DENSITY."""
         metres = UNITS[unit]
-        sides = " × ".join(f"{side * metres:.3g}" for side in self.sides)
-        volume = self.inspection.volume
+        sides, volume = _sides(self.sides * metres), self.inspection.volume
         if volume is None:
-            return f"{sides} m"
-        return f"{sides} m, {SENSIBLE_DENSITY * volume * metres**3:.3g} kg at {SENSIBLE_DENSITY:g} kg/m³"
+            return sides
+        return f"{sides}, {SENSIBLE_DENSITY * volume * metres**3:.3g} kg at {SENSIBLE_DENSITY:g} kg/m³"
 
     def scene(self, unit: str, stand_in: dict[str, object]) -> dict[str, object]:
         """Parameters of a scene with only this body, at rest; stand_in: parameters that replace an open mesh."""

@@ -32,6 +32,9 @@ TYPING_S = 0.6
 TOUCHED_S = 1.0
 """[s] An input isn't written to this soon after its user touched it: it would jump back under the finger."""
 
+NOTE = '<div style="padding: 0 1em; font-size: 0.85em">{}</div>'
+"""A line below a slider: what its factor comes to."""
+
 NEW_WEIGHT = "ballast.weight"
 """A point mass that can be added, beside those of the scene."""
 
@@ -84,10 +87,23 @@ class Controls:
         handle = self._gui.add_checkbox(label, False, hint=_hint(name))
         return self.bind(handle, lambda values: bool(values[name]), lambda value: {name: value})
 
-    def choice(self, name: str, label: str) -> Handle:
-        """One of the parameter's choices."""
-        handle = self._gui.add_dropdown(label, parameter_named(name).choices, hint=_hint(name))
-        return self.bind(handle, lambda values: values[name], lambda value: {name: value})
+    def choice(self, name: str, label: str, values: Mapping[str, Any] | None = None) -> Any:
+        """One of these values by their names, to which another one that is in force is added; or of the parameter's."""
+        values = values or {choice or "none": choice for choice in parameter_named(name).choices}
+        known = dict(values)
+        handle: Any = self._gui.add_dropdown(label, tuple(known), hint=_hint(name))
+
+        def shown(in_force: Values) -> str:
+            value = in_force[name]
+            texts = (text for text, one in values.items() if np.array_equal(one, value))
+            text = next(texts, None) or " ".join(f"{x:.16g}" for x in np.ravel(value))
+            known[text] = value
+            options = tuple(dict.fromkeys((*values, text)))
+            if handle.options != options:
+                handle.options = options
+            return text
+
+        return self.bind(handle, shown, lambda text: {name: known[text]})
 
     def numbers(self, name: str, label: str, length: int = 1, check: Callable[[], None] = lambda: None) -> Handle:
         """Numbers of any size, as text with blanks between them. check() raises InputError while they would have no

@@ -36,7 +36,10 @@ POKE_SHOWN_NS = 800_000_000
 ZOOM = (0.15, 1.6)
 """Body sizes in the picture's units between which a body may grow or shrink before the picture is scaled anew."""
 
-SEEN_INTO = 0.35
+BODY_COLOUR = (160, 153, 142)
+"""Three times as dark as the floor, in WCAG's ratio: a lighter body is hardly seen in a projector's picture."""
+
+SEEN_INTO = 0.5
 """Opacity of a body that one can look into."""
 
 LABEL = "-"
@@ -167,7 +170,7 @@ class ViserBackend(Backend):
             f"/{name}_{self._meshes}",
             vertices,
             surface.triangles,
-            color=look.colours[0],
+            color=BODY_COLOUR if name == style.BODY_MESH else look.colours[0],
             opacity=None if solid else look.opacity,
             side="double",
             scale=1.0 / self.unit,
@@ -208,7 +211,8 @@ class ViserBackend(Backend):
             points = np.stack([self.drawn(name, first), self.drawn(name, first + vectors[-count:])], axis=1)
             node = self._nodes.get(name)
             if node is None or len(node.points) != count:
-                colours = _colours(style.STYLES[name].colours, count)
+                look = style.STYLES[name].colours  # one for all, or one of each
+                colours = np.array(look if len(look) == count else look[0], np.uint8)
                 node = self._scene.add_arrows(f"/{name}", points, colours, **self._arrow_sides(name))
                 self._nodes[name] = node
             else:
@@ -319,11 +323,6 @@ def move(node: Any, position: np.ndarray) -> None:
     """Set the position (3,) of a node that isn't there already; viser 1.1 compares, too, but takes much longer."""
     if not np.array_equal(node.position, position):
         node.position = position
-
-
-def _colours(colours: tuple[style.Colour, ...], count: int) -> np.ndarray:
-    """One colour for all, or one of each."""
-    return np.array(colours if len(colours) == count else colours[0], np.uint8)
 
 
 def wxyz(q_xyzw: Iterable[float]) -> Wxyz:

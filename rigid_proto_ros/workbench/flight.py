@@ -213,7 +213,7 @@ class Flight:
         """Whether the past is shown, in which nothing can be done; if so, it says so."""
         if self.moment_ns is None:
             return False
-        self.say("The past is shown: go on from here (space), or return to the present first.")
+        self.say("The past is shown: press Play to go on from here, or return to the present first.")
         self.refused()
         return True
 

@@ -23,6 +23,7 @@ from .readouts import (
     ENERGY,
     GHOST_ANGLE,
     MOMENTUM,
+    NUMBERS_S,
     ROTATIONAL,
     SPEED,
     SPIN,
@@ -36,6 +37,9 @@ from .server import ANSWERS
 TURN = "set initial.angular_velocity"
 
 ALONE = "watch 1"
+
+IN_BODY = ("set density", "set inertia_model")
+"""Of what steps set, that which is in the tab Body; the rest is in Forces."""
 
 
 @dataclass(frozen=True)
@@ -191,9 +195,6 @@ class LessonProgress:
 
 FREE = "– (no lesson)"
 
-NUMBERS_S = 0.2
-"""[s] Interval at which the numbers are updated."""
-
 SPACE = f'<div class="{ANSWERS}"></div>'
 """Empty space for answers on a printed page."""
 
@@ -337,12 +338,20 @@ class LessonPanel:
         done = self._progress.done
         for k, sentence in enumerate(lesson.sentences):
             mark = "✓ " if k < done else "**→** " if k == done else ""
-            lines.append(f"{k + 1}. {mark}{sentence}")
+            lines.append(f"{k + 1}. {mark}{sentence}{self._where(k) if k == done else ''}")
         if done == len(lesson.sentences):
             right = lesson.answer == self._guess
             correct = f"It is **{'ABC'[lesson.answer]}**: {lesson.choices[lesson.answer]}"
             lines += ["", f"{'**You were right.**' if right else correct} {lesson.reason}"]
         return "\n".join(lines)
+
+    def _where(self, step: int) -> str:
+        """The tab in which the step sets or shows something, or empty."""
+        whats = [what for what in self.course.steps[step] if what.startswith(("set ", "show "))]
+        if not whats:
+            return ""
+        tab = "Show" if whats[0].startswith("show ") else "Body" if whats[0] in IN_BODY else "Forces"
+        return f" *(tab {tab})*"
 
     # Actions that the steps require
 

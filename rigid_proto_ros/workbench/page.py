@@ -111,13 +111,7 @@ class Page:
     browser is there to see it.
     """
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        live: LiveSimulation,
-        lesson: str = "",
-        anew: bool = False,
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, live: LiveSimulation, lesson: str = "", anew: bool = False) -> None:
         self._begins_anew = anew
         self.server = server
         self.live = live
@@ -178,7 +172,7 @@ class Page:
             self._for_class,
         )
         self.body_tab = BodyTab(gui, tabs, self.controls, flight, self._fly)
-        self.forces_tab = ForcesTab(gui, tabs, self.controls, self.pointer, flight)
+        self.forces_tab = ForcesTab(gui, tabs, self.controls, self.pointer)
         self.readout_tab = ReadoutTab(gui, tabs, self.readings)
         self.session_tab = SessionTab(gui, tabs, flight)
         self.show_tab = ShowTab(
@@ -276,7 +270,8 @@ class Page:
         simulation = self.live.loop.simulation
         tied = simulation.string is not None
         loads = len(self.picture.loads.acting)
-        return motion_words(self._scenario, loads, tied, simulation.at_rest, self.live.paused)
+        words = motion_words(self._scenario, loads, tied, simulation.at_rest, self.live.paused)
+        return f"{words}: acts on Play" if self.live.paused and simulation.commands_wait else words
 
     def _take(self, events: list[tuple[Event, str]]) -> None:
         times: list[int] = []

@@ -29,7 +29,7 @@ from ..scene.scene_file import read_scene_text
 from ..session.as_script import SceneAndScript, script_of_session
 from ..session.recorded_session import play
 from .body_tab import shown_name
-from .controls import Changes, Controls, log_slider, on_slider
+from .controls import NOTE, Controls, log_slider, on_slider
 from .flight import Flight
 from .pointer import Pointer
 from .server import MARK
@@ -47,7 +47,7 @@ REWIND_STEP_S = 0.05
 
 RATES = ("24", "25", "30", "60")
 
-GRAVITIES = {"off": [0.0, 0.0, 0.0], "Earth's": [0.0, 0.0, -9.81], "Moon's": [0.0, 0.0, -1.62]}
+GRAVITIES = {"none": [0.0] * 3, "Earth's, 9.81 m/s²": [0.0, 0.0, -9.81], "Moon's, 1.62 m/s²": [0.0, 0.0, -1.62]}
 
 FORCE_DECADES = 2.0
 """Range of the force's slider in decades, up and down from the force that suits the body."""
@@ -77,9 +77,7 @@ class TimeBar:
         with gui.add_folder("Time"):
             self._line = gui.add_html("")
             play = gui.add_button_group("Simulation", (PAUSE, STEP, RESET))
-            self.speed: Any = gui.add_dropdown(
-                "Speed", tuple(SPEEDS), initial_value="1", hint="Simulated seconds per second (real_time_factor)"
-            )
+            self.speed = controls.choice("real_time_factor", "Speed", SPEEDS)
         self._play: Any = play
 
         @play.on_click
@@ -96,19 +94,6 @@ class TimeBar:
                     flight.pause(True)
             else:
                 await self.play_or_pause()
-
-        def shown(values: Any) -> str:
-            factor = values["real_time_factor"]
-            name = next((name for name, f in SPEEDS.items() if f == factor), repr(factor).removesuffix(".0"))
-            options = tuple(dict.fromkeys((*SPEEDS, name)))
-            if self.speed.options != options:
-                self.speed.options = options
-            return name
-
-        def changes(name: str) -> Changes:
-            return {"real_time_factor": SPEEDS[name] if name in SPEEDS else float(name)}
-
-        controls.bind(self.speed, shown, changes)
 
         # Browsers send no key that is typed into an input.
         @gui.add_command("Pause or resume; after rewinding, continue from there", hotkey="space").on_trigger
@@ -157,9 +142,7 @@ def motion_words(scenario: Scenario, loads: int, tied: bool, at_rest: bool, paus
 class ForcesTab:
     """Loads on the body: the force of a click, initial spin, gravity, and any parameter by its name."""
 
-    def __init__(
-        self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle, controls: Controls, pointer: Pointer, flight: Flight
-    ) -> None:
+    def __init__(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle, controls: Controls, pointer: Pointer) -> None:
         self._pointer = pointer
         with tabs.add_tab("Forces"):
             with gui.add_folder("By hand"):
@@ -169,7 +152,7 @@ class ForcesTab:
             with gui.add_folder("Motion"):
                 controls.numbers("initial.angular_velocity", "Initial spin [rad/s]", 3)
                 controls.checkbox("gyroscopic", "Gyroscopic term ω × Iω")
-                gravity = gui.add_button_group("Gravity is", tuple(GRAVITIES))
+                controls.choice("gravity", "Gravity", GRAVITIES)
             with gui.add_folder("Any parameter"):
                 controls.any_parameter()
 
@@ -181,32 +164,22 @@ class ForcesTab:
                 pointer.force = float(f"{pointer.usual_force * 10.0 ** force.value[0]:.3g}")
                 self.show_force()
 
-        @gravity.on_click
-        async def _(_: viser.GuiEvent[Any]) -> None:
-            flight.set({"gravity": GRAVITIES[gravity.value]})
-
     def show_force(self) -> None:
         """The poke's force, as it is now."""
         pointer = self._pointer
-        self._force.content = f'<div style="padding: 0 1em; font-size: 0.85em">{pointer.force:.3g} N</div>'
+        self._force.content = NOTE.format(f"{pointer.force:.3g} N")
         self._slider.value = on_slider(pointer.force / pointer.usual_force, FORCE_DECADES)
 
 
 class SessionTab:
     """The tab for the recording of the run since the last reset."""
 
-    def __init__(
-        self,
-        gui: viser.GuiApi,
-        tabs: viser.GuiTabGroupHandle,
-        flight: Flight,
-    ) -> None:
+    def __init__(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle, flight: Flight) -> None:
         self._flight = flight
         with tabs.add_tab("Record"):
             with gui.add_folder("Rewind"):
-                hint = "Simulated time is paused while the past is shown"
+                hint = "Simulated time is paused while the past is shown; Play goes on from there"
                 self._back: Any = gui.add_slider("Seconds back", 0.0, 10.0, REWIND_STEP_S, 0.0, hint=hint)
-                self._go_on = gui.add_button("Go on from here", disabled=True, hint="From the time that is shown")
             with gui.add_folder("Recording since the last reset"):
                 hint = "The commands given on this page; they reproduce the motion bit for bit (.zip)"
                 save = gui.add_button("Save scene and script", hint=hint)
@@ -222,10 +195,6 @@ class SessionTab:
                     flight.look_at_present()
                 else:
                     flight.look_at(flight.reach_s[1] - seconds)
-
-        @self._go_on.on_click
-        async def _(_: viser.GuiEvent[Any]) -> None:
-            await flight.go_on_from_here()
 
         @save.on_click
         async def _(event: viser.GuiEvent[Any]) -> None:
@@ -250,7 +219,6 @@ class SessionTab:
         # The user may have set more than is available; the value is overwritten only if it differs by a step.
         if abs(self._back.value - back_s) > 0.5 * REWIND_STEP_S:
             self._back.value = min(back_s, self._back.max)
-        self._go_on.disabled = not looking
 
     async def _saving(self, client: viser.ClientHandle, name: str, make: Callable[[], tuple[bytes, str]]) -> None:
         try:

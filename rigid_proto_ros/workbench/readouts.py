@@ -114,12 +114,7 @@ class LivePlot:
     """
 
     def __init__(
-        self,
-        gui: Any,
-        title: str,
-        unit: str,
-        series: Sequence[tuple[str, style.Colour]],
-        least: float = 0.0,
+        self, gui: Any, title: str, unit: str, series: Sequence[tuple[str, style.Colour]], least: float = 0.0
     ) -> None:
         self._title, self._unit, self._least = title, unit, least
         self._range = PlotRange(0, -1.0, 1.0)

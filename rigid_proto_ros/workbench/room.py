@@ -29,6 +29,9 @@ BODY_FILLS, PATH_FILLS = 0.62, 0.9
 one that falls.
 """
 
+BLUE = (16, 60, 110)
+"""Of buttons on white; viser lightens it by half. Its own has less than the contrast of 4.5 that small letters need."""
+
 CELLS = 4.0
 """About so many cells of the floor's grid to a unit."""
 
@@ -102,8 +105,9 @@ class Room:
     def paint(self, dark: bool) -> None:
         """Light or dark, all of it."""
         theme = DARK if dark else LIGHT
+        brand = None if dark else BLUE
         self._server.gui.configure_theme(
-            show_logo=False, show_share_button=False, control_width="large", dark_mode=dark
+            show_logo=False, show_share_button=False, control_width="large", dark_mode=dark, brand_color=brand
         )
         for grid in (self._floor, self._wall):
             grid.cell_color, grid.section_color = theme.cell, theme.section

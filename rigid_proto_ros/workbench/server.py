@@ -175,6 +175,7 @@ _DOCKED_ROW = f'{_DOCK} [style*="flex-direction: row; position: relative; width:
 _DOCKED_PICTURE = '[style*="position: absolute; inset: 0px "]:has(canvas)'
 
 _CANVAS = "canvas[data-engine]"  # three.js marks its own; the plots have others
+_MARK_LABEL = '[class*="mark"][class*="label" i]'  # of both kinds of sliders
 _SCROLLED = ".mantine-ScrollArea-viewport"
 
 _BAR = f'.mantine-Paper-root:has(> [style*="box-sizing: border-box"] .{MARK})'
@@ -184,7 +185,7 @@ _FOLDING = f'[style*="overflow: hidden"][style*="min-height: 0px"]:has(.{MARK})'
 
 STYLE = f"""<style>
 .mantine-Notification-root {{ max-height: 60vh !important; }}
-.mantine-Button-root {{ height: auto !important; padding-block: 0.25em; }}
+.mantine-Button-root {{ height: auto !important; padding-block: 0.4em; font-size: 0.875rem !important; }}
 .mantine-Button-label {{ white-space: normal; overflow: visible; line-height: 1.3; }}
 .mantine-Notification-root:has(.tabler-icon-check) {{ display: none; }}
 .{MARK} {{ padding: 0 0.6em; font-size: 0.95em; white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }}
@@ -192,6 +193,9 @@ STYLE = f"""<style>
 .{MARK} b {{ display: inline-block; min-width: 4.6em; }}
 .{MARK} span {{ opacity: 0.7; }}
 .mantine-Input-input {{ text-overflow: ellipsis; }}
+.mantine-Checkbox-root {{ --checkbox-size: 1.4em !important; }}
+.mantine-Text-root, [role="tab"], {_MARK_LABEL} {{ color: inherit !important; }}
+{_MARK_LABEL} {{ font-size: 0.7rem !important; }}
 {_BAR} {{ position: sticky; top: 0; z-index: 20; background: var(--mantine-color-body); margin-top: 0.4em; }}
 {_FOLDING} {{ overflow: clip !important; min-width: 0; }}
 .{ANSWERS} {{ display: none; }}

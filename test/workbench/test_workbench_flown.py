@@ -159,8 +159,8 @@ def test_what_is_done_after_going_back_is_saved_from_there(flown: FlownPage, tmp
         flown.do(lambda force=force: flown.page.flight.do({"at": "tip", "force": force}))
         flown.fly(seconds)
     flown._update(flown.widget("Seconds back"), 1.5)
-    flown.until(lambda: not flown.widget("Go on from here").disabled, "button")
-    flown.press("Go on from here")
+    flown.until(lambda: flown.widget("Simulation").options[0] == "Play", "button")
+    flown.press("Play", of="Simulation")
     flown.fly(0.3)
     flown.do(lambda: flown.page.flight.do({"at": "tip", "force": [1.0, 0.0, 0.0]}))
     flown.fly(0.7)
@@ -217,8 +217,8 @@ def test_a_branch_begins_at_the_moment_looked_at_to_which_reset_returns(flown: F
     flown._update(flown.widget("Seconds back"), 2.0)
     moment_ns = flown.until(lambda: flown.page.flight.moment_ns, "moment of the past")
     assert moment_ns == pytest.approx(1_000_000_000, abs=10_000_000)
-    flown.until(lambda: not flown.widget("Go on from here").disabled, "button")
-    flown.press("Go on from here")
+    flown.until(lambda: flown.widget("Simulation").options[0] == "Play", "button")
+    flown.press("Play", of="Simulation")
     flown.fly(0.5)
     k = next(k for k, (time_ns, _) in enumerate(rows) if time_ns == moment_ns)
     # Undisturbed it does again what it did: the exact free flight from the recorded state.
@@ -318,6 +318,18 @@ def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -
         "poke",
         "string_release",
     ]
+
+
+def test_while_paused_the_bar_says_that_what_was_done_acts_on_play(flown: FlownPage) -> None:
+    words = flown.page._words
+    flown.press("Pause", of="Simulation")
+    assert flown.do(words) == "paused"
+    for act in (lambda: flown.click((0.0, 0.0, 0.068), [0.0, 1.0, 0.0]), lambda: flown.set("Mass ×", (1.0,))):
+        act()
+        assert flown.do(words) == "paused: acts on Play"
+        flown.reset()
+        assert flown.do(words) == "paused"
+        flown.page.flight.pause(True)
 
 
 def string_events(flown: FlownPage) -> list[str]:
@@ -473,7 +485,7 @@ def test_a_click_on_a_body_that_is_to_change_when_time_goes_on_hits_what_is_draw
 
 def test_of_a_tensor_no_rounding_is_shown(flown: FlownPage) -> None:
     assert [x == 0.0 for x in numbers(flown.widget("Tensor").value)] == [False, True, True, False, True, False]
-    assert "| 0 % |" in flown.page.body_tab.table, "the masses of the two models"
+    assert "| 0 % |" in flown.page.body_tab._table.content, "the masses of the two models"
 
 
 def test_a_body_of_any_size_fills_the_picture_alike_and_grows_in_sight(flown: FlownPage) -> None:

@@ -73,7 +73,7 @@ class User(FlownPage):
         self.set("Value", place)
 
     def gravity_off(self) -> None:
-        self.press("off", of="Gravity is")
+        self.set("Gravity", "none")
         assert not self.scenario.setup.gravity.any()
 
     def see_axes(self) -> None:
@@ -100,7 +100,7 @@ class User(FlownPage):
 
     def compare(self, *words: str) -> None:
         """Words of the table of tensors."""
-        assert all(word in self.page.body_tab.table for word in words), self.page.body_tab.table
+        assert all(word in self.page.body_tab._table.content for word in words), self.page.body_tab._table.content
 
 
 STEPS: dict[str, tuple[tuple[tuple, ...], ...]] = {
@@ -199,6 +199,21 @@ def test_every_step_of_the_lesson_can_be_done_on_the_page_and_gets_its_mark(user
         user.fly(0.02)
         user.until(lambda done=done: text.content.count("✓") == done, f"mark at step {done}, nor at that alone")
     assert not user.said
+
+
+def test_a_step_that_sets_or_shows_something_names_the_tab(user: User) -> None:
+    lessons, named = user.page.lessons, {}
+    for name, course in COURSES.items():
+        lessons.name(name)
+        for step, whats in enumerate(course.steps):
+            for label in (what.split(".")[0] for what in whats if what.startswith(("set ", "show "))):
+                named.setdefault(lessons._where(step), set()).add(label)
+    user.set("Lesson", FREE)
+    assert named == {
+        " *(tab Body)*": {"set density", "set inertia_model"},
+        " *(tab Forces)*": {"set ballast", "set gravity", "set gyroscopic", "set initial", "set string"},
+        " *(tab Show)*": {"show Principal axes"},
+    }
 
 
 def test_time_that_jumps_was_not_watched_and_another_lesson_begins_without_marks() -> None:

@@ -326,6 +326,45 @@ def test_in_dark_mode_nothing_glares_and_in_class_mode_a_lesson_and_three_button
     assert b"/ShadingType" in printed, "the lines for answers are a background, which browsers leave out unasked"
 
 
+MEASURED = """() => {
+  const numbers = css => [...css.match(/[0-9.]+/g).map(Number), 1].slice(0, 4);
+  const over = (back, [r, g, b, a]) => [r, g, b].map((c, i) => a * c + (1 - a) * back[i]);
+  const linear = c => c < 10 ? c / 3295 : ((c / 255 + 0.055) / 1.055) ** 2.4;
+  const light = ([r, g, b]) => 0.05 + 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+  const contrast = node => {
+    const around = [];
+    for (let each = node; each; each = each.parentElement) around.unshift(numbers(getComputedStyle(each).backgroundColor));
+    const back = around.reduce(over, [255, 255, 255]);
+    const ratio = light(over(back, numbers(getComputedStyle(node).color))) / light(back);
+    return Math.max(ratio, 1 / ratio);
+  };
+  const seen = selector => [...document.querySelectorAll(selector)].filter(node => node.offsetParent);
+  const words = seen('label[for], .mantine-Button-label, [role="tab"], [class*="mark"][class*="abel"]');
+  const heights = seen('.mantine-Button-root').map(button => button.getBoundingClientRect().height);
+  return [Math.min(...words.map(contrast)), Math.min(...heights)];
+}"""
+"""The least contrast of labels, as WCAG defines it, and the least height of buttons [pixels], of those that are seen."""
+
+
+def test_labels_have_a_contrast_of_4_and_a_half_and_buttons_are_26_pixels_high(page) -> None:
+    page.page.set_viewport_size({"width": 1000, "height": 420})
+    background = "getComputedStyle(document.body).backgroundColor"
+    for dark, colour in ((True, "rgb(36, 36, 36)"), (False, "rgb(255, 255, 255)")):
+        page.flown.page.room.paint(dark)
+        page.until(lambda colour=colour: page.page.evaluate(background) == colour, "theme")
+        for tab in ("Lesson", "Body", "Forces", "Record", "Show"):
+            page.tab(tab)
+            contrast, height = page.page.evaluate(MEASURED)
+            assert contrast > 4.5 and height >= 26.0, (dark, tab, contrast, height)  # measured 4.9 and 28
+
+
+def test_the_body_has_a_contrast_of_3_to_the_floor(page) -> None:
+    x, y = map(int, com_pixel(page))
+    picture = (page.look()[y - 60 : y + 60, x - 60 : x + 60].reshape(-1, 3) / 255.0) ** 2.2
+    light = np.sort(0.05 + picture @ [0.2126, 0.7152, 0.0722])
+    assert light[-len(light) // 5] > 3.0 * light[len(light) // 10]
+
+
 def test_plots_show_their_curves_also_after_a_lesson_was_begun(page) -> None:
     page.page.set_viewport_size({"width": 700, "height": 320})
     page.tab("Plots")

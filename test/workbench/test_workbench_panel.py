@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import shutil
 import threading
 from pathlib import Path
@@ -18,9 +19,11 @@ from flown_page import FlownPage, flies_again
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.mesh.locate import resolve_mesh
+from rigid_proto_ros.picture import style
 from rigid_proto_ros.workbench import controls
 from rigid_proto_ros.workbench.controls import NEW_WEIGHT
 from rigid_proto_ros.workbench.panel import SPEEDS
+from rigid_proto_ros.workbench.readouts import GHOST_ANGLE
 
 
 def every_option_is_there_once(flown: FlownPage) -> None:
@@ -54,6 +57,36 @@ def test_any_speed_that_is_in_force_is_shown_and_another_can_be_chosen(flown: Fl
     flown.set("Speed", "1")
     assert flown.scenario.parameters.real_time_factor == 1.0
     assert (speed.value, tuple(speed.options)) == ("1", tuple(SPEEDS))
+
+
+def test_the_gravity_in_force_is_shown_by_its_name_or_its_numbers(flown: FlownPage) -> None:
+    gravity = flown.widget("Gravity")
+    for numbers, shown in (("0 0 -9.81", "Earth's, 9.81 m/s²"), ("0 0 -3.7", "0 0 -3.7"), ("0 0 0", "none")):
+        flown.set("Parameter", "gravity")
+        flown.set("Value", numbers)
+        assert gravity.value == shown
+        every_option_is_there_once(flown)
+    flown.set("Gravity", "Moon's, 1.62 m/s²")
+    assert flown.scenario.setup.gravity.tolist() == [0.0, 0.0, -1.62]
+
+
+def test_size_and_mass_in_force_are_said_with_their_units(flown: FlownPage) -> None:
+    flown.do(lambda: flown.page.flight.fly({"mesh": "hollow_box", "mass": 2.0}))
+    flown.fly(0.0)
+    flown.set("Size ×", (math.log10(2.0),))
+    sides = " × ".join(f"{side:.3g}" for side in 2.0 * flown.scenario.setup.surface.extent)
+    assert f">{sides} m, 2 kg<" in flown.page.body_tab._size_and_mass.content
+
+
+def test_a_ghost_with_another_tensor_is_chosen_beside_the_model_and_is_there_from_the_reset_on(
+    flown: FlownPage,
+) -> None:
+    assert flown.widget("Ghost").value == "none"
+    flown.set("Ghost", "bounding_box")
+    flown.reset()
+    flown.fly(1.0)
+    assert flown.node(style.GHOST_MESH).visible
+    assert GHOST_ANGLE in flown.page.readings.values
 
 
 @pytest.fixture
@@ -222,7 +255,7 @@ def test_one_can_go_on_from_the_past_of_an_upload_when_another_file_was_uploaded
     flown.fly(1.0)
     flown.do(lambda: folder.take("second.obj", b"# z up\n" + resolve_mesh("book").read_bytes()))
     flown._update(flown.widget("Seconds back"), 1.5)
-    flown.until(lambda: not flown.widget("Go on from here").disabled, "button")
-    flown.press("Go on from here")
+    flown.until(lambda: flown.widget("Simulation").options[0] == "Play", "button")
+    flown.press("Play", of="Simulation")
     flown.fly(0.3)
     assert not flown.said and flown.scenario.parameters.mesh == first

@@ -65,7 +65,7 @@ def test_what_is_done_while_the_past_is_shown_is_refused_with_what_to_do(flown: 
     before, mass = len(session().events), flown.scenario.setup.body.mass
     act(flown)
     flown.wait_until_asked()
-    assert flown.said == ["The past is shown: go on from here (space), or return to the present first."]
+    assert flown.said == ["The past is shown: press Play to go on from here, or return to the present first."]
     assert len(session().events) == before and flown.scenario.setup.body.mass == mass
     assert not flown.page.pointer.dragging
     # How one looks at the motion can be changed.
