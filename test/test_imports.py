@@ -6,9 +6,8 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
-
-import pytest
 
 import rigid_proto_ros
 
@@ -57,13 +56,20 @@ ALLOWED = {
 }
 
 
+@cache
+def imports_of(path: Path) -> list[ast.Import | ast.ImportFrom]:
+    """The import statements of a file, at its top or inside a function."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
 def imports(module: str, path: Path) -> Iterator[tuple[str, int]]:
-    """Absolute names of everything that a module imports, at its top or inside a function, with the line."""
+    """Absolute names of everything that a module imports, with the line."""
     package = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in imports_of(path):
         if isinstance(node, ast.Import):
             yield from ((alias.name, node.lineno) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             base = package[: len(package) - node.level + 1] if node.level else []
             name = ".".join([*base, *filter(None, [node.module])])
             for alias in node.names:
@@ -121,7 +127,7 @@ def test_imports_inside_the_package_are_relative() -> None:
     absolute = [
         f"{module}:{node.lineno}"
         for module, path in MODULES.items()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in imports_of(path)
         if (isinstance(node, ast.ImportFrom) and not node.level and is_ours(node.module or ""))
         or (isinstance(node, ast.Import) and any(is_ours(alias.name) for alias in node.names))
     ]
@@ -157,11 +163,13 @@ def test_a_launch_file_needs_no_numba() -> None:
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"
 
 
-@pytest.mark.parametrize("module", ["simulation.simulation", "scene.scenario", "session.recorded_session"])
-def test_simulating_loads_no_viewer_mesh_reader_or_ros(module: str) -> None:
+def test_simulating_loads_no_viewer_mesh_reader_or_ros() -> None:
     # numba would load the last three, wherever they are installed, for what no kernel here uses.
     heavy = ("trimesh", "rerun", "rclpy", "pyarrow", "manifold3d", "mcap", "zstandard", "scipy", "cffi", "coverage")
-    code = f"import sys, {PACKAGE}.{module}; print(*[name for name in {heavy!r} if name in sys.modules])"
+    modules = ", ".join(
+        f"{PACKAGE}.{name}" for name in ("simulation.simulation", "scene.scenario", "session.recorded_session")
+    )
+    code = f"import sys, {modules}; print(*[name for name in {heavy!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == []
