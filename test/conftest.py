@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numba
 import pytest
 from hypothesis import settings
 
+from rigid_proto_ros.base import compilation
 from rigid_proto_ros.ros.domain import hold_domain
 
 settings.register_profile("the same examples every time", derandomize=True, deadline=None)
@@ -63,6 +65,14 @@ def meshes() -> Path:
     if not path.is_dir():
         pytest.fail(f"RIGID_PROTO_MESHES: {folder} is not a folder")
     return path.resolve()
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The user's cache folder is a test's own, but for the kernels in it: each would be compiled once more."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(Path(compilation.kernel_folder(compilation.__file__)).parent))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
 
 
 @contextmanager

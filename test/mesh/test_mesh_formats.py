@@ -187,9 +187,7 @@ def test_names_of_bundled_bodies_and_package_uris_find_the_same_file():
     assert (by_name.path, by_name.sha256) == (by_uri.path, by_uri.sha256)
 
 
-def test_a_second_look_judges_nothing_and_a_cache_that_fails_is_no_error(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
+def test_a_second_look_judges_nothing_and_a_cache_that_fails_is_no_error(tmp_path, monkeypatch, own_cache):
     first = mesh_body(load(tmp_path, "a.obj", obj(faces=CUBE_QUADS))).verdict
 
     def never(*_args, **_options):
@@ -207,8 +205,7 @@ def test_a_second_look_judges_nothing_and_a_cache_that_fails_is_no_error(tmp_pat
     assert mesh_body(load_mesh(str(tmp_path / "a.obj"))).verdict == first
 
 
-def test_without_a_cache_nothing_is_kept_and_all_is_judged(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+def test_without_a_cache_nothing_is_kept_and_all_is_judged(tmp_path, monkeypatch, own_cache):
     monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
     assert volume(load(tmp_path, "a.obj", obj())) == 1.0
     assert [path.name for path in tmp_path.iterdir()] == ["a.obj"]

@@ -25,9 +25,7 @@ def write_gltf(folder, vertices: np.ndarray) -> None:
     (folder / "model.bin").write_bytes(made.bytes)
 
 
-def test_every_file_that_was_read_is_in_the_caches_key(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
+def test_every_file_that_was_read_is_in_the_caches_key(tmp_path, own_cache):
     for name, scale, expected in (("a", 1.0, 1.0), ("b", 2.0, 8.0), ("a", 1.0, 1.0), ("a", 3.0, 27.0)):
         write_gltf(tmp_path / name, scale * mf.CUBE_VERTICES)
         assert volume(load_mesh(str(tmp_path / name / "model.gltf"))) == pytest.approx(expected, rel=1e-12)

@@ -86,9 +86,12 @@ def test_a_body_that_falls_is_followed_while_it_is_in_sight_and_no_longer(tmp_pa
     assert "Played at 0.1 of the real speed" in file.read_text("utf-8")
 
 
-def test_the_hanging_book_is_shown_until_it_has_come_to_rest(tmp_path, capsys) -> None:
+def test_the_hanging_book_is_shown_until_it_has_come_to_rest(tmp_path, capsys, monkeypatch) -> None:
+    ends_ns = []
+    monkeypatch.setattr(lesson_file, "lesson_html", lambda _, record: ends_ns.append(record.times_ns[-1]) or "drawn")
     assert main(["lesson", "plumb_line", "--html", str(tmp_path / "a.html")]) == 0
     assert "40 s of plumb_line" in capsys.readouterr().out
+    assert ends_ns == [40_000_000_000]
 
 
 @pytest.mark.parametrize(
