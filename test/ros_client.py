@@ -133,7 +133,10 @@ class RosClient:
             with self._taking:
                 for subscription in self._subscriptions.values():
                     with subscription.handle:
-                        while taken := subscription.handle.take_message(subscription.msg_type, False):
+                        # No more at a time: a topic that is never empty must not keep the others waiting.
+                        for _ in range(100):
+                            if (taken := subscription.handle.take_message(subscription.msg_type, False)) is None:
+                                break
                             subscription.callback(taken[0])
 
     def __enter__(self):
