@@ -194,6 +194,7 @@ STYLE = f"""<style>
 .{MARK} span {{ opacity: 0.7; }}
 .mantine-Input-input {{ text-overflow: ellipsis; }}
 .mantine-Checkbox-root {{ --checkbox-size: 1.4em !important; }}
+.multi-slider-thumb, .mantine-Slider-thumb {{ width: 1.1em !important; height: 1.1em !important; }}
 .mantine-Text-root, [role="tab"], {_MARK_LABEL} {{ color: inherit !important; }}
 {_MARK_LABEL} {{ font-size: 0.7rem !important; }}
 {_BAR} {{ position: sticky; top: 0; z-index: 20; background: var(--mantine-color-body); margin-top: 0.4em; }}
