@@ -8,8 +8,14 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from .errors import InputError, did_you_mean
+
+try:
+    import fcntl
+except ImportError:  # on Windows, where several may write to one file
+    fcntl = None  # type: ignore[assignment]
 
 CHUNK = 1 << 20
 """Bytes read at a time from what doesn't say its size, such as a pipe."""
@@ -54,6 +60,26 @@ def output_file(option: str, file: str | Path) -> Path:
     except OSError as error:
         raise InputError(option, str(file), f"a file in a folder that can be made ({error.strerror})") from None
     return path
+
+
+def file_for_one_writer(option: str, file: str | Path) -> BinaryIO:
+    """An empty file to write to, which is refused to everybody who opens it by this function until it is closed, in
+    this process and in others. Raises InputError, which names ``option``, and OSError.
+    """
+    # Not emptied as it is opened: it may be somebody's.
+    number = os.open(output_file(option, file), os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
+    stream = os.fdopen(number, "wb")
+    try:
+        if fcntl is not None:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        stream.close()
+        raise InputError(option, str(file), "another file than the one that is being recorded") from None
+    except OSError:
+        pass  # a file system without locks
+    with suppress(OSError):  # a device or a pipe
+        stream.truncate()
+    return stream
 
 
 def is_same_file(one: str | Path, other: str | Path) -> bool:

@@ -13,13 +13,12 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from ..base.errors import CommandRefused, InputError
-from ..base.files import is_same_file
 from ..motion.frames import parse_frame
 from ..motion.state import State, shift_com
 from ..scene.command_codec import frame_names
@@ -70,6 +69,8 @@ class LiveSimulation:
         self.loop = SimulationLoop(scenario, Observers(*observers), self.endpoints, self.stamps)
         self._requests: list[tuple[Callable[[], Any], Future]] = []
         self._wake = threading.Event()
+        # Held while a request is taken, and while the thread begins or is to end.
+        self._handing_over = threading.Lock()
         self._stopping = False
         self._thread: threading.Thread | None = None
 
@@ -87,9 +88,13 @@ class LiveSimulation:
         """Begin the recording that the scenario asks for, and tell the observers what is going to fly; once, before
         ``start``, when nothing else can be refused any more. Raises InputError when the recording can't be written.
         """
-        self._recorder = self._open_recorder(self.scenario)
-        self._watch()
-        self._introduce(self.loop.observer)
+
+        def announce() -> None:
+            self._recorder = self._open_recorder(self.scenario)
+            self._watch()
+            self._introduce(self.loop.observer)
+
+        self.call(announce)
 
     def start(self, on_crash: Callable[[], None] = lambda: None) -> None:
         """Simulated time begins. on_crash() is called should the thread end by a fault of the program. What isn't
@@ -97,12 +102,14 @@ class LiveSimulation:
         """
         # What start-up has made stays: the garbage collector going through it again would hold up the motion for 0.1 s.
         gc.freeze()
-        self._thread = threading.Thread(target=self._run, args=(on_crash,), name="physics", daemon=True)
-        self._thread.start()
+        with self._handing_over:
+            self._thread = threading.Thread(target=self._run, args=(on_crash,), name="physics", daemon=True)
+            self._thread.start()
 
     def stop(self) -> None:
-        """End the motion, then the observers: what they hold goes out. Requests that still wait are cancelled."""
-        self._stopping = True
+        """End the motion, then the observers: what they hold goes out. Requests that still wait are refused."""
+        with self._handing_over:
+            self._stopping = True
         self._wake.set()
         if self._thread is not None:
             self._thread.join(timeout=5.0)
@@ -115,15 +122,21 @@ class LiveSimulation:
         """Run a function on the physics thread between two ticks and return what it returns, or raise what it raises;
         at once, before the thread is started.
 
-        Raises InputError when the thread is too busy to begin it within BUSY_S; then it is never run.
+        Raises InputError when the simulation has ended, or the thread is too busy to begin it within BUSY_S; then it is
+        never run.
         """
-        if self._thread is None:
-            return function()
         future: Future = Future()
-        self._requests.append((function, future))
+        with self._handing_over:
+            if self._stopping:
+                raise InputError("request", "the simulation has ended")
+            if self._thread is None:
+                return function()
+            self._requests.append((function, future))
         self._wake.set()
         try:
             return future.result(BUSY_S)
+        except CancelledError:
+            raise InputError("request", "the simulation has ended") from None
         except TimeoutError:
             if future.cancel():
                 text = f"the simulation was too busy to start this request within {BUSY_S:g} s"
@@ -255,8 +268,12 @@ class LiveSimulation:
                 raise
             return scenario
 
-        def change() -> None:
-            loop.expect(check(), Change(dict(changes)))
+        def change() -> Observer | None:
+            scenario = check()
+            # A recording begins in the scene before the change that begins it, and has that as its first event.
+            finished = self._switch_recording(recorder) if "record" in changes else None
+            loop.expect(scenario, Change(dict(changes)))
+            return finished
 
         recorder = None
         if "record" in changes:
@@ -264,15 +281,13 @@ class LiveSimulation:
             self.call(check)
             recorder = self._open_recorder(planned)
         try:
-            self.call(change)
+            finished = self.call(change)
         except InputError:
             if recorder is not None:
                 recorder.close()
             raise
-        if "record" in changes:
-            finished = self.call(lambda: self._switch_recording(recorder))
-            if finished is not None:
-                finished.close()
+        if finished is not None:
+            finished.close()
 
     def _warm_up_change(self, planned: Scenario) -> None:
         """Compile the kernels of another integrator."""
@@ -316,8 +331,6 @@ class LiveSimulation:
         path = scenario.parameters.record
         if not path:
             return None
-        if self._recorder is not None and is_same_file(path, self.scenario.parameters.record):
-            raise InputError("record", path, "another file than the one that is being recorded")
         from ..rerun_view.session_files import make_recorder
 
         return make_recorder(path, self.name, scenario.parameters, self._recording_failed)
@@ -346,17 +359,17 @@ class LiveSimulation:
 
     def give_up_failed_recording(self) -> None:
         """Where a recording has stopped by itself: close it, and ``record`` is empty from now on."""
-        if not getattr(self._recorder, "error", ""):
+        failed = self._recorder
+        if failed is None or not getattr(failed, "error", ""):
             return
 
-        def give_up() -> Observer | None:
-            recorder = self._switch_recording(None)
-            self.loop.stop_recording()
-            return recorder
+        def give_up() -> None:
+            if self._recorder is failed:  # and no other one has taken its place
+                self._switch_recording(None)
+                self.loop.stop_recording()
 
-        recorder = self.call(give_up)
-        if recorder is not None:
-            recorder.close()
+        self.call(give_up)
+        failed.close()
 
 
 def warm_up(setup: Setup) -> State:

@@ -29,7 +29,7 @@ import numpy as np
 import rerun as rr
 
 from ..base.errors import InputError
-from ..base.files import output_file
+from ..base.files import file_for_one_writer
 from ..base.rotation import matrix_from_quaternion
 from ..picture import style
 from ..picture.picture import Picture
@@ -139,7 +139,10 @@ class RerunObserver(Observer):
                 stream, self._stream = self._stream, None
                 self._lost(f"{type(error).__name__}: {error}")
                 if stream is not None:
-                    self._end(stream)
+                    try:
+                        self._end(stream)
+                    except Exception:  # as where the disk is full
+                        stream.leave()
             if not closing:
                 self._mailbox.wait(FLUSH_PERIOD_S)
 
@@ -376,8 +379,8 @@ class FileStream(Stream):
         self._path = path
         if path.suffix != ".rrd":
             raise InputError("record", str(path), "a path that ends in .rrd or .mcap")
-        output_file("record", path)
         try:
+            self._held = file_for_one_writer("record", path)
             # An application of its own: in a viewer that shows another recording, too, it has its own layout.
             application_id = f"{e.APPLICATION_ID}_{recording_id[:8]}"
             super().__init__(rr.FileSink(path, write_footer=False), recording_id, name, application_id)
@@ -403,6 +406,12 @@ class FileStream(Stream):
         self.flush()
         self.recording.disconnect()
         mark_end(self._path)
+        self._held.close()
+
+    def leave(self) -> Thread:
+        """Close it as it is."""
+        self._held.close()
+        return super().leave()
 
 
 def mark_end(path: Path) -> None:

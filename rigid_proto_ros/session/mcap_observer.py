@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
-from ..base.files import output_file
+from ..base.files import file_for_one_writer
 from ..base.provenance import cpu, versions
 from ..scene import cdr
 from ..scene.command_codec import frame_names
@@ -82,7 +82,7 @@ class McapObserver(Observer):
         self._attached: set[str] = set()
         self._writer: Writer | None = None
         try:
-            self._stream = open(output_file("record", path), "wb")  # noqa: SIM115 (closed by the thread)
+            self._stream = file_for_one_writer("record", path)  # closed by the thread
             self._writer = self._begin(node_name)
         except OSError as error:
             accepted = f"a file that can be written ({error.strerror})"

@@ -31,7 +31,7 @@ from ..mesh.reading import OWN_FORMATS, load_mesh
 from ..picture.style import without_rounding
 from ..scene.scenario import Scenario
 from .controls import NOTE, TYPING_S, Controls, parse_numbers
-from .flight import Flight
+from .flight import Flight, whole
 
 OWN_FILE = "(a file)"
 
@@ -296,11 +296,12 @@ def _without_options(message: str) -> str:
     return OPTION.sub(r"\1", ACCEPT_OPEN.sub("", message))
 
 
-def take_upload(file_name: str, data: bytes) -> Upload:
-    """Check a file and keep it in a new folder, since a body that is given the same path again sees no change.
+def take_upload(file_name: str, data: bytes, within: str | None = None) -> Upload:
+    """Check a file and keep it in a new folder, since a body that is given the same path again sees no change. within:
+    the folder in which that is made.
 
     A readable mesh that bounds no solid is kept, too; its ``refusal`` has the reason. Raises MeshError for a file that
-    isn't a mesh, which isn't kept.
+    isn't a mesh, or that the disk doesn't take; nothing of it is kept.
     """
     name, suffix = shown_name(file_name)
     if suffix not in ACCEPTED:
@@ -308,13 +309,16 @@ def take_upload(file_name: str, data: bytes) -> Upload:
     if len(data) > MAX_BYTES:
         limit = f"at most {MAX_BYTES} are accepted, so name a larger file by its path"
         raise MeshError("upload", f"{name} has {len(data)} bytes; {limit}")
-    path = Path(tempfile.mkdtemp(prefix=PASSING)) / name
     try:
-        path.write_bytes(data)
-        inspection = inspect_mesh(mesh_body(load_mesh(str(path))))
-    except InputError:
-        shutil.rmtree(path.parent)
-        raise
+        path = Path(tempfile.mkdtemp(prefix=PASSING, dir=within)) / name
+        try:
+            path.write_bytes(data)
+            inspection = inspect_mesh(mesh_body(load_mesh(str(path))))
+        except BaseException:
+            shutil.rmtree(path.parent)
+            raise
+    except OSError as error:
+        raise MeshError("upload", name, f"a disk that takes it ({error.strerror})") from None
     z_up = suffix == "obj" and Z_UP_COMMENT.search(data[:4096])
     return Upload(name, str(path), "y" if suffix in Y_UP and not z_up else "z", inspection)
 
@@ -344,7 +348,7 @@ class UploadFolder:
         self._fly_scene = fly
         self._show_verdict = show_verdict
         self.present: Upload | None = None
-        self._taken: list[str] = []
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
         with gui.add_folder("Upload"):
             button = gui.add_upload_button(
                 "Upload a mesh",
@@ -378,18 +382,19 @@ class UploadFolder:
 
     def close(self) -> None:
         """Remove all files."""
-        for path in self._taken:
-            shutil.rmtree(Path(path).parent, ignore_errors=True)
-        self._taken.clear()
+        if self._folder is not None:
+            self._folder.cleanup()
 
+    @whole
     async def take(self, name: str, content: bytes) -> None:
         """Check a file and show the remarks."""
         try:
-            upload = await asyncio.to_thread(take_upload, name, content)
-        except InputError as error:
+            if self._folder is None:
+                self._folder = tempfile.TemporaryDirectory(prefix=PASSING, ignore_cleanup_errors=True)
+            upload = await asyncio.to_thread(take_upload, name, content, self._folder.name)
+        except (InputError, OSError) as error:
             self._show([f"refused: {error}"], None)
             return
-        self._taken.append(upload.path)
         lines = [*upload.verdict, *([f"refused: {upload.refusal}"] if upload.refusal else [])]
         self._show([f"{upload.name}:", *lines] if lines else [f"{upload.name}: no problems found"], upload)
 
@@ -408,6 +413,7 @@ class UploadFolder:
         if self.present is not None:
             self._size.content = f"**{self.present.size_and_mass(self._unit.value)}**"
 
+    @whole
     async def _fly(self, stand_in: dict[str, object]) -> None:
         upload = self.present
         if upload is None:

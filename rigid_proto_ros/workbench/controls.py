@@ -43,13 +43,14 @@ NEW_WEIGHT = "ballast.weight"
 class _Control:
     """handle: the input. shown(values) gives what it shows of parameters; changes(input) what an input means for them,
     None for nothing; it raises InputError for one that can't be read or would have no effect. waits: it was touched,
-    and hasn't been taken as meant yet."""
+    and hasn't been taken as meant yet. behind: it may not show what is in force."""
 
     handle: Any
     shown: Callable[[Values], object]
     changes: Callable[[Any], Changes | None]
     touched_s: float = -1e9
     waits: bool = False
+    behind: bool = False
 
 
 class Controls:
@@ -65,9 +66,17 @@ class Controls:
         """Show the parameters in force; ``at_once`` also in inputs that somebody is just using."""
         self._values = values
         for control in self._controls:
-            if at_once or time.monotonic() > control.touched_s + TOUCHED_S:
-                control.touched_s, control.waits = -1e9, False
-                control.handle.value = control.shown(values)
+            control.behind = True
+            if at_once:
+                control.touched_s = -1e9
+        self.catch_up()
+
+    def catch_up(self) -> None:
+        """To be called often: inputs that were in use show what has changed meanwhile."""
+        for control in self._controls:
+            if control.behind and time.monotonic() > control.touched_s + TOUCHED_S:
+                control.behind = control.waits = False
+                control.handle.value = control.shown(self._values)
 
     def settle(self) -> None:
         """Take what was typed last as it stands, before something else is done."""

@@ -10,12 +10,13 @@ from __future__ import annotations
 import asyncio
 import functools
 import json
+import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -56,6 +57,21 @@ Entry = dict[str, Any]
 """One entry of a poke script."""
 
 Result = TypeVar("Result")
+Arguments = ParamSpec("Arguments")
+
+_logger = logging.getLogger(__name__)
+
+
+def whole(
+    asked: Callable[Arguments, Coroutine[Any, Any, Result]],
+) -> Callable[Arguments, Coroutine[Any, Any, Result]]:
+    """Goes on to its end where the browser that asked for it leaves meanwhile: viser cancels what it awaits for one."""
+
+    @functools.wraps(asked)
+    async def to_its_end(*arguments: Arguments.args, **named: Arguments.kwargs) -> Result:
+        return await asyncio.shield(asked(*arguments, **named))
+
+    return to_its_end
 
 
 class RunMemory(Observer):
@@ -140,7 +156,7 @@ class Flight:
         self.say = say
         self.refused: Callable[[], None] = lambda: None
         self.before_jump: Callable[[], None] = lambda: None
-        self._doing, self._since_s = "", 0.0
+        self._doing = "", 0.0
         self._worker = ThreadPoolExecutor(1, "page")
         self.jump = ""
         self._past: RecordedSession | None = None
@@ -159,14 +175,15 @@ class Flight:
 
     def busy(self, doing: str) -> None:
         """The page is busy with this, or, where it is empty, no longer."""
-        if doing != self._doing:
-            self._doing, self._since_s = doing, time.monotonic()
+        if doing != self._doing[0]:
+            self._doing = doing, time.monotonic()
 
     @property
     def waited_for(self) -> str:
         """What takes time, and for how long it has; empty for nothing."""
-        since_s = time.monotonic() - self._since_s
-        return f"{self._doing} … {since_s:.0f} s" if self._doing and since_s > SOON_S else ""
+        doing, began_s = self._doing
+        since_s = time.monotonic() - began_s
+        return f"{doing} … {since_s:.0f} s" if doing and since_s > SOON_S else ""
 
     def close(self) -> None:
         """No more requests."""
@@ -175,13 +192,16 @@ class Flight:
     # Asking
 
     async def _ask(self, doing: str, function: Callable[[], Result]) -> Result | None:
-        """Run a function on the worker thread; a refusal is said, and gives None."""
+        """Run a function on the worker thread; a refusal, or a fault of the program, is said, and gives None."""
         try:
             return await asyncio.get_running_loop().run_in_executor(self._worker, self._work, doing, function)
         except InputError as error:
             self.say(f"Refused: {error}")
-            self.refused()
-            return None
+        except Exception as error:
+            self.say(f"Failed: {type(error).__name__}: {error}")
+            _logger.exception("a request of the page failed")
+        self.refused()
+        return None
 
     def _work(self, doing: str, function: Callable[[], Result]) -> Result:
         """On the worker thread: who has asked for something else meanwhile sees what is being waited for."""
@@ -192,22 +212,22 @@ class Flight:
         finally:
             self.busy("")
 
-    def _soon(self, asked: Awaitable[object]) -> None:
-        task = asyncio.ensure_future(asked)
-        task.add_done_callback(lambda done: None if done.cancelled() else done.exception())
+    def ask(self, function: Callable[[], object], doing: str = "") -> None:
+        """Have a function run on the worker thread."""
+        asyncio.ensure_future(self._ask(doing, function))
 
     def do(self, *entries: Entry) -> None:
         """Do this by hand, in this order: entries of a poke script without their time, which is now."""
         if self.refuses_in_past():
             return
         text = json.dumps([{"t": 0, **entry} for entry in entries])
-        self._soon(self._ask("", functools.partial(self.live.schedule, text)))
+        self.ask(functools.partial(self.live.schedule, text))
 
     def set(self, changes: Mapping[str, object]) -> None:
         """Set parameters, all or none."""
         if not changes.keys() <= LOOKS and self.refuses_in_past():
             return
-        self._soon(self._ask("setting parameters", functools.partial(self.live.set_parameters, dict(changes))))
+        self.ask(functools.partial(self.live.set_parameters, dict(changes)), "setting parameters")
 
     def refuses_in_past(self) -> bool:
         """Whether the past is shown, in which nothing can be done; if so, it says so."""
@@ -219,11 +239,11 @@ class Flight:
 
     def pause(self, paused: bool) -> None:
         """Stop simulated time, or let it go on."""
-        self._soon(self._ask("", functools.partial(self.live.pause, paused)))
+        self.ask(functools.partial(self.live.pause, paused))
 
     def step(self) -> None:
         """Go on by one publication period."""
-        self._soon(self._ask("", self.live.step))
+        self.ask(self.live.step)
 
     def prepare(self, warm_up: Callable[[], object], start: Callable[[], None]) -> None:
         """Compile what the body needs, then let its time begin; from any thread."""
@@ -287,7 +307,7 @@ class Flight:
         """Time 0 of the scene, or of the branch."""
         self.before_jump()
         self.look_at_present()
-        self._soon(self._ask("", self.live.reset))
+        self.ask(self.live.reset)
 
     # The past
 
@@ -334,6 +354,7 @@ class Flight:
         first, last = np.searchsorted(past.times, [moment_ns - lasting_ns, moment_ns])
         return past.times[first : last + 1], past.rows[first : last + 1]
 
+    @whole
     async def go_on_from_here(self) -> None:
         """Let simulated time go on from the moment that is looked at, with another future."""
         past, moment_ns = self._past, self.moment_ns

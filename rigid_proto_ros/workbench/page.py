@@ -8,8 +8,8 @@ no browser is connected the page isn't told anything.
 from __future__ import annotations
 
 import asyncio
+import functools
 import logging
-import threading
 import time
 from collections import deque
 
@@ -43,7 +43,7 @@ from ..simulation.simulation import Simulation
 from .body_tab import BodyTab
 from .controls import Controls
 from .drawing import POKE_SHOWN_NS, ViserBackend
-from .flight import SCENE, Flight
+from .flight import SCENE, Flight, whole
 from .lessons import Course, LessonPanel
 from .panel import ALWAYS, CENTRE_OF_MASS, ForcesTab, SessionTab, ShowTab, TimeBar, motion_words
 from .pointer import DrawnPose, Pointer, suggested_force
@@ -144,7 +144,7 @@ class Page:
         self._unit, self._home = self.backend.unit, self.backend.origin
         self.readings = Readings()
         self._make_panel()
-        self._open = asyncio.Event()
+        self._open, self._coming_and_going = asyncio.Event(), asyncio.Lock()
         if lesson:
             self.lessons.name(lesson)
         server.on_client_connect(self._on_connect)
@@ -206,16 +206,21 @@ class Page:
 
     # Browsers come and go
 
+    @whole
     async def _on_connect(self, client: viser.ClientHandle) -> None:
         self.room.look(client)
-        if self._listening:
-            return
-        self._listening = self._new_scene = True
+        async with self._coming_and_going:
+            if not self._listening:
+                await self._begin_to_listen()
+
+    async def _begin_to_listen(self) -> None:
+        self._new_scene = True
         # What acts now is told anew; what has ended meanwhile was not heard.
         self._forget_drawn()
         if self.live.loop.resets != self._resets_heard:
             self.readings.restart()
         await asyncio.to_thread(self.live.add_observer, self._told)
+        self._listening = True
         self._open.set()
         begins_anew, self._begins_anew = self._begins_anew, False
         if begins_anew and self.lessons.lesson is not None:
@@ -228,12 +233,13 @@ class Page:
     async def _on_disconnect(self, client: viser.ClientHandle) -> None:
         self.pointer.left(client.client_id)
         await asyncio.sleep(GRACE_S)
-        if not self.server.get_clients() and self._listening:
-            self._listening = False
-            self._open.clear()
-            self.flight.look_at_present()
-            await asyncio.to_thread(self.live.remove_observer, self._told)
-            self._resets_heard = self.live.loop.resets
+        async with self._coming_and_going:
+            if not self.server.get_clients() and self._listening:
+                self._listening = False
+                self._open.clear()
+                self.flight.look_at_present()
+                await asyncio.to_thread(self.live.remove_observer, self._told)
+                self._resets_heard = self.live.loop.resets
 
     # What the simulation tells
 
@@ -259,6 +265,7 @@ class Page:
             place = self.backend.origin.copy(), self.backend.unit
             self.pointer.drawn(DrawnPose(now_s, state.position, state.orientation_xyzw, *place, setup))
         self.pointer.hold()
+        self.controls.catch_up()
         self.lessons.draw(now_s)
         self.readout_tab.draw(now_s)
         failure = self.live.loop.simulation.failure
@@ -464,7 +471,7 @@ class Page:
                 ghost.announce()
             self._told.on(Published(simulation.time_ns, simulation.state.row))
 
-        threading.Thread(target=self.live.call, args=(introduce,), daemon=True).start()
+        self.flight.ask(functools.partial(self.live.call, introduce))
 
     def _follow(self, position: np.ndarray) -> None:
         if not self.pointer.dragging:

@@ -15,7 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from conftest import needs_rerun
+from conftest import ENDINGS, needs_rerun
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
@@ -232,6 +232,51 @@ def test_time_runs_pauses_steps_and_starts_anew(live, watcher):
     assert watcher.times[:10] == [k * PERIOD_NS for k in range(1, 11)]
 
 
+def test_a_request_that_waits_at_the_end_is_refused_and_so_is_one_that_comes_later(live):
+    within, ended, refused = threading.Event(), threading.Event(), []
+
+    def publish(_) -> None:
+        within.set()
+        ended.wait()
+
+    live.endpoints.publish = publish
+    within.wait()
+
+    def ask() -> None:
+        with pytest.raises(InputError, match="request: the simulation has ended"):
+            live.call(int)
+        refused.append(True)
+
+    asking, stopping = threading.Thread(target=ask), threading.Thread(target=live.stop)
+    for thread, begun in ((asking, lambda: live._requests), (stopping, lambda: live._stopping)):
+        thread.start()
+        while not begun():
+            time.sleep(0.01)
+    ended.set()
+    stopping.join()
+    asking.join()
+    ask()
+    assert refused == [True, True]
+
+
+def test_before_the_start_one_request_is_served_after_another(monkeypatch):
+    """The page's first browser may come while the node announces its body."""
+    live, guest = LiveSimulation(make_scenario({"mesh": "t_handle"})), Watcher()
+    coming, watch = threading.Thread(target=live.add_observer, args=(guest,)), live.loop.watch
+
+    def watch_late(observer) -> None:
+        monkeypatch.undo()
+        coming.start()
+        coming.join(0.3)  # in vain
+        watch(observer)
+
+    monkeypatch.setattr(live.loop, "watch", watch_late)
+    live.announce()
+    coming.join()
+    live.reset()
+    assert [json.loads(line)["kind"] for line in guest.lines] == ["reset"]
+
+
 def test_parameters_change_together_or_not_at_all(live):
     live.set_parameters({"density": 2000.0, "gravity": [0.0, 0.0, -2.0]})
     live.step()
@@ -283,6 +328,57 @@ def test_a_recording_that_begins_at_time_0_after_other_commands_is_not_taken_for
     assert verify(second) is None
 
 
+def test_a_recording_that_is_begun_with_another_change_in_a_run_without_events_is_verified(tmp_path):
+    path = tmp_path / "flight.mcap"
+    live = LiveSimulation(make_scenario({"mesh": "t_handle", "initial.angular_velocity": [0.1, 5.0, 0.1]}))
+    live.announce()
+    live.start()
+    while not live.state.time_ns:
+        time.sleep(0.01)
+    live.set_parameters({"record": str(path), "mass": 5.0, "angular_damping": 1e-3})
+    began_ns = live.state.time_ns
+    while live.state.time_ns < began_ns + 5 * PERIOD_NS:
+        time.sleep(0.01)
+    live.stop()
+    (run,) = read_runs(path)
+    assert json.loads(run.lines[0])["content"]["mass"] == 5.0
+    assert verify(run) is None
+
+
+def test_a_reset_between_the_requests_that_begin_a_recording_leaves_it_verifiable(live, tmp_path, monkeypatch):
+    path, call, resets = tmp_path / "flight.mcap", live.call, iter([False, True])
+
+    def call_and_reset(function):
+        found = call(function)
+        if next(resets, False):
+            call(live.loop.reset)
+        return found
+
+    live.step()
+    monkeypatch.setattr(live, "call", call_and_reset)
+    live.set_parameters({"record": str(path)})
+    monkeypatch.undo()
+    live.step(2)
+    live.stop()
+    run = read_runs(path)[-1]
+    assert json.loads(run.lines[0])["kind"] == "reset"
+    assert verify(run) is None
+
+
+def test_a_recording_that_takes_the_place_of_a_lost_one_is_not_given_up_for_it(live, tmp_path, monkeypatch):
+    live.set_parameters({"record": str(tmp_path / "lost.mcap")})
+    live._recorder.error, call = "lost", live.call
+
+    def call_later(function):
+        monkeypatch.undo()
+        live.set_parameters({"record": str(tmp_path / "next.mcap")})
+        return call(function)
+
+    monkeypatch.setattr(live, "call", call_later)
+    live.give_up_failed_recording()
+    assert live.scenario.parameters.record == str(tmp_path / "next.mcap")
+
+
 def test_a_recording_that_is_lost_while_time_stands_can_be_begun_again(live, tmp_path):
     path = tmp_path / "flight.mcap"
     live.set_parameters({"record": str(path)})
@@ -323,16 +419,23 @@ def test_what_was_done_behind_the_last_state_is_in_a_converted_session_too(live,
     assert len(script_of_session(run).entries) == 4
 
 
-def test_the_file_that_is_being_recorded_is_refused_for_a_second_recording_by_any_name(live, tmp_path):
-    path = tmp_path / "flight.mcap"
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_the_file_that_is_being_recorded_is_refused_for_a_second_recording_by_any_name_and_anybody(
+    live, tmp_path, ending
+):
+    path = tmp_path / f"flight{ending}"
     live.set_parameters({"record": str(path)})
     live.step(3)
-    with pytest.raises(InputError, match="another file than the one that is being recorded"):
-        live.set_parameters({"record": f"{tmp_path}/./flight.mcap"})
+    other = LiveSimulation(make_scenario({"mesh": "t_handle", "record": str(path)}))
+    for begin in (lambda: live.set_parameters({"record": f"{tmp_path}/./flight{ending}"}), other.announce):
+        with pytest.raises(InputError, match="another file than the one that is being recorded"):
+            begin()
     live.step(2)
     live.set_parameters({"record": ""})
     (run,) = read_runs(path)
     assert (np.asarray(run.times) // PERIOD_NS).tolist() == [1, 2, 3, 4, 5]
+    other.announce()
+    other.stop()
 
 
 def test_a_step_of_a_motion_that_has_failed_is_refused_with_the_reason(live):
