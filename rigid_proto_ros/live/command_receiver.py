@@ -64,7 +64,6 @@ class CommandReceiver:
             loop.simulation.refuse(refusal)
             raise
         finally:
-            # Last: a command that counts as received counts as late or refused too, if it is.
             self.received[topic] += 1
             if topic in ("wrench", "thrusters"):
                 loop.request_step()

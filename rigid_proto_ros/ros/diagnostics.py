@@ -10,6 +10,7 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
+from ..base.errors import InputError
 from ..live.command_receiver import TOPICS
 from ..live.live_simulation import LiveSimulation
 from .commands import CommandSubscriber
@@ -43,22 +44,17 @@ class Diagnostics:
         self._live = live
         self._subscriber = subscriber
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._before = self._values()
+        self._before = live.call(self._values)
         # Steady: the node's own clock stands still with /clock.
         node.create_timer(REPORT_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _values(self) -> dict[str, Any]:
-        """Counters and values by their keys."""
+        """Counters and values by their keys; on the physics thread, so that they belong together."""
         loop = self._live.loop
         commands, simulation = loop.commands, loop.simulation
-        # First: whatever happened up to then is counted in what follows.
-        time_ns = simulation.time_ns
-        momentum = simulation.angular_momentum
-        # Counted last by the physics thread, so read first: who finds a message received finds its refusal too.
-        received = dict(commands.received)
-        refused = dict(simulation.refused)
+        momentum, received, refused = simulation.angular_momentum, commands.received, simulation.refused
         return {
-            "sim_time_ns": time_ns,
+            "sim_time_ns": simulation.time_ns,
             "stamp_offset_ns": loop.stamps.offset_ns,
             "publish_rate": loop.scenario.parameters.publish_rate,
             "overruns": loop.pace.overruns,
@@ -87,7 +83,10 @@ class Diagnostics:
         """Publish the diagnostics, and log when simulated time falls behind real time."""
         # Before the values are read: what was done before the stamp is in them.
         stamp = self._node.get_clock().now().to_msg()
-        before, values = self._before, self._values()
+        try:
+            before, values = self._before, self._live.call(self._values)
+        except InputError:
+            return  # it has ended, or is busy and has nothing to report
         self._before = values
         if (lost_s := values["real_time_lost_s"] - before["real_time_lost_s"]) > 0.0:
             self._node.get_logger().warning(

@@ -75,7 +75,8 @@ class NodeProcess(threading.Thread):
             given = given_arguments(self._argv, remapped_node_name(self._argv), _tell)
             self._begin(given, own_arguments(self._argv).until)
         except BaseException as error:  # raised again by the main thread
-            self._error = error
+            if not self._ending:  # else what was closed refuses what is still asked of it
+                self._error = error
             self._request_end()
 
     def _begin(self, given: Mapping[str, object], until_s: float | None) -> None:

@@ -559,9 +559,7 @@ class Simulation:
     @property
     def potential_energy(self) -> float:
         """−m g·x plus the energy of the string [J]."""
-        setup = self.setup
-        # Read once: another thread may release it meanwhile.
-        string = self.string
+        setup, string = self.setup, self.string
         energy = -setup.body.mass * dot(setup.gravity, self.state.position)
         return energy + (string.potential_energy(setup.body, self.state) if string else 0.0)
 

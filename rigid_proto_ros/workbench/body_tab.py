@@ -31,7 +31,7 @@ from ..mesh.reading import OWN_FORMATS, load_mesh
 from ..picture.style import without_rounding
 from ..scene.scenario import Scenario
 from .controls import NOTE, TYPING_S, Controls, parse_numbers
-from .flight import Flight, whole
+from .flight import Flight
 
 OWN_FILE = "(a file)"
 
@@ -385,7 +385,6 @@ class UploadFolder:
         if self._folder is not None:
             self._folder.cleanup()
 
-    @whole
     async def take(self, name: str, content: bytes) -> None:
         """Check a file and show the remarks."""
         try:
@@ -413,7 +412,6 @@ class UploadFolder:
         if self.present is not None:
             self._size.content = f"**{self.present.size_and_mass(self._unit.value)}**"
 
-    @whole
     async def _fly(self, stand_in: dict[str, object]) -> None:
         upload = self.present
         if upload is None:

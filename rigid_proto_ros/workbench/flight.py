@@ -14,9 +14,9 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -57,21 +57,8 @@ Entry = dict[str, Any]
 """One entry of a poke script."""
 
 Result = TypeVar("Result")
-Arguments = ParamSpec("Arguments")
 
 _logger = logging.getLogger(__name__)
-
-
-def whole(
-    asked: Callable[Arguments, Coroutine[Any, Any, Result]],
-) -> Callable[Arguments, Coroutine[Any, Any, Result]]:
-    """Goes on to its end where the browser that asked for it leaves meanwhile: viser cancels what it awaits for one."""
-
-    @functools.wraps(asked)
-    async def to_its_end(*arguments: Arguments.args, **named: Arguments.kwargs) -> Result:
-        return await asyncio.shield(asked(*arguments, **named))
-
-    return to_its_end
 
 
 class RunMemory(Observer):
@@ -354,7 +341,6 @@ class Flight:
         first, last = np.searchsorted(past.times, [moment_ns - lasting_ns, moment_ns])
         return past.times[first : last + 1], past.rows[first : last + 1]
 
-    @whole
     async def go_on_from_here(self) -> None:
         """Let simulated time go on from the moment that is looked at, with another future."""
         past, moment_ns = self._past, self.moment_ns

@@ -15,7 +15,7 @@ from ..base.bundled import example_path
 from ..picture import style
 from ..scene.lessons import Lesson, lessons
 from ..scene.scenario import Scenario
-from .flight import Flight, whole
+from .flight import Flight
 from .panel import CENTRE_OF_MASS, PATHS, SEE_INTO
 from .readouts import (
     COM_PLACE,
@@ -304,7 +304,6 @@ class LessonPanel:
         else:
             await self._fly(lesson, "", True)
 
-    @whole
     async def _fly(self, lesson: Lesson, script: str, asks: bool) -> None:
         course = COURSES.get(lesson.name, NO_LESSON)
         if await self._flight.fly(lesson.path.read_text("utf-8"), script, paused=asks, speed=course.speed):

@@ -43,7 +43,7 @@ from ..simulation.simulation import Simulation
 from .body_tab import BodyTab
 from .controls import Controls
 from .drawing import POKE_SHOWN_NS, ViserBackend
-from .flight import SCENE, Flight, whole
+from .flight import SCENE, Flight
 from .lessons import Course, LessonPanel
 from .panel import ALWAYS, CENTRE_OF_MASS, ForcesTab, SessionTab, ShowTab, TimeBar, motion_words
 from .pointer import DrawnPose, Pointer, suggested_force
@@ -206,7 +206,6 @@ class Page:
 
     # Browsers come and go
 
-    @whole
     async def _on_connect(self, client: viser.ClientHandle) -> None:
         self.room.look(client)
         async with self._coming_and_going:

@@ -237,6 +237,18 @@ def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_ru
     assert session.complete and session.rows.tobytes() == states[:20].tobytes()
 
 
+def test_an_error_in_the_recorder_whose_file_is_lost_too_ends_it_quietly(tmp_path, states, monkeypatch):
+    uncaught, errors, path = [], [], tmp_path / "session.rrd"
+    monkeypatch.setattr(threading, "excepthook", uncaught.append)
+    observer = FileRecorder(str(path), on_error=errors.append)
+    flight.fly(observer, states[:20])
+    flight.flush(observer)
+    path.unlink()
+    observer.on(BodyChanged(200_000_000, None))
+    observer.close()
+    assert len(errors) == 1 and not uncaught
+
+
 FULL_IN_FLIGHT = """
 import resource, signal, sys
 import rerun_flight as flight

@@ -3,8 +3,10 @@
 
 import importlib.util
 import socket
+import threading
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 import yaml
@@ -17,10 +19,12 @@ from node_interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.ros.arguments import given_arguments
+from rigid_proto_ros.ros.diagnostics import Diagnostics
 from rigid_proto_ros.ros.main import make_viewer, open_page
 from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS, READ_ONLY, is_ros_parameter
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
+from rigid_proto_ros.simulation.simulation import Simulation
 
 KEYS = {
     *("sim_time_ns", "stamp_offset_ns", "publish_rate", "overruns", "real_time_lost_s", "wrench_received"),
@@ -223,6 +227,21 @@ def test_a_port_that_a_scene_names_is_asked_for_and_a_default_one_may_move(monke
     for named, asked in ((9191, 9191), (default, None)):
         viewer = make_viewer(make_scenario({"viewer": "web", "web_port": named}), "tool")
         assert (viewer["rerun_port"], viewer["web_port"]) == (None, asked)
+
+
+def test_a_report_is_read_between_two_ticks_so_that_its_values_belong_together(monkeypatch) -> None:
+    live = LiveSimulation(make_scenario({"mesh": "t_handle", "start_paused": True}))
+    node = Mock()
+    node.create_publisher().get_subscription_count.return_value = 0
+    report = Diagnostics(node, live, SimpleNamespace(messages_lost=0, queue_full=0))._report
+    threads: list[str] = []
+    seen = property(lambda _: threads.append(threading.current_thread().name) or 0.0)
+    monkeypatch.setattr(Simulation, "angular_momentum_drift", seen)
+    live.start()
+    report()
+    live.stop()
+    report()  # none of what has ended
+    assert threads == ["physics"]
 
 
 def test_a_page_whose_port_is_taken_is_refused_by_the_parameters_name():

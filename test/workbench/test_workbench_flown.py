@@ -17,7 +17,9 @@ import pytest
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
 from flown_page import PATIENCE_S, FlownPage, flies_again, numbers
+from workbench_page import bare_page
 
+from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
@@ -300,6 +302,46 @@ def test_a_page_that_comes_back_shows_nothing_that_ended_or_began_while_none_was
     flown.until(lambda: page._told in flown.live._observers, "page that hears again")
     flown.fly(2.0)
     assert page.readings.values[DRIFT] == "0°"
+
+
+def test_a_browser_that_comes_while_the_page_stops_listening_is_told_of_the_body(flown: FlownPage, monkeypatch) -> None:
+    remove, within, free, removed = flown.live.remove_observer, *(threading.Event() for _ in range(3))
+
+    def remove_later(observer) -> None:
+        within.set()
+        free.wait()
+        remove(observer)
+        removed.set()
+
+    monkeypatch.setattr(flown.live, "remove_observer", remove_later)
+    flown.leave()
+    within.wait()
+    flown.come()
+    flown.until(flown.server.get_clients, "browser")
+    free.set()
+    removed.wait()
+    flown.fly(0.1)
+
+
+def test_where_the_first_browser_is_refused_the_body_by_a_busy_machine_the_next_one_gets_it(
+    flown: FlownPage, monkeypatch
+) -> None:
+    page, add, asked = flown.page, flown.live.add_observer, []
+
+    def refuse_first(observer) -> None:
+        asked.append(observer)
+        if len(asked) == 1:
+            raise InputError("request", "the simulation was too busy")
+        add(observer)
+
+    flown.leave()
+    flown.until(lambda: page._told not in flown.live._observers, "end of listening")
+    monkeypatch.setattr(flown.live, "add_observer", refuse_first)
+    with bare_page(flown.server.get_port()):
+        flown.until(lambda: asked, "first browser")
+        flown.come()
+        flown.until(page._open.is_set, "page for the second browser")
+    flown.fly(0.1)
 
 
 def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -> None:

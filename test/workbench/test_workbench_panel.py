@@ -140,6 +140,26 @@ def test_a_file_that_is_uploaded_while_another_is_prepared_can_be_simulated(flow
     assert flown.scenario.parameters.mesh.endswith("second.obj")
 
 
+def test_an_input_that_was_in_use_shows_later_what_somebody_else_has_set_meanwhile(
+    flown: FlownPage, monkeypatch
+) -> None:
+    switch = flown.widget("Gyroscopic term ω × Iω")
+    monkeypatch.setattr(controls, "TOUCHED_S", 3600.0)
+    flown.set("Gyroscopic term ω × Iω", False)
+    flown.live.set_parameters({"gyroscopic": True})
+    flown.fly(0.1)
+    assert switch.value is False
+    monkeypatch.undo()
+    flown.until(lambda: switch.value is True, "what is in force")
+
+
+def test_a_fault_of_the_program_is_said(flown: FlownPage, monkeypatch, caplog) -> None:
+    monkeypatch.setattr(flown.live, "reset", lambda: 1 / 0)
+    flown.press("Reset", of="Simulation")
+    flown.until(lambda: flown.said == ["Failed: ZeroDivisionError: division by zero"], "fault")
+    assert "in <lambda>" in caplog.text
+
+
 def test_a_density_is_refused_while_a_tensor_is_in_force(flown: FlownPage) -> None:
     flown.set("Tensor", "1e-3 0 0 2e-3 0 2.5e-3")
     flown.until(lambda: flown.scenario.parameters.inertia_model == "explicit", "tensor")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
 import re
 import struct
@@ -23,6 +24,7 @@ from rigid_proto_ros.mass.inspection import as_json
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.picture.surface import BOX_CORNERS, BOX_TRIANGLES
 from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.workbench import body_tab
 from rigid_proto_ros.workbench.body_tab import MAX_BYTES, UploadFolder, take_upload
 
 BOOK = resolve_mesh("book").read_bytes()
@@ -170,6 +172,26 @@ def test_uploads_are_kept_until_the_page_ends_and_nothing_of_them_is_cached(plac
     assert not files(place)
     assert from_mesh.folder() is not None
     assert not from_mesh.folder().exists()
+
+
+def test_an_upload_is_refused_by_a_full_disk_and_one_that_is_checked_when_the_page_ends_is_not_kept(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server, said = viser.ViserServer(host="127.0.0.1", verbose=False), []
+    folder = UploadFolder(server.gui, SimpleNamespace(), None, said.append)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        asyncio.run(folder.take("part.obj", OPEN))
+    assert "No space left on device" in said[0][0] and not list(place.glob("*/*"))
+    inspect = body_tab.inspect_mesh
+    monkeypatch.setattr(body_tab, "inspect_mesh", lambda body: (folder.close(), inspect(body))[1])
+    asyncio.run(folder.take("part.obj", OPEN))
+    server.stop()
+    assert not list(place.iterdir())
 
 
 @pytest.mark.parametrize(("head", "up"), [(b"", "y"), (b"# made by hand\n# Z-up\n", "z")])
