@@ -288,6 +288,7 @@ class LiveSimulation:
             raise
         if finished is not None:
             finished.close()
+        self.endpoints.parameters_changed()
 
     def _warm_up_change(self, planned: Scenario) -> None:
         """Compile the kernels of another integrator."""

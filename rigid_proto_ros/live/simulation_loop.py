@@ -50,7 +50,7 @@ class Endpoints:
     publish(state): one is due. has_subscribers(): whether anybody gets it; without, no state is built for them.
     take_commands(wall_ns, all_topics): submit what has arrived, on quiet topics too if all_topics; whether commands
     come in these seconds. serve_steps(wall_ns): answer requests for steps; whether more are to be expected soon.
-    parameters_changed(): a command has changed them, or a recording has stopped by itself. warn(message): tell the
+    parameters_changed(): they have changed, by whatever, or a recording has stopped by itself. warn(message): tell the
     user.
     """
 

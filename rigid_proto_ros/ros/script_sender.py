@@ -100,7 +100,7 @@ def send_script(
     try:
         return sender.send(script, reset, lead_s)
     finally:
-        sender.destroy_node()
+        sender.close()
 
 
 class ScriptSender(Node):
@@ -117,7 +117,7 @@ class ScriptSender(Node):
         super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
         self._counters: dict[str, str] = {}
         self._reported_s = 0.0
-        self._restarted = False
+        self._restarted = self._paused = False
         self._schedule = self.create_publisher(String, f"{self.target}/schedule", qos.COMMAND)
         self._get_parameters = self.create_client(GetParameters, f"{self.target}/get_parameters")
         self._reset_client = self.create_client(Trigger, f"{self.target}/reset")
@@ -132,20 +132,19 @@ class ScriptSender(Node):
         self._resets = int(before.get("resets", 0)) + reset
         start_ns = 0
         if reset:
-            self._call(self._pause_client, SetBool.Request(data=True))
+            self._pause(True)
             self._call(self._reset_client, Trigger.Request())
         else:
             start_ns = self._present_ns() + nanoseconds(lead_s)
         horizon_ns = nanoseconds(float(self._parameter("schedule_horizon") or 0.0))
-        paused, number = reset, 0
+        number = 0
         for time_ns, count, text in schedules(script, start_ns):
-            if paused and time_ns > horizon_ns:
+            if self._paused and time_ns > horizon_ns:
                 self._confirm(number)
-                self._call(self._pause_client, SetBool.Request(data=False))
-                paused = False
+                self._pause(False)
             if number + count - self._confirmed() > MAX_UNCONFIRMED:
                 self._confirm(min(number, number + count - MAX_UNCONFIRMED))
-            ahead_ns = horizon_ns if paused else min(horizon_ns, SEND_AHEAD_NS)
+            ahead_ns = horizon_ns if self._paused else min(horizon_ns, SEND_AHEAD_NS)
             while time_ns > self._reached_ns() + ahead_ns and not self._was_reset():
                 self._listen()
             if self._was_reset():
@@ -154,8 +153,8 @@ class ScriptSender(Node):
             number += count
         if not self._was_reset():
             self._confirm(number)
-        if paused:
-            self._call(self._pause_client, SetBool.Request(data=False))
+        if self._paused:
+            self._pause(False)
         last_ns = start_ns + (script[-1].stamp_ns if script else 0)
         if script:
             self._wait_until_acted(last_ns)
@@ -168,6 +167,17 @@ class ScriptSender(Node):
         late = int(self._counters["late"]) - int(before["late"])
         sent = Counter(command.kind for command in script[:number])
         return Report(sent, late, refused, reasons, last_ns, self._reached_ns(), self._was_reset())
+
+    def close(self) -> None:
+        """Where an error or a signal has come between, time goes on, and what was sent acts."""
+        if self._paused:
+            self._pause_client.call_async(SetBool.Request(data=False))
+        self.destroy_node()
+
+    def _pause(self, paused: bool) -> None:
+        self._paused |= paused
+        self._call(self._pause_client, SetBool.Request(data=paused))
+        self._paused = paused
 
     def _was_reset(self) -> bool:
         """Whether somebody else has reset the node since ``send`` began, or it has restarted."""

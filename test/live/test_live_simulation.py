@@ -287,6 +287,13 @@ def test_parameters_change_together_or_not_at_all(live):
     assert live.scenario.parameters.density == 2000.0
 
 
+def test_what_anybody_sets_is_told_so_that_the_nodes_own_parameters_follow(live):
+    told = []
+    live.endpoints.parameters_changed = lambda: told.append(live.scenario.parameters.mass)
+    live.set_parameters({"mass": 3.0})
+    assert told == [3.0]
+
+
 def test_an_observer_that_comes_in_flight_is_told_and_one_that_leaves_is_not(live, watcher):
     live.step(2)
     guest = Watcher()

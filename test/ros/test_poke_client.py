@@ -309,6 +309,21 @@ def test_never_more_than_500_commands_are_ahead_of_what_the_node_has_confirmed(
         assert slow.calls == ["pauseTrue", "reset", "pauseFalse"]
 
 
+def test_a_client_that_ends_while_it_sends_lets_time_go_on(ros_environment, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
+
+    def interrupted(self, count: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(script_sender.ScriptSender, "_confirm", interrupted)
+    path = tmp_path / "poke.yaml"
+    path.write_text("- {t: 1.0, impulse: [1.0e-6, 0, 0]}\n")
+    with SlowNode(ros_environment, 1) as slow:
+        with pytest.raises(KeyboardInterrupt):
+            poke_client([str(path), "--node", "tester", "--reset", "--timeout", "0"])
+        slow.until(lambda: slow.calls == ["pauseTrue", "reset", "pauseFalse"], "resumption")
+
+
 def test_a_client_without_a_time_limit_waits_for_a_node_that_starts_later(ros_environment, tmp_path):
     path = tmp_path / "poke.yaml"
     path.write_text("- {t: 0, impulse: [1.0e-6, 0, 0]}\n")
