@@ -157,11 +157,13 @@ def scalar_columns(values: np.ndarray) -> Any:
 class RerunBackend(Backend):
     """Draws on ``stream``, or, where that is None, nothing.
 
-    plotted: the least and the largest value of each plot of the run, by name.
+    plotted: the least and the largest value of each plot of the run, by name. on_sent() is called when the stream has
+    taken something.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, on_sent: Callable[[], None] = lambda: None) -> None:
         self.stream: Stream | None = None
+        self._on_sent = on_sent
         self._size = 1.0
         self._known = self._walls = np.zeros(1, np.int64)
         self._times: list[Any] = []
@@ -178,6 +180,7 @@ class RerunBackend(Backend):
         """Log columns of an entity at the times of ``begin``."""
         if self.stream is not None:
             self.stream.send(entity, self._times, *parts)
+            self._on_sent()
 
     def begin(self, times_ns: np.ndarray, walls_ns: np.ndarray | None = None) -> None:
         """What follows is of these times (n,) [ns]; walls_ns (n,) [ns]: when they were by the wall's clock, None for

@@ -84,7 +84,8 @@ class RerunObserver(Observer):
         self._run, self._last_time_ns = 1, 0
         self._begin_ns: int | None = None
         self._stream: Stream | None = self._open(uuid.uuid4().hex, name)
-        self._backend = RerunBackend()
+        # A machine that is busy may take seconds for all that a bundle of states has to be drawn.
+        self._backend = RerunBackend(on_sent=lambda: self._mailbox.moved())
         self._picture = Picture(self._backend)
         self._scene = ""
         self._rows: dict[type, np.ndarray] = {}

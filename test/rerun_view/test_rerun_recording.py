@@ -237,6 +237,17 @@ def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_ru
     assert session.complete and session.rows.tobytes() == states[:20].tobytes()
 
 
+def test_a_recorder_gets_something_done_with_every_piece_that_it_sends(tmp_path, states, monkeypatch):
+    observer, done = FileRecorder(str(tmp_path / "session.rrd")), []
+    flight.fly(observer, states[:1])
+    flight.flush(observer)
+    monkeypatch.setattr(observer._mailbox, "moved", lambda: done.append(threading.get_ident()))
+    noted = [(0, Published(k * flight.PERIOD_NS, states[k])) for k in range(1, 9)]
+    observer._write(noted)
+    assert done.count(threading.get_ident()) > len(noted) + 5
+    observer.close()
+
+
 def test_an_error_in_the_recorder_whose_file_is_lost_too_ends_it_quietly(tmp_path, states, monkeypatch):
     uncaught, errors, path = [], [], tmp_path / "session.rrd"
     monkeypatch.setattr(threading, "excepthook", uncaught.append)
