@@ -60,7 +60,7 @@ class Controls:
         self._gui = gui
         self._flight = flight
         self._controls: list[_Control] = []
-        self._values: Values = {}
+        self._values: Values = flight.scenario.parameters.named()
 
     def update(self, values: Values, at_once: bool = False) -> None:
         """Show the parameters in force; ``at_once`` also in inputs that somebody is just using."""

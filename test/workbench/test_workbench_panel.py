@@ -153,6 +153,14 @@ def test_an_input_that_was_in_use_shows_later_what_somebody_else_has_set_meanwhi
     flown.until(lambda: switch.value is True, "what is in force")
 
 
+def test_an_input_that_is_refused_before_the_page_was_told_anything_shows_what_is_in_force(flown: FlownPage) -> None:
+    fresh = controls.Controls(flown.server.gui, flown.page.flight)
+    density = fresh.numbers("density", "ρ")
+    flown.set("ρ", "none")
+    assert density.value == f"{flown.scenario.parameters.density:g}" and flown.said.pop().startswith("ρ: got 'none'")
+    density.remove()
+
+
 def test_a_fault_of_the_program_is_said(flown: FlownPage, monkeypatch, caplog) -> None:
     monkeypatch.setattr(flown.live, "reset", lambda: 1 / 0)
     flown.press("Reset", of="Simulation")
