@@ -20,6 +20,7 @@ from workbench_page import PATIENCE_S, any_free_port
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.ports import LOOPBACK
+from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.workbench.controls import Controls
 from rigid_proto_ros.workbench.main import TITLE, address_of, serve
 from rigid_proto_ros.workbench.server import make_server, refusal, stop_server
@@ -159,7 +160,7 @@ def test_what_one_page_sets_another_one_shows(server) -> None:
     from websockets.sync.client import connect
 
     with server.gui.add_folder("Two pages"):
-        controls = Controls(server.gui, SimpleNamespace(set=[].append, say=[].append))
+        controls = Controls(server.gui, SimpleNamespace(set=[].append, say=[].append, scenario=read_scene("book")))
         field = controls.numbers("mass", "Mass")
     address, protocol = f"ws://{LOOPBACK}:{server.get_port()}", f"viser-v{viser.__version__}"
     with connect(address, subprotocols=[protocol]) as one, connect(address, subprotocols=[protocol]) as other:
