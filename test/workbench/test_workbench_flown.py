@@ -320,6 +320,7 @@ def test_a_browser_that_comes_while_the_page_stops_listening_is_told_of_the_body
     flown.until(flown.server.get_clients, "browser")
     free.set()
     removed.wait()
+    flown.until(lambda: flown.page._told in flown.live._observers, "page that hears again")
     flown.fly(0.1)
 
 
