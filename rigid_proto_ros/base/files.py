@@ -14,8 +14,8 @@ from .errors import InputError, did_you_mean
 
 try:
     import fcntl
-except ImportError:  # on Windows, where several may write to one file
-    fcntl = None  # type: ignore[assignment]
+except ImportError:
+    fcntl = None  # type: ignore[assignment]  # on Windows, where several may write to one file
 
 CHUNK = 1 << 20
 """Bytes read at a time from what doesn't say its size, such as a pipe."""
