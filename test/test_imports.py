@@ -52,6 +52,7 @@ ALLOWED = {
     "viser": ("workbench",),
     "websockets": ("workbench",),  # comes with viser
     "mcap": ("session.bag", "session.mcap_observer"),
+    "zstandard": ("session.bag",),  # comes with mcap
     "rosbags": ("identify.bag_reading",),
 }
 

@@ -8,6 +8,21 @@ import os
 import sys
 from collections.abc import Iterable
 
+LONGEST = 4000
+"""Characters of a text that is shown: a file's own may have millions."""
+
+
+def printable(text: str) -> str:
+    """A text that has words of a file in it, as one line for a terminal or log: control characters and marks that turn
+    a text round are escaped, and what is longer than anybody reads is cut off.
+    """
+    shown = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
+    return shown if shown.isprintable() else "".join(map(_shown, shown))
+
+
+def _shown(character: str) -> str:
+    return character if character.isprintable() else " " if character.isspace() else repr(character)[1:-1]
+
 
 class InputError(ValueError):
     """Input that was refused: what was received and what is accepted; or, without ``accepted``, a sentence that says
@@ -21,7 +36,9 @@ class InputError(ValueError):
         self.field = field
         self.received = received
         self.accepted = accepted
-        super().__init__(f"{field}: got {received!r}; accepted: {accepted}" if accepted else f"{field}: {received}")
+        super().__init__(
+            printable(f"{field}: got {received!r}; accepted: {accepted}" if accepted else f"{field}: {received}")
+        )
 
 
 class MeshError(InputError):

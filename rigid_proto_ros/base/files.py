@@ -21,12 +21,15 @@ CHUNK = 1 << 20
 """Bytes read at a time from what doesn't say its size, such as a pipe."""
 
 
-def read_bounded(path: Path, max_bytes: int, field: str, kind: str) -> bytes:
+def read_bounded(path: Path, max_bytes: int, field: str, kind: str, *, ordinary: bool = False) -> bytes:
     """The bytes of the file at ``path``; ``kind`` says in the refusal what it should be ("a URDF, SDF or MJCF file").
+    ordinary: no pipe and no device, which may never end, as suits a path that another file gives.
 
     Raises InputError naming ``field`` when the file can't be read or holds more than ``max_bytes``.
     """
     try:
+        if ordinary and path.exists() and not path.is_file():
+            raise InputError(field, str(path), f"{kind}; this is a folder, a device or a pipe")
         with path.open("rb") as stream:
             size = os.fstat(stream.fileno()).st_size
             parts = [stream.read(min(size, max_bytes) + 1)]

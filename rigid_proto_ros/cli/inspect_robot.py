@@ -13,7 +13,7 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError
+from ..base.errors import InputError, printable
 from ..base.files import is_same_file, whole_file
 from ..mass.properties import scale_vector
 from ..mass.tensor import principal_axes, six_from_tensor
@@ -121,7 +121,7 @@ def _print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
     for d in diagnoses:
         name = f" ({d.mesh})" if d.mesh else ""
         note = f"; {d.note}" if d.note else ""
-        print(f"{d.link}{name}: {d.status}{note}")
+        print(printable(f"{d.link}{name}: {d.status}{note}"))
         if d.inertia_error is not None:
             errors = f"inertia {d.inertia_error:.2g} ({d.ratio:.3g} times as large)"
             center = f"centre of mass {d.center_of_mass_error:.2g} of the size"
@@ -157,7 +157,7 @@ def _fix(args: argparse.Namespace) -> int:
     else:
         for link in links:
             became = " -> uniform" if link.written else f"; left: {link.left}" if link.left else ""
-            print(f"{link.before.link}: {link.before.status}{became}")
+            print(printable(f"{link.before.link}: {link.before.status}{became}"))
         written, left = sum(link.written for link in links), sum(bool(link.left) for link in links)
         print(f"{args.fix}: {written} of {len(links)} inertials rewritten, {left} left as they are")
     return 1 if any(link.before.status in WRONG and not link.written for link in links) else 0
@@ -201,9 +201,9 @@ def _print_lump(whole: Lump, written: tuple[str, ...]) -> None:
     rows.append(("principal moments", row_of(principal_axes(properties.inertia)[0]), "kg m²"))
     table(rows)
     if whole.massless:
-        print(f"without an inertial, and so without mass: {', '.join(whole.massless)}")
+        print(printable(f"without an inertial, and so without mass: {', '.join(whole.massless)}"))
     for text in whole.absent:
-        print(f"not in the mesh: {text}")
+        print(printable(f"not in the mesh: {text}"))
     for name in written:
         print(f"wrote {name}")
 

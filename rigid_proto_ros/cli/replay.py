@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.command_line import Progress, number_from
-from ..base.errors import InputError
+from ..base.errors import InputError, printable
 from ..base.files import check_whole_file, check_writable, is_same_file, whole_file
 from .exports import add_exports, asked, check_exports, write_exports
 
@@ -105,12 +105,12 @@ def _print_session(name: str, session: RecordedSession) -> None:
     if not session.complete:
         print("  truncated: read up to where it was cut")
     if session.missing:
-        print(f"  without {', '.join(session.missing)}")
+        print(printable(f"  without {', '.join(session.missing)}"))
     if session.accuracy_floor:
-        print(f"  the accuracy asked for is not held throughout: {session.accuracy_floor}")
+        print(printable(f"  the accuracy asked for is not held throughout: {session.accuracy_floor}"))
     if session.refusals:
         time_ns, line = session.refusals[-1]
-        print(f"  commands refused: {len(session.refusals)}, the last at {time_ns / 1e9:.9g} s: {line}")
+        print(printable(f"  commands refused: {len(session.refusals)}, the last at {time_ns / 1e9:.9g} s: {line}"))
 
 
 def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
@@ -129,7 +129,7 @@ def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:
             print(f"  {which}not checked: {error.received}")
             continue
         if difference is not None:
-            print(f"rigid_proto replay: {args.session}: {which}{difference}", file=sys.stderr)
+            print(printable(f"rigid_proto replay: {args.session}: {which}{difference}"), file=sys.stderr)
             if not difference.tampered:
                 _print_difference(difference, session)
             return 1
@@ -155,13 +155,13 @@ def _print_difference(difference: Difference, session: RecordedSession) -> None:
     from ..session.check import made_with_table
 
     if difference.command:
-        print(f"  before it acted {difference.command}", file=sys.stderr)
+        print(printable(f"  before it acted {difference.command}"), file=sys.stderr)
     table = made_with_table(session)
     if not table:
         print("  the recording doesn't say what it was made with", file=sys.stderr)
     for name, was, here in table:
         if was != here:
-            print(f"  {name} differs: {was} recorded, {here} here", file=sys.stderr)
+            print(printable(f"  {name} differs: {was} recorded, {here} here"), file=sys.stderr)
 
 
 def _given_scene(path: str | None, session: RecordedSession) -> Scenario | None:

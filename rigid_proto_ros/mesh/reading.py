@@ -75,7 +75,8 @@ def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[np.ndarray, np.nd
 
     def beside(name: str) -> bytes:
         found = unquote(name)
-        content = read_bounded(path.parent / found, MAX_BYTES, path.name, "a file with the mesh's numbers")
+        kind = "a file with the mesh's numbers"
+        content = read_bounded(path.parent / found, MAX_BYTES, path.name, kind, ordinary=True)
         files[found] = hashlib.sha256(content).hexdigest()
         return content
 
@@ -84,7 +85,7 @@ def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[np.ndarray, np.nd
         if suffix in ("glb", "gltf"):
             add_gltf(data, beside, assembly)
         elif suffix == "3mf":
-            unit = add_threemf(data, assembly, MAX_BYTES)
+            unit = add_threemf(data, assembly)
         elif suffix == "dae":
             unit = add_collada(data, assembly)
         else:

@@ -15,6 +15,10 @@ from .assembly import Assembly, tag_of
 UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 SUPPORTS = ("support", "solidsupport")
 """Types of objects that support a part during printing and don't belong to it."""
+MAX_RATIO, SPARE = 100, 1_000_000
+"""Bytes unpacked, for each byte of the file and beyond: models shrink to a tenth, and what is made to fill the memory
+to a thousandth.
+"""
 MAX_PLACES = 100_000
 """Maximum number of placements of objects, nested ones included; a file with more is refused."""
 _CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
@@ -45,10 +49,18 @@ class _Package:
         """An error that names the file."""
         return MeshError(self._assembly.name, reason, accepted)
 
+    def _read(self, name: str) -> bytes:
+        """A file of the archive, as long as its directory says at most."""
+        entry = self._archive.getinfo(name)
+        if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):  # others unpack all that there is
+            raise self.refusal(f"{name} is compressed by method {entry.compress_type}", "DEFLATE, as packages have it")
+        with self._archive.open(entry) as stream:
+            return stream.read(entry.file_size)
+
     def root(self) -> str:
         """Path of the model file with the items to be built."""
         if "/_rels/.rels" in self._names:
-            for relation in ElementTree.fromstring(self._archive.read(self._names["/_rels/.rels"])):
+            for relation in ElementTree.fromstring(self._read(self._names["/_rels/.rels"])):
                 if relation.get("Type", "").endswith("/3dmodel"):
                     return "/" + relation.get("Target", "").lstrip("/")
         models = [name for name in self._names if name.endswith(".model")]
@@ -62,7 +74,7 @@ class _Package:
             name = self._names.get(path.lower())
             if name is None:
                 raise self.refusal(f"it names the model file {path!r}, which isn't in it")
-            parser = ElementTree.iterparse(io.BytesIO(self._archive.read(name)), events=("start-ns",))
+            parser = ElementTree.iterparse(io.BytesIO(self._read(name)), events=("start-ns",))
             prefixes = dict(names for _, names in parser)
             model = parser.root  # type: ignore[attr-defined]  # set once the file is read
             for prefix in model.get("requiredextensions", "").split():
@@ -115,17 +127,15 @@ class _Package:
         return np.array(vertices).reshape(-1, 3), np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
-def add_threemf(data: bytes, assembly: Assembly, max_bytes: int) -> float:
+def add_threemf(data: bytes, assembly: Assembly) -> float:
     """Add the items to be built, except supports, in a file's bytes, in the file's unit; returns this unit in metres.
-
-    An archive of more than ``max_bytes``, unpacked, is refused.
 
     Raises MeshError, or other errors if the file doesn't follow the specification.
     """
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        size = sum(entry.file_size for entry in archive.infolist())
-        if size > max_bytes:
-            raise MeshError(assembly.name, f"{size} bytes unpacked", f"at most {max_bytes}")
+        size, most = sum(entry.file_size for entry in archive.infolist()), MAX_RATIO * len(data) + SPARE
+        if size > most:
+            raise MeshError(assembly.name, f"{size} bytes unpacked", f"at most {most} in a file of {len(data)}")
         package = _Package(archive, assembly)
         root = package.root()
         unit = package.unit(root)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -42,6 +42,7 @@ def make_recorder(
     parameters: the scene's, of which frames' names count. simulated_log: messages of an .mcap are logged at simulated
     time, as suits a run without a clock; else at the wall's. files (name, bytes): meshes whose own files may be gone.
     """
+    _check_place(path)
     if is_mcap(path):
         try:
             from ..session.mcap_observer import McapObserver
@@ -54,6 +55,19 @@ def make_recorder(
     from .observer import FileRecorder
 
     return FileRecorder(path, node_name, on_error, files)
+
+
+def _check_place(path: str) -> None:
+    """A scene, or any node, may name the place: a recording that stands there is overwritten, and nothing else is."""
+    place, head = Path(path), b""
+    with suppress(OSError):  # what can't be read is refused where it can't be written
+        if place.is_file():
+            with open(place, "rb") as stream:
+                head = stream.read(5)
+        elif place.exists() and not place.is_dir():
+            head = b"a device or a pipe"
+    if head and not head.startswith((b"RRF2", b"\x89MCAP")):
+        raise InputError("record", path, "a new file or an earlier recording; there is something else")
 
 
 def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:

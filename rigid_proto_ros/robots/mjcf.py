@@ -37,7 +37,8 @@ def _include(parent: Element, main: Path, path: Path, left: Iterator[int]) -> No
             raise InputError("robot file", f"{main.name} includes more files", f"at most {MAX_INCLUDES}")
         places = [folder / child.get("file", "") for folder in (main.parent, path.parent)]
         file = next((place for place in places if place.is_file()), places[0])
-        content = rd.parse_xml(read_bounded(file, rd.MAX_BYTES, "robot file", "an MJCF file to include"), file)
+        text = read_bounded(file, rd.MAX_BYTES, "robot file", "an MJCF file to include", ordinary=True)
+        content = rd.parse_xml(text, file)
         _include(content, main, file, left)
         place = list(parent).index(child)
         parent[place : place + 1] = list(content)
@@ -181,7 +182,10 @@ def _simulated(source: _Source, links: list[rd.Link], names: list[str]) -> list[
 def read_mjcf(root: Element, path: Path) -> rd.Robot:
     """The bodies of a <mujoco>; raises InputError for what MuJoCo refuses, and without it."""
     inertials = {body.get("name", ""): body.find("inertial") for body in root.iter("body")}
-    _include(root, path, path, iter(range(MAX_INCLUDES)))
+    try:
+        _include(root, path, path, iter(range(MAX_INCLUDES)))
+    except RecursionError:
+        raise InputError("robot file", path.name, "elements within each other as deep as MuJoCo takes them") from None
     if any(not model.get("file") for model in root.iter("model")):  # MuJoCo may loop at a later file after such a one
         raise InputError("robot file", path.name, "a file for each <model>")
     source = _Source(root, path)

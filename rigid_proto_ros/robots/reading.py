@@ -114,10 +114,14 @@ def parse_xml(data: bytes, path: Path) -> Element:
 
     Raises InputError for what is no XML, or has entities.
     """
-    if b"<!ENTITY" in data:
-        raise InputError("robot file", path.name, "a file without XML entities")
+
+    def check_doctype(_name: str, _system: str | None, _public: str | None, has_declarations: bool) -> None:
+        if has_declarations:
+            raise InputError("robot file", path.name, "a file without XML entities or other declarations")
+
     tree = ElementTree.TreeBuilder()
     parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = check_doctype
     parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
     parser.CharacterDataHandler = tree.data
     try:
@@ -280,7 +284,7 @@ def _urdf_link(link: Element) -> Link:
 def _urdf_poses(root: Element) -> dict[str, Pose]:
     """Poses of the links in the frame of the root link."""
     above: dict[str, tuple[str, Pose]] = {}
-    names = [link.get("name", "?") for link in root.findall("link")]
+    names = dict.fromkeys(link.get("name", "?") for link in root.findall("link"))
     for joint in root.findall("joint"):
         ends = [joint.find(tag) for tag in ("parent", "child")]
         parent, child = ("" if end is None else end.get("link", "") for end in ends)
@@ -293,11 +297,14 @@ def _urdf_poses(root: Element) -> dict[str, Pose]:
     roots = [name for name in names if name not in above]
     if len(roots) != 1:
         raise InputError("lump", f"{len(roots)} root links ({', '.join(roots[:4])}); accepted: one tree of links")
-    poses = {roots[0]: HERE}
-    while placed := [child for child, (parent, _) in above.items() if parent in poses]:
-        for child in placed:
-            parent, pose = above.pop(child)
-            poses[child] = poses[parent] @ pose
+    below: dict[str, list[str]] = {}
+    for child, (parent, _) in above.items():
+        below.setdefault(parent, []).append(child)
+    poses, reached = {roots[0]: HERE}, [roots[0]]
+    for parent in reached:
+        for child in below.get(parent, ()):
+            poses[child] = poses[parent] @ above[child][1]
+            reached.append(child)
     return poses
 
 
@@ -386,10 +393,10 @@ def _sdf_poses(root: Element) -> dict[str, Pose]:
         element.get("name", "?"): element for tag in ("link", "joint", "frame") for element in models[0].findall(tag)
     }
     found = {"": HERE, "__model__": HERE}
-
-    def pose_of(name: str, below: tuple[str, ...] = ()) -> Pose:
-        if name not in found:
-            if name not in elements or name in below:
+    for one in elements:
+        name, bases = one, dict[str, str]()
+        while name not in found:
+            if name not in elements or name in bases:
                 raise InputError("lump", f"frame {name!r}", "poses relative to links, joints and frames of the model")
             element = elements[name]
             base = _frame_of_pose(element)
@@ -397,7 +404,8 @@ def _sdf_poses(root: Element) -> dict[str, Pose]:
                 base = base or (element.findtext("child") or "").strip()
             if element.tag == "frame":
                 base = base or element.get("attached_to", "")
-            found[name] = pose_of(base, (*below, name)) @ _sdf_pose(element, f"{element.tag} {name}")
-        return found[name]
-
-    return {name: pose_of(name) for name in elements}
+            bases[name] = base
+            name = base
+        for name, base in reversed(bases.items()):
+            found[name] = found[base] @ _sdf_pose(elements[name], f"{elements[name].tag} {name}")
+    return {name: found[name] for name in elements}

@@ -17,7 +17,7 @@ from pathlib import Path
 import yaml
 
 from ..base.bundled import scene_names, scene_path
-from ..base.errors import InputError, MeshError, did_you_mean
+from ..base.errors import InputError, MeshError, did_you_mean, printable
 from ..mesh.locate import resolve_mesh
 from .parameters import is_ros_parameter, parameter_named
 from .yaml_text import compose_yaml, key_of, read_text, refused, typed
@@ -101,7 +101,8 @@ def scene_values(
     scene = read_scene_file(path, node_name)
     if not scene.has_section:
         there = ", ".join(scene.unused[:5]) or "none"
-        warn(f"{path}: there is no section for /{node_name.lstrip('/')} (it has {there}); /** is for every node")
+        none = f"there is no section for /{node_name.lstrip('/')} (it has {there})"
+        warn(printable(f"{path}: {none}; /** is for every node"))
     values: dict[str, object] = {}
     for parameter, value in scene.values.items():
         if is_ros_parameter(parameter):
@@ -111,7 +112,7 @@ def scene_values(
         except InputError as error:
             if parameter not in scene.wildcard:
                 raise InputError(f"{path}, {parameter}", error.received, error.accepted) from None
-            warn(f"{path}: {parameter} under /** is not a parameter of this node; ignored")
+            warn(printable(f"{path}: {parameter} under /** is not a parameter of this node; ignored"))
             continue
         values[parameter] = value
     if isinstance(mesh := values.get("mesh"), str):

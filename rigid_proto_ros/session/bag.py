@@ -12,8 +12,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import zstandard
 from mcap import records
-from mcap.stream_reader import StreamReader
+from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC, Writer
 
 from ..base.errors import InputError
@@ -23,6 +24,11 @@ from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_state, read_stri
 from .recorded_session import RecordedSession, StampedRows, decode_event
 
 ROS_PROFILE = "ros2"
+
+MAX_RATIO, SPARE = 200, 64_000_000
+"""Bytes that chunks hold unpacked, for each byte of the file and beyond: our states shrink to a sixteenth, and what is
+made to fill the memory to a thirty thousandth.
+"""
 
 _RECORD_HEAD = struct.Struct("<BQ")
 """Opcode and length of what follows."""
@@ -111,9 +117,10 @@ def _whole_records(path: Path) -> Iterator[records.McapRecord]:
             remedy = "ros2 bag convert rewrites other or compressed files"
             raise InputError("session", f"the content of {str(path)!r} is that of no .mcap recording; {remedy}")
         end, footer = stream.tell(), None
+        left = MAX_RATIO * path.stat().st_size + SPARE
         stream.seek(0)
         try:
-            for record in StreamReader(stream, validate_crcs=True).records:
+            for record in _unpacked(StreamReader(stream, emit_chunks=True, validate_crcs=True), left):
                 end = stream.tell()
                 if isinstance(record, records.Footer):
                     footer = record
@@ -134,6 +141,21 @@ def _whole_records(path: Path) -> Iterator[records.McapRecord]:
                 reason = str(error) or type(error).__name__
                 accepted = f"an undamaged .mcap, as ros2 bag record or ros2 bag convert writes it ({reason})"
                 raise InputError("session", str(path), accepted) from None
+
+
+def _unpacked(reader: StreamReader, left: int) -> Iterator[records.McapRecord]:
+    """The records that are read, chunks opened that hold no more than ``left`` bytes together."""
+    for record in reader.records:
+        if not isinstance(record, records.Chunk):
+            yield record
+            continue
+        left -= record.uncompressed_size
+        # The library takes a frame's own word for its size, where that has one.
+        if left < 0 or (
+            record.compression == "zstd" and zstandard.frame_content_size(record.data) > record.uncompressed_size
+        ):
+            raise ValueError("chunks that hold more than a recording of this size can")
+        yield from breakup_chunk(record, validate_crc=True)
 
 
 def _files(path: Path) -> list[Path]:

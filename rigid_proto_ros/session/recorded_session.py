@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tempfile
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -18,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError, MeshError
-from ..mesh.reading import Mesh, load_mesh
+from ..mesh.reading import Mesh, load_mesh, read_mesh
 from ..scene.command_codec import frame_names, of_event
 from ..scene.parameters import Parameters, convert_all
 from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
@@ -95,7 +94,7 @@ def decode_event(line: str, number: int) -> tuple[int, str, dict]:
     try:
         event = json.loads(line)
         time_ns, kind, content = event["time_ns"], event["kind"], event["content"]
-        if type(time_ns) is int and time_ns >= 0 and isinstance(kind, str) and isinstance(content, dict):
+        if type(time_ns) is int and 0 <= time_ns < 1 << 63 and isinstance(kind, str) and isinstance(content, dict):
             return time_ns, kind, content
     except (ValueError, KeyError, TypeError, RecursionError):
         pass
@@ -118,11 +117,7 @@ def find_mesh(session: RecordedSession, name: str, sha256: str) -> Mesh:
             return mesh
     for file_name, data in session.attachments:
         if hashlib.sha256(data).hexdigest() == sha256:
-            # Loaded through a file: what a mesh is depends on its ending, too.
-            with tempfile.TemporaryDirectory(prefix="rigid_proto_") as temporary:
-                path = Path(temporary) / Path(file_name).name
-                path.write_bytes(data)
-                return load_mesh(str(path))
+            return read_mesh(data, Path(Path(file_name).name))
     raise MeshError(
         "mesh", name, f"the file with SHA-256 {sha256}, there or in the session's folder; the recording lacks it"
     )

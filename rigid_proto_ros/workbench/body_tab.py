@@ -35,6 +35,9 @@ from .flight import Flight
 
 OWN_FILE = "(a file)"
 
+PUNCTUATION = re.compile(r"[!-/:-@\[-`{-~]")
+"""All that can mean something in Markdown or HTML."""
+
 
 class BodyTab:
     """Everything about mass and shape. ``changed`` is called whenever the parameters have changed. fly(values) starts a
@@ -90,7 +93,7 @@ class BodyTab:
 
     def show_verdict(self, lines: Sequence[str]) -> None:
         """Show these remarks on a mesh, one per line."""
-        self._verdict.content = "\n".join(f"- {line}" for line in lines)
+        self._verdict.content = "\n".join(f"- {as_words(line)}" for line in lines)
 
     def _size_factor(self, values: Mapping[str, Any]) -> float:
         scale = values["scale"]
@@ -149,6 +152,11 @@ def _own_mass(scenario: Scenario) -> float:
     return given if given > 0.0 else scenario.setup.body.mass - weights
 
 
+def as_words(text: object) -> str:
+    """A text of words alone for the page, which takes Markdown and all of HTML, scripts too: files' words are in it."""
+    return PUNCTUATION.sub(lambda found: f"&#{ord(found[0])};", str(text))
+
+
 # Comparison of the true tensor with an approximate one
 
 TURNED = 1e-6
@@ -177,7 +185,7 @@ def comparison(scenario: Scenario) -> str:
         true, approximate = model_properties(scenario, "solid"), model_properties(scenario, other)
         own = model_properties(scenario, other, com="model")
     except InputError as error:
-        return f"Simulating: **{flying}**. Nothing to compare with: {error}"
+        return f"Simulating: **{flying}**. Nothing to compare with: {as_words(error)}"
     difference = model_difference(approximate, true)
     surface = scenario.setup.surface
     size = 1.0 if surface is None else float(np.linalg.norm(surface.extent * scenario.setup.body.scale))

@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Files of placed parts, .gltf, .3mf and .dae: each feature that moves a vertex is read as specified or refused by name."""
 
+import io
+import json
+import os
+import struct
+import zipfile
+
 import numpy as np
 import pytest
 from judged_meshes import codes, load, volume
@@ -193,3 +199,25 @@ def test_dae_strips_are_triangles_and_mirrored_nodes_face_outward(tmp_path):
 def test_dae_of_which_something_is_not_read_says_what(tmp_path, nodes, geometry, words):
     with pytest.raises(MeshError, match=words):
         load_dae(tmp_path, nodes, geometry)
+
+
+@pytest.mark.parametrize(
+    "method, words", [(zipfile.ZIP_DEFLATED, "bytes unpacked"), (zipfile.ZIP_BZIP2, "compressed by")]
+)
+def test_a_3mf_that_unpacks_to_far_more_than_its_size_is_refused_before_it_is_unpacked(tmp_path, method, words):
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", method) as archive:
+        archive.writestr("root.model", b" " * 10_000_000)
+    data = bytearray(packed.getvalue())
+    if method == zipfile.ZIP_BZIP2:  # what its directory says isn't what it is
+        struct.pack_into("<I", data, data.rfind(b"PK\1\2") + 24, 100)
+    with pytest.raises(MeshError, match=words):
+        load(tmp_path, "a.3mf", bytes(data))
+
+
+def test_a_gltf_whose_numbers_are_in_a_pipe_is_refused_without_waiting_for_it(tmp_path):
+    file = Gltf()
+    os.mkfifo(tmp_path / "pipe.bin")
+    file.json["buffers"] = [{"uri": "pipe.bin", "byteLength": 1}]
+    with pytest.raises(MeshError, match="pipe"):
+        load(tmp_path, "a.gltf", json.dumps(file.json).encode())

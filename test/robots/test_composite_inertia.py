@@ -13,6 +13,7 @@ from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mesh.reading import Mesh
 from rigid_proto_ros.robots.composite_inertia import lump_robot
 from rigid_proto_ros.robots.link_shapes import primitive_solid, primitive_surface
+from rigid_proto_ros.robots.reading import read_robot
 
 INERTIA = 'ixx="0.03" ixy="0.001" ixz="-0.002" iyy="0.02" iyz="0.003" izz="0.025"'
 
@@ -112,6 +113,14 @@ def test_an_sdfs_frames_are_followed(tmp_path):
     same.write_text(f'<robot name="r">{"".join(links)}{joint("revolute", "base", "arm")}</robot>')
     expected = lump_robot(same).properties
     assert_same(lump_robot(path), (expected.mass, expected.center_of_mass, expected.inertia))
+
+
+def test_a_chain_of_frames_is_followed_however_long_it_is(tmp_path):
+    pose = '<pose relative_to="l{}">1 0 0 0 0 0</pose>'
+    links = [f'<link name="l{k}">{pose.format(k + 1)}</link>' for k in range(2000)]
+    path = tmp_path / "model.sdf"
+    path.write_text(f'<sdf><model name="m">{"".join(links)}<link name="l2000"><inertial/></link></model></sdf>')
+    assert read_robot(path).poses()["l0"].position.tolist() == [2000.0, 0.0, 0.0]
 
 
 def test_a_pose_with_a_quaternion_is_that_with_angles(tmp_path):

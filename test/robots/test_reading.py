@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Files that were misread or refused without need: MJCF as MuJoCo compiles it, SDF as Gazebo takes it."""
 
+import os
+
 import numpy as np
 import pytest
 from mesh_files import CUBE_VERTICES, stl
@@ -83,6 +85,16 @@ def test_a_file_included_twice_and_meshes_that_mujoco_cannot_load(tmp_path):
     assert lump_robot(path).properties.mass == 24.0
 
 
+def test_an_mjcf_too_deep_or_with_a_pipe_to_include_is_refused(tmp_path):
+    pytest.importorskip("mujoco")
+    os.mkfifo(tmp_path / "pipe.xml")
+    path = tmp_path / "model.xml"
+    for inside, words in ((2000 * "<body>" + 2000 * "</body>", "deep"), ('<include file="pipe.xml"/>', "pipe")):
+        path.write_text(f"<mujoco><worldbody>{inside}</worldbody></mujoco>")
+        with pytest.raises(InputError, match=words):
+            read_robot(path)
+
+
 def test_an_mjcf_with_an_inertial_that_mujoco_refuses_is_judged(tmp_path, capsys):
     pytest.importorskip("mujoco")
     path = tmp_path / "model.xml"
@@ -127,6 +139,13 @@ def test_links_of_several_models_have_the_names_of_their_models_before_theirs(tm
     path.write_text(f'<sdf version="1.9"><world name="w">{"".join(models)}</world></sdf>')
     assert [link.name for link in read_robot(path).links] == ["cup::link", "table::link"]
     assert [link.name for link in read_robot(sdf(tmp_path, f'<link name="link">{inertial}</link>')).links] == ["link"]
+
+
+def test_a_name_with_line_breaks_and_control_characters_is_one_printable_line(tmp_path, capsys):
+    path = sdf(tmp_path, '<link name="a&#10;9 links: 9 uniform&#155;2J&#x202e;"><inertial/></link>')
+    assert main(["inspect", "--compare", str(path)]) == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.isprintable() and line.startswith("a 9 links")
 
 
 def test_prefixes_that_an_sdf_does_not_declare_are_names_and_blank_lines_before_it_are_no_fault(tmp_path):

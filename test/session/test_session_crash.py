@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+import zstandard
 from conftest import ENDINGS, needs_rerun
 
 pytest.importorskip("mcap")
@@ -134,6 +135,18 @@ def test_damage_inside_is_refused_in_one_line(recording, tmp_path, capsys):
             assert len(error.splitlines()) == 1 and "damaged.mcap" in error
     assert repaired.read_bytes() == b"an earlier one"
     assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize("says_size", [True, False])
+def test_a_chunk_that_unpacks_to_far_more_than_the_file_can_is_refused(says_size, tmp_path):
+    frame = zstandard.ZstdCompressor(write_content_size=says_size).compress(bytes(200_000_000))
+    # Where the frame itself says its size, the chunk may lie.
+    size = 100 if says_size else 200_000_000
+    chunk = struct.pack("<QQQII4sQ", 0, 0, size, 0, 4, b"zstd", len(frame)) + frame
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(b"\x89MCAP0\r\n" + RECORD_HEAD.pack(0x06, len(chunk)) + chunk)
+    with pytest.raises(InputError, match="chunks that hold more"):
+        read_runs(path)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
+import os
 import shlex
 import shutil
 import subprocess
@@ -29,14 +31,14 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.mesh.locate import resolve_mesh
-from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.rerun_view.session_files import make_recorder, read_runs
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun, notify_start
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
 from rigid_proto_ros.session.messages import twist_row
-from rigid_proto_ros.session.recorded_session import RecordedSession, play
+from rigid_proto_ros.session.recorded_session import RecordedSession, find_mesh, play
 from rigid_proto_ros.simulation.observer import Logged, Observer, Observers, Published, SceneChanged, Started
 from rigid_proto_ros.sweep.flights import Flight, load_scene
 
@@ -165,6 +167,24 @@ def test_meshes_come_from_inside_where_their_files_are_gone_or_others(tmp_path, 
     assert main(["replay", session, "--record", again]) == 0
     Path(session).unlink()
     assert main(["replay", again, "--verify"]) == 0
+
+
+@pytest.mark.parametrize("name", ["../../x.obj", "x\0y.obj", "x" * 300 + ".obj"])
+def test_a_mesh_inside_a_recording_is_read_whatever_its_name(name):
+    data = resolve_mesh("book").read_bytes()
+    session = RecordedSession(attachments=[(name, data)])
+    assert find_mesh(session, "gone.obj", hashlib.sha256(data).hexdigest()).vertices.size
+
+
+def test_a_recording_takes_the_place_of_an_earlier_one_and_of_no_other_file(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    link = tmp_path / "flight.mcap"
+    link.symlink_to("notes.txt")
+    os.mkfifo(tmp_path / "pipe.rrd")
+    for path in (link, tmp_path / "pipe.rrd"):
+        with pytest.raises(InputError, match="something else"):
+            make_recorder(str(path))
+    assert link.read_text() == "mine"
 
 
 @pytest.mark.parametrize("first", ["book", "mesh"])

@@ -131,7 +131,11 @@ def test_one_bit_of_a_state_is_found(session, topic):
 
 
 @pytest.mark.parametrize(
-    "line", ["", "{", "[]", "null", '{"time_ns": 1}', '{"time_ns": "1", "kind": "poke", "content": {}}', "[" * 9999]
+    "line",
+    [
+        *("", "{", "[]", "null", "[" * 9999, '{"time_ns": 1}'),
+        *(f'{{"time_ns": {time}, "kind": "poke", "content": {{}}}}' for time in ('"1"', "9" * 400)),
+    ],
 )
 def test_an_event_that_cannot_be_decoded_is_refused(session, line):
     with pytest.raises(InputError, match="event 3"):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import threading
 import time
@@ -126,6 +127,14 @@ def test_an_upload_flies_alone_and_its_take_holds_it(flown: FlownPage, tmp_path)
 OPEN_BOX = b"# z up\n" + b"".join(b"v %d %d %d\n" % (k >> 2, k >> 1 & 1, k & 1) for k in range(8))
 OPEN_BOX += b"f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\n"
 """A cube of a metre that lacks a side."""
+
+
+def test_words_of_an_uploaded_file_are_words_on_the_page_and_neither_html_nor_markdown(flown: FlownPage) -> None:
+    body = flown.page.body_tab
+    for word in ("<script>", "![](//x.y)"):
+        flown.do(lambda word=word: body.upload.take("a.obj", f"v {word} 0 0".encode()))
+        assert html.unescape(body._verdict.content).startswith(f"- refused: a.obj line 1: got 'v {word} 0 0'")
+        assert not set("<![") & set(body._verdict.content)
 
 
 @pytest.mark.parametrize(("stand_in", "parameter"), [("it repaired", "mesh_repair"), ("its hull", "mesh_fallback")])
