@@ -95,12 +95,13 @@ def _chosen_topics(path: Path, choice: Choice) -> dict[str, _Topic]:
                 message: Any = bag.deserialize(data, connection.msgtype)
                 parts = message.transforms if connection.msgtype == TRANSFORMS[1] else [message]
                 found[connection.topic] += [(logged_ns, part) for part in parts]
+        # Here, too, a type that the bag defines in its own way may lack what it is read for.
+        return {kind: _topic(found[name], name, types[name], frame) for kind, (name, frame) in chosen.items()}
     except InputError:
         raise
     except Exception as error:  # the library lets through whatever cut or damaged bytes lead to
         accepted = f"a bag that rosbags can read ({error}); ros2 bag reindex repairs a bag whose recorder was killed"
         raise InputError("session", str(path), accepted) from None
-    return {kind: _topic(found[name], name, types[name], frame) for kind, (name, frame) in chosen.items()}
 
 
 def _chosen(types: dict[str, str], given: dict[str, str], path: str) -> dict[str, tuple[str, str]]:

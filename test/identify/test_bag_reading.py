@@ -10,6 +10,7 @@ import foreign_bags as fb
 import measured_flights as mf
 import numpy as np
 import pytest
+from mcap.writer import Writer
 from rosbags.rosbag2 import StoragePlugin
 
 from rigid_proto_ros.base.errors import InputError
@@ -193,6 +194,16 @@ def test_a_folder_of_rosbag2_says_what_the_bare_file_does_and_a_broken_one_is_re
     file.write_bytes(file.read_bytes()[:3000])
     with pytest.raises(InputError, match="a bag that rosbags can read"):
         bag_flight(file, Choice())
+
+
+def test_a_bag_that_defines_poses_in_its_own_way_is_refused(tmp_path: Path) -> None:
+    writer = Writer(str(tmp_path / "own.mcap"))
+    writer.start(profile="ros2")
+    schema = writer.register_schema(POSE, "ros2msg", b"float64 x")
+    writer.add_message(writer.register_channel("/pose", "cdr", schema), 0, b"\0\1\0\0" + bytes(8), 0)
+    writer.finish()
+    with pytest.raises(InputError, match="no attribute 'header'"):
+        bag_flight(tmp_path / "own.mcap", Choice())
 
 
 POSE, IMU, WRENCH = "geometry_msgs/msg/PoseStamped", "sensor_msgs/msg/Imu", "geometry_msgs/msg/WrenchStamped"
