@@ -203,6 +203,8 @@ def share(scene: Scene, row_at, accuracy: float, end_s: float = END_S) -> float:
         ways /= np.linalg.norm(ways, axis=2, keepdims=True)
         disturbed = fly(scene.numbers, LOAD_S, MOVE_S, end_s, 10.0 * accuracy, ways)
         allowed = max(allowed, error(disturbed, exact, size))
+        if found <= allowed <= CHAOS:
+            break  # more tries can only allow more
     if allowed > CHAOS:
         return share(scene, row_at, accuracy, 0.5 * end_s)
     return found / allowed
