@@ -17,8 +17,9 @@ import os
 import re
 import sys
 import tempfile
+import uuid
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -93,6 +94,13 @@ def _source(file: str) -> tuple[bytes, list[str]]:
 _exists = functools.cache(os.path.isfile)
 
 
+def user_cache() -> str:
+    """This package's part of the user's cache folder; empty where there is no home folder."""
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    base = base if os.path.isabs(base) else os.path.expanduser(os.path.join("~", ".cache"))
+    return os.path.join(base, "rigid_proto_ros") if os.path.isabs(base) else ""
+
+
 @functools.cache
 def kernel_folder(file: str) -> str:
     """The cache folder for a source file's kernels, created and writable. Its name has a hash of the file and of all
@@ -102,10 +110,10 @@ def kernel_folder(file: str) -> str:
     """
     # Includes the package's own name, which compiled code refers to.
     module = os.path.relpath(file, os.path.dirname(PACKAGE)).removesuffix(".py").replace(os.sep, ".")
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    user = base if os.path.isabs(base) else os.path.join(os.path.expanduser("~"), ".cache")
-    usual = (os.path.join(user, "rigid_proto_ros", "kernels"), os.path.join(PACKAGE, "__pycache__", "kernels"))
-    for place in filter(None, (_CONFIG.CACHE_DIR, *usual)):
+    user = user_cache()
+    usual = (user and os.path.join(user, "kernels"), os.path.join(PACKAGE, "__pycache__", "kernels"))
+    places = list(filter(None, (_CONFIG.CACHE_DIR, *usual)))
+    for place in places:
         folder = os.path.join(place, f"{module}-{source_stamp(file).hex()[:20]}")
         try:
             os.makedirs(folder, exist_ok=True)
@@ -113,7 +121,8 @@ def kernel_folder(file: str) -> str:
         except OSError:
             continue
         return folder
-    raise OSError(f"no folder for compiled kernels can be written to: {', '.join(usual)}")
+    tried = " or ".join(places)
+    raise OSError(f"compiled kernels can't be kept in {tried}; set XDG_CACHE_HOME to a folder that can be written to")
 
 
 class KernelLocator:
@@ -125,15 +134,9 @@ class KernelLocator:
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> Any:
-        """A locator, as numba expects it; None for a function outside this package, or if no folder is writable."""
+        """A locator, as numba expects it; None for a function outside this package."""
         path = os.path.realpath(file)
-        if not path.startswith(PACKAGE + os.sep):
-            return None
-        try:
-            kernel_folder(path)
-        except OSError:
-            return None
-        return cls(path, function.__code__.co_firstlineno)
+        return cls(path, function.__code__.co_firstlineno) if path.startswith(PACKAGE + os.sep) else None
 
     def get_cache_path(self) -> str:
         """The cache folder."""
@@ -181,9 +184,26 @@ class KernelCache(FunctionCache):
                 super().__init__(self._function)
             finally:
                 _CONFIG.CACHE_LOCATOR_CLASSES = named
+            # numba numbers the kernels of a function. Two processes that compile two of them at once take one number,
+            # and the one would stay in the other's place: euler would run as midpoint.
+            own = f"{self._impl.filename_base}.{uuid.uuid4().hex[:16]}"
+            self._cache_file._data_name_pattern = own + ".{number:d}.nbc"  # noqa: SLF001
         # Also for a kernel that doesn't allocate: it may have been compiled from functions that count references.
         rtsys.initialize(target)
-        return self._load_overload(signature, target)
+        try:
+            return self._load_overload(signature, target)
+        except (OSError, MemoryError):
+            return None
+        except Exception:
+            # Damaged, as after a power cut, for which pickle and LLVM raise errors of any class: compiled anew.
+            with suppress(OSError):
+                os.unlink(self._cache_file._index_path)  # noqa: SLF001 (numba has no other way)
+            return None
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep a kernel; one that can't be kept, as on a full disk, is compiled again at the next start."""
+        with suppress(OSError):
+            super().save_overload(signature, result)
 
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])

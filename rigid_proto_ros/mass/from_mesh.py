@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.compilation import INTERPRETED, source_stamp
+from ..base.compilation import INTERPRETED, source_stamp, user_cache
 from ..base.errors import InputError
 from ..base.files import whole_file
 from ..mesh.reading import Mesh, load_mesh
@@ -108,11 +108,8 @@ def folder() -> Path | None:
     """The cache folder, or None if it is disabled or there is no home directory."""
     if os.environ.get("RIGID_PROTO_CACHE", "").lower() in ("off", "0", "no"):
         return None
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    try:
-        return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "rigid_proto_ros" / "meshes"
-    except RuntimeError:
-        return None
+    base = user_cache()
+    return Path(base) / "meshes" if base else None
 
 
 def check_mesh(mesh: Mesh) -> Verdict:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Kernels kept on disk are those of the present sources."""
 
+import errno
 import os
 import shutil
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 import rigid_proto_ros
 from rigid_proto_ros.base import compilation
@@ -40,6 +42,67 @@ def test_a_kernel_on_disk_is_that_of_its_file_and_of_all_behind_its_imports_also
         said.append(called(base.parents[1], tmp_path, locators))
     # Value, and whether it came from the disk: a copy elsewhere finds it, and neither of two versions drives out the other.
     assert said == [["2", "0"], ["2", "1"], ["3", "0"], ["2", "1"]], BROKEN
+
+
+@pytest.fixture
+def adding(tmp_path, monkeypatch):
+    """adding(k): a kernel x + k, kept below tmp_path."""
+    file = tmp_path / "adding.py"
+    file.write_text("def adding(njit, k):\n    @njit()\n    def plus(x):\n        return x + k\n\n    return plus\n")
+    monkeypatch.setattr(compilation, "PACKAGE", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    code = {}
+    exec(compile(file.read_text(), file, "exec"), code)
+    return lambda k: code["adding"](compilation.njit, k)
+
+
+def test_two_kernels_of_one_function_that_two_processes_keep_at_once_stay_apart(adding, monkeypatch):
+    one, two = adding(1), adding(2)
+    save = IndexDataCacheFile._save_data
+
+    def save_after_the_other(file, *data):
+        monkeypatch.setattr(IndexDataCacheFile, "_save_data", save)
+        assert two(1) == 3
+        save(file, *data)
+
+    with monkeypatch.context() as both:
+        both.setattr(IndexDataCacheFile, "_load_index", lambda _: {})  # neither sees what the other one writes
+        monkeypatch.setattr(IndexDataCacheFile, "_save_data", save_after_the_other)
+        assert one(1) == 2
+    assert (adding(1)(1), adding(2)(1)) == (2, 3)
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("content", [b"", b"hello", bytes(100)], ids=["empty", "text", "zeros"])
+def test_a_damaged_kernel_on_disk_is_compiled_and_kept_anew(adding, tmp_path, ending, content):
+    assert adding(1)(1) == 2
+    (file,) = tmp_path.rglob(f"*.{ending}")
+    file.write_bytes(content)
+    again = adding(1)
+    assert again(1) == 2 and not again.stats.cache_hits
+    kept = adding(1)
+    assert kept(1) == 2 and kept.stats.cache_hits
+
+
+def test_a_kernel_that_the_disk_has_no_room_for_is_used_all_the_same(adding, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(IndexDataCacheFile, "_save_index", full)
+    assert adding(1)(1) == 2
+
+
+def test_without_a_folder_for_kernels_one_line_says_which_were_tried_and_what_to_set(adding, tmp_path, monkeypatch):
+    (tmp_path / "__pycache__").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "adding.py"))
+    with pytest.raises(OSError, match="adding.py/rigid_proto_ros/kernels or .*__pycache__.*; set XDG_CACHE_HOME"):
+        adding(1)(1)
+
+
+def test_without_a_home_folder_none_of_that_name_is_made_in_the_current_one(monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", "cache")  # to be ignored, as its specification says
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
+    assert compilation.user_cache() == ""
 
 
 def test_every_kernel_of_the_package_is_kept_that_way():
