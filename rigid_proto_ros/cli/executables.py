@@ -11,6 +11,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import json
+import os
 import sys
 
 from ..base import interrupts
@@ -37,6 +38,11 @@ def poke_client() -> int:
 def _start(program: str, module: str, needs_ros: bool = False, interrupted: int | None = None) -> int:
     """Import and run a program. interrupted: its exit status after a signal; None: 128 + the signal's number."""
     interrupts.end_at_once(interrupted)
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed, as by 2>&-: the next file that is opened would get its number
+            stream = open(os.devnull, "r" if name == "stdin" else "w")  # noqa: SIM115
+            os.set_inheritable(stream.fileno(), True)
+            setattr(sys, name, stream)
     remedy = _remedy(needs_ros)
     if remedy:
         print(f"{program}: {remedy}", file=sys.stderr)
@@ -77,7 +83,7 @@ def own_executable(name: str) -> list[str]:
     InputError where they lack ROS.
     """
     check_rclpy(name)
-    return [sys.executable, "-m", "rigid_proto_ros.cli.executables", name]
+    return [sys.executable, "-P", "-m", "rigid_proto_ros.cli.executables", name]
 
 
 def as_typed(name: str) -> str:

@@ -45,6 +45,22 @@ def test_without_numba_an_executable_names_it_and_the_command_that_installs_it(p
     assert line.startswith(f"{program}: numba not found by ") and "make setup" in line and "pip install numba" in line
 
 
+def test_a_stream_that_the_shell_has_closed_is_open_to_nothing_also_for_processes_that_are_started(monkeypatch) -> None:
+    without(monkeypatch, "numba")
+    for name in ("stdin", "stdout", "stderr"):
+        monkeypatch.setattr(sys, name, None)
+    assert START["rigid_proto"]() == 2
+    assert sys.stdin.read() == "" and not sys.stderr.isatty()
+    assert all(os.get_inheritable(stream.fileno()) for stream in (sys.stdin, sys.stdout, sys.stderr))
+
+
+def test_an_executable_that_is_started_here_imports_nothing_from_the_current_folder(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(executables, "check_rclpy", lambda _: None)
+    (tmp_path / "json.py").write_text("raise SystemExit('the user's own json')")
+    started = [*executables.own_executable("rigid_proto"), "--version"]
+    assert subprocess.run(started, cwd=tmp_path, env=interrupts.with_this_package(), check=False).returncode == 0
+
+
 @pytest.mark.parametrize("program", ["rigid_body_node", "poke_client"])
 def test_without_rclpy_the_node_and_its_client_say_what_to_source_or_install(program, monkeypatch, capsys) -> None:
     without(monkeypatch, "rclpy")
