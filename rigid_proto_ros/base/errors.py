@@ -58,15 +58,17 @@ class CommandRefused(InputError):
 
 
 def tell(program: str, error: Exception) -> int:
-    """Print one line on stderr of what was refused or couldn't be written, and return the exit status; any other error
-    is raised again.
+    """Print one line on stderr of what was refused, couldn't be written or has no room in memory, and return the exit
+    status; any other error is raised again.
     """
     if isinstance(error, BrokenPipeError):
         # The reader of our output went away, as `| head` does; Python would complain again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    if isinstance(error, InputError | OSError):
-        print(f"{program}: {' '.join(str(error).split())}", file=sys.stderr)
+    if isinstance(error, UnicodeEncodeError):
+        error = InputError("a name", error.object, "text; libraries that read or write files take no other")
+    if isinstance(error, InputError | OSError | MemoryError):
+        print(f"{program}: {' '.join(str(error).split()) or 'out of memory'}", file=sys.stderr)
         return 2
     raise error
 

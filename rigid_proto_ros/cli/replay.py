@@ -15,6 +15,8 @@ from ..base.files import check_whole_file, check_writable, is_same_file, whole_f
 from .exports import add_exports, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..scene.scenario import Scenario
     from ..session.check import Difference
     from ..session.recorded_session import RecordedSession
@@ -70,12 +72,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--at", "needs --as-scene FILE.yaml, and --as-scene needs --at T")
     if args.speed is not None and args.publish != "states":
         raise InputError("--speed", "needs --publish states; a running node has real_time_factor")
-    if args.record and is_same_file(args.record, args.session):
-        raise InputError("--record", args.record, "another file than the session")
-    if args.record:
-        check_writable("--record", args.record)
-    if args.as_scene:
-        check_whole_file("--as-scene", args.as_scene)
+    _check_place("--record", args.record, args.session, check_writable)
+    _check_place("--as-scene", args.as_scene, args.session, check_whole_file)
     check_exports(args)
     if args.repair:
         repair(args.session, args.repair)
@@ -96,6 +94,14 @@ def run(args: argparse.Namespace) -> int:
     if status == 0 and args.publish:
         status = _publish(runs[-1], args)
     return status
+
+
+def _check_place(option: str, file: str | None, session: str, check: Callable[[str, str], None]) -> None:
+    """Check before long work that a file can be written, and that it isn't the session."""
+    if file and is_same_file(file, session):
+        raise InputError(option, file, "another file than the session")
+    if file:
+        check(option, file)
 
 
 def _print_session(name: str, session: RecordedSession) -> None:

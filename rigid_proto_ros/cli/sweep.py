@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
+from ..base.files import is_same_file
 
 if TYPE_CHECKING:
     from ..sweep.study import Study
@@ -35,6 +36,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.as_scene and args.row is None:
         raise InputError("--as-scene", "needs --row")
+    if args.as_scene and is_same_file(args.as_scene, args.study):
+        raise InputError("--as-scene", args.as_scene, "another file than the study")
     if args.output and args.row is not None:
         raise InputError("--output", "can't be combined with --row, which writes no table")
     study = read_study(args.study)

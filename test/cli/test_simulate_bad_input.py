@@ -126,6 +126,13 @@ def test_a_mesh_name_that_the_system_itself_refuses_is_refused(command, name, re
     assert name in line and reason in line
 
 
+def test_a_name_of_bytes_that_are_no_text_is_refused_where_a_library_takes_no_such_name(tmp_path, capfd):
+    pytest.importorskip("pyarrow")
+    name = str(tmp_path / "caf\udce9.parquet")  # Latin-1
+    line = one_line(capfd, rigid_proto, ["simulate", "t_handle", "--duration", "0.1", "--parquet", name])
+    assert "caf\\udce9.parquet" in line
+
+
 @pytest.mark.parametrize("method", ["is_file", "open"])
 def test_a_mesh_or_its_folder_that_may_not_be_read_is_refused(method, tmp_path, monkeypatch, capfd):
     def denied(*_):

@@ -224,6 +224,12 @@ def test_a_place_that_cannot_be_written_is_named_with_its_option_before_the_work
     assert out == "" and err.startswith(f"rigid_proto replay: {option}: got '{place}'; accepted: a file that can be")
 
 
+def test_a_scene_doesnt_take_the_place_of_the_recording_that_it_is_taken_from(session, capsys):
+    before = session.read_bytes()
+    assert main(["replay", str(session), "--at", "1", "--as-scene", str(session)]) == 2
+    assert "--as-scene" in capsys.readouterr().err and session.read_bytes() == before
+
+
 @pytest.mark.parametrize(
     "arguments",
     [["--at", "9"], ["--at", "-1"], ["--at", "nan"], ["--at", "1"], ["--as-scene", "x.yaml"]],

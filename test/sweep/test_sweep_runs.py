@@ -90,6 +90,14 @@ def test_a_row_written_as_a_scene_flies_to_the_same_bits(spec, tmp_path, monkeyp
         assert flown["angular_velocity_body"] == [row[f"spin.{axis}"] for axis in "xyz"]
 
 
+def test_a_row_doesnt_take_the_place_of_its_study(tmp_path, capsys) -> None:
+    study = tmp_path / "s.yaml"
+    study.write_text(yaml.safe_dump(POKES, sort_keys=False))
+    before = study.read_bytes()
+    assert main(["sweep", str(study), "--row", "2", "--as-scene", str(study)]) == 2
+    assert "--as-scene" in capsys.readouterr().err and study.read_bytes() == before
+
+
 def test_a_study_that_is_refused_is_one_line_and_exit_2(tmp_path, capsys) -> None:
     file = tmp_path / "bad.yaml"
     file.write_text("scene: t_handle\nduration: 1\nvary: {mass: {uniform: [2, 1]}}\nsamples: 2\n")
