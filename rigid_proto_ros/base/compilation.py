@@ -187,7 +187,7 @@ class KernelCache(FunctionCache):
             # numba numbers the kernels of a function. Two processes that compile two of them at once take one number,
             # and the one would stay in the other's place: euler would run as midpoint.
             own = f"{self._impl.filename_base}.{uuid.uuid4().hex[:16]}"
-            self._cache_file._data_name_pattern = own + ".{number:d}.nbc"  # noqa: SLF001
+            self._cache_file._data_name_pattern = own + ".{number:d}.nbc"  # noqa: SLF001 (there is no option)
         # Also for a kernel that doesn't allocate: it may have been compiled from functions that count references.
         rtsys.initialize(target)
         try:

@@ -59,7 +59,7 @@ def output_file(option: str, file: str | Path) -> Path:
             raise InputError(option, str(file), "the name of a file; this is a folder")
         path.absolute().parent.mkdir(exist_ok=True)
     except FileNotFoundError:
-        raise InputError(option, str(file), f"a folder that exists: {path.absolute().parent.parent} doesn't") from None
+        raise InputError(option, str(file), f"a folder that exists: {path.parent.parent} doesn't") from None
     except OSError as error:
         raise InputError(option, str(file), f"a file in a folder that can be made ({error.strerror})") from None
     return path

@@ -40,7 +40,7 @@ def _start(program: str, module: str, needs_ros: bool = False, interrupted: int 
     interrupts.end_at_once(interrupted)
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:  # closed, as by 2>&-: the next file that is opened would get its number
-            stream = open(os.devnull, "r" if name == "stdin" else "w")  # noqa: SIM115
+            stream = open(os.devnull, "r" if name == "stdin" else "w")  # noqa: SIM115 (until the end)
             os.set_inheritable(stream.fileno(), True)
             setattr(sys, name, stream)
     remedy = _remedy(needs_ros)

@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from ..base.errors import InputError
-from ..base.files import output_file
+from ..base.files import check_whole_file, whole_file
 from ..session.recorded_session import RecordedSession
 from .backend import SIM_TIME
 from .ports import LOOPBACK, PortTakenError, is_free, listens, serve_on_port
@@ -69,17 +69,15 @@ def take_picture(
         pixels = _stable_picture(client)
         if is_one_colour(pixels):
             raise InputError("--at", at_s, "a time at which the view shows something; this picture came out blank")
-        try:
-            picture.write_bytes(pixels)
-        except OSError as error:
-            raise InputError("-o", str(picture), f"a path that can be written ({error.strerror})") from error
+        with whole_file("-o", picture) as beside:
+            beside.write_bytes(pixels)
 
 
 def check_picture(picture: str | Path) -> None:
     """Raise InputError unless a picture could be written there; its folder is made."""
     if Path(picture).suffix.lower() != ".png":
         raise InputError("-o", str(picture), "a file that ends in .png")
-    output_file("-o", picture)
+    check_whole_file("-o", picture)
 
 
 def check_time(session: RecordedSession, at_s: float) -> None:

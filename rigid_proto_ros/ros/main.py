@@ -14,7 +14,7 @@ import traceback
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError, is_missing
+from ..base.errors import InputError, is_missing, tell
 from ..base.interrupts import leave
 from ..live.shutdown import Shutdown, begin_closing, begin_teardown
 from .domain import hold_own_domain
@@ -41,9 +41,8 @@ def main(argv: list[str] | None = None, as_job: bool = False) -> int:
             if as_job and number:
                 status = status or 128 + number
             leave(status)
-    except InputError as error:
-        print(f"rigid_body_node: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
+    except Exception as error:
+        return tell("rigid_body_node", error)
 
 
 class NodeProcess(threading.Thread):
@@ -186,7 +185,7 @@ def make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
         raise InputError("viewer", is_missing("rerun-sdk", "rerun"))
     from ..rerun_view.live_view import LiveView
 
-    def tell(line: str) -> None:
+    def report(line: str) -> None:
         print(f"{node_name}: {line}", file=sys.stderr)
 
     return LiveView(
@@ -194,8 +193,8 @@ def make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
         rerun_port=_asked_for("rerun_port", parameters.rerun_port),
         web_port=_asked_for("web_port", parameters.web_port),
         name=node_name,
-        report=tell,
-        on_error=tell,
+        report=report,
+        on_error=report,
     )
 
 

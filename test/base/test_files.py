@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.base.files import check_whole_file, whole_file
+from rigid_proto_ros.base.files import check_whole_file, output_file, whole_file
 
 
 def test_a_pipe_or_a_device_is_left_as_it_is(tmp_path: Path) -> None:
@@ -30,3 +30,10 @@ def test_a_link_stays_one_and_leads_to_the_new_file(tmp_path: Path) -> None:
         beside.write_text("new")
         assert file.read_text() == "old"
     assert link.is_symlink() and file.read_text() == "new" and list(file.parent.iterdir()) == [file]
+
+
+def test_a_current_folder_that_is_gone_is_told_with_the_option(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tmp_path.rmdir()
+    with pytest.raises(InputError, match="^--csv: got 'x.csv'"):
+        output_file("--csv", "x.csv")

@@ -11,6 +11,7 @@ from ros_process import refusal
 
 from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.ros.arguments import given_arguments, own_arguments
+from rigid_proto_ros.ros.main import NodeProcess
 from rigid_proto_ros.ros.main import main as rigid_body_node
 from rigid_proto_ros.ros.poke_client import main as poke_client
 from rigid_proto_ros.scene.parameters import PARAMETERS
@@ -129,8 +130,9 @@ def test_a_mesh_name_that_the_system_itself_refuses_is_refused(command, name, re
 def test_a_name_of_bytes_that_are_no_text_is_refused_where_a_library_takes_no_such_name(tmp_path, capfd):
     pytest.importorskip("pyarrow")
     name = str(tmp_path / "caf\udce9.parquet")  # Latin-1
-    line = one_line(capfd, rigid_proto, ["simulate", "t_handle", "--duration", "0.1", "--parquet", name])
-    assert "caf\\udce9.parquet" in line
+    assert rigid_proto(["simulate", "t_handle", "--duration", "0.1", "--parquet", name]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "caf\\udce9" in line and "accepted: text" in line
 
 
 @pytest.mark.parametrize("method", ["is_file", "open"])
@@ -294,6 +296,14 @@ def test_what_ros_itself_hands_a_node_is_no_mistake(tmp_path):
     assert own_arguments(["node", *ros.split()]).until is None
     assert own_arguments(["node", *ros.split(), "--", "--until", "3"]).until == 3.0
     assert own_arguments(["node", "--until", "3", *ros.split()]).until == 3.0
+
+
+def test_what_the_system_refuses_a_node_as_it_starts_is_told_in_one_line(monkeypatch, capfd):
+    def refused(*_):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), "/home/x/.cache")
+
+    monkeypatch.setattr(NodeProcess, "_begin", refused)
+    assert "/home/x/.cache" in one_line(capfd, rigid_body_node, ["rigid_body_node"])
 
 
 @pytest.mark.parametrize("name", ["my part #2.obj", "[v2].obj", 'it\'s: "é" \\1.obj', "- *a.obj", "!x %y.obj"])

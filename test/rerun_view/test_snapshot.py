@@ -4,7 +4,12 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import io
+import os
+from contextlib import nullcontext
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +19,7 @@ from PIL import Image
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli import snapshot as command
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.rerun_view import snapshot
 from rigid_proto_ros.rerun_view.observer import FileRecorder
 from rigid_proto_ros.rerun_view.snapshot import DRIVERS, is_one_colour
 
@@ -95,6 +101,28 @@ def test_what_cannot_be_drawn_is_refused_with_what_would_be_accepted(recording, 
     args = arguments(str(recording), *words)
     with pytest.raises(InputError, match=f"^{field}: "):
         args.run(args)
+
+
+def test_a_picture_that_a_full_disk_takes_half_of_leaves_the_earlier_one_as_it_is(recording, tmp_path, monkeypatch):
+    def half(path, _):
+        path.touch()
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    picture = tmp_path / "x.png"
+    picture.write_bytes(b"earlier")
+    client = nullcontext(SimpleNamespace(set_time=lambda *_, **__: None))
+    drawn = {
+        "headless_viewer": lambda *_: client,
+        "show": lambda *_: None,
+        "_stable_picture": lambda _: b"",
+        "NOTICE_GONE_S": 0,
+    }
+    for name, value in {**drawn, "is_one_colour": lambda _: False}.items():
+        monkeypatch.setattr(snapshot, name, value)
+    monkeypatch.setattr(Path, "write_bytes", half)
+    with pytest.raises(InputError, match="^-o: .*No space left"):
+        snapshot.take_picture(recording, 0.3, picture)
+    assert picture.read_bytes() == b"earlier" and list(tmp_path.iterdir()) == [picture]
 
 
 def test_a_recording_that_is_not_there_is_refused(tmp_path):
