@@ -492,9 +492,9 @@ def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_
 
 def test_a_recording_is_begun_when_nothing_else_can_be_refused_any_more(tmp_path):
     path = tmp_path / "flight.mcap"
-    path.write_bytes(b"an earlier flight")
+    path.write_bytes(b"\x89MCAP of an earlier flight")
     live = LiveSimulation(make_scenario({"mesh": "t_handle", "record": str(path)}))
-    assert path.read_bytes() == b"an earlier flight"
+    assert path.read_bytes() == b"\x89MCAP of an earlier flight"
     live.announce()
     live.stop()
     assert read_runs(path)[0].complete
