@@ -152,13 +152,13 @@ def test_a_wrong_value_of_a_parameter_of_every_ros_node_is_told_in_one_line(ros_
         "qos_overrides./rigid_body/pose.publisher.depth:=100000000000",
     )
     earlier = tmp_path / "flight.mcap"
-    earlier.write_bytes(b"an earlier flight")
+    earlier.write_bytes(b"\x89MCAP of an earlier flight")
     words = [sys.executable, "-c", REFUSED, earlier, *wrong]
     done = subprocess.run(words, env=from_source(ros_environment), capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     lines = done.stderr.splitlines()
     assert len(lines) == len(wrong) and all(x.startswith("rigid_body_node: ROS arguments: ") for x in lines), lines
-    assert earlier.read_bytes() == b"an earlier flight"
+    assert earlier.read_bytes() == b"\x89MCAP of an earlier flight"
 
 
 FULL_BYTES = 2_000_000

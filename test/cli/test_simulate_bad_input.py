@@ -210,23 +210,23 @@ def test_a_slip_on_the_command_line_is_refused(arguments, part, capfd):
 @pytest.mark.parametrize("option", ["--record", "--bag", "--set"])
 def test_what_is_refused_overwrites_no_recording(option, tmp_path, capfd):
     kept, script = tmp_path / "kept.mcap", tmp_path / "pokes.yaml"
-    kept.write_bytes(b"an earlier flight")
+    kept.write_bytes(b"\x89MCAP of an earlier flight")
     script.write_text(SCRIPTS["contact"][0])
     recorded = [option, f"record={kept}" if option == "--set" else str(kept)]
     elsewhere = ["--record", str(script / "x.mcap")] if option == "--bag" else []
     for refused in (["--script", str(script)], elsewhere or ["--set", "mass=-1"], ["--duration", "-1"]):
         one_line(capfd, rigid_proto, ["simulate", "t_handle", *recorded, *refused])
-        assert kept.read_bytes() == b"an earlier flight"
+        assert kept.read_bytes() == b"\x89MCAP of an earlier flight"
 
 
 def test_a_demo_of_an_open_mesh_names_what_helps_and_keeps_the_session_before_it(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     session = Path("out/session.rrd")
     session.parent.mkdir()
-    session.write_bytes(b"an earlier flight")
+    session.write_bytes(b"RRF2 of an earlier flight")
     Path("open.obj").write_text(MESHES["open.obj"][0])
     assert "mesh_repair" in one_line(capfd, rigid_proto, ["demo", "--mesh", "open.obj"])
-    assert session.read_bytes() == b"an earlier flight"
+    assert session.read_bytes() == b"RRF2 of an earlier flight"
 
 
 def test_two_recordings_of_one_flight_are_two_files(tmp_path, capfd):

@@ -202,7 +202,7 @@ def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path):
 
 def test_a_session_that_cannot_be_played_leaves_an_earlier_recording_as_it_was(tmp_path):
     path = tmp_path / "earlier.rrd"
-    path.write_bytes(b"earlier")
+    path.write_bytes(b"RRF2 earlier")
     good = RecordedSession(scene="rigid_body: {ros__parameters: {mesh: book}}")
     broken = RecordedSession(scene=good.scene, events=[(0, "no line of a log")])
     for runs in (
@@ -213,7 +213,7 @@ def test_a_session_that_cannot_be_played_leaves_an_earlier_recording_as_it_was(t
     ):
         with pytest.raises(InputError):
             record(runs, path)
-        assert path.read_bytes() == b"earlier"
+        assert path.read_bytes() == b"RRF2 earlier"
 
 
 def test_a_recording_made_of_a_bag_and_named_after_it_is_read(recording, tmp_path):
