@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from concurrent.futures import Future
@@ -39,22 +40,24 @@ def has_display() -> bool:
 
 
 def _run(command: list[str], log: int, started: Future[subprocess.Popen]) -> None:
-    # RERUN_APP_ONLY: no analytics question on the terminal of a program that only wants a picture.
-    environment = {**os.environ, "RERUN_APP_ONLY": "true"}
-    try:
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=log,
-            env=environment,
-            preexec_fn=end_with_this_thread(),
-        )
-    except OSError as error:
-        started.set_exception(error)
-        return
-    started.set_result(process)
-    process.wait()
+    # RERUN_APP_ONLY: no analytics question on the terminal of a program that only wants a picture. TMPDIR: the viewer
+    # doesn't remove its folder there when it is ended by a signal.
+    with tempfile.TemporaryDirectory(prefix="rigid_proto_", ignore_cleanup_errors=True) as folder:
+        environment = {**os.environ, "RERUN_APP_ONLY": "true", "TMPDIR": folder}
+        try:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                env=environment,
+                preexec_fn=end_with_this_thread(),
+            )
+        except OSError as error:
+            started.set_exception(error)
+            return
+        started.set_result(process)
+        process.wait()
 
 
 class ViewerProcess:
@@ -66,7 +69,9 @@ class ViewerProcess:
             raise FileNotFoundError(is_missing("rerun-sdk", "rerun"))
         started: Future[subprocess.Popen] = Future()
         # On a thread that waits for it: the one that calls this may end before the viewer.
-        threading.Thread(target=_run, args=([program, *arguments], log, started), name="viewer", daemon=True).start()
+        run = ([program, *arguments], log, started)
+        self._thread = threading.Thread(target=_run, args=run, name="viewer", daemon=True)
+        self._thread.start()
         self.process = started.result()
 
     @property
@@ -76,14 +81,13 @@ class ViewerProcess:
 
     def stop(self) -> None:
         """End the process, kindly and then not."""
-        if not self.running:
-            return
-        self.process.terminate()
-        try:
-            self.process.wait(STOP_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
+        if self.running:
+            self.process.terminate()
+            try:
+                self.process.wait(STOP_TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+        self._thread.join()
 
 
 def serve_web(web_port: int, stream_address: str) -> tuple[ViewerProcess, str]:

@@ -7,6 +7,7 @@ import argparse
 import errno
 import io
 import os
+import tempfile
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -72,12 +73,17 @@ def test_the_body_is_in_the_middle_of_the_flight_view_also_from_a_cut_file(tmp_p
     assert 0.02 < drawn.mean() < 0.6
 
 
-def test_a_bag_is_drawn_too(tmp_path):
+def test_a_bag_is_drawn_too_and_the_viewer_leaves_no_files_behind(tmp_path, monkeypatch):
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    monkeypatch.setenv("TMPDIR", str(temporary))
     pytest.importorskip("mcap")
     bag, picture = tmp_path / "s.mcap", tmp_path / "s.png"
     assert main(["simulate", "t_handle", "--duration", "0.5", "--bag", str(bag)]) == 0
     take(str(bag), "--at", "0.4", "-o", str(picture), "--size", "800x500")
     assert not is_one_colour(picture.read_bytes())
+    assert not list(temporary.iterdir())
     args = arguments(str(bag), "--at", "0.6", "-o", str(tmp_path / "x.png"))
     with pytest.raises(InputError, match="^--at: "):
         args.run(args)
