@@ -85,7 +85,7 @@ def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[np.ndarray, np.nd
         if suffix in ("glb", "gltf"):
             add_gltf(data, beside, assembly)
         elif suffix == "3mf":
-            unit = add_threemf(data, assembly)
+            unit = add_threemf(data, assembly, MAX_BYTES)
         elif suffix == "dae":
             unit = add_collada(data, assembly)
         else:

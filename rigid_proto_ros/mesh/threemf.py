@@ -127,13 +127,16 @@ class _Package:
         return np.array(vertices).reshape(-1, 3), np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
-def add_threemf(data: bytes, assembly: Assembly) -> float:
+def add_threemf(data: bytes, assembly: Assembly, max_bytes: int) -> float:
     """Add the items to be built, except supports, in a file's bytes, in the file's unit; returns this unit in metres.
+
+    An archive of more than ``max_bytes``, or of far more than a model of its size holds, unpacked, is refused.
 
     Raises MeshError, or other errors if the file doesn't follow the specification.
     """
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        size, most = sum(entry.file_size for entry in archive.infolist()), MAX_RATIO * len(data) + SPARE
+        size = sum(entry.file_size for entry in archive.infolist())
+        most = min(max_bytes, MAX_RATIO * len(data) + SPARE)
         if size > most:
             raise MeshError(assembly.name, f"{size} bytes unpacked", f"at most {most} in a file of {len(data)}")
         package = _Package(archive, assembly)
