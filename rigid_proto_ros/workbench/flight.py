@@ -185,10 +185,13 @@ class Flight:
         except InputError as error:
             self.say(f"Refused: {error}")
         except Exception as error:
-            self.say(f"Failed: {type(error).__name__}: {error}")
-            _logger.exception("a request of the page failed")
+            self._say_failed(error)
         self.refused()
         return None
+
+    def _say_failed(self, error: Exception) -> None:
+        self.say(f"Failed: {type(error).__name__}: {error}")
+        _logger.error("a request of the page failed", exc_info=error)
 
     def _work(self, doing: str, function: Callable[[], Result]) -> Result:
         """On the worker thread: who has asked for something else meanwhile sees what is being waited for."""
@@ -236,8 +239,11 @@ class Flight:
         """Compile what the body needs, then let its time begin; from any thread."""
 
         def work() -> None:
-            self._work("", warm_up)
-            start()
+            try:
+                self._work("", warm_up)
+                start()
+            except Exception as error:
+                self._say_failed(error)
 
         self._worker.submit(work)
 

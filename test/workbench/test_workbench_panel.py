@@ -165,6 +165,8 @@ def test_a_fault_of_the_program_is_said(flown: FlownPage, monkeypatch, caplog) -
     monkeypatch.setattr(flown.live, "reset", lambda: 1 / 0)
     flown.press("Reset", of="Simulation")
     flown.until(lambda: flown.said == ["Failed: ZeroDivisionError: division by zero"], "fault")
+    flown.page.flight.prepare(lambda: 1 / 0, lambda: None)
+    flown.until(lambda: flown.said == ["Failed: ZeroDivisionError: division by zero"] * 2, "fault before the start")
     assert "in <lambda>" in caplog.text
 
 
