@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Simulate the study, or one row of it."""
     from ..sweep.study import read_study
+    from ..sweep.table import arrow
 
     if args.as_scene and args.row is None:
         raise InputError("--as-scene", "needs --row")
@@ -40,6 +41,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--as-scene", args.as_scene, "another file than the study")
     if args.output and args.row is not None:
         raise InputError("--output", "can't be combined with --row, which writes no table")
+    if args.row is None:
+        arrow()  # before anything is compiled
     study = read_study(args.study)
     return _whole(study, args) if args.row is None else _one_row(study, args)
 

@@ -142,3 +142,9 @@ def test_vertices_of_a_grid_are_flown_and_failed_rows_are_counted(tmp_path, monk
     assert run_chunk(spaced, 0, 3).columns["spin.z"].tolist() == rows["spin.z"][:3]
     drawn = run_chunk(study(NUDGED, vary={"script.1.at": "random_vertex"}, samples=5), 0, 5)
     assert drawn.simulated == 5 and len(set(drawn.columns["script.1.at.vertex"])) > 1
+
+
+def test_a_sweep_without_pyarrow_says_so_before_the_study_is_read(monkeypatch, capsys) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert main(["sweep", "no_study"]) == 2
+    assert "pyarrow is missing: pip install 'rigid_proto_ros[sweep]'" in capsys.readouterr().err
