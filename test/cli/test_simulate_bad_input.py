@@ -300,10 +300,10 @@ def test_what_ros_itself_hands_a_node_is_no_mistake(tmp_path):
 
 def test_what_the_system_refuses_a_node_as_it_starts_is_told_in_one_line(monkeypatch, capfd):
     def refused(*_):
-        raise OSError(errno.EROFS, os.strerror(errno.EROFS), "/home/x/.cache")
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), "/nowhere/.cache")
 
     monkeypatch.setattr(NodeProcess, "_begin", refused)
-    assert "/home/x/.cache" in one_line(capfd, rigid_body_node, ["rigid_body_node"])
+    assert "/nowhere/.cache" in one_line(capfd, rigid_body_node, ["rigid_body_node"])
 
 
 @pytest.mark.parametrize("name", ["my part #2.obj", "[v2].obj", 'it\'s: "é" \\1.obj', "- *a.obj", "!x %y.obj"])
