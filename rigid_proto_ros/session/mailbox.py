@@ -6,7 +6,9 @@ from __future__ import annotations
 import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 
 from ..simulation.observer import Event, GhostPublished, Published
 
@@ -21,6 +23,9 @@ BATCH = 4096
 STALLED_S = 0.9
 """A write that takes longer is told of: a report comes once a second, and a stalled file is to be told within two."""
 
+LOOK_AGAIN_S = 0.002
+"""How often a producer that found no place looks for one."""
+
 PATIENCE_S = 10.0
 """A writer that fetches nothing for so long, with all places taken or at the end, won't: the simulation goes on, or
 ends, and what waits is lost."""
@@ -32,7 +37,8 @@ back, so that what is sorted by it keeps its order.
 
 
 class Mailbox:
-    """One producer, one consumer. ``put`` takes about two microseconds.
+    """One producer, one consumer. ``put`` takes about two microseconds, and holds no lock: a signal's exception may be
+    raised within it, and within a Condition, as of a queue.Queue, that can leave the lock taken for ever.
 
     on_given_up() is called, from the producer's thread, when the consumer is stuck and everything is thrown away from
     then on.
@@ -45,8 +51,8 @@ class Mailbox:
         self._moved_at = time.monotonic()
         self._wall_offset_ns = time.time_ns() - time.monotonic_ns()
         self._idle = False
-        self._waiting: queue.Queue[Noted] = queue.Queue(MOST_WAITING)
-        self._wake = threading.Event()
+        self._waiting: deque[Noted] = deque()
+        self._wake: queue.SimpleQueue[None] = queue.SimpleQueue()
 
     def put(self, event: Event) -> None:
         """Take an event; a state, whose row is reused, is copied."""
@@ -54,18 +60,26 @@ class Mailbox:
             return
         if isinstance(event, Published | GhostPublished):
             event = type(event)(event.time_ns, event.row.copy())
-        try:
-            self._waiting.put((time.monotonic_ns() + self._wall_offset_ns, event), timeout=PATIENCE_S)
-        except queue.Full:
+        noted = time.monotonic_ns() + self._wall_offset_ns, event
+        if len(self._waiting) >= MOST_WAITING and not self._has_place():
             self._given_up = True
             self._on_given_up()
-        if self._waiting.qsize() >= BATCH:
+            return
+        self._waiting.append(noted)
+        if len(self._waiting) >= BATCH:
             self.wake()
+
+    def _has_place(self) -> bool:
+        """Wait for a place; False when there is none within PATIENCE_S."""
+        end_s = time.monotonic() + PATIENCE_S
+        while (full := len(self._waiting) >= MOST_WAITING) and time.monotonic() < end_s:
+            time.sleep(LOOK_AGAIN_S)
+        return not full
 
     def take(self) -> list[Noted]:
         """The oldest events, BATCH at most; none when it is empty."""
         self.moved()
-        return [self._waiting.get_nowait() for _ in range(min(BATCH, self._waiting.qsize()))]
+        return [self._waiting.popleft() for _ in range(min(BATCH, len(self._waiting)))]
 
     def moved(self) -> None:
         """The consumer got something done: as long as it does, a disk is slow, or the machine busy, and no more."""
@@ -74,8 +88,8 @@ class Mailbox:
     def wait(self, seconds: float) -> None:
         """Return after ``seconds``, or at once when the mailbox is filling up, is closed, or on ``wake``."""
         self._idle = True
-        self._wake.wait(seconds)
-        self._wake.clear()
+        with suppress(queue.Empty):
+            self._wake.get(timeout=seconds)
         self.moved()
         self._idle = False
 
@@ -87,7 +101,8 @@ class Mailbox:
 
     def wake(self) -> None:
         """End the consumer's ``wait``."""
-        self._wake.set()
+        if self._wake.empty():
+            self._wake.put(None)
 
     def close(self) -> None:
         """Nothing more is taken; what is inside can still be fetched."""

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import itertools
+import sys
 import time
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -43,6 +46,37 @@ def test_a_recorder_that_is_stuck_is_given_up_and_what_waits_has_no_gap(monkeypa
     assert given_up == [True]
     taken = [event.time_ns for events in iter(box.take, []) for _, event in events]
     assert taken == list(range(MOST_WAITING))
+
+
+def test_an_interrupt_anywhere_in_put_leaves_the_mailbox_to_its_consumer(monkeypatch):
+    """Raised, as by a signal's handler, at each line, call and return of what ``put`` runs, one after the other."""
+    monkeypatch.setattr(mailbox, "BATCH", 1)
+    interrupted = 0
+    for step in itertools.count():
+        box, left = Mailbox(), itertools.count(step, -1)
+
+        def interrupt(*_, left=left):
+            if next(left) == 0:
+                raise KeyboardInterrupt
+            return interrupt
+
+        tracer = sys.gettrace()
+        sys.settrace(interrupt)
+        try:
+            box.put(Reset(0))
+        except KeyboardInterrupt:
+            interrupted += 1
+        finally:
+            sys.settrace(tracer)
+        consumer = Thread(target=lambda box=box: (box.wait(60.0), box.take()), daemon=True)
+        consumer.start()
+        waker = Thread(target=box.close, daemon=True)
+        waker.start()
+        consumer.join(5.0)
+        assert not consumer.is_alive()
+        if interrupted == step:
+            break
+    assert interrupted > 10
 
 
 class Consumer:
