@@ -71,12 +71,13 @@ def plain(value: Any) -> Any:
 
 
 def filled(message: Any, content: dict) -> Any:
-    """A message with these fields set."""
+    """A message with these fields set; a whole number is one where a double is expected."""
     for name, value in content.items():
+        field = getattr(message, name)
         if isinstance(value, dict):
-            filled(getattr(message, name), value)
+            filled(field, value)
         else:
-            setattr(message, name, value)
+            setattr(message, name, float(value) if isinstance(field, float) else value)
     return message
 
 

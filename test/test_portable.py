@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Nothing of POSIX alone is needed to inspect, simulate, record, replay and serve the page, as on macOS and Windows."""
+"""Nothing of POSIX alone, ROS or Rerun is needed to inspect, simulate, record, replay and serve the page, as on macOS and Windows."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SOURCE = Path(__file__).resolve().parent.parent
 HIDDEN = """
 import builtins, os, signal, sys
 
-MODULES = {"fcntl", "resource", "termios", "tty", "pty", "pwd", "grp", "syslog", "posix"}
+MODULES = {"fcntl", "resource", "termios", "tty", "pty", "pwd", "grp", "syslog", "posix", "rclpy", "rerun"}
 NAMES = {
     "signal": {"SIGUSR1", "SIGUSR2", "SIGHUP", "SIGALRM", "SIGQUIT", "SIGKILL", "SIGCHLD", "pthread_sigmask", "setitimer"},
     "os": {"sched_getaffinity", "getuid", "geteuid", "getpgid", "setsid", "killpg", "fork", "uname", "mkfifo", "confstr"},
@@ -46,36 +46,26 @@ for command in sys.argv[1:]:
 """
 
 
-def start(folder: Path, *commands: str) -> subprocess.Popen:
-    """Commands of ``rigid_proto``, one after the other, in a process without what only POSIX has."""
-    return subprocess.Popen(
+def test_a_mesh_is_inspected_a_simulation_recorded_replayed_and_verified_and_the_page_served(tmp_path: Path) -> None:
+    pytest.importorskip("mcap")
+    pytest.importorskip("viser")
+    commands = (
+        *("inspect hammer", "simulate t_handle --duration 0.5 --bag flight.mcap"),
+        *("replay flight.mcap --verify --csv flight.csv", "workbench hammer --no-browser"),
+    )
+    process = subprocess.Popen(
         [sys.executable, "-c", HIDDEN, *commands],
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(SOURCE), *filter(None, sys.path)])},
-        cwd=folder,
+        cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
     )
-
-
-def test_a_mesh_is_inspected_and_a_simulation_recorded_replayed_and_verified(tmp_path: Path) -> None:
-    pytest.importorskip("mcap")
-    process = start(
-        *(tmp_path, "inspect hammer", "simulate t_handle --duration 0.5 --bag flight.mcap"),
-        "replay flight.mcap --verify --csv flight.csv",
-    )
-    said, _ = process.communicate()
-    assert process.returncode == 0, said
-    assert (tmp_path / "flight.csv").exists()
-
-
-def test_the_page_is_served(tmp_path: Path) -> None:
-    pytest.importorskip("viser")
-    process = start(tmp_path, "workbench hammer --no-browser")
     try:
         said = []
         ready = any((said.append(line), "The workbench is at" in line)[1] for line in process.stdout)
         assert ready, "".join(said)
+        assert (tmp_path / "flight.csv").exists()
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=180.0) == 130  # by Ctrl-C
     finally:

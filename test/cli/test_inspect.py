@@ -2,8 +2,6 @@
 """The inspect command: its JSON object, exit statuses, scale and mass, verification, pictures."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -205,12 +203,3 @@ def test_what_rounding_leaves_is_0_for_people_and_itself_in_json(capsys):
     )
     assert main(["inspect", "t_handle", "--json"]) == 0
     assert 0.0 < abs(json.loads(capsys.readouterr().out)["inertia"][0][1]) < 1e-14
-
-
-def test_rerun_and_rclpy_are_not_imported():
-    code = (
-        "import sys; from rigid_proto_ros.cli.main import main; main(['inspect', 'book', '--json']); "
-        "sys.exit(any(name in sys.modules for name in ('rerun', 'rclpy')))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr

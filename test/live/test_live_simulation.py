@@ -7,7 +7,6 @@ import ctypes
 import json
 import platform
 import struct
-import subprocess
 import sys
 import threading
 import time
@@ -70,27 +69,6 @@ def live(watcher):
 def submit(live: LiveSimulation, command: WrenchCommand | ThrusterCommand) -> None:
     """As if its message had come now."""
     live.call(lambda: live.loop.commands.receive(command.kind, lambda: command))
-
-
-def test_it_flies_where_rclpy_cannot_be_imported():
-    code = """
-import sys
-for name in ("rclpy", "std_msgs", "geometry_msgs", "rerun", "viser"):
-    sys.modules[name] = None
-import time
-from rigid_proto_ros.live.live_simulation import LiveSimulation
-from rigid_proto_ros.scene.scenario import make_scenario
-live = LiveSimulation(make_scenario({"mesh": "t_handle"}))
-live.announce()
-live.start()
-live.schedule("{t: 0, impulse: [0.01, 0, 0]}")
-while live.state.time_ns < 100_000_000:
-    time.sleep(0.01)
-live.stop()
-print(live.state.linear_velocity[0] > 0.0)
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False)
-    assert done.stdout == "True\n", done.stderr
 
 
 def test_commands_act_and_are_counted_and_a_refusal_is_raised(live):
@@ -275,16 +253,6 @@ def test_before_the_start_one_request_is_served_after_another(monkeypatch):
     coming.join()
     live.reset()
     assert [json.loads(line)["kind"] for line in guest.lines] == ["reset"]
-
-
-def test_parameters_change_together_or_not_at_all(live):
-    live.set_parameters({"density": 2000.0, "gravity": [0.0, 0.0, -2.0]})
-    live.step()
-    assert live.call(lambda: live.loop.simulation.setup.gravity[2]) == -2.0
-    with pytest.raises(InputError, match="inertia_model"):
-        live.set_parameters({"gravity": [0.0, 0.0, -3.0], "inertia_model": "none"})
-    assert live.scenario.parameters.gravity == (0.0, 0.0, -2.0)
-    assert live.scenario.parameters.density == 2000.0
 
 
 def test_what_anybody_sets_is_told_so_that_the_nodes_own_parameters_follow(live):

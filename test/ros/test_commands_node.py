@@ -3,6 +3,7 @@
 
 import hashlib
 import json
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -176,23 +177,11 @@ def test_events_tell_every_command_change_and_service_in_one_unbroken_chain_sinc
     rig.trigger("step")
     rig.pause(False)
     rig.wait_event("poke")
-    kinds = {}
-    for event in rig.events():
-        kinds[event["kind"]] = kinds.get(event["kind"], 0) + 1
-    assert kinds == {
-        "reset": 1,
-        "wrench": 1,
-        "poke": 1,
-        "string_attach": 1,
-        "string_target": 1,
-        "inertia": 1,
-        "set": 2,
-        "string_release": 2,
-        "clear_wrench": 2,
-        "pause": 2,
-        "step": 1,
-    }
+    rig.wait_event("pause", 2)
     events = rig.events()
+    once = ("reset", "wrench", "poke", "string_attach", "string_target", "inertia", "step")
+    twice = ("set", "string_release", "clear_wrench", "pause")
+    assert Counter(event["kind"] for event in events) == {**dict.fromkeys(once, 1), **dict.fromkeys(twice, 2)}
     chain_is_whole(events)
     times = [event["time_ns"] for event in events]
     assert times == sorted(times)
@@ -212,7 +201,7 @@ CONTROLLERS = {
 """What each commands at its k-th step, by topic; the last two are followed by a step without a call of the service."""
 
 
-@pytest.mark.parametrize(("runs", "count"), [(1, 100), pytest.param(20, 1000, marks=pytest.mark.stress)])
+@pytest.mark.parametrize(("runs", "count"), [(1, 50), pytest.param(20, 1000, marks=pytest.mark.stress)])
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_in_lockstep_every_command_acts_at_the_time_that_it_was_sent_for_and_one_step_follows(
     rig, controller, runs, count
@@ -308,14 +297,7 @@ def test_schedule_takes_an_entry_of_any_kind_or_a_list_whole_and_refuses_all_els
         ],
     }
     bad = {
-        **dict.fromkeys(("", "[]", "nonsense", "{t: 0.5}", "{set: {mass: 1.0}}", "{t: -1.0, set: {mass: 1.0}}"), 1),
-        **dict.fromkeys(("{t: .nan, set: {mass: 1}}", "{t: 0.5, set: {}}", "{t: 0.5, set: {masss: 1.0}}"), 1),
-        **dict.fromkeys(("{t: 0.5, set: {mass: -1.0}}", "{t: 0.5, set: {mass: .inf}}", "{t: 0.5, service: reset}"), 1),
-        **dict.fromkeys(("{t: 0.5, string: release, set: {mass: 1.0}}", "{t: 0.5, set: {mass: 1.0}", "\t"), 1),
-        **dict.fromkeys(("{t: 0.5, set: {world_frame: map}}", "{t: 0.5, set: {contacts.tip: [0.0, 0.0, 0.0]}}"), 1),
-        **dict.fromkeys(("[" * 5000, "!!python/object:os.system {t: 0}", "{t: 0.5, wrench: {}}"), 1),
-        **dict.fromkeys(("{script: [{t: 0.5, service: clear_wrench}]}", '[{"t": NaN, "string": "release"}]'), 1),
-        "{t: 0.5, impulse: [0, 0, 1], repeat: 5001, every: 0.1}": 1,
+        "nonsense": 1,
         # A list is taken or refused as a whole, and counts as many as it has entries.
         "[{t: 0.5, string: release}, {t: 0.5, set: {masss: 1.0}}, {t: 0.5, service: clear_wrench}]": 3,
         "[{t: 0.5, string: release}, {t: 0.5, string: {attach: nowhere}}]": 2,
@@ -363,21 +345,6 @@ def test_a_list_is_judged_in_the_scene_that_it_makes_and_one_refused_in_any_entr
     assert gained == {"refused_total": 4, "refused_integrator": 4}
 
 
-def test_a_scheduled_change_that_fits_no_more_when_its_time_comes_is_refused_then(rig):
-    before = rig.counters()
-    rig.start_over(paused=True)
-    rig.schedule("{t: 0.3, set: {mesh: '', inertia_model: explicit}}", "{t: 0.6, set: {inertia_model: solid}}")
-    rig.until_received(rig.sent)
-    rig.pause(False)
-    rig.fly_until(700 * MS)
-    assert rig.gained(before) == {"refused_total": 1, "refused_schedule": 1}
-    assert rig.get("inertia_model") == {"inertia_model": "explicit"}
-
-
-def energy_at_the_start(scene: dict) -> float:
-    return Simulation(make_scenario(scene).setup).kinetic_energy
-
-
 def test_the_string_topics_tie_move_and_release_through_messages(rig):
     rig.set(string__timeout=0.5, string__stiffness=1.0)
     rig.publish("string/attach", point_message(0, "rigid_body/mesh", (0.0, -0.05, 0.0)))
@@ -388,7 +355,7 @@ def test_the_string_topics_tie_move_and_release_through_messages(rig):
     report = rig.diagnostics()
     # The string's energy is gone with it; what it gave to the body stays.
     assert float(report["potential_energy"]) == 0.0
-    assert float(report["kinetic_energy"]) > 2.0 * energy_at_the_start(rig.scene)
+    assert float(report["kinetic_energy"]) > 2.0 * Simulation(make_scenario(rig.scene).setup).kinetic_energy
     assert rig.events("string_attach")[0]["content"]["point"] == [0.0, -0.05, 0.0]
     rig.pause(False)
     rig.set(string__timeout=0.0)
@@ -412,3 +379,98 @@ def test_scene_is_latched_follows_every_change_and_carries_the_meshs_hash(rig):
     assert "mass: 1.25" in texts[0]["data"]
     assert "gravity: [0.0, 0.0, -2.0]" in texts[-1]["data"]
     assert "explicit_inertia.mass: 0.5" in texts[-1]["data"]
+
+
+@pytest.mark.parametrize("list_first", [True, False])
+def test_paused_a_parameter_set_to_its_present_value_holds_after_a_list_that_waits(rig, list_first):
+    rig.start_over(paused=True)
+    if not list_first:
+        rig.set(gravity=[0.0, 0.0, 0.0])
+    rig.schedule("[{t: 0, set: {gravity: [0, 0, -5]}}]")
+    rig.until_received(rig.sent)
+    if list_first:
+        rig.set(gravity=[0.0, 0.0, 0.0])
+    assert rig.trigger("step")["success"]
+    _, twist = rig.state_at(10 * MS)
+    assert twist["twist"]["linear"]["z"] == 0.0 and list(rig.get("gravity")["gravity"]) == [0.0, 0.0, 0.0]
+
+
+def acceleration(rig) -> float:
+    """Along x [m/s²] over states from after the last command has acted."""
+    rig.until_received(rig.sent)
+    acted_ns = int(rig.diagnostics()["sim_time_ns"]) + 100 * MS
+    first, *_, last = rig.until(lambda: len(m := rig.heard("twist", after=acted_ns)) >= 5 and m, "five later twists")
+    gained = last["twist"]["linear"]["x"] - first["twist"]["linear"]["x"]
+    return round(gained / (1e-9 * (stamp_ns(last) - stamp_ns(first))), 6)
+
+
+def test_running_the_last_message_acts_however_fast_it_follows(rig):
+    """Of two back to back, of a controller's at 1 kHz that ends with zero, and of thrusters on and off at once."""
+    rig.set(mass=1.0, wrench_timeout=0.0, real_time_factor=2.0)
+    for last in (0.0, 0.3):
+        for _ in range(5):
+            rig.publish("wrench", *(wrench_message(0, "world", (force, 0.0, 0.0)) for force in (1.0, last)))
+            assert acceleration(rig) == pytest.approx(last, abs=1e-5)
+    messages = [wrench_message(0, "world", (0.1 + 0.001 * k, 0.0, 0.0)) for k in range(100)]
+    for _ in range(3):
+        rig.publish("wrench", *messages, wrench_message(0, ""), rate=1000.0)
+        assert acceleration(rig) == 0.0
+        rig.publish("thrusters", {"data": [1.0]}, {"data": [0.0]})
+        assert acceleration(rig) == 0.0
+
+
+def numbers(vector: dict) -> np.ndarray:
+    return np.array(list(vector.values()))
+
+
+def felt(body, arm, attitude, rate, force_world) -> np.ndarray:
+    """Specific force, body axes, at ``arm`` (m from the COM) of a body that falls under a force at its COM.
+
+    Gravity accelerates body and reference alike, so it isn't felt. rate: angular velocity, body axes.
+    """
+    turning = np.linalg.solve(body.inertia, -np.cross(rate, body.inertia @ rate))
+    at_com = Rotation.from_quat(attitude).inv().apply(force_world) / body.mass
+    return at_com + np.cross(turning, arm) + np.cross(rate, np.cross(rate, arm))
+
+
+def test_the_imu_feels_the_exact_specific_force_at_its_contact_and_turns_at_the_body_rate(rig):
+    force = np.array([0.0, 0.02, 0.01])
+    rig.set(imu_contact="left", gravity=[0.0, 0.0, -9.81], scale=[1.5, 0.8, 2.0], wrench_timeout=0.0)
+    rig.listen("imu")
+    rig.start_over(paused=True)
+    rig.until(lambda: rig.heard("imu"), "the node to know that somebody listens")
+    rig.forget("imu")
+    rig.publish("wrench", wrench_message(SECOND // 2, "world@com", force))
+    rig.until_received(rig.sent)
+    rig.pause(False)
+    for topic in ("odom", "imu"):
+        rig.until(lambda topic=topic: rig.newest_ns(topic) >= SECOND * 7 // 10, f"{topic} of that time")
+    body = make_scenario({**rig.scene, "scale": [1.5, 0.8, 2.0]}).setup.body
+    arm = body.point(rig.scene["contacts.left"])
+    odometry = {stamp_ns(m): m["twist"]["twist"] for m in rig.heard("odom")}
+    measured = {stamp_ns(m): m for m in rig.heard("imu")}
+    moments = [ns for ns in measured if 0 < ns <= SECOND * 7 // 10 and ns in odometry]
+    assert sum(ns <= SECOND // 2 for ns in moments) > 10
+    assert sum(ns > SECOND // 2 for ns in moments) > 5
+    for ns in moments:
+        message = measured[ns]
+        assert message["header"]["frame_id"] == "rigid_body/left"
+        rate, attitude = numbers(message["angular_velocity"]), list(message["orientation"].values())
+        assert message["angular_velocity"] == odometry[ns]["angular"]
+        expected = felt(body, arm, attitude, rate, force if ns > SECOND // 2 else np.zeros(3))
+        assert np.linalg.norm(expected) > 1.0
+        # Measured 2e-15.
+        assert numbers(message["linear_acceleration"]) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    # At the centre of mass a body in free fall feels nothing but the force. It is mounted there from the very time on
+    # at which the command acts.
+    rig.trigger("clear_wrench")
+    now_ns = int(rig.diagnostics()["sim_time_ns"])
+    rig.forget("imu")
+    moved_ns = now_ns + SECOND // 5
+    rig.schedule(f"{{t: {moved_ns / SECOND!r}, set: {{imu_contact: ''}}}}")
+    rig.until(lambda: rig.newest_ns("imu") > moved_ns + SECOND // 10, "the COM's")
+    for message in rig.heard("imu"):
+        at_com, place = message["header"]["frame_id"] == "rigid_body", stamp_ns(message)
+        assert at_com == (place > moved_ns) or place == moved_ns
+        if place > now_ns + SECOND // 10:
+            assert (np.abs(numbers(message["linear_acceleration"])).max() == 0.0) == at_com

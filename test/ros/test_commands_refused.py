@@ -2,18 +2,26 @@
 """What the node refuses, each with its reason, and that it flies on untouched: by message, by the group and by fuzz."""
 
 import math
-import random
-import struct
 import time
 
-import numpy as np
-import pytest
 from command_rig import inertia_message, point_message, wrench_message
+from hypothesis import HealthCheck, given, settings
+from hypothesis.strategies import (
+    binary,
+    builds,
+    characters,
+    floats,
+    integers,
+    just,
+    lists,
+    one_of,
+    sampled_from,
+    text,
+    tuples,
+)
 from ros_client import COMMANDS
 
 from rigid_proto_ros.scene import cdr
-from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.simulation.simulation import Simulation
 
 SECOND = 10**9
 HUGE = (1e15, 0.0, 0.0)
@@ -85,6 +93,15 @@ REFUSED = {
             "{t: 0, set: {mesh: '~nosuchuser/part.obj'}}",
             "{t: 0, set: {mesh: " + 300 * "a" + "}}",
             "{t: 2026-13-45, set: {density: 2}}",
+            "{t: .nan, set: {mass: 1}}",
+            "{t: 0.5, service: reset}",
+            "{t: 0.5, string: release, set: {mass: 1.0}}",
+            "{t: 0.5, set: {world_frame: map}}",
+            "{t: 0.5, set: {contacts.tip: [0.0, 0.0, 0.0]}}",
+            '[{"t": NaN, "string": "release"}]',
+            "!!python/object:os.system {t: 0}",
+            "[" * 5000,
+            "",
             "[]",
         )
     ],
@@ -194,6 +211,9 @@ REFUSED_VALUES: list[tuple[dict, str]] = [
     ({"world_frame": "map"}, "world_frame"),
     ({"contacts.tip": [0.0, 0.0, 0.0]}, "contacts.tip"),
     ({"use_sim_time": True}, "use_sim_time"),
+    ({"gravity": [NAN, NAN, NAN]}, "gravity"),
+    ({"scale": ["a", "b"]}, "scale"),
+    ({"mesh": [True]}, "mesh"),
     ({"string.attached": True, "ghost.integrator": "free_body"}, "ghost.integrator"),
 ]
 
@@ -222,133 +242,31 @@ def test_several_set_atomically_are_judged_together_and_refused_together(rig):
     assert rig.set(mesh="t_handle", inertia_model="solid", atomically=True)[0][0]
 
 
-# Fuzz: every message is made so that it has to be refused, or can do no harm.
+DOUBLES = {"wrench": 6, "poke": 6, "string/target": 3, "string/attach": 3, "inertia/set": 10}
+odd_frames = sampled_from(FRAMES) | text(characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=40)
+odd_stamps = just(0) | integers(-(2**31), 2**31 - 1).map(lambda seconds: seconds * SECOND)
+too_short = binary(max_size=39).map(lambda data: cdr._HEADER + data)
 
 
-def random_number(numbers: random.Random) -> float:
-    extremes = (0.0, -0.0, NAN, INF, -INF, 1e308, -1e308, 5e-324, 1e-310)
-    return numbers.choice((*extremes, numbers.uniform(-1, 1), 10.0 ** numbers.uniform(-300, 300)))
+def malformed(topic: str):
+    """With its topic, a serialized message with odd frame, stamp and numbers, of which one isn't finite."""
+    numbers = lists(floats(), min_size=DOUBLES[topic] - 1, max_size=DOUBLES[topic] - 1).map(lambda x: [*x, NAN])
+    return tuples(just(topic), builds(cdr.stamped_doubles, odd_stamps, odd_frames, numbers) | too_short)
 
 
-def random_frame(numbers: random.Random) -> str:
-    pieces = "world body normal @ com origin vertex/ point/ ray/ ; duration= impulse tip /mesh , / 0 1e308 -1 nan é"
-    kind = numbers.randrange(4)
-    if kind == 0:
-        return numbers.choice(FRAMES)
-    if kind == 1:
-        return "".join(numbers.choice(pieces.split()) for _ in range(numbers.randrange(12)))
-    if kind == 2:
-        return "".join(chr(numbers.randrange(1, 0xD7FF)) for _ in range(numbers.randrange(40)))
-    triple = ",".join(repr(random_number(numbers)) for _ in range(3))
-    return f"{numbers.choice(('world', 'body', 'normal'))}@point/{triple}"
-
-
-def random_stamp(numbers: random.Random) -> tuple[int, int]:
-    sec = numbers.choice(
-        (0, 0, 1, -1, -(2**31), 2**31 - 1, 3600, 10_000, 1_700_000_000, numbers.randrange(-(2**31), 2**31))
+@given(
+    messages=lists(
+        one_of(*map(malformed, DOUBLES), tuples(just("schedule"), odd_frames.map(cdr.string) | too_short)), min_size=100
     )
-    return sec, numbers.choice((0, 999_999_999, 1_000_000_000, 2**32 - 1))
-
-
-def header(numbers: random.Random) -> bytes:
-    frame = random_frame(numbers).encode()
-    if numbers.random() < 0.05:
-        frame = bytes(numbers.randrange(1, 256) for _ in range(12))
-    frame += b"\0"
-    return struct.pack(f"<iII{len(frame)}s", *random_stamp(numbers), len(frame), frame)
-
-
-def random_message(numbers: random.Random, topic: str) -> bytes:
-    """A serialized message of the topic's type: extreme values, odd frames and stamps, or bytes that are none at all."""
-    if numbers.random() < 0.1:
-        return cdr._HEADER + bytes(numbers.randrange(256) for _ in range(numbers.randrange(0, 100)))
-    if topic == "schedule":
-        texts = (
-            "{t: 0",
-            "t: {t: {t: 0}}",
-            "[]",
-            "{t: .inf, set: {mass: 1}}",
-            "&a [*a]",
-            "? ",
-            "{t: 1, set: {mass: .nan}}",
-            "\x00x",
-            "- - - -",
-            "{t: 0, set: {gyroscopic: !!bool x}}",
-            "{t: !!timestamp abc}",
-            "{t: 0, set: {gravity: !!set {1, 2, 3}}}",
-        )
-        text = numbers.choice(
-            (*texts, random_frame(numbers), "{" * 2000, "t: 0\nset: {scale: [0, 0, 0]}", "{t: -1, service: reset}")
-        )
-        return cdr.string(text)
-    count = {"wrench": 6, "poke": 6, "inertia/set": 10}.get(topic, 3)
-    doubles = [random_number(numbers) for _ in range(count)]
-    # At least one that isn't finite, so that none of them moves the body.
-    doubles[numbers.randrange(count)] = numbers.choice((NAN, INF, -INF))
-    body = header(numbers)
-    body += b"\0" * (-len(body) % 8) + struct.pack(f"<{count}d", *doubles)
-    if numbers.random() < 0.1:
-        body = body[: numbers.randrange(len(body))]
-    return cdr._HEADER + body
-
-
-def random_values(numbers: random.Random, names: list[str]) -> dict:
-    """Parameters that must be refused: wrong type, wrong length, not finite, out of bounds, unknown."""
-    wrong = (NAN, INF, -1e308, "", "nonsense" * 100, [NAN] * 3, [1.0] * 7, [], [True], ["a", "b"], [1e308] * 3, "{}")
-    values = {name: numbers.choice(wrong) for name in numbers.sample(names, numbers.randrange(1, 4))}
-    return {**values, "no_such_parameter": 1.0}
-
-
-def fuzz(rig, count: int, seed: int) -> dict:
-    """``count`` messages and sets, an equal share of each; what the counters rose by."""
-    numbers = random.Random(seed)
-    kinds = [*(topic for topic in COMMANDS if topic != "thrusters"), "parameters"]
-    names = [n for n in rig.names() if not n.startswith(("qos", "use_sim", "start_type"))]
+)
+@settings(max_examples=3, suppress_health_check=list(HealthCheck))
+def test_malformed_messages_are_each_refused_and_leave_the_node_flying(rig, messages):
     before = rig.counters()
-    messages: dict[str, list[bytes]] = {topic: [] for topic in kinds[:-1]}
-    refused_sets = 0
-    for k in range(count):
-        kind = kinds[k % len(kinds)]
-        if kind == "parameters":
-            ((accepted, reason),) = rig.set_named(random_values(numbers, names), atomically=True)
-            refused_sets += not accepted and bool(reason)
-        else:
-            messages[kind].append(random_message(numbers, kind))
-    sent = 0
-    for topic, payloads in messages.items():
-        for start in range(0, len(payloads), 200):
-            rig.publish(topic, *payloads[start : start + 200])
-            sent += len(payloads[start : start + 200])
-            rig.until_received(rig.sent)
-    assert refused_sets == sum(kinds[k % len(kinds)] == "parameters" for k in range(count))
+    for topic, message in messages:
+        rig.publish(topic, message)
     gained = rig.gained(before)
-    assert gained["refused_total"] == sum(
-        v for k, v in gained.items() if k.startswith("refused_") and k != "refused_total"
-    )
-    assert gained["refused_total"] == sent
-    return gained
-
-
-def flies_untouched(rig) -> None:
+    assert gained["refused_total"] == len(messages)
+    assert gained["refused_total"] == sum(v for k, v in gained.items() if k[:8] == "refused_") / 2
     report = rig.diagnostics()
-    assert report["state"] == "flying"
-    assert float(report["angular_momentum_drift"]) < 1e-8
-    energy = float(report["kinetic_energy"])
-    assert energy == pytest.approx(Simulation(make_scenario(rig.scene).setup).kinetic_energy, rel=1e-8)
+    assert report["state"] == "flying" and float(report["angular_momentum_drift"]) < 1e-8
     assert not rig.heard("applied")
-    # And it still obeys.
-    rig.publish("poke", wrench_message(0, "world@tip", (1e-3, 0, 0)))
-    rig.wait_event("poke")
-    assert np.isfinite(list(rig.heard("pose", last=1)[0]["pose"]["position"].values())).all()
-
-
-def test_three_hundred_malformed_messages_and_parameter_sets_leave_the_node_flying(rig):
-    fuzz(rig, 300, 1)
-    flies_untouched(rig)
-
-
-@pytest.mark.stress
-def test_ten_thousand_malformed_messages_and_parameter_sets_leave_the_node_flying(rig):
-    gained = fuzz(rig, 10_000, 2)
-    assert {"refused_frame", "refused_nonfinite", "refused_schedule"} <= gained.keys()
-    flies_untouched(rig)

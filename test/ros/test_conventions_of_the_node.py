@@ -21,7 +21,7 @@ from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.ros.arguments import given_arguments
 from rigid_proto_ros.ros.diagnostics import Diagnostics
 from rigid_proto_ros.ros.main import make_viewer, open_page
-from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS, READ_ONLY, is_ros_parameter
+from rigid_proto_ros.scene.parameters import PARAMETERS, READ_ONLY, is_ros_parameter
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
 from rigid_proto_ros.simulation.simulation import Simulation
@@ -68,13 +68,6 @@ def test_a_running_node_has_exactly_the_listed_topics_and_services(rig) -> None:
 
         rig.until(lambda listed=listed, found=found: listed.keys() <= found().keys(), f"all that is {direction}")
         assert found() == listed
-
-
-def test_what_is_on_request_names_a_switch() -> None:
-    for interface in INTERFACES:
-        switch = interface.on_request
-        assert not switch or f"{switch}." in PATTERNS or PARAMETERS[switch].type == "bool"
-        assert interface.meaning and not interface.meaning.endswith(".")
 
 
 def test_all_topics_are_reliable_and_overridable_states_keep_10_commands_5000_and_the_latched_ones_the_last(rig):

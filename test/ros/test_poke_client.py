@@ -2,10 +2,9 @@
 """poke_client: every entry of a script, sent by the real client to a real node, and what it says of what went wrong."""
 
 import json
-import signal
 import subprocess
 import sys
-import time
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -14,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import Parameter
 from ros_client import RosClient, stamp_ns
-from ros_process import READY_S, RosProcess, catches, from_source, run
+from ros_process import from_source, run
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
@@ -226,15 +225,13 @@ def test_a_node_that_is_gone_before_the_last_command_acts_is_reported(
     assert capsys.readouterr().err.startswith("poke_client: --node: got '/tester'; accepted: ")
 
 
-@pytest.mark.parametrize(
-    "option", [["--push", "5"], ["--at", "com"], ["--for", "2"], ["--angular-impulse", "0", "0", "1"]]
-)
+@pytest.mark.parametrize("option", [["--push", "5"], ["--for", "2"]])
 def test_a_script_takes_none_of_the_options_of_a_single_command(script, option, capsys):
     assert poke_client([str(script), *option, "--dry-run"]) == 2
     assert f"{option[0]}: an option of poke and wrench" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["a b", "/a//b", "", "lab/", "tool-2"])
+@pytest.mark.parametrize("name", ["a b", "lab/"])
 def test_a_name_that_no_node_can_have_is_refused_in_one_line(name, ros_environment, monkeypatch, capsys):
     monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
     assert poke_client(["poke", "--at", "tip", "--push", "1", "--node", name]) == 2
@@ -324,19 +321,25 @@ def test_a_client_that_ends_while_it_sends_lets_time_go_on(ros_environment, tmp_
         slow.until(lambda: slow.calls == ["pauseTrue", "reset", "pauseFalse"], "resumption")
 
 
-def test_a_client_without_a_time_limit_waits_for_a_node_that_starts_later(ros_environment, tmp_path):
-    path = tmp_path / "poke.yaml"
+def test_a_client_without_a_time_limit_waits_for_a_node_that_starts_later(
+    ros_environment, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
+    path, looking, spin_once = tmp_path / "poke.yaml", threading.Event(), script_sender.rclpy.spin_once
+
+    def spin(*given, **named) -> None:
+        looking.set()
+        spin_once(*given, **named)
+
+    monkeypatch.setattr(script_sender.rclpy, "spin_once", spin)
     path.write_text("- {t: 0, impulse: [1.0e-6, 0, 0]}\n")
-    words = (path, "--node", "tester", "--reset", "--timeout", "0")
-    client = RosProcess("poke_client", *words, environment=ros_environment, log=tmp_path / "client")
-    # It handles signals when it has begun to look for the node.
-    while not catches(client.pid, signal.SIGINT):
-        assert client.process.poll() is None, client.errors
-        time.sleep(0.02)
-    with SlowNode(ros_environment, 1, time_ns=1) as late:
-        assert client.process.wait(READY_S) == 0, client.errors
-        assert late.received == 1
-    assert "sent 1 poke; 0 late, 0 refused" in client.output
+    with ThreadPoolExecutor() as other:
+        sending = other.submit(poke_client, [str(path), "--node", "tester", "--reset", "--timeout", "0"])
+        looking.wait()
+        with SlowNode(ros_environment, 1, time_ns=1) as late:
+            assert sending.result() == 0
+            assert late.received == 1
+    assert "sent 1 poke; 0 late, 0 refused" in capsys.readouterr().out
 
 
 LOADED = f"""

@@ -7,6 +7,7 @@ import json
 import random
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -144,17 +145,17 @@ def test_an_event_that_cannot_be_decoded_is_refused(session, line):
 
 @pytest.mark.parametrize("scene", scene_names())
 def test_every_bundled_scene_is_verified_with_a_script_that_fits(scene, tmp_path):
+    read = partial(read_scene, scene, {"publish_rate": 20.0}, warn=lambda text: None)
     for name in example_names():
         # Others have points that this scene's body lacks; the messages to paste among the examples are no scripts.
         try:
             script = read_script(example_path(name))
-            OfflineRun(read_scene(scene, warn=lambda text: None), script)
+            OfflineRun(read(), script)
             break
         except InputError:
             continue
     recorder = McapObserver(tmp_path / "s.mcap", simulated_log=True)
-    run = OfflineRun(read_scene(scene, warn=lambda text: None), script, recorder)
-    assert run.advance(min(script[-1].stamp_ns, 9 * SECOND) + SECOND)
+    assert OfflineRun(read(), script, recorder).advance(min(script[-1].stamp_ns, 9 * SECOND) + SECOND)
     recorder.close()
     (session,) = read_runs(tmp_path / "s.mcap")
     assert session.events
