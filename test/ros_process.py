@@ -47,17 +47,6 @@ def run(name: str, *arguments: object, environment: dict[str, str], cwd: Path | 
     )
 
 
-def refusal(name: str, *arguments: object, environment: dict[str, str], cwd: Path | None = None) -> str:
-    """Run what must be refused: exit 2 and one line on stderr, which is returned."""
-    done = run(name, *arguments, environment=environment, cwd=cwd)
-    lines = done.stderr.splitlines()
-    assert done.returncode == 2, (done.returncode, done.stdout, done.stderr)
-    assert len(lines) == 1, done.stderr
-    assert done.stdout == ""
-    assert "Traceback" not in lines[0]
-    return lines[0]
-
-
 class RosProcess:
     """A process with its output in files ``<log>.out`` and ``<log>.err``."""
 

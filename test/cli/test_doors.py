@@ -47,7 +47,7 @@ def test_the_hook_is_a_command_that_takes_files(robots):
     assert main([*words, *hook["args"], "good.urdf", "deep/er/bad.urdf"]) == 1
 
 
-@pytest.mark.parametrize(("files", "status"), [("**/*.urdf", 2), ("good.urdf", 0), ("deep/**/*.urdf", 1), ("*.sdf", 2)])
+@pytest.mark.parametrize(("files", "status"), [("good.urdf", 0), ("deep/**/*.urdf", 1), ("*.sdf", 2)])
 def test_the_actions_step_judges_the_files_that_match(robots, files, status):
     action = yaml.safe_load((ROOT / "action.yml").read_text())
     step = action["runs"]["steps"][-1]

@@ -143,7 +143,9 @@ for argument in sys.argv[2:]:
 """
 
 
-def test_a_wrong_value_of_a_parameter_of_every_ros_node_is_told_in_one_line(ros_environment, tmp_path):
+def test_a_wrong_value_of_a_parameter_is_told_in_one_line_also_of_one_that_every_ros_node_has(
+    ros_environment, tmp_path
+):
     pytest.importorskip("rclpy")
     wrong = (
         *("use_sim_time:=1", "start_type_description_service:=3"),
@@ -153,15 +155,16 @@ def test_a_wrong_value_of_a_parameter_of_every_ros_node_is_told_in_one_line(ros_
     )
     earlier = tmp_path / "flight.mcap"
     earlier.write_bytes(b"\x89MCAP of an earlier flight")
-    words = [sys.executable, "-c", REFUSED, earlier, *wrong]
+    words = [sys.executable, "-c", REFUSED, earlier, *wrong, "mass:=-1.0"]
     done = subprocess.run(words, env=from_source(ros_environment), capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    lines = done.stderr.splitlines()
+    *lines, mass = done.stderr.splitlines()
+    assert mass.startswith("rigid_body_node: mass: got -1.0")
     assert len(lines) == len(wrong) and all(x.startswith("rigid_body_node: ROS arguments: ") for x in lines), lines
     assert earlier.read_bytes() == b"\x89MCAP of an earlier flight"
 
 
-FULL_BYTES = 2_000_000
+FULL_BYTES = 1_000_000
 """Larger than any kernel that may be compiled and kept on the way."""
 
 
@@ -169,7 +172,7 @@ FULL_BYTES = 2_000_000
 def test_a_recording_that_stopped_on_a_full_disk_is_exit_2_and_not_said_to_be_recorded(ending, tmp_path):
     pytest.importorskip("mcap")
     path = tmp_path / f"session{ending}"
-    words = ("simulate", "book", "--set", "publish_rate=10000", "--duration", "3", "--record", path)
+    words = ("simulate", "book", "--set", "publish_rate=10000", "--duration", "1.5", "--record", path)
     done = subprocess.run(
         command("rigid_proto", *words),
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (FULL_BYTES, FULL_BYTES)),
