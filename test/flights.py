@@ -12,7 +12,7 @@ from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import integrator_named
 from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.simulation.observer import Logged, Observer
-from rigid_proto_ros.simulation.setup import Setup
+from rigid_proto_ros.simulation.setup import Setup, check_start
 from rigid_proto_ros.simulation.simulation import Simulation
 
 SECOND = 10**9
@@ -65,8 +65,10 @@ def flight_setup(body: Body, *, integrator: str = "rk4", step_s: float = 1e-3, i
 
 
 def flight(body: Body, **values) -> Simulation:
-    """A Simulation of ``flight_setup(body, **values)``."""
-    return Simulation(flight_setup(body, **values))
+    """A Simulation of ``flight_setup(body, **values)``, which is checked as that of a scene."""
+    setup = flight_setup(body, **values)
+    check_start(setup)
+    return Simulation(setup)
 
 
 def spinning(angular_velocity_body, orientation_xyzw=(0.0, 0.0, 0.0, 1.0)) -> np.ndarray:

@@ -154,6 +154,7 @@ def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
 def build_scenario(parameters: Parameters, body_mesh: BodyMesh | None) -> Scenario:
     """The scenario of parameters whose mesh is loaded already; raises InputError."""
     setup, warnings = _setup(parameters, body_mesh)
+    check_start(setup)
     return Scenario(parameters, body_mesh, setup, warnings, _ghost_setup(parameters, body_mesh))
 
 

@@ -65,7 +65,6 @@ from .setup import (
     check_command,
     check_load_supported,
     check_rates,
-    check_start,
     check_thrust,
     load_row,
     needs_of,
@@ -101,7 +100,6 @@ class Simulation:
         self._arrivals = 0
         self.listed: Listed | None = None
         self.logs_timeouts = True
-        check_start(setup)
         self._arrays = FlightArrays(setup)
         self._told_string: StringState | None = None
         self.watch(observer or Observer())

@@ -32,7 +32,7 @@ from ..simulation import batch
 from ..simulation import flight as fl
 from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand
 from ..simulation.quantities import CONTEXT, STATE, begin, fill_state, measure_flight
-from ..simulation.setup import Setup, check_command, check_start
+from ..simulation.setup import Setup, check_command
 from ..simulation.simulation import Simulation
 from .sampling import Draw, as_text
 from .study import Study, Variation, Vary, body_mesh_of, vertex_number
@@ -92,7 +92,6 @@ class BatchMaker:
         parameters = parameters.replaced(self._reference)
         body_mesh = body_mesh_of(parameters)
         self._setup = setup = build_scenario(parameters, body_mesh).setup
-        check_start(setup)
         varied = {v.target.parameter for v in study.vary}
         check_supported(setup.integrator, frozenset(need for name, need in ENVIRONMENT_NEEDS.items() if name in varied))
         if setup.string.attached and setup.initial_string_mass:
