@@ -123,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
         _warn(f"stopped in the last good state: {flight.simulation.failure}")
         return 1
     # A recording that stopped has already printed a message.
-    return 2 if recorded != files else min(1, flight.simulation.refused.total())
+    return 2 if recorded != files else 1 if flight.simulation.refused else 0
 
 
 def _setting(text: str) -> tuple[str, object]:

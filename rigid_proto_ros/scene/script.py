@@ -95,10 +95,10 @@ def expand_schedule(entries: dict | list) -> list[Command]:
 
 
 def expand_script(
-    entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES, start_ns: int = 0
+    entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES, now_ns: int | None = None
 ) -> list[Command]:
-    """As ``parse_script``, from what its YAML says: a list of entries, or nothing. start_ns: from when its times
-    count.
+    """As ``parse_script``, from what its YAML says: a list of entries, or nothing. now_ns: when an entry without a time
+    acts; None where each has one.
     """
     if entries is None:
         entries = []
@@ -108,12 +108,12 @@ def expand_script(
     for number, entry in enumerate(entries, 1):
         key = ""
         try:
-            times_ns = _times_ns(entry, number, max_commands)
+            times_ns = _times_ns(entry, number, max_commands, now_ns)
             if not entry.keys() <= _POKE_KEYS:
                 key = min(entry.keys() & _READERS.keys(), default="")
                 _check_keys(entry, _TIMING_KEYS | {key} if key else _POKE_KEYS, set() if key else _READERS.keys())
             for t_ns in times_ns:
-                stamp = {"stamp_ns": start_ns + t_ns, "entry": number}
+                stamp = {"stamp_ns": t_ns, "entry": number}
                 commands += _READERS[key](entry[key], stamp) if key else [_load(False, entry, stamp)]
             if len(commands) > max_commands:
                 raise InputError("", f"more than {max_commands} commands")
@@ -126,15 +126,18 @@ def expand_script(
     return commands
 
 
-def _times_ns(entry: Any, number: int, max_commands: int) -> list[int]:
-    """When the ``number``-th entry acts: at t, again ``every`` seconds for ``repeat`` times in all, each moved by up
-    to ±``jitter``: a uniform random shift, the same for the same seed wherever and whenever the script is read.
+def _times_ns(entry: Any, number: int, max_commands: int, now_ns: int | None) -> list[int]:
+    """When the ``number``-th entry acts: at t, or now, again ``every`` seconds for ``repeat`` times in all, each moved
+    by up to ±``jitter``: a uniform random shift, the same for the same seed wherever and whenever the script is read.
     """
     if not isinstance(entry, dict):
         raise InputError("", entry, "a mapping such as {t: 0.5, force: [0, 0, 1]}")
-    if "t" not in entry:
+    if "t" in entry:
+        t_ns = nanoseconds(_number(entry["t"], "t", 0.0, MAX_TIME_S))
+    elif now_ns is None:
         raise InputError("t", None, "the time in seconds")
-    t_ns = nanoseconds(_number(entry["t"], "t", 0.0, MAX_TIME_S))
+    else:
+        t_ns = now_ns
     if entry.keys().isdisjoint(_REPEATING):
         return [t_ns]
     repeat = _number(entry.get("repeat", 1), "repeat", 1, max_commands)

@@ -7,7 +7,7 @@ segment loads are constant and an integrator advances the body. ``advance`` is t
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
 from typing import Any
@@ -95,7 +95,7 @@ class Simulation:
         self.setup = setup
         self.follower: Callable[[Command, int, Listed | None], None] | None = None
         self.events = EventLog()
-        self.refused: Counter[str] = Counter()
+        self.refused: dict[str, int] = defaultdict(int)
         self.refusals: dict[str, str] = {}
         self._arrivals = 0
         self.listed: Listed | None = None

@@ -75,9 +75,7 @@ class Flight:
         """
         if not isinstance(entry, Mapping):
             raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
-        # Counted from now, in whole nanoseconds; seconds don't hold them all.
-        start_ns = 0 if "t" in entry else self._run.simulation.time_ns
-        self._run.submit(expand_script([{"t": 0.0, **plain(entry)}], "command", start_ns=start_ns))
+        self._run.submit(expand_script([plain(entry)], "command", now_ns=self._run.simulation.time_ns))
 
     def step(self, seconds: float) -> State:
         """Simulate so long, and return the state at the end. Raises InputError for no such time, when the motion fails,
@@ -93,8 +91,8 @@ class Flight:
         before = dict(simulation.refused)
         if not self._run.advance(until_ns):
             raise InputError("step", simulation.failure)
-        new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
-        if any(new.values()):
+        if simulation.refused != before:
+            new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
             texts = [f"{count} {reason}, {simulation.refusals[reason]}" for reason, count in new.items() if count]
             raise CommandRefused("schedule", "command", f"refused when it was due to act: {'; '.join(texts)}")
         return self.sample()
