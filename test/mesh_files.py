@@ -111,9 +111,9 @@ class Gltf:
         uri = "data:application/octet-stream;base64," + base64.b64encode(self.bytes).decode()
         return json.dumps({**self.json, "buffers": [{"uri": uri, "byteLength": len(self.bytes)}]}).encode()
 
-    def glb(self) -> bytes:
-        """The file as a binary one."""
-        text = json.dumps({**self.json, "buffers": [{"byteLength": len(self.bytes)}]}).encode()
+    def glb(self, **buffer: str) -> bytes:
+        """The file as a binary one. buffer: what it says of its numbers."""
+        text = json.dumps({**self.json, "buffers": [{"byteLength": len(self.bytes), **buffer}]}).encode()
         text += b" " * (-len(text) % 4)
         chunks = struct.pack("<I4s", len(text), b"JSON") + text
         chunks += struct.pack("<I4s", len(self.bytes), b"BIN\0") + self.bytes

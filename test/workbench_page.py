@@ -10,10 +10,11 @@ import re
 import shutil
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
+from viser._messages import RunJavascriptMessage
 
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
@@ -26,28 +27,43 @@ if ctypes.util.find_library("atomic") is None:
     CHROMIUM = None  # playwright's own program is linked to it, and not every system has it
 
 NO_CHROMIUM = "there is no browser to drive: sudo apt install chromium libatomic1"
-SOFTWARE_GL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
+RENDERERS = (
+    ["--use-angle=gl-egl", "--ignore-gpu-blocklist"],
+    ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+)
+"""What draws WebGL without a graphics card: Mesa where it is installed, which compiles viser's shaders in a third of the
+time, or Chromium's own."""
 
-FLAGS = [*SOFTWARE_GL, "--webgl-antialiasing-mode=none", "--disable-gpu-compositing"]
+QUICK = ["--webgl-antialiasing-mode=none", "--disable-gpu-compositing"]
 """For tests: without a graphics card, smooth edges and a page that WebGL puts together double the cost of a picture."""
 
 PATIENCE_S = 150.0
 """[s] Software WebGL compiles its shaders first, and on a busy machine nothing else moves meanwhile."""
 
-DRAWN_MS = 300
-"""[ms] Between two pictures: software WebGL would draw as often as it is let, and leave nothing of a core."""
+DRAWN_MS = 1000
+"""[ms] Between two pictures that nobody waits for: software WebGL would draw as often as it is let, and leave nothing of a
+core."""
 
 RARELY_DRAWN = """pause_ms => {
-  const request = window.requestAnimationFrame, cancelled = new Set();
-  let last = 0;
-  window.requestAnimationFrame = draw => {
-    const number = ++last;
-    setTimeout(() => request(time => cancelled.delete(number) || draw(time)), pause_ms);
-    return number;
+  const request = window.requestAnimationFrame, waiting = new Map();
+  let last = 0, timer = 0;
+  window.drawNow = () => {
+    clearTimeout(timer);
+    timer = 0;
+    request(time => {
+      const draws = [...waiting.values()];
+      waiting.clear();
+      draws.forEach(draw => draw(time));
+    });
   };
-  window.cancelAnimationFrame = number => { cancelled.add(number); };
+  window.requestAnimationFrame = draw => {
+    waiting.set(++last, draw);
+    timer ||= setTimeout(window.drawNow, pause_ms);
+    return last;
+  };
+  window.cancelAnimationFrame = number => { waiting.delete(number); };
 }"""
-"""A page with this drawn picture by picture, so far apart; a request that is cancelled draws none."""
+"""A page with this is drawn picture by picture, so far apart or when drawNow is called."""
 
 SAID_S = 0.06
 """[s] A page says at most every 0.05 s where the pointer is."""
@@ -58,6 +74,7 @@ SEE_THROUGH = ".mantine-Notifications-root, .mantine-Notifications-root * {opaci
 
 NEXT_PICTURE = """() => new Promise(done => {
   requestAnimationFrame(() => done(true));
+  drawNow();
   setTimeout(() => done(false), 10000);
 })"""
 
@@ -95,7 +112,7 @@ class Browser:
     """One browser page of it."""
 
     def __init__(self, chromium, flown: Flown, size: tuple[int, int] = (1000, 600)) -> None:
-        self.flown = flown
+        self.flown, self._told = flown, 0
         self.page = chromium.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=True)
         self.page.set_default_timeout(PATIENCE_S * 1e3)
         self._fingers = self.page.context.new_cdp_session(self.page)
@@ -108,8 +125,12 @@ class Browser:
         self.until(lambda: re.search(r"\d\.\d\d s", self.text), "time on the page")
         (self.client,) = (client for number, client in flown.server.get_clients().items() if number not in known)
 
-    def drawn(self, pictures: int = 2) -> None:
-        """Wait for two pictures: what the page has been told is in the second, and there a click hits it."""
+    def drawn(self, pictures: int = 1) -> None:
+        """Wait until the page has heard all that it was told so far, and for pictures of it: there a click hits what is drawn."""
+        self._told += 1
+        heard = RunJavascriptMessage(f"window.heard = {self._told}")
+        self.flown.server.gui._websock_interface.queue_message(heard)
+        self.until(lambda: self._draws() and self.page.evaluate("window.heard") == self._told, "picture of what was told")
         for _ in range(pictures):
             self.until(self._draws, "picture")
 
@@ -211,12 +232,20 @@ class Browser:
 
 
 @contextmanager
-def chromium(flags: list[str]) -> Iterator:
+def chromium(flags: Sequence[str] = ()) -> Iterator:
     """The browser itself."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=flags)
+        for renderer in RENDERERS:
+            args = ["--no-sandbox", "--disable-dev-shm-usage", *renderer, *flags]
+            browser = driver.chromium.launch(executable_path=CHROMIUM, args=args)
+            page = browser.new_page()
+            draws = page.evaluate("document.createElement('canvas').getContext('webgl2') !== null")
+            page.close()
+            if draws:
+                break
+            browser.close()
         yield browser
         browser.close()
 

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 from PIL import Image
-from workbench_page import PATIENCE_S, SOFTWARE_GL, Browser, Flown, any_free_port, chromium
+from workbench_page import PATIENCE_S, Browser, Flown, any_free_port, chromium
 
 from rigid_proto_ros.scene.lessons import Lesson, lesson
 from rigid_proto_ros.workbench.flight import Flight
@@ -38,7 +38,7 @@ def main() -> None:
         shown._scenario, len(shown.picture.loads.acting), flown.live.loop.simulation.string is not None, False, False
     )
     try:
-        with chromium(SOFTWARE_GL) as started:
+        with chromium() as started:
             page = Browser(started, flown, MOVING_SIZE)
             draw_moving(page, args.folder / "flight.gif")
             page.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})

@@ -78,9 +78,7 @@ LOOPBACK_HEX = "0100007F"
 
 
 def test_a_taken_default_port_moves_on_and_a_taken_asked_one_is_refused():
-    with socket.socket() as taken:
-        taken.bind((ports.LOOPBACK, 0))
-        taken.listen()
+    with socket.create_server((ports.LOOPBACK, 0)) as taken:
         port = taken.getsockname()[1]
         assert ports.serve_on_port("rerun_port", None, port, lambda served: served) > port
         with pytest.raises(InputError, match="rerun_port"):
@@ -89,23 +87,22 @@ def test_a_taken_default_port_moves_on_and_a_taken_asked_one_is_refused():
             LiveView("web", web_port=port)
 
 
-@pytest.mark.parametrize("field", ["rerun_port", "web_port"])
-def test_who_loses_the_race_for_a_port_serves_on_the_next_one_on_loopback_only_and_prints_that(monkeypatch, field):
+def test_who_loses_the_race_for_a_port_serves_on_the_next_one_on_loopback_only_and_prints_that(monkeypatch):
     lines = []
-    with socket.socket() as taken:
-        taken.bind((ports.LOOPBACK, 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        # As if the other process had come just after the look.
-        monkeypatch.setattr(ports, "is_free", lambda _: True)
-        with pytest.raises(InputError, match=field):
-            LiveView("web", **{field: port})
-        monkeypatch.setattr(f"rigid_proto_ros.rerun_view.live_view.DEFAULT_{field.upper()}", port)
+    # As if other processes had come just after the look.
+    monkeypatch.setattr(ports, "is_free", lambda _: True)
+    with socket.create_server((ports.LOOPBACK, 0)) as one, socket.create_server((ports.LOOPBACK, 0)) as two:
+        taken = {"rerun_port": one.getsockname()[1], "web_port": two.getsockname()[1]}
+        for field, port in taken.items():
+            with pytest.raises(InputError, match=field):
+                LiveView("web", **{field: port})
+            monkeypatch.setattr(f"rigid_proto_ros.rerun_view.live_view.DEFAULT_{field.upper()}", port)
         observer = LiveView("web", report=lines.append)
         try:
             addresses = [observer.live_address, observer.web_address]
             served = [int(address.split(":")[2].split("/")[0]) for address in addresses]
-            assert port not in served and min(abs(other - port) for other in served) < ports.PORTS_TRIED
+            for port, asked in zip(served, taken.values(), strict=True):
+                assert asked < port < asked + ports.PORTS_TRIED
             assert b"html" in wait_for(lambda: _page(observer.web_address)).lower()
             assert all(
                 ports.listens(pid, at)

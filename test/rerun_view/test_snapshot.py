@@ -22,6 +22,7 @@ from rigid_proto_ros.cli import snapshot as command
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view import snapshot
 from rigid_proto_ros.rerun_view.observer import FileRecorder
+from rigid_proto_ros.rerun_view.rrd_reading import read_session
 from rigid_proto_ros.rerun_view.snapshot import DRIVERS, is_one_colour
 
 pytestmark = pytest.mark.drawn
@@ -36,32 +37,35 @@ def recording(tmp_path_factory):
     return path
 
 
-def arguments(*words: str) -> argparse.Namespace:
+def run(*words: str) -> None:
+    """The command; raises what it refuses."""
     parser = argparse.ArgumentParser()
     command.add_arguments(parser)
-    parser.set_defaults(run=command.run)
-    return parser.parse_args(words)
+    assert command.run(parser.parse_args(words)) == 0
 
 
 def take(*words: str) -> None:
-    args = arguments(*words)
+    """The same; without drivers the test skips."""
     try:
-        assert args.run(args) == 0
+        run(*words)
     except InputError as error:
         if DRIVERS in str(error):
             pytest.skip(str(error))
         raise
 
 
-def test_the_body_is_in_the_middle_of_the_flight_view_also_from_a_cut_file(tmp_path):
-    picture = tmp_path / "flight.png"
-    recording = tmp_path / "session.rrd"
-    observer = FileRecorder(str(recording))
+def test_of_a_bag_the_body_is_in_the_middle_of_the_flight_view_and_the_viewer_leaves_no_files(tmp_path, monkeypatch):
+    pytest.importorskip("mcap")
+    temporary, bag, picture = (tmp_path / name for name in ("temporary", "s.mcap", "s.png"))
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    monkeypatch.setenv("TMPDIR", str(temporary))
     # Without gravity: of a body that falls the path is shown, and the body where it has come to.
-    flight.fly(observer, flight.rows(60), flight.setup_of(gravity=np.zeros(3)))
-    observer.close()
-    recording.write_bytes(recording.read_bytes()[:-2000])
-    take(str(recording), "--at", "0.3", "-o", str(picture), "--size", "1000x600")
+    assert main(["simulate", "book", "--duration", "0.5", "--bag", str(bag)]) == 0
+    with pytest.raises(InputError, match="^--at: "):
+        take(str(bag), "--at", "0.6", "-o", str(picture))
+    take(str(bag), "--at", "0.3", "-o", str(picture), "--size", "1000x600")
+    assert not list(temporary.iterdir())
     with Image.open(picture) as image:
         assert image.size == (1000, 600)
         pixels = np.asarray(image.convert("RGB"), dtype=float)
@@ -71,22 +75,6 @@ def test_the_body_is_in_the_middle_of_the_flight_view_also_from_a_cut_file(tmp_p
     height, width = drawn.shape
     assert drawn[int(0.45 * height) : int(0.55 * height), int(0.45 * width) : int(0.55 * width)].mean() > 0.9
     assert 0.02 < drawn.mean() < 0.6
-
-
-def test_a_bag_is_drawn_too_and_the_viewer_leaves_no_files_behind(tmp_path, monkeypatch):
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
-    monkeypatch.setenv("TMPDIR", str(temporary))
-    pytest.importorskip("mcap")
-    bag, picture = tmp_path / "s.mcap", tmp_path / "s.png"
-    assert main(["simulate", "t_handle", "--duration", "0.5", "--bag", str(bag)]) == 0
-    take(str(bag), "--at", "0.4", "-o", str(picture), "--size", "800x500")
-    assert not is_one_colour(picture.read_bytes())
-    assert not list(temporary.iterdir())
-    args = arguments(str(bag), "--at", "0.6", "-o", str(tmp_path / "x.png"))
-    with pytest.raises(InputError, match="^--at: "):
-        args.run(args)
 
 
 @pytest.mark.parametrize(
@@ -104,37 +92,49 @@ def test_a_bag_is_drawn_too_and_the_viewer_leaves_no_files_behind(tmp_path, monk
 def test_what_cannot_be_drawn_is_refused_with_what_would_be_accepted(recording, tmp_path, monkeypatch, words, field):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").touch()
-    args = arguments(str(recording), *words)
     with pytest.raises(InputError, match=f"^{field}: "):
-        args.run(args)
+        take(str(recording), *words)
 
 
-def test_a_picture_that_a_full_disk_takes_half_of_leaves_the_earlier_one_as_it_is(recording, tmp_path, monkeypatch):
+@pytest.fixture
+def opened(monkeypatch):
+    """Recordings that a viewer was given, in which nothing is drawn."""
+    sessions = []
+    client = nullcontext(SimpleNamespace(set_time=lambda *_, **__: None))
+    stand_in = {
+        "headless_viewer": lambda *_: client,
+        "show": lambda _, path: sessions.append(read_session(path)),
+        "_stable_picture": lambda _: b"",
+        "NOTICE_GONE_S": 0,
+        "is_one_colour": lambda _: False,
+    }
+    for name, value in stand_in.items():
+        monkeypatch.setattr(snapshot, name, value)
+    return sessions
+
+
+def test_the_viewer_is_given_what_is_whole_of_a_cut_file(recording, tmp_path, opened):
+    cut = tmp_path / "cut.rrd"
+    cut.write_bytes(recording.read_bytes()[:-2000])
+    take(str(cut), "--at", "0.3", "-o", str(tmp_path / "x.png"))
+    (session,) = opened
+    assert session.complete and not read_session(cut).complete
+    assert session.times.tolist() == read_session(cut).times.tolist()
+
+
+def test_a_picture_that_a_full_disk_takes_half_of_leaves_the_earlier_one_as_it_is(
+    recording, tmp_path, opened, monkeypatch
+):
     def half(path, _):
         path.touch()
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     picture = tmp_path / "x.png"
     picture.write_bytes(b"earlier")
-    client = nullcontext(SimpleNamespace(set_time=lambda *_, **__: None))
-    drawn = {
-        "headless_viewer": lambda *_: client,
-        "show": lambda *_: None,
-        "_stable_picture": lambda _: b"",
-        "NOTICE_GONE_S": 0,
-    }
-    for name, value in {**drawn, "is_one_colour": lambda _: False}.items():
-        monkeypatch.setattr(snapshot, name, value)
     monkeypatch.setattr(Path, "write_bytes", half)
     with pytest.raises(InputError, match="^-o: .*No space left"):
         snapshot.take_picture(recording, 0.3, picture)
     assert picture.read_bytes() == b"earlier" and list(tmp_path.iterdir()) == [picture]
-
-
-def test_a_recording_that_is_not_there_is_refused(tmp_path):
-    args = arguments(str(tmp_path / "none.rrd"), "--at", "0", "-o", str(tmp_path / "x.png"))
-    with pytest.raises(InputError, match="No such file"):
-        args.run(args)
 
 
 @pytest.mark.parametrize("without", ["any adapter", "Vulkan"])
@@ -145,9 +145,8 @@ def test_a_machine_without_drivers_is_told_what_to_install(recording, tmp_path, 
     if without == "any adapter":
         monkeypatch.setenv("LIBGL_DRIVERS_PATH", str(tmp_path))
         monkeypatch.setenv("WGPU_BACKEND", "vulkan")
-    args = arguments(str(recording), "--at", "0.3", "-o", str(tmp_path / "x.png"))
     with pytest.raises(InputError, match="mesa-vulkan-drivers") as refusal:
-        args.run(args)
+        run(str(recording), "--at", "0.3", "-o", str(tmp_path / "x.png"))
     assert "\n" not in str(refusal.value)
 
 

@@ -18,6 +18,7 @@ import pytest
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
 from flown_page import PATIENCE_S, FlownPage, flies_again, numbers
+from mesh_files import CUBE_QUADS, obj
 from workbench_page import bare_page
 
 from rigid_proto_ros.base.errors import InputError
@@ -124,8 +125,7 @@ def test_an_upload_flies_alone_and_its_take_holds_it(flown: FlownPage, tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my_hammer.obj", "scene.yaml", "script.yaml"]
 
 
-OPEN_BOX = b"# z up\n" + b"".join(b"v %d %d %d\n" % (k >> 2, k >> 1 & 1, k & 1) for k in range(8))
-OPEN_BOX += b"f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\n"
+OPEN_BOX = b"# z up\n" + obj(faces=CUBE_QUADS[:-1])
 """A cube of a metre that lacks a side."""
 
 

@@ -16,6 +16,7 @@ import pytest
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
 from flown_page import FlownPage, flies_again
+from mesh_files import Gltf
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.mesh.locate import resolve_mesh
@@ -243,36 +244,14 @@ def test_nothing_is_saved_without_a_mesh_that_is_gone_or_that_reads_other_files(
     gone.unlink()
     with pytest.raises(InputError, match=r"gone\.obj"):
         flown.page.session_tab._take()
-    flown.do(lambda: flown.page.flight.fly({"mesh": str(in_two_files(tmp_path))}))
+    cube = Gltf()
+    (tmp_path / "two.bin").write_bytes(cube.bytes)
+    document = {**cube.json, "buffers": [{"uri": "two.bin", "byteLength": len(cube.bytes)}]}
+    (tmp_path / "two.gltf").write_text(json.dumps(document))
+    flown.do(lambda: flown.page.flight.fly({"mesh": str(tmp_path / "two.gltf")}))
     flown.fly(0.1)
     with pytest.raises(InputError, match=r"two\.gltf.*\.glb"):
         flown.page.session_tab._take()
-
-
-def in_two_files(folder: Path) -> Path:
-    """A tetrahedron as .gltf, whose numbers are in a .bin."""
-    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
-    triangles = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.uint16)
-    (folder / "two.bin").write_bytes(corners.tobytes() + triangles.tobytes())
-    document = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "buffers": [{"uri": "two.bin", "byteLength": 72}],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": 48},
-            {"buffer": 0, "byteOffset": 48, "byteLength": 24},
-        ],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
-            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
-        ],
-    }
-    path = folder / "two.gltf"
-    path.write_text(json.dumps(document))
-    return path
 
 
 def test_one_can_go_on_from_the_past_of_an_upload_when_another_file_was_uploaded(flown: FlownPage) -> None:

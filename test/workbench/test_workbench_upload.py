@@ -14,15 +14,14 @@ from types import SimpleNamespace
 
 import pytest
 import viser
+from mesh_files import CUBE_VERTICES, Gltf, obj
 
 from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.export.gltf import INDICES, TRIANGLES, VERTICES, Document
 from rigid_proto_ros.mass import from_mesh
 from rigid_proto_ros.mass.inspection import as_json
 from rigid_proto_ros.mesh.locate import resolve_mesh
-from rigid_proto_ros.picture.surface import BOX_CORNERS, BOX_TRIANGLES
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.workbench import body_tab
 from rigid_proto_ros.workbench.body_tab import MAX_BYTES, UploadFolder, take_upload
@@ -77,18 +76,14 @@ def test_what_is_no_mesh_is_refused_and_nothing_is_kept_of_it(place: Path, name:
     assert not list(place.iterdir())
 
 
-def bust_in_millimetres() -> bytes:
-    """A box as large as a bust of half a metre, in a file whose numbers are millimetres."""
-    sides = (200.0, 250.0, 480.0)
-    corners = [[s * bool(k >> axis & 1) for axis, s in enumerate(sides)] for k in range(8)]
-    faces = ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"]
-    return "".join(f"v {x} {y} {z}\n" for x, y, z in corners).encode() + "".join(f"f {f}\n" for f in faces).encode()
+BUST = obj(CUBE_VERTICES * (200.0, 250.0, 480.0))
+"""A box as large as a bust of half a metre, in a file whose numbers are millimetres."""
 
 
 def test_a_bust_in_millimetres_is_said_to_weigh_24_kg_before_it_flies_and_not_as_much_as_a_mountain(
     place: Path,
 ) -> None:
-    upload = take_upload("bust.obj", bust_in_millimetres())
+    upload = take_upload("bust.obj", BUST)
     assert (upload.likely_unit, upload.up) == ("mm", "y")
     assert upload.size_and_mass("mm") == "0.2 × 0.25 × 0.48 m, 24 kg at 1000 kg/m³"
     assert upload.size_and_mass("m") == "200 × 250 × 480 m, 2.4e+10 kg at 1000 kg/m³"
@@ -101,10 +96,10 @@ def test_a_bust_in_millimetres_is_said_to_weigh_24_kg_before_it_flies_and_not_as
 
 
 def test_a_verdict_names_what_the_page_has_and_no_options_of_the_command(place: Path) -> None:
-    assert take_upload("bust.obj", bust_in_millimetres()).verdict == []
-    lines = BOOK.decode().splitlines()
-    first = next(k for k, line in enumerate(lines) if line.startswith("f "))
-    hole = take_upload("hole.obj", "\n".join(lines[:first] + lines[first + 1 :]).encode())
+    assert take_upload("bust.obj", BUST).verdict == []
+    before, _, face = BOOK.rstrip().rpartition(b"\n")
+    assert face.startswith(b"f ")
+    hole = take_upload("hole.obj", before)
     (line,) = hole.verdict
     assert line.startswith(
         "error: open surface with 3 boundary edges; any way to close it changes volume and tensor by"
@@ -116,25 +111,13 @@ def test_a_verdict_names_what_the_page_has_and_no_options_of_the_command(place: 
 
 
 def test_a_glb_is_taken_in_metres_with_y_up_and_one_that_names_other_files_is_refused(place: Path) -> None:
-    document = Document(0)
-    corners = document.accessor(BOX_CORNERS, VERTICES, bounds=True)
-    triangles = document.accessor(BOX_TRIANGLES.ravel(), INDICES)
-    box = document.mesh("box", {"POSITION": corners}, triangles, TRIANGLES, document.material("box", (1, 2, 3)))
-    document.node("box", None, mesh=box, scale=[0.5, 1.0, 1.5])
-    data = document.binary()
-    upload = take_upload("Box.glb", data)
+    cube = Gltf(CUBE_VERTICES * (1.0, 2.0, 3.0))
+    upload = take_upload("Box.glb", cube.glb())
     assert (upload.likely_unit, upload.up, upload.refusal) == ("m", "y", "")
     assert upload.size_and_mass("m") == "1 × 2 × 3 m, 6e+03 kg at 1000 kg/m³"
-    length = struct.unpack_from("<I", data, 12)[0]
-    parts = json.loads(data[20 : 20 + length])
     for uri in ("../../../etc/passwd", "file:///etc/passwd", "http://127.0.0.1/x"):
-        parts["buffers"][0]["uri"] = uri
-        text = json.dumps(parts).encode()
-        text += b" " * (-len(text) % 4)
-        rest = data[20 + length :]
-        other = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest
         with pytest.raises(InputError):
-            take_upload("Other.glb", other)
+            take_upload("Other.glb", cube.glb(uri=uri))
     assert files(place) == [Path(upload.path)]
 
 
