@@ -178,10 +178,6 @@ class FlownPage:
         assert widget.visible and not getattr(widget, "disabled", False), label
         return widget
 
-    def begin_to_set(self, label: str, value) -> Future[None]:
-        """The same, without waiting until it is done."""
-        return self._begin_update(self._usable(label), value)
-
     def _begin_update(self, widget, value) -> Future[None]:
         """As a browser says it."""
 

@@ -75,6 +75,7 @@ def test_pip_installs_executables_bodies_and_scenes(source_copy: Path, tmp_path:
         "--no-deps",
         "--no-index",
         "--ignore-installed",
+        "--no-compile",
         "--prefix",
         prefix,
         ".",

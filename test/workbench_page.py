@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ctypes.util
+import io
 import math
 import os
 import re
@@ -79,6 +80,23 @@ NEXT_PICTURE = """() => new Promise(done => {
 })"""
 
 
+def until(condition, what: str):
+    """Wait for a condition; returns its value."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not (found := condition()):
+        assert time.monotonic() < deadline, f"no {what} within {PATIENCE_S} s"
+        time.sleep(0.05)
+    return found
+
+
+def seen_on(page) -> np.ndarray:
+    """A page of the browser as it is drawn, (height, width, 3)."""
+    from PIL import Image
+
+    with Image.open(io.BytesIO(page.screenshot(timeout=1e3 * PATIENCE_S))) as image:
+        return np.asarray(image.convert("RGB"), dtype=int)
+
+
 def any_free_port() -> int:
     """A loopback port that the system says is free."""
     with socket.socket() as probe:
@@ -130,7 +148,9 @@ class Browser:
         self._told += 1
         heard = RunJavascriptMessage(f"window.heard = {self._told}")
         self.flown.server.gui._websock_interface.queue_message(heard)
-        self.until(lambda: self._draws() and self.page.evaluate("window.heard") == self._told, "picture of what was told")
+        self.until(
+            lambda: self._draws() and self.page.evaluate("window.heard") == self._told, "picture of what was told"
+        )
         for _ in range(pictures):
             self.until(self._draws, "picture")
 
@@ -145,18 +165,9 @@ class Browser:
     def text(self) -> str:
         return self.page.inner_text("body")
 
-    @property
-    def time_s(self) -> float:
-        """As the bar shows it."""
-        return float(re.search(r"(\d+\.\d\d) s", self.text)[1])
-
-    def until(self, condition, what: str, timeout_s: float = PATIENCE_S):
+    def until(self, condition, what: str):
         """Wait for a condition; returns its value."""
-        deadline = time.monotonic() + timeout_s
-        while not (found := condition()):
-            assert time.monotonic() < deadline, f"no {what} within {timeout_s} s: {self.text}"
-            time.sleep(0.05)
-        return found
+        return until(condition, what)
 
     # The panel
 
@@ -194,14 +205,9 @@ class Browser:
         middle = np.array([box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]])
         return middle + focal * seen[..., :2] / seen[..., 2:]
 
-    def look(self):
+    def look(self) -> np.ndarray:
         """The page as it is drawn, (height, width, 3)."""
-        import io
-
-        from PIL import Image
-
-        with Image.open(io.BytesIO(self.page.screenshot())) as image:
-            return np.asarray(image.convert("RGB"), dtype=int)
+        return seen_on(self.page)
 
     def click(self, x: float, y: float, modifier: str = "") -> None:
         """Press and release at one place: a poke."""

@@ -173,7 +173,7 @@ def test_no_facet_of_a_damaged_text_is_left_out_in_silence(tmp_path, damaged):
 @pytest.mark.parametrize("kind", ["off", "ply", "stl", "stl_ascii", "glb"])
 def test_files_that_trimesh_writes_are_read_as_it_had_them(tmp_path, meshes, kind):
     trimesh = pytest.importorskip("trimesh")
-    mesh = load_mesh(str(meshes / "sword.obj"))
+    mesh = load_mesh(str(meshes / "spot.obj"))
     data = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False).export(file_type=kind)
     again = load(tmp_path, "a." + kind.split("_")[0], data.encode() if isinstance(data, str) else data)
     # Single precision, but for .ply and .off.

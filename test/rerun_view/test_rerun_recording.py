@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import resource
 import threading
 import time
 from pathlib import Path
@@ -260,29 +261,19 @@ def test_an_error_in_the_recorder_whose_file_is_lost_too_ends_it_quietly(tmp_pat
     assert len(errors) == 1 and not uncaught
 
 
-FULL_IN_FLIGHT = """
-import resource, signal, sys
-import rerun_flight as flight
-from rigid_proto_ros.rerun_view.observer import FileRecorder
-from rigid_proto_ros.rerun_view.rrd_reading import read_session
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
-errors = []
-observer = FileRecorder(sys.argv[1], on_error=errors.append)
-flight.fly(observer, flight.rows(12_000))
-observer.close()
-assert len(errors) == 1 and sys.argv[1] in errors[0], errors
-assert observer.error == errors[0]
-session = read_session(sys.argv[1])
-assert not session.complete and 0 < len(session.times) < 12_000
-"""
-
-
 def test_a_file_that_cannot_grow_in_flight_stops_the_recording_and_keeps_what_is_there(tmp_path):
     # A limit on the file's size stands in for a full disk: the write fails in the same place.
-    run = flight.child(FULL_IN_FLIGHT, tmp_path / "session.rrd")
-    run.communicate(timeout=flight.WAIT_S)
-    assert run.returncode == 0
+    path, errors, limits = tmp_path / "session.rrd", [], resource.getrlimit(resource.RLIMIT_FSIZE)
+    observer = FileRecorder(str(path), on_error=errors.append)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, limits[1]))
+    try:
+        flight.fly(observer, flight.rows(12_000))
+        observer.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert errors == [observer.error] and str(path) in observer.error
+    session = read_session(path)
+    assert not session.complete and 0 < len(session.times) < 12_000
 
 
 @pytest.mark.parametrize("hangs", ["flush", "disconnect"])

@@ -83,7 +83,7 @@ def test_resets_and_bodies_of_every_size_leave_no_threads_behind(kind, tmp_path)
         for _ in range(3):
             one_more_run()
         before = _threads_of_this_process()
-        for _ in range(12):
+        for _ in range(6):
             one_more_run()
         # A run that has just ended may still be leaving.
         flight.wait_for(lambda: one_more_run() or _threads_of_this_process() <= before + 2)

@@ -189,7 +189,7 @@ SHAPED = {
 }
 
 
-@pytest.mark.parametrize("word", ["nan", "inf", "1e999", "1e200", "1 2", "x"])
+@pytest.mark.parametrize("word", ["nan", "1e999", "1e200", "1 2", "x"])
 @pytest.mark.parametrize("file_format", SHAPED)
 def test_numbers_that_no_robot_has_are_named(tmp_path, capsys, file_format, word):
     if file_format == "xml":

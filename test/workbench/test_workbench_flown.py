@@ -657,7 +657,7 @@ def test_a_lesson_that_is_picked_while_kernels_are_compiled_begins_when_they_are
         assert compiled.wait(PATIENCE_S)
 
     page.flight.prepare(compile_something, lambda: None)
-    picking = flown.begin_to_set("Lesson", lesson("hammer").title)
+    picking = flown._begin_update(flown.widget("Lesson"), lesson("hammer").title)
     flown.until(lambda: f"{COMPILING} …" in page.bar._line.content, "word of what is waited for")
     compiled.set()
     picking.result(PATIENCE_S)
