@@ -18,7 +18,7 @@ _UNUSED = (*(f"library_{kind}" for kind in _LIBRARIES), "bind_material", "instan
 """Elements without effect on triangles. pycollada drops a geometry whose material it can't read."""
 _ARCHIVES = ("zip", "bz2", "tar.bz2", "tar.gz", "zae")
 MAX_TRIANGLES = 20_000_000
-"""A mesh with more triangles is refused: this many take about 1.5 GB."""
+"""A mesh with more triangles is refused: to read and judge this many takes about 10 GB (480 bytes for each)."""
 
 
 class Assembly:

@@ -45,6 +45,7 @@ class Diagnostics:
         self._subscriber = subscriber
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._before = live.call(self._values)
+        self._of_this_name = 1
         # Steady: the node's own clock stands still with /clock.
         node.create_timer(REPORT_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -79,8 +80,20 @@ class Diagnostics:
             "warning": simulation.failure or self._live.recording_trouble or simulation.too_coarse,
         }
 
+    def _warn_of_namesakes(self) -> None:
+        """Log when another node of this name comes: its topics are the same, so that nobody can tell the two apart."""
+        node = self._node
+        count = node.get_node_names_and_namespaces().count((node.get_name(), node.get_namespace()))
+        if count > self._of_this_name:
+            node.get_logger().warning(
+                f"another node is called {node.get_fully_qualified_name()}, or one was killed within the last 20 s: "
+                "both take the same commands and publish to the same topics; -r __node:=NAME gives one another name"
+            )
+        self._of_this_name = max(count, 1)
+
     def _report(self) -> None:
         """Publish the diagnostics, and log when simulated time falls behind real time."""
+        self._warn_of_namesakes()
         # Before the values are read: what was done before the stamp is in them.
         stamp = self._node.get_clock().now().to_msg()
         try:

@@ -13,6 +13,7 @@ from unittest.mock import Mock
 
 import often_reporting_node
 import pytest
+import rclpy
 import yaml
 from command_rig import wrench_message
 from rcl_interfaces.srv import DescribeParameters
@@ -230,6 +231,7 @@ def test_a_report_is_read_between_two_ticks_so_that_its_values_belong_together(m
     live = LiveSimulation(make_scenario({"mesh": "t_handle", "start_paused": True}))
     node = Mock()
     node.create_publisher().get_subscription_count.return_value = 0
+    node.get_node_names_and_namespaces.return_value = []
     report = Diagnostics(node, live, SimpleNamespace(messages_lost=0, queue_full=0))._report
     threads: list[str] = []
     seen = property(lambda _: threads.append(threading.current_thread().name) or 0.0)
@@ -261,6 +263,19 @@ def test_a_publisher_with_incompatible_qos_on_a_command_topic_is_warned_of(rig):
     rig.until(lambda: said in rig.node_process.errors, "a warning")
 
 
+def test_another_node_of_the_same_name_is_warned_of_once(rig):
+    said = "another node is called /rigid_body,"
+    assert rig.node_process.errors.count(said) == 0
+    other = rclpy.create_node(
+        "rigid_body", context=rig.own.context, start_parameter_services=False, enable_rosout=False
+    )
+    rig.until(lambda: said in rig.node_process.errors, "a warning")
+    rig.forget("/diagnostics")
+    rig.until(lambda: len(rig.all_diagnostics()) > 1, "two reports")
+    other.destroy_node()
+    assert rig.node_process.errors.count(said) == 1
+
+
 def test_real_time_that_is_given_up_is_warned_of_and_not_every_second(rig):
     said = "of real time given up"
     before, start, began_ns = rig.node_process.errors.count(said), time.monotonic(), time.time_ns()
@@ -287,9 +302,9 @@ def test_that_tf_lacks_its_messages_is_warned_of_once_and_not_at_every_change_of
 
 
 def test_a_fixed_step_too_long_for_the_motion_is_a_warning_as_long_as_it_is_in_force(rig):
-    rig.set(integrator="rk4", step=0.5)
+    assert rig.set(integrator="rk4", step=0.5) == [[True, ""]] * 2
     report = rig.diagnostics()
-    assert report["level"] == 1
+    assert report["level"] == 1, report
     assert all("rk4: |w| step = 6" in report[words] for words in ("message", "warning"))
     rig.set(integrator="auto")
     assert not rig.diagnostics()["warning"]
