@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from ..base.errors import CommandRefused, InputError
@@ -252,7 +253,11 @@ class LiveSimulation:
         loop = self.loop
         changes = with_mass_of_density(changes)
         present = loop.scenario
-        planned = present.with_changes(changes)
+        try:
+            planned = present.with_changes(changes)
+        except CommandRefused as refusal:
+            self.call(partial(loop.simulation.refuse, refusal))
+            raise
         self._warm_up_change(planned)
         if changes.get("record", "") == present.parameters.record:
             changes = {name: value for name, value in changes.items() if name != "record"}
@@ -260,8 +265,8 @@ class LiveSimulation:
             return
 
         def check() -> Scenario:
-            scenario = loop.scenario.with_changes(changes, at_hand=planned)
             try:
+                scenario = loop.scenario.with_changes(changes, at_hand=planned)
                 loop.check_change(scenario)
             except CommandRefused as refusal:
                 loop.simulation.refuse(refusal)
