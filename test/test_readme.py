@@ -18,7 +18,7 @@ from ros_process import command as start_of
 
 import docs_tables
 import rigid_proto_ros
-from rigid_proto_ros.base.bundled import example_names, example_path, scene_names
+from rigid_proto_ros.base.bundled import example_names, example_path
 from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.ros import poke_client
 from rigid_proto_ros.scene.command_codec import of_message
@@ -370,9 +370,3 @@ def test_a_table_that_is_behind_is_written_anew() -> None:
 def test_pictures_of_the_documents_are_small(name, head, largest) -> None:
     data = (SOURCE / "docs" / name).read_bytes()
     assert data.startswith(head) and 20_000 < len(data) < largest
-
-
-def test_every_scene_stands_in_the_list_of_lessons() -> None:
-    text = (SOURCE / "docs" / "lessons" / "README.md").read_text("utf-8")
-    for name in scene_names():
-        assert f"`{name}`" in text, name

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib.util
 import runpy
 import sys
@@ -24,46 +23,9 @@ pytestmark = pytest.mark.skipif(not FILE.is_file(), reason="not run from a sourc
 LAUNCH_INSTALLED = importlib.util.find_spec("launch_ros") is not None
 
 
-@pytest.fixture(scope="module")
-def tree() -> ast.Module:
-    return ast.parse(FILE.read_text("utf-8"))
-
-
-def declared(tree: ast.Module) -> dict[str, tuple[str, str]]:
-    """Default and description by argument."""
-    (table,) = (node.value for node in tree.body if isinstance(node, ast.Assign) and node.targets[0].id == "ARGUMENTS")
-    return {name: (default, description) for name, default, description in ast.literal_eval(table)}
-
-
-def test_arguments_that_become_parameters_are_parameters_with_accepted_defaults(tree: ast.Module) -> None:
-    arguments = declared(tree)
-    # Empty: the scene's.
-    assert {arguments[name][0] for name in ("mesh", "viewer", "record", "use_sim_time")} == {""}
-    assert {"mesh", "viewer", "record"} <= PARAMETERS.keys()
-
-
-def test_every_argument_is_described_and_used(tree: ast.Module) -> None:
-    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
-    used = {n.value for function in functions for n in ast.walk(function) if isinstance(n, ast.Constant)}
-    for name, (_, description) in declared(tree).items():
-        assert len(description) > 10
-        assert name in used, f"{name} is declared and not used"
-
-
-def test_client_accepts_the_options_that_the_launch_file_gives_it(tree: ast.Module, capsys) -> None:
-    text = FILE.read_text("utf-8")
-    for option in ("--node", "--timeout", "--reset"):
-        assert f'"{option}"' in text
-    script = SOURCE / "msg_examples" / "flip_and_poke.yaml"
-    # The first start compiles for a minute or two; a client without a limit ends with its node.
-    assert '"--timeout", "0"' in text and "on_exit=Shutdown()" in text
-    assert poke_client([str(script), "--node", "/a/b", "--timeout", "0", "--reset", "--dry-run"]) == 0
-    assert '"at": "tip"' in capsys.readouterr().out
-
-
 @pytest.fixture
-def launched(monkeypatch):
-    """launched(arguments): the actions, with stand-ins for launch."""
+def launch_file(monkeypatch):
+    """What the launch file defines, with stand-ins for launch."""
     keep = lambda *_, **given: SimpleNamespace(**given)  # noqa: E731
     configuration = lambda name: SimpleNamespace(perform=lambda context: context[name])  # noqa: E731
     for name, content in {
@@ -74,9 +36,33 @@ def launched(monkeypatch):
         "launch_ros.actions": {"Node": keep},
     }.items():
         monkeypatch.setitem(sys.modules, name, SimpleNamespace(**content))
-    module = SimpleNamespace(**runpy.run_path(str(FILE)))
-    defaults = {name: default for name, default, _ in module.ARGUMENTS}
-    return lambda **given: module.nodes({**defaults, **given})
+    return SimpleNamespace(**runpy.run_path(str(FILE)))
+
+
+@pytest.fixture
+def launched(launch_file):
+    """launched(arguments): the actions."""
+    defaults = {name: default for name, default, _ in launch_file.ARGUMENTS}
+    return lambda **given: launch_file.nodes({**defaults, **given})
+
+
+def test_every_argument_is_described_and_used_and_those_that_become_parameters_are_the_scenes_by_default(launch_file):
+    for name, default, description in launch_file.ARGUMENTS:
+        assert len(description) > 10
+        assert FILE.read_text("utf-8").count(f'"{name}"') > 1, f"{name} is declared and not used"
+        assert default == "" or name not in {*PARAMETERS, "use_sim_time"}
+    assert {"mesh", "viewer", "record"} <= PARAMETERS.keys()
+
+
+def test_client_accepts_the_options_that_the_launch_file_gives_it(capsys) -> None:
+    text = FILE.read_text("utf-8")
+    for option in ("--node", "--timeout", "--reset"):
+        assert f'"{option}"' in text
+    script = SOURCE / "msg_examples" / "flip_and_poke.yaml"
+    # The first start compiles for a minute or two; a client without a limit ends with its node.
+    assert '"--timeout", "0"' in text and "on_exit=Shutdown()" in text
+    assert poke_client([str(script), "--node", "/a/b", "--timeout", "0", "--reset", "--dry-run"]) == 0
+    assert '"at": "tip"' in capsys.readouterr().out
 
 
 def test_a_node_of_another_name_gets_the_scene_its_own_section_and_a_mesh_beside_the_file(launched, tmp_path) -> None:

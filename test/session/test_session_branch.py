@@ -48,14 +48,13 @@ def fly_on(folder, seconds: float) -> OfflineRun:
     return run
 
 
-@pytest.mark.parametrize("at", [0.0, 0.3, 0.85, 1.75, 3.15])
-def test_a_branch_begins_with_the_recorded_state_and_flies_on_as_the_session_did(session, tmp_path, at, capsys):
-    until = {0.0: 0.15, 0.3: 0.08, 0.85: 0.04, 1.75: 0.5, 3.15: 0.9}[at]
+@pytest.mark.parametrize(("at", "until"), [(0.0, 0.15), (0.85, 0.04), (3.15, 0.9)])
+def test_a_branch_begins_with_the_recorded_state_and_flies_on_as_the_session_did(session, tmp_path, at, until, capsys):
     assert main(["replay", str(session), "--at", str(at), "--as-scene", str(tmp_path / "x.yaml")]) == 0
     said = capsys.readouterr().out.splitlines()[-1]
     scene, script = tmp_path / "x.yaml", tmp_path / "x_script.yaml"
     assert said == f"  scene at {at:g} s: rigid_proto simulate {scene} --script {script}"
-    assert bool(read_script(script)) == (at in (0.3, 0.85, 3.15))
+    assert bool(read_script(script)) == (at > 0.0)
     (recorded,) = read_runs(session)
 
     def differs(row: np.ndarray, time_s: float) -> float:
