@@ -35,7 +35,7 @@ collect_ignore_glob = [file for files in MISSING.values() for file in files]
 
 LONG = (
     *("msg_examples", "workbench_page", "readme", "sweep_runs", "replay_publish", "mass_exactness", "poke_client"),
-    *("string_scenes", "commands_flood", "time_in_flight", "demo", "executables", "stress_auto"),
+    *("commands_flood", "time_in_flight", "demo", "executables"),
     *("session_crash", "order_of_commands", "commands_node", "string_pendulum", "rerun_live", "rerun_slow_viewers"),
     *("snapshot", "packaging", "fitting", "rerun_crash", "conventions_of_the_node", "node_signals"),
     *("session_bag", "workbench_lessons", "node_workbench", "node_work", "commands_refused", "simulate_bad_input"),

@@ -9,8 +9,8 @@ import zlib
 import numpy as np
 import pytest
 from mpmath import mp
-from random_scenes import log_uniform
 from reference_motion import angle_between, free_motion
+from reference_scenes import direction, log_uniform
 
 from problems import P1
 from rigid_proto_ros.base.compilation import new_record
@@ -21,11 +21,6 @@ EPSILON = 2.0**-52
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 LONGEST = 3.0
 """rad. Beyond it a rounding of the start grows with the motion itself, and the closed form below judges."""
-
-
-def direction(rng):
-    w = rng.normal(size=3)
-    return w / np.sqrt((w * w).sum())
 
 
 def body_of(second_moments):

@@ -47,6 +47,27 @@ def test_a_wrench_that_the_integrator_cannot_carry_is_refused_and_the_flight_goe
     assert simulation.advance(2 * SECOND).sha256() == untouched.sha256()
 
 
+@pytest.mark.parametrize(
+    "name", ["taylor", "lie_midpoint", "dop853", "free_body", "free_body_strang", "semi_implicit_euler"]
+)
+def test_others_refuse_to_drop_the_gyroscopic_term_and_name_those_that_can(name):
+    with pytest.raises(CommandRefused, match="gyroscopic: false: auto, euler, midpoint, rk4$") as refusal:
+        flight(BODY, integrator=name, initial=SPIN, gyroscopic=False)
+    assert (refusal.value.field, refusal.value.reason) == ("integrator", "integrator")
+
+
+@pytest.mark.parametrize("name", ["auto", "euler", "midpoint", "rk4"])
+def test_without_the_gyroscopic_term_energy_and_size_of_momentum_stay_but_its_direction_turns(name):
+    simulation = flight(BODY, integrator=name, initial=SPIN, gyroscopic=False)
+    energy, momentum = simulation.kinetic_energy, simulation.angular_momentum
+    for half in range(1, 5):
+        simulation.advance(half * SECOND // 2)
+        now = simulation.angular_momentum
+        assert simulation.kinetic_energy == pytest.approx(energy, rel=1e-12)
+        assert np.linalg.norm(now) == pytest.approx(np.linalg.norm(momentum), rel=1e-12)
+    assert now @ momentum < 0.99 * (momentum @ momentum)
+
+
 def test_impulses_are_for_all_because_no_integrator_sees_them():
     simulation = flight(BODY, integrator="free_body", initial=SPIN)
     simulation.submit(wrench("body@point/.1,.2,.3;impulse", (1.0, 0.0, 0.0), held=False), SECOND)

@@ -6,10 +6,10 @@ wrenches, a free end that moves; bodies from micrometres to kilometres.
 """
 
 import numpy as np
-from feature_scenes import END_S, FEATURES, everyday_scene, make_scene, share
 from flights import SECOND
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from reference_scenes import END_S, FEATURES, everyday_scene, make_scene, share
 
 END_NS = round(END_S * SECOND)
 
@@ -21,9 +21,9 @@ END_NS = round(END_S * SECOND)
     seed=st.integers(0, 2**32 - 1),
 )
 def test_any_features_together_fly_as_the_reference_does_in_one_portion_or_a_hundred(features, accuracy, seed):
-    scene = make_scene(features, np.random.default_rng(seed), accuracy)
-    assert share(scene, scene.row_at, accuracy) <= 1.0
-    whole, split = scene.simulation(), scene.simulation()
+    scene = make_scene(features, np.random.default_rng(seed))
+    assert share(scene, accuracy) <= 1.0
+    whole, split = (scene.simulation(accuracy=accuracy) for _ in range(2))
     whole.advance(END_NS)
     for time_ns in np.sort(np.random.default_rng([7, seed]).integers(0, END_NS, 100)):
         split.advance(int(time_ns))
@@ -34,7 +34,8 @@ def test_any_features_together_fly_as_the_reference_does_in_one_portion_or_a_hun
 
 
 @settings(max_examples=8, deadline=None)
-@given(st.integers(0, 10**6))
-def test_everyday_throws_on_a_rope_fly_as_the_reference_does(seed):
-    scene = everyday_scene(seed)
-    assert share(scene, scene.row_at, 1e-9) <= 1.0
+@given(st.integers(0, 10**6), st.sampled_from([1e-9, 1e-3, 1e-6, 1e-12]))
+# The knot turns by 1.1 rad in one step of free flight; caught 2e-8 s too late it is 1e-6 off.
+@example(8650, 1e-9)
+def test_everyday_throws_on_a_rope_fly_as_the_reference_does(seed, accuracy):
+    assert share(everyday_scene(seed), accuracy) <= 1.0
