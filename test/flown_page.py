@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import io
-import re
+import json
 import time
 import zipfile
 from collections.abc import Callable, Iterator
@@ -195,18 +195,43 @@ class FlownPage:
         self.wait_until_still()
         self.do(lambda: asyncio.sleep(0.0))
 
-    def pick(self, title: str) -> None:
-        """A lesson of the list, and the first answer to its question."""
-        self.set("Lesson", title)
-        self.until(lambda: self.page.lessons._asked, "question")
+    def ask(self, name: str) -> None:
+        """A lesson of the list from its beginning, with its question."""
+        self.set("Lesson", FREE)
+        self.set("Lesson", lesson(name).title)
+        self.until(lambda: self.page.lessons._asked and not self.page._undrawn, "question")
+
+    def pick(self, name: str) -> None:
+        """The same, and the first answer to its question."""
+        self.ask(name)
         self.do(lambda: self.page.lessons.answer(0))
         self.fly(0.0)
 
     def start_over(self) -> None:
         """The first lesson anew; nothing said."""
-        self.set("Lesson", FREE)
-        self.pick(lesson("t_handle").title)
+        self.pick("t_handle")
         self.said.clear()
+
+    def begin(self, scene: dict) -> None:
+        """A scene by its parameters."""
+        assert self.do(lambda: self.page.flight.fly(scene))
+        self.fly(0.0)
+
+    def act(self, entry: dict) -> None:
+        """An entry of a poke script, without its time."""
+        self.do(lambda: self.page.flight.do(entry))
+
+    @property
+    def events(self) -> list[dict]:
+        """What was done since the last reset, as the event log has it."""
+        return [json.loads(line) for _, line in self.page.flight.memory.session().events]
+
+    def look_back(self, seconds: float) -> None:
+        """At the past, or, with 0, at the present."""
+        self._update(self.widget("Seconds back"), seconds)
+        self.until(lambda: (self.page._drawn_moment_ns is not None) == (seconds > 0.0), "moment")
+        if seconds > 0.0:
+            self.until(lambda: self.widget("Simulation").options[0] == "Play", "button")
 
     def click(self, mesh_point, direction=None) -> None:
         """Click on the body, as it is drawn, where it has this point; direction of the view (3,) [world]."""
@@ -258,7 +283,3 @@ def flies_again(flown: FlownPage, folder: Path) -> tuple[dict, list[Command]]:
         again.advance(flown.live.state.time_ns)
     assert again.simulation.state.row.tobytes() == flown.live.state.row.tobytes()
     return scenario.parameters.named(), script
-
-
-def numbers(text: str) -> list[float]:
-    return [float(x) for x in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)]

@@ -17,7 +17,7 @@ import pytest
 
 pytest.importorskip("viser", reason="viser is not installed: no interactive page")
 
-from flown_page import PATIENCE_S, FlownPage, flies_again, numbers
+from flown_page import PATIENCE_S, FlownPage, flies_again
 from mesh_files import CUBE_QUADS, obj
 from workbench_page import bare_page
 
@@ -30,7 +30,7 @@ from rigid_proto_ros.simulation.observer import Published, SceneChanged
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench import pointer
 from rigid_proto_ros.workbench.flight import COMPILING, RunMemory
-from rigid_proto_ros.workbench.lessons import COURSES, FREE
+from rigid_proto_ros.workbench.lessons import COURSES
 from rigid_proto_ros.workbench.page import CLASS_LABELS
 from rigid_proto_ros.workbench.panel import CENTRE_OF_MASS, SEE_INTO, motion_words
 from rigid_proto_ros.workbench.readouts import DRIFT, ENERGY, PLOTTED_S, ROTATIONAL, SPEED, TRANSLATIONAL
@@ -48,9 +48,7 @@ def test_a_lesson_that_asks_begins_at_its_time_0_with_its_ghost_however_fast_tim
 
     monkeypatch.setattr(flown.live, "begin", begin_and_go_on)
     for _ in range(2):
-        flown.set("Lesson", FREE)
-        flown.set("Lesson", lesson("true_or_box_tensor").title)
-        flown.until(lambda: flown.page.lessons._asked and not flown.page._undrawn, "question")
+        flown.ask("true_or_box_tensor")
         ghost, start = flown.node(style.GHOST), flown.scenario.setup.initial
         assert flown.live.state.time_ns == flown.page.state.time_ns == 0
         assert np.allclose(np.roll(ghost.wxyz, -1), start[3:7])
@@ -62,28 +60,28 @@ def test_a_lesson_that_asks_begins_at_its_time_0_with_its_ghost_however_fast_tim
         flown.fly(1.0)
         assert not np.allclose(np.roll(ghost.wxyz, -1), start[3:7])
     # Of the ghost no past is kept, so none is shown beside the body's.
-    flown._update(flown.widget("Seconds back"), 0.5)
+    flown.look_back(0.5)
     flown.until(lambda: style.GHOST_MESH not in flown.page.backend._nodes, "past without a ghost")
-    flown._update(flown.widget("Seconds back"), 0.0)
+    flown.look_back(0.0)
     flown.until(lambda: flown.node(style.GHOST_MESH).visible, "ghost")
     # One that another client switches off meanwhile is gone.
-    flown._update(flown.widget("Seconds back"), 0.5)
+    flown.look_back(0.5)
     flown.live.set_parameters({"ghost.inertia_model": ""})
     flown.wait_until_still()
-    flown._update(flown.widget("Seconds back"), 0.0)
+    flown.look_back(0.0)
     flown.until(lambda: flown.page._drawn_moment_ns is None and not flown.page._undrawn, "present")
-    assert style.GHOST_MESH not in flown.page.backend._nodes
+    assert style.GHOST_MESH not in flown.page.backend._nodes and flown.page._ghost_state() is None
 
 
 def test_a_near_miss_of_the_centre_of_mass_ticks_nothing_and_the_speed_is_read_off(flown: FlownPage) -> None:
-    flown.pick(lesson("com_or_rim").title)
+    flown.pick("com_or_rim")
     com = flown.scenario.setup.body.center_of_mass
     # Of the throat's rim, a seventh of the racket off.
-    flown.do(lambda: flown.page.flight.do({"at": {"point": (com + [0.1, 0.0, 0.0]).tolist()}, "force": [0, 0, -1.0]}))
+    flown.act({"at": {"point": (com + [0.1, 0.0, 0.0]).tolist()}, "force": [0, 0, -1.0]})
     flown.fly(0.1)
     assert flown.page.lessons._progress.done == 0
     flown.reset()
-    flown.do(lambda: flown.page.flight.do({"force": [0, 0, -1.0]}))
+    flown.act({"force": [0, 0, -1.0]})
     flown.fly(0.1)
     assert flown.page.lessons._progress.done == 1
     speed = float(np.linalg.norm(flown.live.state.linear_velocity))
@@ -95,7 +93,7 @@ def test_nothing_of_the_body_before_stays_when_another_scene_begins(flown: Flown
     flown.do(lambda: flown.page.flight.set({"ballast.nut": [0.1, 0.0, 0.0, 0.05]}))
     flown.wait_until_still()
     assert "nut" in flown.scenario.parameters.ballast
-    flown.pick(lesson("teapot").title)
+    flown.pick("teapot")
     parameters = flown.scenario.parameters
     assert not parameters.ballast
     assert not parameters.thrusters
@@ -105,8 +103,7 @@ def test_nothing_of_the_body_before_stays_when_another_scene_begins(flown: Flown
         return [n for n in flown.server.scene._handle_from_node_name if n.startswith(f"/{style.BODY_MESH}")]
 
     assert len(drawn()) == 1
-    flown.do(lambda: flown.page.flight.fly({"mesh": "", "inertia_model": "explicit"}))
-    flown.fly(0.0)
+    flown.begin({"mesh": "", "inertia_model": "explicit"})
     assert not drawn()
 
 
@@ -118,7 +115,7 @@ def test_an_upload_flies_alone_and_its_take_holds_it(flown: FlownPage, tmp_path)
     flown.fly(0.0)
     parameters = flown.scenario.parameters
     assert not parameters.contacts and not parameters.thrusters and not parameters.ballast
-    flown.do(lambda: flown.page.flight.do({"at": {"point": [0.06, 0.0, 0.29]}, "force": [1.0, 0.0, 0.0]}))
+    flown.act({"at": {"point": [0.06, 0.0, 0.29]}, "force": [1.0, 0.0, 0.0]})
     flown.fly(1.0)
     values, _ = flies_again(flown, tmp_path)
     assert values["mesh"] == "my_hammer.obj"
@@ -156,24 +153,26 @@ def test_for_an_open_mesh_the_page_offers_repair_or_hull_and_flies_it(
 def test_what_was_done_before_a_reset_is_no_part_of_what_is_saved(flown: FlownPage, tmp_path: Path) -> None:
     push = {"at": {"point": [0.0, 0.0, 0.068]}, "force": [0.0, 1.0, 0.0]}
     flown.do(lambda: flown.page.flight.set({"mass": 0.2}))
-    flown.do(lambda: flown.page.flight.do(push))
+    flown.act(push)
     flown.fly(0.5)
     flown.reset()
-    flown.do(lambda: flown.page.flight.do(push))
+    flown.act(push)
     flown.fly(0.5)
     values, script = flies_again(flown, tmp_path)
     assert values["mass"] == 0.2 and [command.kind for command in script] == ["poke"]
+    # A bundled mesh stays a name.
+    assert resolve_mesh(values["mesh"]) == resolve_mesh("t_handle")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.yaml", "script.yaml"]
 
 
 def test_what_is_done_after_going_back_is_saved_from_there(flown: FlownPage, tmp_path: Path) -> None:
     for force, seconds in (([0.0, 1.0, 0.0], 1.0), ([0.0, 0.0, 2.0], 1.0)):
-        flown.do(lambda force=force: flown.page.flight.do({"at": "tip", "force": force}))
+        flown.act({"at": "tip", "force": force})
         flown.fly(seconds)
-    flown._update(flown.widget("Seconds back"), 1.5)
-    flown.until(lambda: flown.widget("Simulation").options[0] == "Play", "button")
+    flown.look_back(1.5)
     flown.press("Play", of="Simulation")
     flown.fly(0.3)
-    flown.do(lambda: flown.page.flight.do({"at": "tip", "force": [1.0, 0.0, 0.0]}))
+    flown.act({"at": "tip", "force": [1.0, 0.0, 0.0]})
     flown.fly(0.7)
     _, script = flies_again(flown, tmp_path)
     assert [command.force for command in script] == [(1.0, 0.0, 0.0)]
@@ -204,7 +203,7 @@ def test_the_energies_of_a_spinning_nut_are_read_off_and_those_that_rounding_lea
         "explicit_inertia.tensor": [1e-9, 0.0, 0.0, 1.1e-9, 0.0, 1.2e-9],
         "initial.angular_velocity": [0.0, 0.0, 1.0],
     }
-    flown.do(lambda: flown.page.flight.fly({**nut, "initial.linear_velocity": [1e-10, 0.0, 0.0]}))
+    flown.begin({**nut, "initial.linear_velocity": [1e-10, 0.0, 0.0]})
     flown.fly(0.1)
     values = flown.page.readings.values
     assert (values[ROTATIONAL], values[TRANSLATIONAL]) == ("6e-10 J", "0 J")
@@ -225,10 +224,9 @@ def test_plots_are_drawn_against_seconds_before_now_also_after_a_jump_of_time(fl
 def test_a_branch_begins_at_the_moment_looked_at_to_which_reset_returns(flown: FlownPage) -> None:
     flown.fly(3.0)
     rows = list(flown.seen.rows)
-    flown._update(flown.widget("Seconds back"), 2.0)
-    moment_ns = flown.until(lambda: flown.page.flight.moment_ns, "moment of the past")
+    flown.look_back(2.0)
+    moment_ns = flown.page.flight.moment_ns
     assert moment_ns == pytest.approx(1_000_000_000, abs=10_000_000)
-    flown.until(lambda: flown.widget("Simulation").options[0] == "Play", "button")
     flown.press("Play", of="Simulation")
     flown.fly(0.5)
     k = next(k for k, (time_ns, _) in enumerate(rows) if time_ns == moment_ns)
@@ -242,7 +240,7 @@ def test_the_energy_holds_the_string_of_its_moment_also_of_one_that_is_looked_ba
     flown.fly(0.2)
     flown.until(lambda: flown.page.readout_tab._free.shown, "plot without a string")
     assert not flown.page.readout_tab._held.shown
-    flown.do(lambda: flown.page.flight.do({"string": {"attach": "tip", "target": [0.3, 0.0, 0.2]}}))
+    flown.act({"string": {"attach": "tip", "target": [0.3, 0.0, 0.2]}})
     flown.fly(0.2)
     tab = flown.page.readout_tab
     flown.until(lambda: tab._held.shown and not tab._free.shown, "plot with the string's energy")
@@ -251,13 +249,11 @@ def test_the_energy_holds_the_string_of_its_moment_also_of_one_that_is_looked_ba
     total, held = flown.page.readings.samples[-1][4:6]
     assert held == pytest.approx(tied, rel=1e-9) and tied > 0.0
     flown.fly(0.1)
-    flown.do(lambda: flown.page.flight.do({"string": "release"}))
+    flown.act({"string": "release"})
     flown.fly(0.5)
     assert flown.page.readings.samples[-1][5] == 0.0
-    flown._update(flown.widget("Seconds back"), 0.6)
-    moment_ns = flown.until(lambda: flown.page.flight.moment_ns, "moment of the past")
-    assert moment_ns == 400_000_000
-    assert flown.until(lambda: flown.page.state.time_ns == moment_ns, "state of the past")
+    flown.look_back(0.6)
+    assert flown.until(lambda: flown.page.state.time_ns == 400_000_000, "state of the past")
     assert float(flown.page.readings.values[ENERGY].split()[0]) == pytest.approx(total, rel=1e-4)
     assert flown.page.picture.string.tied
     # Nor does what is looked back at let the next lesson's time begin before its question is answered.
@@ -274,8 +270,7 @@ def test_the_last_page_that_closes_while_it_looks_back_leaves_the_body_as_it_was
     page = flown.page
     flown.do(lambda: page.flight.pause(paused))
     flown.fly(1.0)
-    flown._update(flown.widget("Seconds back"), 0.5)
-    flown.until(lambda: page.flight.moment_ns, "moment of the past")
+    flown.look_back(0.5)
     flown.wait_until_asked()
     assert flown.live.paused
     flown.leave()
@@ -356,20 +351,15 @@ def test_where_the_first_browser_is_refused_the_body_by_a_busy_machine_the_next_
 
 def test_while_paused_what_is_done_by_hand_acts_in_its_order(flown: FlownPage) -> None:
     flown.press("Pause", of="Simulation")
-    flight = flown.page.flight
     place = flown.live.state.position + [0.0, 0.0, 0.2]
-    flown.do(lambda: flight.do({"string": {"target": place.tolist()}}))
-    flown.do(lambda: flight.do({"force": [1.0, 0.0, 0.0]}))
-    flown.do(lambda: flight.do({"string": "release"}))
+    flown.act({"string": {"target": place.tolist()}})
+    flown.act({"force": [1.0, 0.0, 0.0]})
+    flown.act({"string": "release"})
     flown.wait_until_still()
     flown.press("Play", of="Simulation")
     flown.fly(0.1)
-    kinds = [line for _, line in flight.memory.session().events if '"pause"' not in line and '"reset"' not in line]
-    assert [kind for line in kinds for kind in ("string_target", "poke", "string_release") if kind in line] == [
-        "string_target",
-        "poke",
-        "string_release",
-    ]
+    kinds = [event["kind"] for event in flown.events]
+    assert [kind for kind in kinds if kind not in ("pause", "reset")] == ["string_target", "poke", "string_release"]
 
 
 def test_while_paused_the_bar_says_that_what_was_done_acts_on_play(flown: FlownPage) -> None:
@@ -385,8 +375,7 @@ def test_while_paused_the_bar_says_that_what_was_done_acts_on_play(flown: FlownP
 
 
 def string_events(flown: FlownPage) -> list[str]:
-    lines = [json.loads(line)["kind"] for _, line in flown.page.flight.memory.session().events]
-    return [kind for kind in lines if kind.startswith("string")]
+    return [event["kind"] for event in flown.events if event["kind"].startswith("string")]
 
 
 def test_the_string_is_of_the_page_that_grabbed_first_and_goes_with_it(flown: FlownPage) -> None:
@@ -458,8 +447,7 @@ def test_a_factor_is_ten_to_its_slider_that_of_the_mass_without_the_ballast(
     flown: FlownPage, values: dict, parameter: str
 ) -> None:
     scene = {"mesh": "t_handle", "ballast.weight": [0.6, 0.0, 0.0, 0.0], **values}
-    flown.do(lambda: flown.page.flight.fly(scene))
-    flown.fly(0.0)
+    flown.begin(scene)
     own = flown.scenario.setup.body.mass - 0.6
     assert flown.widget("Mass ×").value == (0.0,)
     flown.set("Mass ×", (1.0,))
@@ -502,7 +490,7 @@ def test_a_pushed_body_shows_the_force_and_at_most_three_labels(flown: FlownPage
 
 
 def test_names_stay_at_their_contacts_when_the_body_changes_and_when_the_past_is_shown(flown: FlownPage) -> None:
-    flown.pick(lesson("hammer").title)
+    flown.pick("hammer")
     page = flown.page
 
     def named_where_they_are() -> None:
@@ -517,8 +505,7 @@ def test_names_stay_at_their_contacts_when_the_body_changes_and_when_the_past_is
         flown.set(label, value)
         flown.fly(0.5)
         named_where_they_are()
-    flown._update(flown.widget("Seconds back"), 1.2)
-    flown.until(lambda: page._drawn_moment_ns is not None, "moment of the past")
+    flown.look_back(1.2)
     named_where_they_are()
 
 
@@ -530,13 +517,15 @@ def test_a_click_on_a_body_that_is_to_change_when_time_goes_on_hits_what_is_draw
     flown.click((0.0, 0.0, 0.065), flown.live.state.rotation @ np.array([0.0, -1.0, 0.0]))
     flown.press("Play", of="Simulation")
     flown.fly(0.02)
-    lines = [json.loads(line) for _, line in flown.page.flight.memory.session().events]
-    (point,) = (line["content"]["frame_id"].partition("point/")[2] for line in lines if line["kind"] == "poke")
-    assert float(point.split(",")[2]) == pytest.approx(0.065, abs=1e-6), "mesh coordinates, whatever the scale"
+    (poke,) = (event["content"] for event in flown.events if event["kind"] == "poke")
+    assert float(poke["frame_id"].split(",")[2]) == pytest.approx(0.065, abs=1e-6), (
+        "mesh coordinates, whatever the scale"
+    )
 
 
 def test_of_a_tensor_no_rounding_is_shown(flown: FlownPage) -> None:
-    assert [x == 0.0 for x in numbers(flown.widget("Tensor").value)] == [False, True, True, False, True, False]
+    entries = [float(entry) for entry in flown.widget("Tensor").value.split()]
+    assert [entry == 0.0 for entry in entries] == [False, True, True, False, True, False]
     assert "| 0 % |" in flown.page.body_tab._table.content, "the masses of the two models"
 
 
@@ -556,9 +545,7 @@ def test_a_body_of_any_size_fills_the_picture_alike_and_grows_in_sight(flown: Fl
 def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_things(
     flown: FlownPage, name: str
 ) -> None:
-    flown.set("Lesson", FREE)
-    flown.set("Lesson", lesson(name).title)
-    flown.until(lambda: flown.page.lessons._asked and not flown.page._undrawn, "question")
+    flown.ask(name)
     page, setup = flown.page, flown.scenario.setup
     backend = page.backend
     flown.do(lambda: page.tick(time.monotonic()))  # with the labels of this lesson
@@ -669,7 +656,7 @@ def test_a_lesson_that_is_picked_while_kernels_are_compiled_begins_when_they_are
 
 
 def test_a_gravity_whose_square_is_0_is_no_reason_not_to_draw(flown: FlownPage) -> None:
-    assert flown.do(lambda: flown.page.flight.fly({"mesh": "hammer", "gravity": [1e-300, 0.0, 0.0]}))
+    flown.begin({"mesh": "hammer", "gravity": [1e-300, 0.0, 0.0]})
     flown.fly(0.1)
     assert flown.page.picture.setup is flown.scenario.setup
 

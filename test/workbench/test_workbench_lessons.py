@@ -16,7 +16,6 @@ from flown_page import FlownPage, without_waiting
 
 from rigid_proto_ros.base.bundled import scene_names
 from rigid_proto_ros.picture import style
-from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.workbench import readouts
 from rigid_proto_ros.workbench.lessons import COURSES, FREE, LessonProgress
 from rigid_proto_ros.workbench.panel import PATHS
@@ -39,7 +38,7 @@ class User(FlownPage):
         """A click on the mark of the centre of mass, which may lie where there is no body."""
         mark = self.page._com
         assert mark.visible and mark._impl.click_cb and mark._impl.drag_cb, "it lies before the body"
-        self.do(lambda: self.page.flight.do({"force": [0.0, 0.0, -self.page.pointer.force]}))
+        self.act({"force": [0.0, 0.0, -self.page.pointer.force]})
         self.fly(0.06)
 
     def drag(self, *point: float) -> None:
@@ -190,7 +189,7 @@ def test_every_sentence_of_every_lesson_has_a_step() -> None:
 def test_every_step_of_the_lesson_can_be_done_on_the_page_and_gets_its_mark(user: User, name: str) -> None:
     user.set("Lesson", FREE)
     user.said.clear()
-    user.pick(lesson(name).title)
+    user.pick(name)
     text = user.page.lessons._text
     assert text.content.count("✓") == 0
     for done, step in enumerate(STEPS[name], 1):
@@ -230,8 +229,7 @@ def test_time_that_jumps_was_not_watched_and_another_lesson_begins_without_marks
 
 
 def test_a_drag_is_done_when_the_body_is_released_and_not_by_a_reset(user: User) -> None:
-    user.set("Lesson", FREE)
-    user.pick(lesson("t_handle").title)
+    user.pick("t_handle")
     user.fly(4.1)
     user.push(0.0, 0.0, 0.068)
     user.fly(2.1)
@@ -250,9 +248,8 @@ def test_a_drag_is_done_when_the_body_is_released_and_not_by_a_reset(user: User)
 
 
 def test_factors_are_those_of_the_body_that_a_lesson_begins_with(user: User) -> None:
-    for name in ("hammer", "com_or_rim", "book", "weigh_by_throwing"):
-        user.set("Lesson", FREE)
-        user.pick(lesson(name).title)
+    for name in ("com_or_rim", "weigh_by_throwing"):
+        user.pick(name)
         user.fly(0.1)
         assert user.widget("Mass ×").value == user.widget("Size ×").value == (0.0,)
         user.set("Mass ×", (0.3,))
@@ -264,9 +261,8 @@ def test_factors_are_those_of_the_body_that_a_lesson_begins_with(user: User) -> 
 
 def test_beginning_a_lesson_is_no_action_of_its_user(user: User) -> None:
     # The lesson before has another density, which the first step here asks to change.
-    for title in (lesson("t_handle").title, lesson("weigh_by_throwing").title):
-        user.set("Lesson", FREE)
-        user.pick(title)
+    for name in ("t_handle", "weigh_by_throwing"):
+        user.pick(name)
         user.fly(0.1)
     assert user.scenario.parameters.density == 700.0
     user.fly(3.0)
@@ -283,8 +279,7 @@ def test_beginning_a_lesson_is_no_action_of_its_user(user: User) -> None:
 
 
 def test_going_on_from_the_past_is_no_action_of_a_step(user: User) -> None:
-    user.set("Lesson", FREE)
-    user.pick(lesson("top_on_string").title)
+    user.pick("top_on_string")
     user.fly(2.1)
     text = user.page.lessons._text
     assert text.content.count("✓") == 1

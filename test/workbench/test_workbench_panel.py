@@ -42,8 +42,7 @@ def test_a_weight_that_is_added_is_an_option_once_as_is_one_of_the_scene(flown: 
     assert flown.scenario.parameters.ballast == {"weight": (0.05, 0.0, 0.0, 0.05)}
     flown.set("Parameter", "mass")
     every_option_is_there_once(flown)
-    flown.do(lambda: flown.page.flight.fly({"mesh": "hammer", NEW_WEIGHT: [0.1, 0.0, 0.0, 0.0]}))
-    flown.fly(0.0)
+    flown.begin({"mesh": "hammer", NEW_WEIGHT: [0.1, 0.0, 0.0, 0.0]})
     every_option_is_there_once(flown)
 
 
@@ -72,8 +71,7 @@ def test_the_gravity_in_force_is_shown_by_its_name_or_its_numbers(flown: FlownPa
 
 
 def test_size_and_mass_in_force_are_said_with_their_units(flown: FlownPage) -> None:
-    flown.do(lambda: flown.page.flight.fly({"mesh": "hollow_box", "mass": 2.0}))
-    flown.fly(0.0)
+    flown.begin({"mesh": "hollow_box", "mass": 2.0})
     flown.set("Size ×", (math.log10(2.0),))
     sides = " × ".join(f"{side:.3g}" for side in 2.0 * flown.scenario.setup.surface.extent)
     assert f">{sides} m, 2 kg<" in flown.page.body_tab._size_and_mass.content
@@ -111,8 +109,7 @@ def test_what_was_just_typed_is_taken_before_another_parameter_is_chosen_or_time
     assert flown.live.state.time_ns == 0 and np.linalg.norm(flown.live.state.angular_velocity) == pytest.approx(5.0)
     # What is typed for one scene is nothing to the next.
     flown.set("Density [kg/m³]", "3")
-    assert flown.do(lambda: flown.page.flight.fly({"mesh": "hammer", "density": 2000.0}))
-    flown.fly(0.0)
+    flown.begin({"mesh": "hammer", "density": 2000.0})
     assert flown.scenario.parameters.density == 2000.0 and flown.widget("Density [kg/m³]").value == "2000"
     flown.press("Reset", of="Simulation")
     assert flown.scenario.parameters.density == 2000.0 and not flown.said
@@ -203,7 +200,7 @@ def test_a_mesh_of_any_path_is_saved_with_its_run(
     shutil.copy(resolve_mesh("hammer"), here / name)
     monkeypatch.chdir(here)
     mesh = name if name == "part.obj" else str(here / name)
-    assert flown.do(lambda: flown.page.flight.fly({"mesh": mesh, "initial.angular_velocity": [1.0, 2.0, 3.0]}))
+    flown.begin({"mesh": mesh, "initial.angular_velocity": [1.0, 2.0, 3.0]})
     flown.fly(0.3)
     values, _, files = save_and_fly_elsewhere(flown, tmp_path / "elsewhere")
     assert [values["mesh"]] == files
@@ -226,19 +223,12 @@ def test_the_mesh_of_the_start_and_those_of_later_changes_are_saved(flown: Flown
     assert [command.content["mesh"] for command in script] == ["book", "x_2.obj"]
 
 
-def test_a_bundled_mesh_stays_a_name(flown: FlownPage, tmp_path: Path) -> None:
-    flown.set("Body", "hammer")
-    flown.fly(0.2)
-    values, _, files = save_and_fly_elsewhere(flown, tmp_path / "elsewhere")
-    assert resolve_mesh(values["mesh"]) == resolve_mesh("t_handle") and not files
-
-
 def test_nothing_is_saved_without_a_mesh_that_is_gone_or_that_reads_other_files(
     flown: FlownPage, tmp_path: Path
 ) -> None:
     gone = tmp_path / "gone.obj"
     shutil.copy(resolve_mesh("hammer"), gone)
-    assert flown.do(lambda: flown.page.flight.fly({"mesh": str(gone)}))
+    flown.begin({"mesh": str(gone)})
     flown.set("Body", "book")
     flown.fly(0.1)
     gone.unlink()
@@ -248,7 +238,7 @@ def test_nothing_is_saved_without_a_mesh_that_is_gone_or_that_reads_other_files(
     (tmp_path / "two.bin").write_bytes(cube.bytes)
     document = {**cube.json, "buffers": [{"uri": "two.bin", "byteLength": len(cube.bytes)}]}
     (tmp_path / "two.gltf").write_text(json.dumps(document))
-    flown.do(lambda: flown.page.flight.fly({"mesh": str(tmp_path / "two.gltf")}))
+    flown.begin({"mesh": str(tmp_path / "two.gltf")})
     flown.fly(0.1)
     with pytest.raises(InputError, match=r"two\.gltf.*\.glb"):
         flown.page.session_tab._take()
@@ -263,8 +253,7 @@ def test_one_can_go_on_from_the_past_of_an_upload_when_another_file_was_uploaded
     flown.set("Body", "hammer")
     flown.fly(1.0)
     flown.do(lambda: folder.take("second.obj", b"# z up\n" + resolve_mesh("book").read_bytes()))
-    flown._update(flown.widget("Seconds back"), 1.5)
-    flown.until(lambda: flown.widget("Simulation").options[0] == "Play", "button")
+    flown.look_back(1.5)
     flown.press("Play", of="Simulation")
     flown.fly(0.3)
     assert not flown.said and flown.scenario.parameters.mesh == first

@@ -9,18 +9,7 @@ import pytest
 pytest.importorskip("viser")
 from flown_page import FlownPage
 
-from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.workbench.readouts import ENERGY, MOMENTUM
-
-
-def look_back(flown: FlownPage, seconds: float) -> None:
-    flown._update(flown.widget("Seconds back"), seconds)
-    flown.until(lambda: flown.page._drawn_moment_ns is not None, "moment of the past")
-
-
-def look_at_present(flown: FlownPage) -> None:
-    flown._update(flown.widget("Seconds back"), 0.0)
-    flown.until(lambda: flown.page._drawn_moment_ns is None, "present")
 
 
 def set_parameters(flown: FlownPage, **values) -> None:
@@ -41,49 +30,45 @@ def test_the_past_is_shown_with_the_body_that_moved_then(flown: FlownPage) -> No
     flown.fly(0.5)
     last = flown.scenario.setup
     assert readings(flown) != numbers and picture.setup is last
-    look_back(flown, 1.5)
+    flown.look_back(1.5)
     assert readings(flown) == numbers and picture.setup is first
     assert len(picture._vertices) == len(first.surface.vertices)
     assert picture.shape.size * flown.page.backend.unit > 0.0 and flown.page._unit == flown.page.backend.unit
-    look_at_present(flown)
+    flown.look_back(0.0)
     assert picture.setup is last and len(picture._vertices) == len(last.surface.vertices)
 
 
-@pytest.mark.parametrize(
-    "act",
-    [
-        lambda flown: flown.click((0.0, 0.045, 0.0), (1.0, 0.0, 0.0)),
-        lambda flown: flown.grab((0.0, 0.045, 0.0)),
-        lambda flown: flown.do(lambda: flown.page.flight.set({"mass": 1.0})),
-    ],
-    ids=["click", "drag", "parameter"],
-)
-def test_what_is_done_while_the_past_is_shown_is_refused_with_what_to_do(flown: FlownPage, act) -> None:
+def test_what_is_done_while_the_past_is_shown_is_refused_with_what_to_do(flown: FlownPage) -> None:
     flown.fly(1.0)
-    look_back(flown, 0.5)
-    session = flown.page.flight.memory.session
-    before, mass = len(session().events), flown.scenario.setup.body.mass
-    act(flown)
-    flown.wait_until_asked()
-    assert flown.said == ["The past is shown: press Play to go on from here, or return to the present first."]
-    assert len(session().events) == before and flown.scenario.setup.body.mass == mass
-    assert not flown.page.pointer.dragging
+    flown.look_back(0.5)
+    before, mass = len(flown.events), flown.scenario.setup.body.mass
+    for act in (
+        lambda: flown.click((0.0, 0.045, 0.0), (1.0, 0.0, 0.0)),
+        lambda: flown.grab((0.0, 0.045, 0.0)),
+        lambda: flown.do(lambda: flown.page.flight.set({"mass": 1.0})),
+    ):
+        act()
+        flown.wait_until_asked()
+        refusal = "The past is shown: press Play to go on from here, or return to the present first."
+        assert flown.said.pop() == refusal and not flown.said
+        assert len(flown.events) == before and flown.scenario.setup.body.mass == mass
+        assert not flown.page.pointer.dragging
     # How one looks at the motion can be changed.
     set_parameters(flown, real_time_factor=2.0)
-    assert flown.scenario.parameters.real_time_factor == 2.0 and len(flown.said) == 1
-    look_at_present(flown)
+    assert flown.scenario.parameters.real_time_factor == 2.0 and not flown.said
+    flown.look_back(0.0)
     flown.fly(0.1)
 
 
 def test_going_on_from_the_past_moves_neither_the_camera_nor_the_reference_of_size_and_mass(
     flown: FlownPage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    flown.pick(lesson("thrown_hammer").title)
+    flown.pick("thrown_hammer")
     flown.set("Mass ×", (0.3,))
     flown.fly(0.6)
     looks: list[object] = []
     monkeypatch.setattr(flown.page.room, "look", looks.append)
-    look_back(flown, 0.3)
+    flown.look_back(0.3)
     seen = flown.page.backend.origin.copy()
     flown.do(flown.page.flight.go_on_from_here)
     flown.fly(0.0)
@@ -97,10 +82,9 @@ def test_going_on_from_the_past_moves_neither_the_camera_nor_the_reference_of_si
 
 
 def test_an_answer_to_a_lessons_question_returns_from_the_past_to_the_motion(flown: FlownPage) -> None:
-    flown.set("Lesson", lesson("book").title)
-    flown.until(lambda: flown.page.lessons._asked, "question")
+    flown.ask("book")
     flown.fly(0.0)
-    look_back(flown, 1.0)
+    flown.look_back(1.0)
     flown.do(lambda: flown.page.lessons.answer(0))
     flown.fly(0.5)
     assert not flown.live.paused and flown.page.flight.moment_ns is None
@@ -112,7 +96,7 @@ def test_a_step_returns_from_the_past_to_the_present_and_time_stands_there(flown
     flown.do(lambda: flown.page.flight.pause(paused))
     flown.fly(1.0)
     before_ns = flown.live.state.time_ns
-    look_back(flown, 0.5)
+    flown.look_back(0.5)
     flown.press("Step", of="Simulation")
     flown.wait_until_asked()
     flown.until(lambda: flown.page._drawn_moment_ns is None, "present")
@@ -140,10 +124,10 @@ def test_plots_of_the_past_end_at_it_and_those_of_the_present_are_whole_again(fl
     flown.fly(10.0)
     whole = flown.page.readings.samples
     for seconds in (8.0, 2.0):
-        look_back(flown, seconds)
+        flown.look_back(seconds)
         flown.until(lambda s=seconds: abs(flown.page.state.time_ns - (10.0 - s) * 1e9) < 1e8, "moment")
         assert np.array_equal(flown.page.readings.samples, whole[whole[:, 0] <= 10.0 - seconds])
-    look_at_present(flown)
+    flown.look_back(0.0)
     assert np.array_equal(flown.page.readings.samples, whole)
 
 
@@ -158,7 +142,7 @@ def test_after_a_reset_while_time_stands_the_plots_of_the_run_before_are_gone(fl
 
 def test_what_another_client_does_while_the_past_is_shown_is_shown(flown: FlownPage) -> None:
     flown.fly(1.0)
-    look_back(flown, 0.5)
+    flown.look_back(0.5)
     flown.live.set_parameters({"density": 1234.5})
     flown.until(lambda: flown.widget("Density [kg/m³]").value == "1234.5", "density set elsewhere")
     flown.live.reset()
@@ -166,12 +150,3 @@ def test_what_another_client_does_while_the_past_is_shown_is_shown(flown: FlownP
     flown.wait_until_asked()
     assert not flown.live.paused and flown.page.state.time_ns == 0 and flown.page.flight.moment_ns is None
     assert len(flown.page.readings.samples) == 1
-
-
-def test_a_ghost_that_is_switched_off_is_gone_from_the_picture(flown: FlownPage) -> None:
-    flown.pick(lesson("true_or_box_tensor").title)
-    flown.fly(0.2)
-    assert flown.page.picture.ghost is not None
-    set_parameters(flown, ghost__inertia_model="")
-    flown.fly(0.1)
-    assert flown.page.picture.ghost is None and flown.page._ghost_state() is None

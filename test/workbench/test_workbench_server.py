@@ -37,7 +37,7 @@ NOT_HERE = "203.0.113.7"
 """An address that documents are written about: no machine has it."""
 
 
-@pytest.mark.parametrize("host", [NOT_HERE, "a..b", "http://127.0.0.1"])
+@pytest.mark.parametrize("host", ["a..b", "http://127.0.0.1"])
 def test_a_host_that_nothing_can_listen_on_is_refused_by_name(host: str) -> None:
     with pytest.raises(InputError, match="--host: got"):
         make_server(TITLE, host, None, any_free_port())
@@ -50,14 +50,14 @@ def test_the_address_that_is_told_is_one_that_a_browser_takes(host: str, address
     assert address_of(SimpleNamespace(get_host=lambda: host, get_port=lambda: 8080)) == address
 
 
-def test_a_port_asked_for_and_taken_is_refused_and_a_default_one_moves_on(server) -> None:
+def test_a_port_asked_for_and_taken_is_refused_and_a_default_one_moves_on_and_is_in_the_tabs_title(server) -> None:
     taken = server.get_port()
     with pytest.raises(InputError, match=f"--port: got {taken}"):
         make_server(TITLE, LOOPBACK, taken, taken)
     other = make_server(TITLE, LOOPBACK, None, taken)
     port = other.get_port()
     # A second one on this machine has its port in the tab's title, too.
-    assert port > taken and title(other) == f"{TITLE} :{port}"
+    assert port > taken and title(server) == TITLE and title(other) == f"{TITLE} :{port}"
     stop_server(other)
 
 
@@ -95,10 +95,6 @@ def title(server) -> str:
     (found,) = re.findall("<title>(.*)</title>", connection.getresponse().read().decode())
     connection.close()
     return found
-
-
-def test_the_browsers_tab_has_our_title(server) -> None:
-    assert title(server) == TITLE
 
 
 @pytest.mark.parametrize(
