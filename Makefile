@@ -53,7 +53,7 @@ lint: setup ## ruff and mypy
 pictures: setup run ## draw the pictures of README and lessons anew (needs mesa-vulkan-drivers and chromium)
 	.venv/bin/rigid_proto snapshot out/session.rrd --at 4.05 -o docs/flight.png
 	$(PY) docs/lessons/pictures.py
-	PYTHONPATH=test $(PY) test/workbench_pictures.py docs
+	PYTHONPATH=test $(PY) docs/page_pictures.py docs
 
 build: setup ## colcon build into build/, install/ and log/; then: source install/setup.bash
 	$(ROS) $(PY) -m colcon build --packages-select rigid_proto_ros

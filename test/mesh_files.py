@@ -142,11 +142,11 @@ def model(objects: str, *items: str, attributes: str = "") -> str:
     return f'<model unit="meter" {names} {attributes}><resources>{objects}</resources><build>{build}</build></model>'
 
 
-def threemf(root: str, **others: str) -> bytes:
+def threemf(root: str, method: int = zipfile.ZIP_DEFLATED, **others: str) -> bytes:
     """A .3mf archive with the model to be built, and others by their names."""
     relation = '<Relationship Target="/3D/root.model" Id="r" Type="http://x/3dmodel"/>'
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(packed, "w", method) as archive:
         archive.writestr("_rels/.rels", f"<Relationships>{relation}</Relationships>")
         archive.writestr("3D/root.model", root)
         for name, text in others.items():

@@ -124,14 +124,6 @@ def _check_installed(prefix: Path, found: list[str]) -> None:
     assert scenes.split() == bundled.scene_names()
 
 
-def test_package_xml_and_the_package_agree_on_version_and_name() -> None:
-    package = ElementTree.parse(SOURCE / "package.xml").getroot()
-    assert package.get("format") == "3"
-    assert package.findtext("name") == "rigid_proto_ros"
-    assert package.findtext("version") == rigid_proto_ros.__version__
-    assert package.findtext("export/build_type") == "ament_python"
-
-
 def test_every_source_file_names_its_licence() -> None:
     files = [
         path
@@ -155,10 +147,18 @@ ROS_PACKAGES = {
 """Released into Jazzy under these names."""
 
 
-def test_every_dependency_is_a_rosdep_key() -> None:
+def test_what_the_code_imports_of_ros_is_declared_and_every_dependency_is_a_rosdep_key() -> None:
     tree = ElementTree.parse(SOURCE / "package.xml")
     asked = {element.text for element in tree.iter() if element.tag.endswith("depend")}
     assert asked == ROSDEP_KEYS | ROS_PACKAGES
+    text = "\n".join(path.read_text("utf-8") for path in (SOURCE / "rigid_proto_ros").rglob("*.py"))
+    imported = set(
+        re.findall(r"^ *(?:from|import) (rclpy|ament\w*|\w+_(?:msgs|srvs|interfaces))\b", text, re.MULTILINE)
+    )
+    assert len(imported) > 8
+    # builtin_interfaces comes with every message package; the other one is served where it is installed.
+    declared = {element.text for element in tree.iter("exec_depend")}
+    assert imported - {"builtin_interfaces", "simulation_interfaces"} <= declared
 
 
 def test_all_but_ros_is_an_extra_and_every_extra_allows_what_is_pinned() -> None:
@@ -192,21 +192,6 @@ def test_a_refusal_names_an_extra_that_installs_what_is_missing() -> None:
     named = re.findall(r"""is_missing\(['"]([\w-]+)['"], ['"](\w+)['"]\)""", text)
     assert len(named) > 10
     assert not [(package, extra) for package, extra in named if package not in brought[extra]]
-
-
-def test_every_ros_package_that_the_code_imports_is_declared() -> None:
-    declared = {node.text for node in ElementTree.parse(SOURCE / "package.xml").iter("exec_depend")}
-    text = "\n".join(path.read_text(encoding="utf-8") for path in (SOURCE / "rigid_proto_ros").rglob("*.py"))
-    imported = {
-        line.split()[1].split(".")[0] for line in text.splitlines() if line.strip().startswith(("from ", "import "))
-    }
-    used = {
-        name
-        for name in imported
-        if name.startswith(("rclpy", "ament")) or name.endswith(("_msgs", "_srvs", "_interfaces"))
-    }
-    # builtin_interfaces comes with every message package; the other one is served where it is installed.
-    assert used - {"builtin_interfaces", "simulation_interfaces"} <= declared
 
 
 def scene_parameters(name: str) -> dict:
@@ -243,7 +228,10 @@ def test_an_unknown_name_is_refused_with_what_there_is(find) -> None:
     assert "\n" not in str(refused.value)
 
 
-def test_recipe_and_citation_agree_with_the_package() -> None:
+def test_package_xml_recipe_and_citation_agree_with_the_package() -> None:
+    package = ElementTree.parse(SOURCE / "package.xml").getroot()
+    assert (package.get("format"), package.findtext("export/build_type")) == ("3", "ament_python")
+    assert (package.findtext("name"), package.findtext("version")) == ("rigid_proto_ros", rigid_proto_ros.__version__)
     recipe = yaml.safe_load((SOURCE / "recipe" / "recipe.yaml").read_text("utf-8"))
     citation = yaml.safe_load((SOURCE / "CITATION.cff").read_text("utf-8"))
     assert recipe["context"]["version"] == citation["version"] == rigid_proto_ros.__version__

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The interactive page in headless Chromium, with its workbench in this process: for tests and pictures."""
+"""The interactive page in headless Chromium, with its workbench in this process: for tests, and pictures of the docs."""
 
 from __future__ import annotations
 

@@ -193,22 +193,16 @@ def test_repair_makes_no_cavity_of_a_part_that_crosses_others():
         assert np.array_equal(np.sort(repaired.triangles, axis=None), np.sort(triangles, axis=None))
 
 
-def test_without_manifold3d_parts_in_others_are_told_and_only_those_that_cross_none_may_be_turned(monkeypatch):
+def test_without_manifold3d_sums_are_taken_and_told_and_only_parts_that_cross_none_may_be_turned(monkeypatch):
     monkeypatch.setattr(solids, "can_unite", lambda: False)
     monkeypatch.setattr("rigid_proto_ros.mass.verdict.can_unite", lambda: False)
+    two = body(together(box(), moved(box(), (0.5, 0.1, 0.2))))
+    assert "[meshes]" in message(two, "overlapping_components") and volume(two) == pytest.approx(2.0)
     inner = body(assembly(HOLLOW[0], (1, UNIT, (0, 0, 0)), KNOB))
     assert "--repair" in message(inner, "nested_components") and volume(inner) == pytest.approx(67.0)
     for made in (body(assembly(*HOLLOW, PIN)), body(assembly(*HOLLOW, PIN), repair=True)):
         assert message(made, "nested_components").endswith("what they share counts twice")
         assert volume(made) == pytest.approx(59.0)
-
-
-def test_without_manifold3d_the_overlap_is_told_and_the_sum_is_taken(monkeypatch):
-    monkeypatch.setattr(solids, "can_unite", lambda: False)
-    monkeypatch.setattr("rigid_proto_ros.mass.verdict.can_unite", lambda: False)
-    two = body(together(box(), moved(box(), (0.5, 0.1, 0.2))))
-    assert "[meshes]" in message(two, "overlapping_components")
-    assert volume(two) == pytest.approx(2.0)
 
 
 def test_a_surface_that_passes_through_itself_is_told():

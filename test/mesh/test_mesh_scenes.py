@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Files of placed parts, .gltf, .3mf and .dae: each feature that moves a vertex is read as specified or refused by name."""
 
-import io
 import json
 import os
 import struct
@@ -14,6 +13,7 @@ from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, GEOMETRY, Gltf, collada, c
 
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mesh import reading
 from rigid_proto_ros.mesh.reading import Mesh
 
 
@@ -201,18 +201,18 @@ def test_dae_of_which_something_is_not_read_says_what(tmp_path, nodes, geometry,
         load_dae(tmp_path, nodes, geometry)
 
 
-@pytest.mark.parametrize(
-    "method, words", [(zipfile.ZIP_DEFLATED, "bytes unpacked"), (zipfile.ZIP_BZIP2, "compressed by")]
-)
-def test_a_3mf_that_unpacks_to_far_more_than_its_size_is_refused_before_it_is_unpacked(tmp_path, method, words):
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", method) as archive:
-        archive.writestr("root.model", b" " * 10_000_000)
-    data = bytearray(packed.getvalue())
-    if method == zipfile.ZIP_BZIP2:  # what its directory says isn't what it is
-        struct.pack_into("<I", data, data.rfind(b"PK\1\2") + 24, 100)
-    with pytest.raises(MeshError, match=words):
-        load(tmp_path, "a.3mf", bytes(data))
+def test_a_3mf_that_is_no_archive_or_unpacks_to_far_more_than_its_size_is_refused_before_it_is_unpacked(
+    tmp_path, monkeypatch
+):
+    large, lying = threemf(" " * 10_000_000), bytearray(threemf(" " * 10_000_000, method=zipfile.ZIP_BZIP2))
+    # What its directory says isn't what it is.
+    struct.pack_into("<I", lying, lying.rfind(b"PK\1\2") + 24, 100)
+    for data, words in ((b"PK\3\4no archive", "zip file"), (large, "bytes unpacked"), (lying, "compressed by")):
+        with pytest.raises(MeshError, match=words):
+            load(tmp_path, "a.3mf", bytes(data))
+    monkeypatch.setattr(reading, "MAX_BYTES", 40_000)
+    with pytest.raises(MeshError, match="at most 40000"):
+        load(tmp_path, "a.3mf", threemf(" " * 50_000))
 
 
 def test_a_gltf_whose_numbers_are_in_a_pipe_is_refused_without_waiting_for_it(tmp_path):

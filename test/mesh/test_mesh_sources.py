@@ -61,13 +61,6 @@ def test_a_unit_that_the_file_states_is_taken_and_said(tmp_path, name, stated, u
     assert (len(said) == 1 and f"{unit:g} m" in said[0]) if unit != 1.0 else not said
 
 
-def test_an_archive_that_is_none_or_would_fill_the_memory_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr(reading, "MAX_BYTES", 40_000)
-    for data, words in ((b"PK\3\4no archive", "zip file"), (mf.threemf(" " * 10**6), "bytes unpacked")):
-        with pytest.raises(MeshError, match=words):
-            load(tmp_path, "a.3mf", data)
-
-
 def test_a_mesh_beyond_the_limit_is_refused(tmp_path, monkeypatch):
     for module in (reading, assembly):
         monkeypatch.setattr(module, "MAX_TRIANGLES", 11)

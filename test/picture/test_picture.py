@@ -105,10 +105,11 @@ def times(count: int, first: int = 0) -> np.ndarray:
     return flight.PERIOD_NS * np.arange(first, first + count)
 
 
-def pictured(setup: Setup = flight.SETUP) -> tuple[Picture, Drawn]:
+def pictured(setup: Setup = flight.SETUP, vertices=flight.VERTICES, triangles=flight.TRIANGLES, **options):
+    """A body's picture, and what is drawn of it."""
     drawn = Drawn()
-    picture = Picture(drawn)
-    picture.on(Started("", flight.VERTICES, flight.TRIANGLES, ""))
+    picture = Picture(drawn, **options)
+    picture.on(Started("", vertices, triangles, ""))
     picture.on(BodyChanged(0, setup))
     return picture, drawn
 
@@ -188,8 +189,7 @@ def test_arrows_stand_at_their_points_and_only_while_the_load_acts():
         if not len(vectors):
             continue
         row = states[time_ns // flight.PERIOD_NS]
-        t = 2.0 * np.cross(row[3:6], flight.POKE.point)
-        point = row[0:3] + flight.POKE.point + row[6] * t + np.cross(row[3:6], t)
+        point = row[0:3] + matrix_from_quaternion(row[3:7]) @ flight.POKE.point
         (origin,) = drawn.origins[name][time_ns]
         ends = np.array([origin, origin + vectors[0]])
         assert min(np.linalg.norm(ends - point, axis=1)) < 1e-12
@@ -212,10 +212,10 @@ def test_the_arrow_of_a_load_stays_at_its_point_of_a_body_that_changes():
     at_com = ShownLoad("poke", "body", np.zeros(3), np.array([0.0, 0.0, 2.0]), np.zeros(3))
     for number, load in enumerate((push, at_com)):
         picture.on(LoadBegan(0, number, load))
-    picture.draw(times(5), np.tile([0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], (5, 1)))
+    picture.draw(times(5), spinning(0.0, 5))
     # Twice as large, about another centre: the point of the mesh is (0.4, 0.3, -0.25) / (2, 1, 1).
     picture.on(BodyChanged(45_000_000, flight.setup_of(com=[0.1, 0.0, 0.0], scale=2.0 * flight.SCALE)))
-    picture.draw(times(1, 5), np.array([[0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]]))
+    picture.draw(times(1, 5), spinning(0.0, 1))
     for load, before, after in (("wrench", [0.1, 0.2, -0.3], [0.7, 0.6, -0.5]), ("poke", np.zeros(3), np.zeros(3))):
         name = style.load_part(load, "force")
         for time_ns, point in ((40_000_000, before), (50_000_000, after)):
@@ -235,7 +235,7 @@ def test_an_impulse_is_shown_from_its_instant_for_a_moment():
 
 
 def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let_go():
-    rows = np.tile([0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], (60, 1))
+    rows = spinning(0.0, 60)
     # The body rises towards the hand at 1 m/s: 0.4 m long, the string goes slack half-way.
     rows[:, 2], rows[:, 9] = 0.01 * np.arange(60), 1.0
     knot, hand = np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.8])
@@ -266,7 +266,7 @@ def test_without_a_string_the_energies_are_three_and_their_total():
 
 def test_the_momentum_of_a_body_that_was_at_rest_drifts_from_where_it_first_points():
     picture, drawn = pictured(WEIGHTLESS)
-    states = np.tile([0.0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], (30, 1))
+    states = spinning(0.0, 30)
     states[15:, 10], states[25:, 10:12] = 1.0, [0.0, 2.0]
     for first in (0, 10, 20):
         picture.draw(times(10, first), states[first : first + 10])
@@ -332,12 +332,8 @@ def test_a_ghost_that_ended_leaves_nothing_and_may_come_back():
 
 
 def test_a_mesh_far_from_its_origin_is_drawn_to_single_precision_of_its_size():
-    far = flight.VERTICES + 1e7
-    drawn = Drawn()
-    picture = Picture(drawn)
-    picture.on(Started("", far, flight.TRIANGLES, ""))
     com = np.array([0.15, 0.1, 0.05]) + 1e7
-    picture.on(BodyChanged(0, flight.setup_of(1.0, com, np.eye(3), np.ones(3), np.zeros(3))))
+    _, drawn = pictured(flight.setup_of(1.0, com, np.eye(3), np.ones(3), np.zeros(3)), flight.VERTICES + 1e7)
     place, _, scale = drawn.places[style.BODY_MESH]
     corners = drawn.meshes[style.BODY_MESH].vertices * scale + place
     assert np.allclose(np.ptp(corners, axis=0), [0.3, 0.2, 0.1], rtol=1e-6)
@@ -346,11 +342,8 @@ def test_a_mesh_far_from_its_origin_is_drawn_to_single_precision_of_its_size():
 
 def test_a_stray_vertex_that_no_triangle_uses_changes_nothing_of_the_picture():
     picture, drawn = pictured()
-    strayed = Drawn()
-    other = Picture(strayed)
     stray = np.insert(flight.VERTICES, 3, [0.0, 0.0, 100.0], axis=0)
-    other.on(Started("", stray, flight.TRIANGLES + (flight.TRIANGLES >= 3), ""))
-    other.on(BodyChanged(0, flight.SETUP))
+    other, strayed = pictured(vertices=stray, triangles=flight.TRIANGLES + (flight.TRIANGLES >= 3))
     for each in (picture, other):
         each.draw(times(20), flight.rows(20))
     assert strayed.size == drawn.size
@@ -374,10 +367,7 @@ def test_trails_go_through_the_com_and_its_farthest_vertex_at_each_state():
 
 
 def test_what_is_not_wanted_is_not_drawn():
-    drawn = Drawn()
-    picture = Picture(drawn, wanted=lambda name: name == style.OMEGA)
-    picture.on(Started("", flight.VERTICES, flight.TRIANGLES, ""))
-    picture.on(BodyChanged(0, flight.SETUP))
+    picture, drawn = pictured(wanted=lambda name: name == style.OMEGA)
     picture.draw(times(20), flight.rows(20))
     moving = {name for name in drawn.parts if name.startswith((style.CENTRE, style.POINSOT, "plots", style.TRAIL))}
     assert moving == {style.OMEGA, style.OMEGA + "/label"}

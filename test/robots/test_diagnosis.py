@@ -136,6 +136,12 @@ def test_the_worst_verdict_stands_first_and_of_equal_ones_the_farthest_off(tmp_p
     assert [(one.link, one.status) for one in compare_robot(path)] == verdicts
 
 
+def test_exchanged_axes_of_a_box_are_called_so(tmp_path):
+    box = '<collision><geometry><box size="0.3 0.2 0.1"/></geometry></collision>'
+    (link,) = compare_robot(urdf(tmp_path, box + inertial("16.2", 0.135, 0.0675, 0.1755)))
+    assert link.causes == ("axes x and y exchanged",)
+
+
 def test_visual_and_collision_are_judged_and_the_better_is_named(tmp_path):
     coarse = '<collision><geometry><box size="1 1.2 1"/></geometry></collision>'
     cube = mesh("cube.obj", role="collision")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The page's own pictures, drawn anew in headless Chromium: ``python test/workbench_pictures.py docs`` writes flight.gif,
-workbench.png and true_against_box.png there.
+"""The page's own pictures, drawn anew in headless Chromium: ``PYTHONPATH=test python docs/page_pictures.py docs`` writes
+flight.gif, workbench.png and true_against_box.png there.
 
 Time stands between two pictures, and isn't said to: a browser without a graphics card takes seconds for each.
 """
