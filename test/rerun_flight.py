@@ -119,16 +119,16 @@ def wait_for(condition: Callable[[], Any]) -> Any:
 
 def flush(observer: Observer) -> None:
     """Wait until everything so far was handed to the file and the viewers."""
-    own, passes = observer._flush, []
+    own, passes = observer._write_what_waits, []
 
     def counted() -> None:
         own()
         passes.append(1)
 
-    observer._flush = counted
+    observer._write_what_waits = counted
     observer._mailbox.wake()
     wait_for(lambda: passes)
-    observer._flush = own
+    observer._write_what_waits = own
 
 
 def cells(path: Path, entity: str, name: str, timeline: str = "sim_time") -> tuple[list[int], list]:

@@ -58,7 +58,7 @@ class LiveView(RerunObserver):
         self._viewer, self._ports, self._report = viewer, (rerun_port, web_port), report
         self._process: viewers.ViewerProcess | None = None
         self._rows_since_repeat = 0
-        super().__init__(name, on_error)
+        super().__init__(name, "", on_error)
 
     def _open(self, run_id: str, name: str) -> Stream:
         rerun_port, web_port = self._ports

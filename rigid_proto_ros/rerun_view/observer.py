@@ -15,7 +15,6 @@ An .rrd is a 12-byte header (``RRF2``, version, options), then frames of two lit
 
 from __future__ import annotations
 
-import logging
 import shutil
 import struct
 import time
@@ -34,7 +33,7 @@ from ..base.rotation import matrix_from_quaternion
 from ..picture import style
 from ..picture.picture import Picture
 from ..scene.scenario import mesh_file, mesh_sha256_of
-from ..session.mailbox import BATCH, Mailbox, Noted
+from ..session.mailbox import Noted, WritingObserver
 from ..simulation.observer import (
     AccuracyFloor,
     Applied,
@@ -43,7 +42,6 @@ from ..simulation.observer import (
     LoadBegan,
     LoadEnded,
     Logged,
-    Observer,
     Published,
     Refused,
     Reset,
@@ -56,9 +54,6 @@ from . import backend as e
 from .backend import RerunBackend, Stream, forget_closed_recordings, last_line, scalar_columns
 from .layout import Finished, Subject, blueprint
 
-FLUSH_PERIOD_S = 0.5
-"""What a kill -9 loses at most, and how far viewers lag; every flush costs about 5 ms and 20 kB of overhead."""
-
 FLUSH_TIMEOUT_S = 5.0
 """A disk that takes longer than this to take half a second of data counts as lost."""
 
@@ -67,20 +62,17 @@ REACH_PER_TIP = 1.7
 
 FRAME_HEAD = struct.Struct("<QQ")
 
-_logger = logging.getLogger(__name__)
 
+class RerunObserver(WritingObserver):
+    """Sends what it is told to a stream, which FileRecorder and LiveView open."""
 
-class RerunObserver(Observer):
-    """Sends what it is told to a stream, which FileRecorder and LiveView open. ``on_error`` gets one line when it has
-    stopped because nothing can be sent, and may be called from another thread. error: that line, or "".
-    """
-
+    # What a kill -9 loses at most, and how far viewers lag; every flush costs about 5 ms and 20 kB of overhead.
+    period_s = 0.5
     takes = frozenset(get_args(Event)) - {Applied}
-    purpose = "recording"
 
-    def __init__(self, name: str, on_error: Callable[[str], None] | None) -> None:
-        self.error = ""
-        self._name, self._on_error = name, on_error or _logger.error
+    def __init__(self, name: str, place: str, on_error: Callable[[str], None] | None) -> None:
+        super().__init__(place, on_error)
+        self._name = name
         self._run, self._last_time_ns = 1, 0
         self._begin_ns: int | None = None
         self._stream: Stream | None = self._open(uuid.uuid4().hex, name)
@@ -91,23 +83,13 @@ class RerunObserver(Observer):
         self._rows: dict[type, np.ndarray] = {}
         self._lines: dict[str, list[tuple[int, int, str]]] = {}
         self._commanded = False
-        self._mailbox = Mailbox(lambda: self._lost("nothing can be written to the disk any more"))
-        self._thread = Thread(target=self._flush_until_closed, name="rerun", daemon=True)
         self._thread.start()
-
-    def on(self, event: Event) -> None:
-        """Take an event from the stepping thread; states are copied."""
-        if type(event) in self.takes:
-            self._mailbox.put(event)
 
     def close(self) -> None:
         """Send what is buffered, and finish."""
-        if self._mailbox.closed:
-            return
-        self._mailbox.close()
-        if not self._mailbox.emptied_by(self._thread):
+        super().close()
+        if self._thread.is_alive():
             rr.unregister_shutdown()
-            self._lost("the last states could not be written")
 
     # The stream
 
@@ -125,34 +107,8 @@ class RerunObserver(Observer):
 
     # The thread
 
-    def _flush_until_closed(self) -> None:
-        closing = False
-        while not closing:
-            closing = self._mailbox.closed
-            # Whatever goes wrong here must not reach the flight: it goes on without a recording.
-            try:
-                self._flush()
-                if closing and self._stream is not None:
-                    self._end(self._stream)
-            except OSError as error:
-                self._give_up(str(error))
-            except Exception as error:
-                stream, self._stream = self._stream, None
-                self._lost(f"{type(error).__name__}: {error}")
-                if stream is not None:
-                    try:
-                        self._end(stream)
-                    except Exception:  # as where the disk is full
-                        stream.leave()
-            if not closing:
-                self._mailbox.wait(FLUSH_PERIOD_S)
-
-    def _flush(self) -> None:
-        """Send what waits; not what arrives meanwhile, a few rows a time."""
-        more = True
-        while more:
-            events = self._mailbox.take()
-            more = len(events) == BATCH
+    def _write_what_waits(self) -> None:
+        for events in self._mailbox.take():
             if self._stream is not None:
                 self._write(events)
         if self._stream is not None:
@@ -161,17 +117,26 @@ class RerunObserver(Observer):
             if self._stream.missed and not self._stream.behind:
                 self._describe(self._stream)
 
-    def _give_up(self, reason: str) -> None:
-        # Told first: what the library does with a file that it can't write may take for ever.
-        stream, self._stream = self._stream, None
-        self._lost(reason)
-        rr.unregister_shutdown()
-        if stream is not None:
-            stream.leave()
+    def _finish(self) -> None:
+        if self._stream is not None:
+            self._end(self._stream)
 
-    def _lost(self, reason: str) -> None:
-        self.error = f"{self.purpose} stopped: {reason}"
-        self._on_error(self.error)
+    def _give_up(self, error: Exception) -> None:
+        stream, self._stream = self._stream, None
+        refused = isinstance(error, OSError)
+        # Told first: what the library does with a file that it can't write may take for ever.
+        self._tell_end(str(error) if refused else f"{type(error).__name__}: {error}")
+        if refused:
+            rr.unregister_shutdown()
+        if stream is None:
+            return
+        try:
+            if not refused:
+                self._end(stream)
+                return
+        except Exception:  # as where the disk is full
+            pass
+        stream.leave()
 
     # What holds for a run
 
@@ -328,13 +293,7 @@ class FileRecorder(RerunObserver):
         self._files = files
         self._mesh: tuple[str, tuple[str, bytes] | None] = "", None
         self._meshes_sent: set[str] = set()
-        super().__init__(name, on_error)
-
-    @property
-    def stalled(self) -> str:
-        """Says that the file doesn't take what is sent; empty while it does."""
-        stalled = "" if self._stream is None else self._mailbox.stalled
-        return stalled and f"recording {self.path}: {stalled}"
+        super().__init__(name, path, on_error)
 
     def _open(self, run_id: str, name: str) -> Stream:
         return FileStream(self.path, run_id, name)
@@ -400,7 +359,7 @@ class FileStream(Stream):
         except RuntimeError as error:
             full = shutil.disk_usage(self._path.parent).free < 1_000_000
             reason = "no space left on the disk" if full else last_line(error)
-        raise OSError(f"{self._path}: {reason}")
+        raise OSError(reason)
 
     def close(self) -> None:
         """Write the rest and mark the end; raises OSError as ``flush`` does."""

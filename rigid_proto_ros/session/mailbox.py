@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Where the stepping thread leaves events, and the thread that writes them fetches them in order."""
+"""Where the stepping thread leaves events, and observers whose own thread fetches and writes them in order."""
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 
-from ..simulation.observer import Event, GhostPublished, Published
+from ..simulation.observer import Event, GhostPublished, Observer, Published
 
 MOST_WAITING = 65536
 """Events that may wait, a minute of states at 1 kHz. Then the stepping thread waits for the other, which only a run
@@ -34,6 +35,8 @@ Noted = tuple[int, Event]
 """An event and when it was told: the wall's time [ns], as it goes on from when the mailbox was made. It is never set
 back, so that what is sorted by it keeps its order.
 """
+
+_logger = logging.getLogger(__name__)
 
 
 class Mailbox:
@@ -76,10 +79,14 @@ class Mailbox:
             time.sleep(LOOK_AGAIN_S)
         return not full
 
-    def take(self) -> list[Noted]:
-        """The oldest events, BATCH at most; none when it is empty."""
-        self.moved()
-        return [self._waiting.popleft() for _ in range(min(BATCH, len(self._waiting)))]
+    def take(self) -> Iterator[list[Noted]]:
+        """What waits now, not what arrives meanwhile, BATCH events at most a time."""
+        rest = len(self._waiting)
+        while rest:
+            self.moved()
+            count = min(BATCH, rest)
+            yield [self._waiting.popleft() for _ in range(count)]
+            rest -= count
 
     def moved(self) -> None:
         """The consumer got something done: as long as it does, a disk is slow, or the machine busy, and no more."""
@@ -115,3 +122,71 @@ class Mailbox:
         while thread.is_alive() and (rest_s := self._moved_at + PATIENCE_S - time.monotonic()) > 0.0:
             thread.join(rest_s)
         return not thread.is_alive()
+
+
+class WritingObserver(Observer):
+    """An observer that writes what it is told on a thread of its own: every ``period_s``, and at the end. What goes
+    wrong there doesn't reach the flight.
+
+    place: what it writes to, for its messages. on_error gets one line when it has stopped because nothing can be
+    written, from another thread; ``error`` keeps it. A subclass starts ``_thread`` when it is ready.
+    """
+
+    purpose = "recording"
+    period_s = 0.5
+
+    def __init__(self, place: str, on_error: Callable[[str], None] | None) -> None:
+        self.error = ""
+        self._place, self._on_error = place, on_error or _logger.error
+        self._mailbox = Mailbox(lambda: self._tell_end("nothing can be written to the disk any more"))
+        self._thread = threading.Thread(target=self._write_until_closed, name=self.purpose, daemon=True)
+
+    def on(self, event: Event) -> None:
+        """Take an event from the stepping thread; a state is copied."""
+        if type(event) in self.takes:
+            self._mailbox.put(event)
+
+    def close(self) -> None:
+        """Write what is buffered, and finish."""
+        if self._mailbox.closed:
+            return
+        self._mailbox.close()
+        if not self._mailbox.emptied_by(self._thread):
+            self._tell_end("the last states could not be written")
+
+    @property
+    def stalled(self) -> str:
+        """Says that what is written isn't taken; empty while it is."""
+        stalled = "" if self.error or not self._thread.is_alive() else self._mailbox.stalled
+        return stalled and f"{self.purpose} {self._place}: {stalled}"
+
+    def _tell_end(self, reason: str) -> None:
+        self.error = ": ".join(filter(None, (f"{self.purpose} stopped", self._place, reason)))
+        self._on_error(self.error)
+
+    # The writing thread
+
+    def _write_until_closed(self) -> None:
+        closing = False
+        while not closing:
+            closing = self._mailbox.closed
+            try:
+                self._write_what_waits()
+                if closing:
+                    self._finish()
+            except Exception as error:
+                self._give_up(error)
+            if not closing:
+                self._mailbox.wait(self.period_s)
+
+    def _write_what_waits(self) -> None:
+        """Write what is in the mailbox, or throw it away where nothing can be written any more."""
+        raise NotImplementedError
+
+    def _finish(self) -> None:
+        """Everything has been written."""
+        raise NotImplementedError
+
+    def _give_up(self, error: Exception) -> None:
+        """Writing has failed: go on without."""
+        raise NotImplementedError

@@ -8,9 +8,7 @@ disk then. All runs go into one file: a reset begins the next one, as in a bag o
 from __future__ import annotations
 
 import errno
-import logging
 import os
-import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -30,36 +28,30 @@ from ..simulation.observer import (
     BodyChanged,
     Event,
     Logged,
-    Observer,
     Published,
     Reset,
     SceneChanged,
     Started,
 )
-from .mailbox import BATCH, Mailbox
+from .mailbox import WritingObserver
 from .messages import DEFINITIONS, FLOOR, MADE_WITH, PROJECTIONS, TOPICS, applied_bytes, inertia_bytes
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
 
-FLUSH_PERIOD_S = 0.4
-"""Longest part [s] of a recording that kill -9 loses."""
-
 CHUNK_NS = 500_000_000
 """Simulated time that a chunk holds at most: what a cut inside it loses, also in a run faster than the clock."""
 
-_logger = logging.getLogger(__name__)
 
-
-class McapObserver(Observer):
+class McapObserver(WritingObserver):
     """Records to ``path``; topics are named after the node, frames as its messages name them.
 
     Messages are logged at the wall's time, as bags have it, or with ``simulated_log`` at simulated time, each run
-    behind the one before. files (name, bytes): meshes at hand, whose own files may be gone. on_error gets one line when
-    recording has stopped because the file can't be written, from another thread; ``error`` keeps it. Raises InputError
-    where the file can't be opened.
+    behind the one before. files (name, bytes): meshes at hand, whose own files may be gone. Raises InputError where the
+    file can't be opened.
     """
 
+    period_s = 0.4  # what kill -9 loses of a recording
     takes = frozenset({Published, Logged, Applied, BodyChanged, SceneChanged, Started, Reset, AccuracyFloor})
 
     def __init__(
@@ -71,9 +63,8 @@ class McapObserver(Observer):
         simulated_log: bool = False,
         files: Sequence[tuple[str, bytes]] = (),
     ) -> None:
-        self.error = ""
+        super().__init__(str(path), on_error)
         self._path = path
-        self._on_error = on_error or _logger.error
         self._simulated_log = simulated_log
         self._run_begins_ns = self._latest_log_ns = self._chunk = self._run = 0
         self._world, self._body_frame = frame_names(parameters or Parameters(), node_name)
@@ -87,28 +78,7 @@ class McapObserver(Observer):
         except OSError as error:
             accepted = f"a file that can be written ({error.strerror})"
             raise InputError("record", str(path), accepted) from None
-        self._mailbox = Mailbox(lambda: self._stopped("nothing can be written to the disk any more"))
-        self._thread = threading.Thread(target=self._write_until_closed, name="mcap", daemon=True)
         self._thread.start()
-
-    def on(self, event: Event) -> None:
-        """Take an event from the stepping thread: a state is copied, others wait to be written."""
-        if type(event) in self.takes:
-            self._mailbox.put(event)
-
-    @property
-    def stalled(self) -> str:
-        """Says that the file doesn't take what is written; empty while it does."""
-        stalled = "" if self._writer is None else self._mailbox.stalled
-        return stalled and f"recording {self._path}: {stalled}"
-
-    def close(self) -> None:
-        """Write what is buffered and finish the file."""
-        if self._mailbox.closed:
-            return
-        self._mailbox.close()
-        if not self._mailbox.emptied_by(self._thread):
-            self._stopped("the last states could not be written")
 
     def _begin(self, node_name: str) -> Writer:
         """The file with its topics declared; raises OSError."""
@@ -131,34 +101,27 @@ class McapObserver(Observer):
 
     # The writing thread
 
-    def _write_until_closed(self) -> None:
-        mailbox = self._mailbox
-        while True:
-            closing = mailbox.closed
-            try:
-                self._write_what_waits()
-                if closing and self._writer is not None:
-                    self._writer.finish()
-                    self._stream.close()
-            except Exception as error:
-                # Whatever goes wrong here must not reach the flight: go on without a recording.
-                self._lost(getattr(error, "strerror", None) or f"{type(error).__name__}: {error}")
-            if closing:
-                return
-            mailbox.wait(FLUSH_PERIOD_S)
-
     def _write_what_waits(self) -> None:
-        """Empty the mailbox into the file; without one, throw away what is in it."""
-        while events := self._mailbox.take():
+        for events in self._mailbox.take():
             if self._writer is not None:
                 for wall_ns, event in events:
                     self._write(self._writer, wall_ns, event)
-            if len(events) < BATCH:
-                break
         if self._writer is not None:
             self._writer.flush()
             if not os.path.samestat(os.stat(self._path), os.fstat(self._stream.fileno())):
                 raise OSError(errno.ESTALE, "another file took its place")
+
+    def _finish(self) -> None:
+        if self._writer is not None:
+            self._writer.finish()
+            self._stream.close()
+
+    def _give_up(self, error: Exception) -> None:
+        if self._writer is not None:
+            self._writer = None
+            with suppress(OSError):
+                self._stream.close()
+            self._tell_end(getattr(error, "strerror", None) or f"{type(error).__name__}: {error}")
 
     def _write(self, writer: Writer, wall_ns: int, event: Event) -> None:
         if isinstance(event, Reset):
@@ -208,14 +171,3 @@ class McapObserver(Observer):
             # The chunk before it declares the topics: from there on a cut file can be read.
             writer.flush()
             writer.add_attachment(0, log_time, found[0], "application/octet-stream", found[1])
-
-    def _lost(self, reason: str) -> None:
-        if self._writer is not None:
-            self._writer = None
-            with suppress(OSError):
-                self._stream.close()
-            self._stopped(reason)
-
-    def _stopped(self, reason: str) -> None:
-        self.error = f"recording stopped: {self._path}: {reason}"
-        self._on_error(self.error)

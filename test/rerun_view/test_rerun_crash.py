@@ -14,7 +14,7 @@ import rerun_flight as flight
 from rerun.chunk import RrdReader
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.rerun_view.observer import FLUSH_PERIOD_S, FileRecorder
+from rigid_proto_ros.rerun_view.observer import FileRecorder
 from rigid_proto_ros.rerun_view.rrd_reading import FRAME_HEAD, HEADER_BYTES, read_session, whole_bytes
 from rigid_proto_ros.rerun_view.session_files import repair
 
@@ -109,12 +109,12 @@ from rigid_proto_ros.simulation.observer import BodyChanged, Published, Started
 from rigid_proto_ros.rerun_view.observer import FileRecorder
 observer = FileRecorder(sys.argv[1])
 states = flight.rows(100_000)
-published, flush = 0, observer._flush
+published, flush = 0, observer._write_what_waits
 def told():
     before = published
     flush()
     print("flushed", before, flush=True)
-observer._flush = told
+observer._write_what_waits = told
 observer.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
 observer.on(BodyChanged(0, flight.SETUP))
 for k, row in enumerate(states):
@@ -139,5 +139,5 @@ def test_kill_9_loses_what_came_since_the_last_flush_half_a_second_ago(tmp_path)
     states = flight.rows(100_000)
     assert session.rows.tobytes() == states[: len(session.rows)].tobytes()
     assert len(session.times) >= flushed > 0
-    assert FLUSH_PERIOD_S <= 0.5
+    assert FileRecorder.period_s <= 0.5
     assert whole_bytes(path)[0] <= path.stat().st_size

@@ -21,7 +21,7 @@ def test_events_come_out_in_the_order_in_which_they_went_in_and_states_are_copie
     for k in range(BATCH + 3):
         row[:] = k
         box.put(Reset(k) if k in (1, BATCH) else Published(k, row))
-    events = [event for events in iter(box.take, []) for _, event in events]
+    events = [event for events in box.take() for _, event in events]
     assert [event.time_ns for event in events] == list(range(BATCH + 3))
     assert [event.time_ns for event in events if isinstance(event, Reset)] == [1, BATCH]
     assert all((event.row == event.time_ns).all() for event in events if isinstance(event, Published))
@@ -32,7 +32,7 @@ def test_what_is_told_has_the_walls_time_in_the_order_in_which_it_was_told_thoug
     box.put(Reset(0))
     monkeypatch.setattr(mailbox.time, "time_ns", lambda: began_ns - 10**12)
     box.put(Reset(1))
-    (first_ns, first), (second_ns, second) = box.take()
+    (((first_ns, first), (second_ns, second)),) = box.take()
     assert (first.time_ns, second.time_ns) == (0, 1)
     assert abs(first_ns - began_ns) < 10**10 and first_ns <= second_ns
 
@@ -44,7 +44,7 @@ def test_a_recorder_that_is_stuck_is_given_up_and_what_waits_has_no_gap(monkeypa
     for k in range(MOST_WAITING + 5):
         box.put(Reset(k))
     assert given_up == [True]
-    taken = [event.time_ns for events in iter(box.take, []) for _, event in events]
+    taken = [event.time_ns for events in box.take() for _, event in events]
     assert taken == list(range(MOST_WAITING))
 
 
@@ -68,7 +68,7 @@ def test_an_interrupt_anywhere_in_put_leaves_the_mailbox_to_its_consumer(monkeyp
             interrupted += 1
         finally:
             sys.settrace(tracer)
-        consumer = Thread(target=lambda box=box: (box.wait(60.0), box.take()), daemon=True)
+        consumer = Thread(target=lambda box=box: (box.wait(60.0), list(box.take())), daemon=True)
         consumer.start()
         waker = Thread(target=box.close, daemon=True)
         waker.start()
