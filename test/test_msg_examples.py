@@ -69,6 +69,31 @@ def test_there_are_ten_of_5_to_40_lines() -> None:
         assert 5 <= len(path.read_text("utf-8").splitlines()) <= 40, path.name
 
 
+def test_many_simulations_from_python_find_the_gains(run) -> None:
+    assert "best of 25: 0.01 N m, 0.0032 N m s" in run(6)
+
+
+def test_a_sweep_writes_its_table_and_says_one_row(run) -> None:
+    pytest.importorskip("pyarrow")
+    said = run(7)
+    assert "3000 rows in out/box_error.parquet" in said and re.search(r"difference.attitude +0\.\d+", said)
+
+
+def test_the_doctor_names_the_cause_and_corrects_it(run) -> None:
+    said = run(8)
+    assert "cause: axes x and y exchanged" in said
+    assert "explained -> uniform" in said
+
+
+def test_a_recording_verifies_and_is_converted_and_continued(run, tmp_path) -> None:
+    pytest.importorskip("mcap")
+    assert "every command and state is reproduced bit for bit" in run(9)
+    assert len((tmp_path / "out" / "flight.csv").read_text("utf-8").splitlines()) == 1002
+
+
+# With a node, which is there from here to the end
+
+
 @pytest.fixture(scope="module")
 def client(ros_environment, tmp_path_factory):
     """A client of the node that the examples talk to."""
@@ -155,25 +180,3 @@ def test_a_filter_is_compared_with_the_truth(client, run) -> None:
     alone, filtered = re.findall(r"([\d.e-]+) rad", run(10))
     # Measured 0.77 and 0.0026 rad.
     assert float(filtered) < 0.02 < 0.5 < float(alone)
-
-
-def test_many_simulations_from_python_find_the_gains(run) -> None:
-    assert "best of 25: 0.01 N m, 0.0032 N m s" in run(6)
-
-
-def test_a_sweep_writes_its_table_and_says_one_row(run) -> None:
-    pytest.importorskip("pyarrow")
-    said = run(7)
-    assert "3000 rows in out/box_error.parquet" in said and re.search(r"difference.attitude +0\.\d+", said)
-
-
-def test_the_doctor_names_the_cause_and_corrects_it(run) -> None:
-    said = run(8)
-    assert "cause: axes x and y exchanged" in said
-    assert "explained -> uniform" in said
-
-
-def test_a_recording_verifies_and_is_converted_and_continued(run, tmp_path) -> None:
-    pytest.importorskip("mcap")
-    assert "every command and state is reproduced bit for bit" in run(9)
-    assert len((tmp_path / "out" / "flight.csv").read_text("utf-8").splitlines()) == 1002

@@ -17,6 +17,8 @@ from ros_process import command, from_source
 from rigid_proto_ros.base import interrupts
 from rigid_proto_ros.cli import executables
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.session.check import verify
 
 
 @pytest.fixture(autouse=True)
@@ -37,12 +39,21 @@ def without(monkeypatch: pytest.MonkeyPatch, *packages: str) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name in packages else find(name))
 
 
-@pytest.mark.parametrize("program", START)
-def test_without_numba_an_executable_names_it_and_the_command_that_installs_it(program, monkeypatch, capsys) -> None:
-    without(monkeypatch, "numba")
+@pytest.mark.parametrize(
+    ("program", "package", "remedies"),
+    [
+        *((program, "numba", ("numba not found by ", "make setup", "pip install numba")) for program in START),
+        ("rigid_body_node", "rclpy", ("/opt/ros/", "rigid_proto_ros[ros]")),
+        ("poke_client", "rclpy", ("/opt/ros/", "rigid_proto_ros[ros]")),
+    ],
+)
+def test_without_a_package_an_executable_says_what_to_source_or_install(
+    program, package, remedies, monkeypatch, capsys
+) -> None:
+    without(monkeypatch, package)
     assert START[program]() == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"{program}: numba not found by ") and "make setup" in line and "pip install numba" in line
+    assert line.startswith(f"{program}: ") and all(remedy in line for remedy in remedies)
 
 
 def test_a_stream_that_the_shell_has_closed_is_open_to_nothing_also_for_processes_that_are_started(monkeypatch) -> None:
@@ -59,14 +70,6 @@ def test_an_executable_that_is_started_here_imports_nothing_from_the_current_fol
     (tmp_path / "json.py").write_text("raise SystemExit('the user's own json')")
     started = [*executables.own_executable("rigid_proto"), "--version"]
     assert subprocess.run(started, cwd=tmp_path, env=interrupts.with_this_package(), check=False).returncode == 0
-
-
-@pytest.mark.parametrize("program", ["rigid_body_node", "poke_client"])
-def test_without_rclpy_the_node_and_its_client_say_what_to_source_or_install(program, monkeypatch, capsys) -> None:
-    without(monkeypatch, "rclpy")
-    assert START[program]() == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "/opt/ros/" in line and "rigid_proto_ros[ros]" in line
 
 
 def test_a_command_to_type_is_a_name_where_the_path_has_it_and_else_a_path(monkeypatch, tmp_path) -> None:
@@ -169,7 +172,9 @@ FULL_BYTES = 1_000_000
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_a_recording_that_stopped_on_a_full_disk_is_exit_2_and_not_said_to_be_recorded(ending, tmp_path):
+def test_a_recording_that_stopped_on_a_full_disk_is_exit_2_and_the_simulation_goes_on_and_the_rest_is_verified(
+    ending, tmp_path
+):
     pytest.importorskip("mcap")
     path = tmp_path / f"session{ending}"
     words = ("simulate", "book", "--set", "publish_rate=10000", "--duration", "1.5", "--record", path)
@@ -184,3 +189,6 @@ def test_a_recording_that_stopped_on_a_full_disk_is_exit_2_and_not_said_to_be_re
     assert f"recording stopped: {path}: " in done.stderr and "Traceback" not in done.stderr
     assert "state hash" in done.stdout and str(path) not in done.stdout
     assert 0.5 * FULL_BYTES < path.stat().st_size <= FULL_BYTES
+    (session,) = read_runs(path)
+    assert not session.complete and session.end_ns > 0
+    assert verify(session) is None

@@ -6,7 +6,6 @@ from __future__ import annotations
 import importlib.util
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -105,37 +104,22 @@ ENDLESS = (
     "poke_client poke --at vertex/0 --push 1 --timeout 0",
 )
 
-# The first calls set the handler.
-at_a_call = given(calls=floats(2.0, 6.0).map(lambda exponent: round(10.0**exponent)))
 
-
-def check_at_a_call(command: str, calls: int, environment: dict[str, str], cwd: Path) -> None:
-    """Interrupt a command at one call of a Python function, or return from it: the same one on a busy machine."""
+@pytest.mark.parametrize("command", ENDLESS)
+@given(exponent=floats(2.0, 6.0))  # the first calls set the handler
+@settings(max_examples=3)
+def test_at_a_call(command, exponent, ros_environment, tmp_path_factory) -> None:
+    """At one call of a Python function, or return from it: the same one on a busy machine."""
     done = subprocess.run(
-        [sys.executable, "-c", AT_A_CALL, str(calls), *command.split()],
-        env=from_source(environment),
-        cwd=cwd,
+        [sys.executable, "-c", AT_A_CALL, str(round(10.0**exponent)), *command.split()],
+        env=from_source(ros_environment),
+        cwd=tmp_path_factory.getbasetemp(),
         capture_output=True,
         text=True,
         timeout=180,
         check=False,
     )
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
-
-
-@pytest.mark.parametrize("command", ENDLESS)
-@at_a_call
-@settings(max_examples=3, deadline=None)
-def test_at_a_call(command, calls, ros_environment, tmp_path_factory) -> None:
-    check_at_a_call(command, calls, ros_environment, tmp_path_factory.getbasetemp())
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("command", ENDLESS)
-@at_a_call
-@settings(max_examples=100, deadline=None)
-def test_at_many_calls(command, calls, ros_environment, tmp_path_factory) -> None:
-    check_at_a_call(command, calls, ros_environment, tmp_path_factory.getbasetemp())
 
 
 IN_A_TEXT = """

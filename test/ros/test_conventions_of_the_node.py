@@ -51,6 +51,12 @@ OF_RCLPY = {
 """What every rclpy node has."""
 
 
+def test_a_node_without_viewer_and_recording_loads_none_of_their_libraries(rig) -> None:
+    libraries = Path(f"/proc/{rig.node_process.pid}/maps").read_text()
+    assert "rclpy" in libraries
+    assert not [name for name in ("rerun", "pyarrow", "zstandard") if name in libraries]
+
+
 def test_a_running_node_has_exactly_the_listed_topics_and_services(rig) -> None:
     """With everything on request switched on: the shared node has a thruster."""
     switches = {i.on_request: True for i in INTERFACES if i.on_request in PARAMETERS}
