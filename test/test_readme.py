@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import signal
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 import yaml
-from ros_process import command as start_of
+from ros_process import RosProcess
 
 import docs_tables
 import rigid_proto_ros
@@ -175,27 +174,15 @@ def test_rigid_proto_commands_run(
 
 
 @pytest.mark.slow
-def test_up_gets_ready_and_ends_cleanly(ros_environment: dict[str, str]) -> None:
+def test_up_gets_ready_and_ends_cleanly(ros_environment: dict[str, str], tmp_path: Path) -> None:
     """As does the workbench, in test_portable.py."""
     pytest.importorskip("rclpy")
-    process = subprocess.Popen(
-        start_of("rigid_proto", "up", "--viewer", "none"),
-        env=ros_environment,
-        cwd=SOURCE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+    up = RosProcess("rigid_proto", "up", "--viewer", "none", environment=ros_environment, log=tmp_path / "up")
     try:
-        # Ends with the process, which the suite's own timeout would end too.
-        ready = any("is simulating" in line for line in process.stdout)
-        process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=180.0) == 130
-        assert ready
+        up.wait_for("is simulating")
     finally:
-        if process.poll() is None:
-            process.kill()
-            process.wait()
+        status = up.end()
+    assert status == 130
 
 
 @pytest.mark.parametrize("command", of("poke_client"))

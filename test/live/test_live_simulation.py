@@ -10,7 +10,6 @@ import struct
 import sys
 import threading
 import time
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -34,24 +33,23 @@ PERIOD_NS = 10_000_000
 
 
 class Watcher(Observer):
-    """Keeps the times of states and the lines of events."""
+    """Keeps the times of what it is told, and the lines of events."""
 
-    def __init__(self) -> None:
+    def __init__(self, *takes: type) -> None:
+        self.takes = frozenset(takes)
         self.times: list[int] = []
         self.lines: list[str] = []
 
-    takes = frozenset({Published, Logged})
-
     def on(self, event) -> None:
-        if isinstance(event, Published):
-            self.times.append(event.time_ns)
-        elif isinstance(event, Logged):
+        if isinstance(event, Logged):
             self.lines.append(event.line)
+        elif type(event) in self.takes:
+            self.times.append(event.time_ns)
 
 
 @pytest.fixture
 def watcher():
-    return Watcher()
+    return Watcher(Published, Logged)
 
 
 @pytest.fixture
@@ -239,7 +237,7 @@ def test_a_request_that_waits_at_the_end_is_refused_and_so_is_one_that_comes_lat
 
 def test_before_the_start_one_request_is_served_after_another(monkeypatch):
     """The page's first browser may come while the node announces its body."""
-    live, guest = LiveSimulation(make_scenario({"mesh": "t_handle"})), Watcher()
+    live, guest = LiveSimulation(make_scenario({"mesh": "t_handle"})), Watcher(Logged)
     coming, watch = threading.Thread(target=live.add_observer, args=(guest,)), live.loop.watch
 
     def watch_late(observer) -> None:
@@ -264,7 +262,7 @@ def test_what_anybody_sets_is_told_so_that_the_nodes_own_parameters_follow(live)
 
 def test_an_observer_that_comes_in_flight_is_told_and_one_that_leaves_is_not(live, watcher):
     live.step(2)
-    guest = Watcher()
+    guest = Watcher(Published)
     live.add_observer(guest)
     live.step(2)
     live.remove_observer(guest)
@@ -479,18 +477,11 @@ def test_a_recording_from_the_start_shows_the_string_that_is_tied_from_the_start
 
 
 def test_a_reset_tells_of_the_body_anew_with_its_own_time(live):
-    class Bodies(Observer):
-        takes = frozenset({BodyChanged})
-        times: ClassVar[list[int]] = []
-
-        def on(self, event) -> None:
-            if isinstance(event, BodyChanged):
-                self.times.append(event.time_ns)
-
+    bodies = Watcher(BodyChanged)
     live.step(3)
-    live.add_observer(Bodies())
+    live.add_observer(bodies)
     live.reset()
-    assert Bodies.times == [3 * PERIOD_NS, 0]
+    assert bodies.times == [3 * PERIOD_NS, 0]
 
 
 @pytest.mark.parametrize("end", ["stop", "reset", "another recording"])
