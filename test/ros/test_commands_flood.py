@@ -2,6 +2,7 @@
 """Floods of commands: all received, or the loss told."""
 
 import itertools
+import math
 import os
 import signal
 import subprocess
@@ -15,20 +16,20 @@ from command_rig import wrench_message
 from ros_client import RosClient
 from ros_process import from_source
 
-HARMLESS = wrench_message(0, "world", (0.0, 0.0, 1e-9))
-PUSH = wrench_message(0, "world;impulse", (0.0, 0.0, 1e-9))
-LAST = wrench_message(0, "nowhere")
-"""Refused: who has counted the refusal has taken all that reached it of what its publisher sent before."""
+FLOOD = wrench_message(0, "nowhere")
+"""Counted and refused at once: nothing that acts is told to anybody."""
+LAST = wrench_message(0, "", (math.nan, 0.0, 0.0))
+"""Refused for another reason: who has counted that has taken all that reached it of what its publisher sent before."""
 
 HELD_UP_S = 10.0
 """The middleware gives up a process that says nothing for 20 s, and counts nothing that it misses from then on."""
 
-COUNTERS = ("wrench_received", "poke_received", "messages_lost", "queue_full", "refused_total")
+COUNTERS = ("wrench_received", "poke_received", "messages_lost", "queue_full", "refused_nonfinite")
 
 
-def greet(client, publishers: list[str], message: dict) -> None:
+def greet(client, publishers: list[str]) -> None:
     """One message of each is taken and acknowledged: the middleware counts what a publisher loses from then on."""
-    client.repeat(publishers, message, 1)
+    client.repeat(publishers, FLOOD, 1)
     client.acknowledged(*publishers)
 
 
@@ -45,7 +46,7 @@ def all_known_or_told(rig, before: dict[str, int], sent: int, publishers: int, t
 
     def accounted_for() -> bool:
         # On a busy machine the middleware may give a stopped node up; then it counts the last ones as lost, too.
-        return known() >= sent or (told and gained["queue_full"] > 0 and gained["refused_total"] == publishers)
+        return known() >= sent or (told and gained["queue_full"] > 0 and gained["refused_nonfinite"] == publishers)
 
     try:
         rig.until(accounted_for, "account of all")
@@ -67,8 +68,8 @@ def test_ten_publishers_at_a_thousand_messages_a_second_are_all_heard_or_a_full_
         names = [f"wrench#{k}" for k in range(10)]
         client.advertise(*names)
         before = rig.counters()
-        greet(client, names, HARMLESS)
-        client.repeat(names, HARMLESS, messages, 1000.0)
+        greet(client, names)
+        client.repeat(names, FLOOD, messages, 1000.0)
         client.repeat(names, LAST, 1)
         all_known_or_told(rig, before, 10 * (messages + 2), 10)
 
@@ -76,10 +77,10 @@ def test_ten_publishers_at_a_thousand_messages_a_second_are_all_heard_or_a_full_
 GUEST = """
 import os, signal, sys
 from ros_client import RosClient
-from test_commands_flood import PUSH
+from test_commands_flood import FLOOD
 with RosClient(dict(os.environ), "/rigid_body") as guest:
     guest.advertise("poke")
-    guest.repeat(["poke"], PUSH, 5)
+    guest.repeat(["poke"], FLOOD, 5)
     guest.acknowledged("poke")
     if sys.argv[1] == "killed":
         os.kill(os.getpid(), signal.SIGKILL)
@@ -92,13 +93,15 @@ def test_publishers_that_leave_or_are_killed_beside_another_count_as_no_loss(rig
     environment["PYTHONPATH"] += f"{os.pathsep}{Path(__file__).parent}"
     guests = [subprocess.Popen([sys.executable, "-c", GUEST, end], env=environment) for end in ("leaves", "killed")]
     while any(guest.poll() is None for guest in guests):
-        rig.repeat(["poke"], PUSH, 30, 300.0)
+        rig.repeat(["poke"], FLOOD, 30, 300.0)
         sent += 30
     assert [guest.returncode for guest in guests] == [0, -signal.SIGKILL]
-    rig.repeat(["poke"], PUSH, 30)
+    rig.repeat(["poke"], FLOOD, 30)
     sent += 5 + 5 + 30
     rig.sent += sent
-    assert rig.gained(before, "poke_received") == {"poke_received": sent}
+    assert rig.gained(before, "poke_received") == dict.fromkeys(
+        ("poke_received", "refused_total", "refused_frame"), sent
+    )
 
 
 @contextmanager
@@ -127,10 +130,10 @@ def test_with_the_node_held_up_losses_are_counted_exactly_or_a_full_queue_is_tol
         rig.sent = int(rig.diagnostics()["commands_received"])
         client.advertise(*names, depth=kept)
         before = rig.counters()
-        greet(client, names, PUSH)
+        greet(client, names)
         with held_up(rig):
             start = time.monotonic()
-            client.repeat(names, PUSH, SENT)
+            client.repeat(names, FLOOD, SENT)
             return before, time.monotonic() - start < HELD_UP_S
 
     for _ in range(5):

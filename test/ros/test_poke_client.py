@@ -335,7 +335,8 @@ def test_a_client_without_a_time_limit_waits_for_a_node_that_starts_later(
     path.write_text("- {t: 0, impulse: [1.0e-6, 0, 0]}\n")
     with ThreadPoolExecutor() as other:
         sending = other.submit(poke_client, [str(path), "--node", "tester", "--reset", "--timeout", "0"])
-        looking.wait()
+        while not looking.wait(0.05):
+            assert not sending.done()
         with SlowNode(ros_environment, 1, time_ns=1) as late:
             assert sending.result() == 0
             assert late.received == 1
