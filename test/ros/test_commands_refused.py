@@ -27,54 +27,31 @@ SECOND = 10**9
 HUGE = (1e15, 0.0, 0.0)
 NAN, INF = math.nan, math.inf
 
-WORDS = "nowhere world@nowhere @com world@ world@com@com com@world WORLD vertex vertex/-1 vertex/99999999 right@"
-POINTS = "point/1,2 point/nan,0,0 point/1,2,three ray/0,0,0 ray/0,0,0/0,0,0 normal normal@com body/mesh tip/0"
-OPTIONS = "world;duration world;duration=0 world;duration=inf world;impulse;duration=0.1 world;impuls world; ;"
-FRAMES = (
-    *WORDS.split(),
-    *POINTS.split(),
-    *OPTIONS.split(),
-    *(" world", "point/1, 2, 3", "\x01", "w" * 10_000, "日本"),
-)
+FRAMES = ("nowhere", "@com", "vertex/99999999", "normal@com", "body/mesh", "tip;impuls", "\x01", "w" * 10_000, "日本")
+UNIT = (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
 REFUSED = {
     "frame": [
         *(("poke", wrench_message(0, frame, (1e-3, 0.0, 0.0))) for frame in FRAMES),
-        *(
-            ("wrench", wrench_message(0, f, (1e-3, 0.0, 0.0)))
-            for f in ("nowhere", "tip;impulse", "tip;duration=0", "x" * 10_000)
-        ),
+        ("wrench", wrench_message(0, "tip;impulse", (1e-3, 0.0, 0.0))),
         ("poke", wrench_message(0, "normal@tip", (1.0, 1.0, 0.0))),
         ("poke", wrench_message(0, "normal@tip", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
-        *(
-            ("string/target", point_message(0, frame, (0, 0, 0)))
-            for frame in ("body", "world@com", "map", "x" * 10_000)
-        ),
-        *(
-            ("string/attach", point_message(0, frame, (0, 0, 0)))
-            for frame in ("tip", "mesh", "world/mesh", "x" * 10_000)
-        ),
-        *(
-            ("inertia/set", inertia_message(0, f, 1, (0, 0, 0), (1, 0, 0, 1, 0, 1)))
-            for f in ("world", "mesh", "x" * 10_000)
-        ),
+        ("string/target", point_message(0, "body", (0, 0, 0))),
+        ("string/attach", point_message(0, "tip", (0, 0, 0))),
+        ("inertia/set", inertia_message(0, "world", 1, (0, 0, 0), UNIT)),
     ],
     "nonfinite": [
-        *(("poke", wrench_message(0, "tip", f)) for f in ((NAN, 0, 0), (0, INF, 0), (0, 0, -INF))),
-        ("wrench", wrench_message(0, "", (0, 0, 0), (NAN, 0, 0))),
-        ("poke", wrench_message(0, "ray/0,0,3/0,0,-1", (NAN, 0, 0))),
+        ("poke", wrench_message(0, "tip", (NAN, 0, 0))),
+        ("wrench", wrench_message(0, "", (0, 0, 0), (-INF, 0, 0))),
         ("poke", wrench_message(0, "point/1e999,0,0", (1, 0, 0))),
         ("string/target", point_message(0, "", (NAN, 0, 0))),
         ("string/attach", point_message(0, "body", (0, INF, 0))),
-        ("inertia/set", inertia_message(0, "", NAN, (0, 0, 0), (1, 0, 0, 1, 0, 1))),
-        ("inertia/set", inertia_message(0, "body", 1, (0, INF, 0), (1, 0, 0, 1, 0, 1))),
-        ("inertia/set", inertia_message(0, "", 1, (0, 0, 0), (1, NAN, 0, 1, 0, 1))),
+        ("inertia/set", inertia_message(0, "body", 1, (0, INF, 0), UNIT)),
     ],
     "magnitude": [
-        *(("poke", wrench_message(0, f, HUGE)) for f in ("", "tip", "world@tip", "body;impulse", "normal@tip")),
-        *(("wrench", wrench_message(0, "", f)) for f in ((1e308, 0, 0), (-1e308, 1e308, 1e308))),
+        *(("poke", wrench_message(0, frame, HUGE)) for frame in ("", "world@tip", "body;impulse", "normal@tip")),
+        ("wrench", wrench_message(0, "", (-1e308, 1e308, 1e308))),
         ("wrench", wrench_message(0, "", (0, 0, 0), (0, 1e12, 0))),
         ("poke", wrench_message(0, "point/1e300,0,0", (1.0, 1.0, 0))),
-        ("string/target", point_message(0, "", (1e200, 0, 0))),
         ("string/target", point_message(0, "", (1e60, 0, 0))),
         ("string/attach", point_message(0, "body", (1e308, 0, 0))),
     ],
@@ -110,31 +87,22 @@ REFUSED = {
         ("wrench", wrench_message(0, "world@ray/0,0,3/0,0,1", (1e-3, 0, 0))),
     ],
     "tensor": [
-        *(("inertia/set", inertia_message(0, "", m, (0, 0, 0), (1, 0, 0, 1, 0, 1))) for m in (0.0, -1.0, 1e200)),
-        *(
-            ("inertia/set", inertia_message(0, "", 1.0, (0, 0, 0), tensor))
-            for tensor in (
-                (1, 0, 0, 1, 0, 3),
-                (1, 0, 0, -1, 0, 1),
-                (0, 0, 0, 0, 0, 0),
-                (1, 5, 0, 1, 0, 1),
-                (1e-14, 0, 0, 1, 0, 1),
-            )
-        ),
-        ("inertia/set", inertia_message(0, "", 1.0, (0, 0, 1e200), (1, 0, 0, 1, 0, 1))),
+        ("inertia/set", inertia_message(0, "", 0.0, (0, 0, 0), UNIT)),
+        ("inertia/set", inertia_message(0, "", 1e200, (0, 0, 0), UNIT)),
+        ("inertia/set", inertia_message(0, "", 1.0, (0, 0, 0), (1, 0, 0, 1, 0, 3))),
+        ("inertia/set", inertia_message(0, "", 1.0, (0, 0, 0), (1e-14, 0, 0, 1, 0, 1))),
+        ("inertia/set", inertia_message(0, "", 1.0, (0, 0, 1e200), UNIT)),
+    ],
+    # Neither past, nor within the horizon, nor within a day of the system's clock.
+    "stamp": [
+        ("poke", wrench_message(3660 * SECOND, "tip", (1e-3, 0, 0))),
+        ("wrench", wrench_message(1_000_000 * SECOND, "tip", (1e-3, 0, 0))),
+        ("string/target", point_message(2_147_483_647 * SECOND, "", (0, 0, 0))),
+        ("string/attach", point_message(100_000_000 * SECOND, "body", (0, 0, 0))),
+        ("inertia/set", inertia_message(100_000_000 * SECOND, "", 1, (0, 0, 0), UNIT)),
+        ("schedule", {"data": "{t: 1e8, service: clear_wrench}"}),
     ],
 }
-
-
-REFUSED["stamp"] = [
-    ("poke", wrench_message(3660 * SECOND, "tip", (1e-3, 0, 0))),
-    ("wrench", wrench_message(1_000_000 * SECOND, "tip", (1e-3, 0, 0))),
-    ("string/target", point_message(2_147_483_647 * SECOND, "", (0, 0, 0))),
-    ("string/attach", point_message(100_000_000 * SECOND, "body", (0, 0, 0))),
-    ("inertia/set", inertia_message(100_000_000 * SECOND, "", 1, (0, 0, 0), (1, 0, 0, 1, 0, 1))),
-    ("schedule", {"data": "{t: 1e8, service: clear_wrench}"}),
-]
-"""Neither past, nor within the horizon, nor within a day of the system's clock."""
 
 
 def test_everything_is_refused_with_its_reason_and_counted_and_the_body_flies_on(rig):
@@ -194,16 +162,11 @@ def test_a_change_that_the_integrator_cant_carry_is_refused_and_counted_naming_t
 
 REFUSED_VALUES: list[tuple[dict, str]] = [
     ({"mass": -1.0}, "mass"),
-    ({"mass": NAN}, "mass"),
-    ({"scale": [1.0, 2.0]}, "scale"),
     ({"scale": [0.0, 1.0, 1.0]}, "scale"),
-    ({"gravity": "[0, 0, down]"}, "gravity"),
     ({"integrator": "magic"}, "integrator"),
     ({"mesh": "no_such_body"}, "no_such_body"),
     ({"mesh": ""}, "mesh"),
     ({"inertia_model": "explicit", "explicit_inertia.tensor": [1.0, 0, 0, 1.0, 0, 3.0]}, "tensor"),
-    ({"initial.orientation_xyzw": [0.0, 0.0, 0.0, 0.0]}, "orientation"),
-    ({"real_time_factor": -1.0}, "real_time_factor"),
     ({"ballast.nut": [-1e9, 0.0, 0.0, 0.0]}, "mass"),
     ({"ballast.Nut": [1.0, 0.0, 0.0, 0.0]}, "ballast.Nut"),
     ({"gyroscopic": 1}, "gyroscopic"),
