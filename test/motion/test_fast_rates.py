@@ -62,41 +62,28 @@ REFUSED = {
 }
 
 
+@pytest.mark.parametrize("mass", [2.0, 0.1, 0.125, 0.185])
 @pytest.mark.parametrize("parameter", REFUSED)
-def test_what_is_too_fast_is_refused_with_the_most_that_this_body_takes(parameter):
+def test_what_is_too_fast_is_refused_with_the_most_that_this_body_takes(parameter, mass):
+    """Three digits of the limit, rounded down."""
+    body = make_body(mass, np.zeros(3), 0.5 * mass * np.diag(MOMENTS))
     changes, most = REFUSED[parameter]
     with pytest.raises(CommandRefused) as refusal:
-        flight(BODY, integrator="auto", **changes)
+        flight(body, integrator="auto", **changes)
     assert (refusal.value.reason, refusal.value.field) == ("integrator", parameter)
     said = float(refusal.value.accepted.split()[2])
-    assert most is None or said == most
+    assert most is None or mass != 2.0 or said == most
     # It is taken, and a hair more isn't.
     name = parameter.removeprefix("string.")
-    for part, taken in ((1.0, True), (1.01, False)):
-        if name == parameter:
-            changed = {name: part * said}
-        else:
-            changed = {"string": replace(changes["string"], **{name: part * said})}
-        if taken:
-            flight(BODY, integrator="auto", **changed)
-        else:
-            with pytest.raises(CommandRefused):
-                flight(BODY, integrator="auto", **changed)
+    taken, refused = (
+        {name: part * said} if name == parameter else {"string": replace(changes["string"], **{name: part * said})}
+        for part in (1.0, 1.01)
+    )
+    flight(body, integrator="auto", **taken)
+    with pytest.raises(CommandRefused):
+        flight(body, integrator="auto", **refused)
     # Fixed steps are the user's own choice.
-    flight(BODY, integrator="rk4", **changes)
-
-
-def test_the_most_that_is_said_is_taken_of_bodies_of_any_mass():
-    """Three digits of the limit, rounded down."""
-    for mass in np.linspace(0.1, 0.2, 21).tolist():
-        body = make_body(mass, np.zeros(3), mass * np.diag((0.02, 0.03, 0.04)))
-        for name, field in (("linear_damping", "linear_damping"), ("stiffness", "string.stiffness")):
-            changes = {"string": tied(stiffness=1e14)} if name == "stiffness" else {name: 1e14}
-            with pytest.raises(CommandRefused, match=field) as refusal:
-                flight(body, integrator="auto", **changes)
-            said = float(refusal.value.accepted.split()[2])
-            taken = {"string": tied(stiffness=said)} if name == "stiffness" else {name: said}
-            flight(body, integrator="auto", **taken)
+    flight(body, integrator="rk4", **changes)
 
 
 def test_tying_and_changing_in_flight_are_refused_and_counted():

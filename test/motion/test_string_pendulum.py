@@ -35,10 +35,9 @@ def zero_crossings(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.parametrize("bilateral", [False, True], ids=["pull-only", "bilateral"])
 @pytest.mark.parametrize("integrator", ["rk4", "auto"])
 @pytest.mark.parametrize("mode", [0, 1], ids=["slow", "fast"])
-def test_both_normal_modes_of_a_body_on_a_taut_string_have_their_period(mode, integrator, bilateral):
+def test_both_normal_modes_of_a_body_on_a_taut_string_have_their_period(mode, integrator):
     """Released at rest with 1e-3 rad in either mode; |T/T₀ − 1| ≤ 1e-5, measured 3e-7 (rk4) at most."""
     rates, shapes = normal_modes()
     shape = 1e-3 * shapes[:, mode] / np.abs(shapes[:, mode]).max()
@@ -55,7 +54,6 @@ def test_both_normal_modes_of_a_body_on_a_taut_string_have_their_period(mode, in
         stiffness=stiffness,
         damping_ratio=0.0,
         rest_length=rest_length,
-        bilateral=bilateral,
     )
     simulation = flight(
         make_body(MASS, (0.0, 0.0, 0.0), np.diag([0.02, INERTIA_Y, 0.015])),
@@ -85,27 +83,32 @@ def test_both_normal_modes_of_a_body_on_a_taut_string_have_their_period(mode, in
     assert abs(measured / period - 1.0) <= 1e-5
 
 
-KNOT = (0.08, 0.03, -0.05)
-
-
-def turned_tensor() -> np.ndarray:
-    R = Rotation.from_rotvec([0.3, 0.5, -0.2]).as_matrix()
-    return R @ np.diag([0.004, 0.006, 0.009]) @ R.T
-
-
-def hand_position(time_s: float) -> np.ndarray:
+def hand_position(time_s: float) -> tuple[float, float, float]:
     """A hand that circles and bobs hard enough to let the string go slack and snatch it taut."""
-    return np.array([0.3 * math.sin(5.0 * time_s), 0.3 * math.cos(4.0 * time_s), 0.4 + 0.2 * math.sin(7.0 * time_s)])
+    return (0.3 * math.sin(5.0 * time_s), 0.3 * math.cos(4.0 * time_s), 0.4 + 0.2 * math.sin(7.0 * time_s))
 
 
-def energy_balance(integrator: str, damping_ratio: float, rest_length: float, bilateral: bool) -> tuple[float, dict]:
-    """|ΔE − (hand's work − damper's heat)| over the largest energy exchanged, and what was exchanged, over 4 s."""
-    body = make_body(0.8, (0.01, -0.02, 0.005), turned_tensor())
+@pytest.mark.parametrize(
+    ("integrator", "damping_ratio", "rest_length", "bilateral"),
+    [
+        ("dop853", 0.1, 0.5, False),
+        ("dop853", 0.1, 0.5, True),
+        ("auto", 0.0, 0.5, False),
+        ("auto", 0.1, 0.0, False),
+        ("auto", 0.1, 0.5, True),
+        ("auto", 1.5, 0.5, False),
+    ],
+)
+def test_the_hands_work_less_the_dampers_heat_is_what_the_body_and_string_gain(
+    integrator, damping_ratio, rest_length, bilateral
+):
+    """To 1e-9 of the largest energy exchanged, at every 10 ms of 4 s with the hand moving."""
+    turn = Rotation.from_rotvec([0.3, 0.5, -0.2]).as_matrix()
     settings = StringSettings(
         frequency=15.0, damping_ratio=damping_ratio, rest_length=rest_length, bilateral=bilateral, timeout_ns=0
     )
     simulation = flight(
-        body,
+        make_body(0.8, (0.01, -0.02, 0.005), turn @ np.diag([0.004, 0.006, 0.009]) @ turn.T),
         integrator=integrator,
         step_s=1e-4,
         initial=[0.0, 0.0, -0.3, *Rotation.from_rotvec([0.2, -0.4, 0.1]).as_quat(), 0.1, 0.0, 0.0, 1.0, -2.0, 0.5],
@@ -113,36 +116,21 @@ def energy_balance(integrator: str, damping_ratio: float, rest_length: float, bi
         string=settings,
         accuracy=1e-12,
     )
-    simulation.submit(TieString("mesh", KNOT))
+    simulation.submit(TieString("mesh", (0.08, 0.03, -0.05)))
     every_ns = 37_000_000
     for k in range(4 * SECOND // every_ns):
-        simulation.submit(MoveString(tuple(hand_position(k * every_ns * 1e-9))), k * every_ns)
+        simulation.submit(MoveString(hand_position(k * every_ns * 1e-9)), k * every_ns)
     # Tying at a distance stores energy at once, which no hand has worked: the balance begins a nanosecond after it.
     simulation.advance(1)
     start = simulation.kinetic_energy + simulation.potential_energy
-    exchanged = {"energy": 0.0, "work": 0.0, "heat": 0.0}
-    error = 0.0
+    exchanged = []
     for time_ns in range(10_000_000, 4 * SECOND, 10_000_000):
         simulation.advance(time_ns)
         gain = simulation.kinetic_energy + simulation.potential_energy - start
-        error = max(error, abs(gain - (simulation.hand_work - simulation.string_heat)))
-        for name, value in (("energy", gain), ("work", simulation.hand_work), ("heat", simulation.string_heat)):
-            exchanged[name] = max(exchanged[name], abs(value))
+        exchanged.append((gain, simulation.hand_work, simulation.string_heat))
     assert not simulation.refused
-    return error / max(exchanged.values()), exchanged
-
-
-@pytest.mark.parametrize("rest_length", [0.0, 0.5])
-@pytest.mark.parametrize("bilateral", [False, True], ids=["pull-only", "bilateral"])
-@pytest.mark.parametrize(
-    ("integrator", "damping_ratio"), [("dop853", 0.1), ("auto", 0.0), ("auto", 0.1), ("auto", 1.5)]
-)
-def test_the_hands_work_less_the_dampers_heat_is_what_the_body_and_string_gain(
-    integrator, damping_ratio, bilateral, rest_length
-):
-    """To 1e-9 of the largest energy exchanged, at every 10 ms of 4 s with the hand moving."""
-    error, exchanged = energy_balance(integrator, damping_ratio, rest_length, bilateral)
-    assert error <= 1e-9
+    gain, work, heat = np.transpose(exchanged)
+    assert np.abs(gain - (work - heat)).max() <= 1e-9 * np.abs(exchanged).max()
     # The test is of something: the hand works, and a damper heats.
-    assert exchanged["work"] > 1.0
-    assert (exchanged["heat"] > 0.1) == (damping_ratio > 0.0)
+    assert np.abs(work).max() > 1.0
+    assert (heat.max() > 0.1) == (damping_ratio > 0.0)

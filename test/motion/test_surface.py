@@ -43,7 +43,7 @@ def blob(seed: int) -> Surface:
     return Surface(mesh.vertices + shifts, np.ascontiguousarray(mesh.faces))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_a_ray_hits_where_every_triangle_by_itself_says(seed):
     rng = np.random.default_rng(seed)
@@ -59,7 +59,7 @@ def test_a_ray_hits_where_every_triangle_by_itself_says(seed):
         assert distance == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_no_ray_slips_through_an_edge_or_a_corner(seed):
     # From outside towards exact points of edges and corners, whose images in the ray's frame round.
@@ -112,7 +112,7 @@ def test_the_inward_normal_of_a_cube_is_its_symmetry_axis(point, outward):
     assert np.abs(CUBE.inward_normal(point) - expected).max() <= 1e-15
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_no_sampled_point_of_the_surface_is_nearer_than_the_nearest(seed):
     rng = np.random.default_rng(seed)

@@ -133,34 +133,6 @@ def test_plumb_line_comes_to_rest_through_the_centre_of_mass(attach: str) -> Non
     assert np.abs(knot - [0.0, 0.0, -0.4 - body.mass * 9.81 / 2000.0]).max() < 1e-4
 
 
-def test_book_on_a_string_swings_in_the_two_rhythms_of_a_double_pendulum() -> None:
-    """Nudged while it hangs by its spine: the normal modes of string and book in one plane, small angles."""
-    half = math.sqrt(0.5)
-    spine = [-0.08, 0.0, 0.0]
-    body = fly("plumb_line", 0.0).body
-    d = float(np.linalg.norm(body.point(spine)))
-    length = 0.4 + body.mass * 9.81 / 2000.0
-    hanging = {
-        "initial__orientation_xyzw": [0.0, half, 0.0, half],  # the mesh's x axis down
-        "initial__position": [0.0, 0.0, -length - d],
-        "initial__linear_velocity": [0.02, 0.0, 0.0],
-        "string__attach": spine,
-    }
-    undamped = {"linear_damping": 0.0, "angular_damping": 0.0, "string__damping_ratio": 0.0}
-    x = fly("plumb_line", 60.0, **hanging, **undamped).position[:, 0]
-    m, moment = body.mass, body.inertia[1, 1]
-    M = np.array([[m * length**2, m * length * d], [m * length * d, moment + m * d * d]])
-    K = np.diag([m * 9.81 * length, m * 9.81 * d])
-    modes = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K))) / (2.0 * np.pi)
-    frequency = np.fft.rfftfreq(len(x), 0.01)
-    amplitude = np.abs(np.fft.rfft(np.hanning(len(x)) * (x - x.mean())))
-    for low, high in ((0.3, 1.2), (1.2, 5.0)):
-        band = (frequency > low) & (frequency < high)
-        strongest = frequency[band][np.argmax(amplitude[band])]
-        assert np.abs(modes - strongest).min() < 0.02  # one bin of the spectrum
-        assert amplitude[band].max() > 20.0 * np.median(amplitude[band])
-
-
 def test_top_on_a_string_walks_at_the_rate_of_its_weight_over_its_momentum() -> None:
     def walk(spin: float) -> tuple[Flight, float]:
         flight = fly("top_on_string", 10.0, interval_s=0.005, initial__angular_velocity=[0.0, -spin, 0.0])
