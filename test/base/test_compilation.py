@@ -72,8 +72,9 @@ def test_two_kernels_of_one_function_that_two_processes_keep_at_once_stay_apart(
     assert (adding(1)(1), adding(2)(1)) == (2, 3)
 
 
-@pytest.mark.parametrize("ending", ["nbi", "nbc"])
-@pytest.mark.parametrize("content", [b"", b"hello", bytes(100)], ids=["empty", "text", "zeros"])
+@pytest.mark.parametrize(
+    ("ending", "content"), [("nbi", b""), ("nbi", b"hello"), ("nbc", bytes(100)), ("nbc", b"")], ids=str
+)
 def test_a_damaged_kernel_on_disk_is_compiled_and_kept_anew(adding, tmp_path, ending, content):
     assert adding(1)(1) == 2
     (file,) = tmp_path.rglob(f"*.{ending}")

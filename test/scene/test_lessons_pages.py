@@ -14,8 +14,8 @@ import pytest
 from lesson_flights import Z, degrees_between, fly
 
 import rigid_proto_ros
-from rigid_proto_ros.base.bundled import scene_names
-from rigid_proto_ros.scene.lessons import lesson
+from rigid_proto_ros.base.bundled import example_names, scene_names
+from rigid_proto_ros.scene.lessons import lesson, lessons
 from rigid_proto_ros.scene.scenario import nanoseconds, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
@@ -28,9 +28,15 @@ SECTIONS = ("What to see", "Why", "What to change next")
 
 
 @pytest.mark.parametrize("name", scene_names())
-def test_every_scene_has_a_page_with_its_title_a_command_a_picture_and_a_reason(name: str) -> None:
-    text = (PAGES / f"{name}.md").read_text("utf-8")
+def test_every_scene_is_a_lesson_and_has_a_page_with_its_title_a_command_a_picture_and_a_reason(name: str) -> None:
     one = lesson(name)
+    assert 8 < len(one.title) < 60 and not one.title.endswith(".")
+    assert one.question.endswith("?") and len(set(one.choices)) == 3 and one.answer in range(3)
+    assert all(20 < len(sentence) < 200 for sentence in one.sentences) and one.sentences[-1].endswith(".")
+    assert len(one.reason) > 60
+    assert f"rigid_proto simulate config/{name}.yaml" in one.commands
+    assert not one.script or one.script in example_names()
+    text = (PAGES / f"{name}.md").read_text("utf-8")
     assert text.startswith(f"# {one.title}\n")
     assert all(sentence in text for sentence in one.sentences)
     assert f"rigid_proto simulate config/{name}.yaml" in text
@@ -41,7 +47,8 @@ def test_every_scene_has_a_page_with_its_title_a_command_a_picture_and_a_reason(
     assert 30_000 < picture.stat().st_size < 250_000
 
 
-def test_there_is_no_page_without_a_scene() -> None:
+def test_there_is_no_page_without_a_scene_and_no_title_twice() -> None:
+    assert len({one.title for one in lessons()}) == len(scene_names())
     assert sorted(page.stem for page in PAGES.glob("*.md") if page.stem != "README") == scene_names()
 
 

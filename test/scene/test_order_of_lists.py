@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Entries of lists and scripts act in the order in which they are listed, before all single messages of their instant."""
+"""Commands of one instant: entries of lists and scripts act in the order in which they are listed, then single messages by kind,
+those of one topic as they arrived.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +9,13 @@ import itertools
 import random
 
 import pytest
-from flights import SECOND, EventLines
+from flights import SECOND, EventLines, wrench
 
-from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.scenario import make_scenario, with_inertia
 from rigid_proto_ros.scene.scenario_run import Ghost, OfflineRun
 from rigid_proto_ros.scene.script import expand_script
 from rigid_proto_ros.session.recorded_session import decode_event
-from rigid_proto_ros.simulation.commands import Change, Command
+from rigid_proto_ros.simulation.commands import Change, Command, ThrusterCommand
 from rigid_proto_ros.simulation.observer import Observer
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -52,7 +54,9 @@ def test_a_script_acts_in_its_own_order_and_not_by_kind(seed: int) -> None:
 
 
 def test_lists_act_first_as_they_arrived_then_single_messages_by_kind_whatever_arrives_first() -> None:
-    found = set()
+    found, scenario = set(), make_scenario(SCENE)
+    content = {"mass": 0.02, "com": (0, 0, 0), "tensor": (1e-5, 0, 0, 2e-5, 0, 2.5e-5), "relative": False}
+    inertia = Change(content, lambda: with_inertia(scenario, content).setup, "inertia")
     for order in itertools.permutations(range(3)):
         lines = EventLines()
         simulation = Simulation(make_scenario(SCENE).setup, lines)
@@ -60,22 +64,25 @@ def test_lists_act_first_as_they_arrived_then_single_messages_by_kind_whatever_a
         parts = [
             [(own[0], (2, 0)), (own[1], (2, 1))],
             [(own[4], (1, 0)), (own[6], (1, 1)), (own[2], (1, 2))],
-            [(own[8], None), (own[3], None), (own[1], None)],
+            [(command, None) for command in (own[8], own[4], own[3], inertia, own[0], own[6], own[1], own[5])],
         ]
         for k in order:
             for command, listed in parts[k]:
                 simulation.submit(command, SECOND, listed)
         found.add(simulation.advance(2 * SECOND).sha256())
+        lists = ["poke", "clear_wrench", "string_target", "poke", "set"]
         assert kinds(lines) == [
-            "poke",
+            *lists,
             "clear_wrench",
-            "string_target",
-            "poke",
             "set",
-            "set",
+            "inertia",
             "string_attach",
             "wrench",
+            "wrench",
+            "poke",
+            "poke",
         ]
+        assert not simulation.refused
     assert len(found) == 1
 
 
@@ -98,3 +105,31 @@ def test_loads_are_summed_in_the_order_in_which_they_began_to_act() -> None:
     run.advance(SECOND)
     kinds = [acting.load.force for acting in run.simulation.acting]
     assert kinds == [(0.1, 0.2, 0.3), (0.7, -0.1, 0.05), (-0.3, 0.11, 0.01)]
+
+
+@pytest.mark.parametrize("at_ns", [0, SECOND // 2], ids=["now", "scheduled"])
+@pytest.mark.parametrize("last", [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0)])
+def test_the_last_wrench_and_the_last_forces_of_thrusters_that_arrive_are_those_that_hold(last, at_ns):
+    scene = {**SCENE, "wrench_timeout": 0.0, "thrusters.a": [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]}
+    simulation = Simulation(make_scenario(scene).setup)
+    for force in ((1.0, 0.0, 0.0), last):
+        simulation.submit(wrench("world", force), at_ns)
+        simulation.submit(ThrusterCommand((force[0],)), at_ns)
+    simulation.advance(2 * SECOND)
+    acting = [load.load.force for load in simulation.acting if load.shown_kind == "wrench"]
+    assert acting == ([last] if any(last) else [])
+    assert [load.load.force[0] for load in simulation.acting if load.shown_kind == "thruster"] == [x for x in last if x]
+
+
+def test_the_total_wrench_does_not_depend_on_who_ended_before():
+    """Pulses summed afresh: after some have ended, the sum is that of the rest alone, to the bit."""
+    setup = make_scenario({**SCENE, "initial.angular_velocity": [0.0, 0.0, 0.0]}).setup
+    with_others, alone = Simulation(setup), Simulation(setup)
+
+    for force, duration in (((1e9, 0.1, -3e7), 1e-3), ((0.1, 0.2, 0.3), 2.0), ((-1e9, 7.7, 1e8), 1e-3)):
+        with_others.submit(wrench(f"body;duration={duration}", force, held=False))
+    alone.submit(wrench("body;duration=2.0", (0.1, 0.2, 0.3), held=False))
+    with_others.advance(SECOND)
+    alone.advance(SECOND)
+    sums = [simulation.flight.sums.tobytes() for simulation in (with_others, alone)]
+    assert sums[0] == sums[1]

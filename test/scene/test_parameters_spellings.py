@@ -115,13 +115,10 @@ def test_the_node_takes_every_spelling_from_files_the_command_line_and_services(
         for parameter in filter(settable, NUMERIC):
             expected = given.get(parameter.name, parameter.convert(whole(parameter)))
             assert read[parameter.name] == expected, parameter.name
-        for parameter in filter(settable, NUMERIC):
-            if parameter.changes == READ_ONLY or parameter.name == "density":
-                continue
-            value = whole(parameter)
-            for spelling in (value, str(value), str(mixed(value)) if isinstance(value, list) else mixed(value)):
-                assert client.set_named({parameter.name: spelling}) == [[True, ""]], (parameter.name, spelling)
-                assert client.get(parameter.name) == {parameter.name: parameter.convert(value)}
+        live = [p for p in filter(settable, NUMERIC) if p.changes != READ_ONLY and p.name != "density"]
+        for spelled in (lambda value: value, str, lambda value: str(mixed(value))):
+            assert client.set_named({p.name: spelled(whole(p)) for p in live}) == [[True, ""]] * len(live)
+            assert client.get(*(p.name for p in live)) == {p.name: p.convert(whole(p)) for p in live}
 
 
 def test_a_parameter_of_an_earlier_version_is_left_out_without_effect_and_refused_by_name_with_one(tmp_path) -> None:

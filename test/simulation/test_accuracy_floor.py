@@ -98,9 +98,3 @@ def test_a_floor_is_judged_by_the_accuracy_and_the_method_of_its_own_segment():
         assert run.simulation.accuracy_floor == ""
         run.advance(SECOND)
         assert ("far from the world's origin" in run.simulation.accuracy_floor) == told, script
-
-
-def test_fixed_steps_promise_no_accuracy_and_report_no_floor():
-    simulation = flight(BOX, integrator="rk4", accuracy=1e-15, initial=spinning((1, 2, 3)))
-    simulation.advance(SECOND // 100)
-    assert simulation.accuracy_floor == ""

@@ -22,6 +22,7 @@ SCRIPT = """
 - {t: 1.0, wrench: {force: [3, 0, 0], slot: left}}
 - {t: 1.0, wrench: {force: [0, 0, 0]}}
 """
+PULSE = "- {t: 1.0, force: [0, 0, 8], duration: 5}\n- {t: 2.0, impulse: [0, 0, 1]}\n"
 
 
 def flown(script: str = SCRIPT, until_s: float = 4.0, **scene) -> tuple[OfflineRun, EventLines]:
@@ -36,14 +37,17 @@ def flown(script: str = SCRIPT, until_s: float = 4.0, **scene) -> tuple[OfflineR
     [
         # left: 1 N for 1 s, then 3 N for the timeout of 1.5 s; right: 2 N for 1.5 s; the unnamed one 4 N for 1 s.
         (SCRIPT, [1.0 + 4.5, 3.0, 4.0], 2),
-        (SCRIPT + "- {t: 1.25, service: clear_wrench}", [1.0 + 0.75, 2.5, 4.0], 0),
+        # clear_wrench ends a running pulse too, and leaves what is scheduled.
+        (SCRIPT + PULSE + "- {t: 1.25, service: clear_wrench}", [1.0 + 0.75, 2.5, 4.0 + 2.0 + 1.0], 0),
         (SCRIPT + "- {t: 0.5, force: [0, 8, 0], duration: 0.25, slot: right}", [1.0 + 4.5, 1.0 + 2.0, 4.0], 1),
         # What has a duration ends by it, and nothing else: no other slot, no timeout, no change of the timeout.
         ("[{t: 0, wrench: {force: [1, 0, 0], duration: 2, slot: a}}, {t: 0, wrench: {force: [0, 1, 0]}}]", [2, 1.5, 0], 1),
         ("[{t: 0, wrench: {force: [1, 0, 0], duration: 2, slot: a}}, {t: 1, force: [0, 1, 0], duration: 2, slot: a}]", [1, 2, 0], 0),
         ("[{t: 0, wrench: {force: [1, 0, 0], duration: 2}}, {t: 1, set: {wrench_timeout: 0.25}}]", [2, 0, 0], 0),
+        # What replaces it ends it for good.
+        ("[{t: 0, wrench: {force: [1, 0, 0], duration: 3}}, {t: 0.5, wrench: {force: [0, 1, 0], duration: 2}}]", [0.5, 2, 0], 0),
     ],
-    ids=["replaced and timed out", "cleared", "poked", "its own end", "replaced by a poke", "timeout changed"],
+    ids=["replaced and timed out", "cleared", "poked", "its own end", "replaced by a poke", "timeout changed", "replaced"],
 )  # fmt: skip
 def test_each_slot_is_replaced_and_ends_by_itself(script: str, velocity: list[float], timeouts: int) -> None:
     run, told = flown(script)
@@ -82,20 +86,6 @@ def test_slots_have_a_number_each() -> None:
 def test_what_is_no_slot_is_refused(frame: str) -> None:
     with pytest.raises(CommandRefused, match="slot"):
         parse_frame(frame)
-
-
-@pytest.mark.parametrize("timeout", [0.0, 0.4, 1.5])
-def test_a_wrench_with_a_duration_holds_that_long_unless_replaced_whatever_the_timeout(timeout: float) -> None:
-    one = {"mesh": "", "inertia_model": "explicit", "explicit_inertia.mass": 1.0, "wrench_timeout": timeout}
-    both = (
-        "- {t: 0, wrench: {force: [0.1, 0, 0], duration: 3}}\n- {t: 0.5, wrench: {force: [0, 0.1, 0], duration: 2}}\n"
-    )
-    run, told = flown(both, mass=0.0, **one)
-    # x until y replaces it, which ends it for good.
-    assert run.simulation.state.linear_velocity == pytest.approx([0.05, 0.2, 0.0], rel=1e-12)
-    assert [json.loads(line)["kind"] for line in told.lines] == ["wrench", "wrench"]
-    apart, _ = flown(both.replace("duration: 3", "duration: 3, slot: x"), mass=0.0, **one)
-    assert apart.simulation.state.linear_velocity == pytest.approx([0.3, 0.2, 0.0], rel=1e-12)
 
 
 @pytest.mark.parametrize(
