@@ -19,21 +19,34 @@ SECOND = 10**9
 AT_REST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-class EventLines(Observer):
+class Heard(Observer):
+    """Keeps the events of some kinds, in the order in which they came."""
+
+    def __init__(self, *kinds: type) -> None:
+        self.takes = frozenset(kinds)
+        self.events: list = []
+
+    def on(self, event) -> None:
+        if type(event) in self.takes:
+            self.events.append(event)
+
+    def of(self, kind: type) -> list:
+        return [event for event in self.events if type(event) is kind]
+
+
+class EventLines(Heard):
     """Keeps the lines of the event log with their times [ns]."""
 
     def __init__(self) -> None:
-        self.timed: list[tuple[int, str]] = []
+        super().__init__(Logged)
+
+    @property
+    def timed(self) -> list[tuple[int, str]]:
+        return [(event.time_ns, event.line) for event in self.events]
 
     @property
     def lines(self) -> list[str]:
-        return [line for _, line in self.timed]
-
-    takes = frozenset({Logged})
-
-    def on(self, event) -> None:
-        if isinstance(event, Logged):
-            self.timed.append((event.time_ns, event.line))
+        return [event.line for event in self.events]
 
 
 def bundled_body(name: str) -> Body:

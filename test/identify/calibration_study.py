@@ -1,16 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Thrown bundled bodies, measured with noise and estimated: how far off, in the standard deviations that
-the estimate gives itself.
-
-``python test/identify/calibration_study.py FIRST LAST`` prints the throws of these numbers as one line of JSON each;
-a third word ``wrong`` begins them with a hundred times the mass and a turned tensor. Half of the throws carry a phone.
+the estimate gives itself. Half of the throws carry a phone.
 """
 
 from __future__ import annotations
 
-import json
-import sys
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import measured_flights as mf
 import numpy as np
@@ -111,7 +106,9 @@ def measured_throw(number: int, poked: bool, seconds: float = 2.0, phone: bool =
 
 
 def throw(number: int, poked: bool, first: str = "ball", phone: bool = False) -> Throw:
-    """One throw, estimated. first: what the estimate begins with, ``ball`` or ``wrong``."""
+    """One throw, estimated. first: what the estimate begins with, ``ball`` or ``wrong``: a hundred times
+    the mass and a turned tensor.
+    """
     made = measured_throw(number, poked, phone=phone)
     begin = _first(first, made.truth, np.random.default_rng([number, 1]))
     found = identify([made.flight], made.fit, Known(body=begin, length=made.size))
@@ -171,14 +168,3 @@ def has_phone(number: int) -> bool:
 def throw_of_study(number: int, first: str = "ball") -> Throw:
     """One of the study: every second one is poked, and of each two neighbouring pairs one carries a phone."""
     return throw(number, poked=number % 2 == 0, first=first, phone=has_phone(number))
-
-
-def main(first: int, last: int, begin: str = "ball") -> None:
-    """The throws of these numbers, printed."""
-    for number in range(first, last):
-        found = throw_of_study(number, begin)
-        print(json.dumps({"number": number, "begin": begin, **asdict(found)}), flush=True)
-
-
-if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:])

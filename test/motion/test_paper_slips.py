@@ -24,28 +24,6 @@ def flown(scene: str, duration_s: float, script: str = "[]", **changes) -> Offli
     return run
 
 
-def test_the_velocity_r_cross_omega_carries_a_point_the_wrong_way_round() -> None:
-    """Midpoint steps of r' = ω × r and of r' = r × ω, a quarter turn: half a turn apart."""
-    omega, h = np.array([0.0, 0.0, 1.0]), 1e-3
-    point = wrong = np.array([1.0, 0.0, 0.0])
-    for _ in range(round(np.pi / 2.0 / h)):
-        point = point + h * np.cross(omega, point + 0.5 * h * np.cross(omega, point))
-        wrong = wrong + h * np.cross(wrong + 0.5 * h * np.cross(wrong, omega), omega)
-    assert point == pytest.approx([0.0, 1.0, 0.0], abs=1e-3)
-    assert wrong == pytest.approx([0.0, -1.0, 0.0], abs=1e-3)
-
-
-def test_one_axis_in_all_three_derivatives_leaves_a_spin_about_it_without_effect() -> None:
-    """e_i' = ω × e_i for each axis, and with e_x for all three; midpoint steps, a quarter turn about x."""
-    omega, h = np.array([1.0, 0.0, 0.0]), 1e-3
-    axes, wrong = np.eye(3), np.eye(3)
-    for _ in range(round(np.pi / 2.0 / h)):
-        axes = axes + h * np.cross(omega, axes + 0.5 * h * np.cross(omega, axes))
-        wrong = wrong + h * np.cross(omega, (wrong + 0.5 * h * np.cross(omega, wrong[0]))[0])
-    assert axes[1] == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
-    assert np.array_equal(wrong, np.eye(3))
-
-
 def test_mislabelled_products_of_inertia_turn_the_principal_axes() -> None:
     """∫xy taken for ∫xz, ∫xz for ∫yz, ∫yz left out: the axis of the smallest moment points elsewhere."""
     true = flown("l_bracket", 0.0).simulation.setup.body

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flights import SECOND
+from flights import SECOND, Heard
 from mass_solids import box, inward
 
 from rigid_proto_ros.base.bundled import BODIES
@@ -16,7 +16,7 @@ from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
-from rigid_proto_ros.simulation.observer import Observer, Refused, SceneChanged
+from rigid_proto_ros.simulation.observer import Refused, SceneChanged
 
 SCRIPT = """
 - {t: 0.0, at: com, torque: [0.1, 0.0, 0.0], duration: 1.0}
@@ -25,30 +25,15 @@ SCRIPT = """
 """
 
 
-class Scenes(Observer):
-    """Notes the scenes that it is told, and what is refused."""
-
-    def __init__(self) -> None:
-        self.scenes: list[str] = []
-        self.refusals: list[str] = []
-
-    takes = frozenset({SceneChanged, Refused})
-
-    def on(self, event) -> None:
-        if isinstance(event, SceneChanged):
-            self.scenes.append(event.scene)
-        elif isinstance(event, Refused):
-            self.refusals.append(event.reason)
-
-
 def test_a_change_refused_when_it_acts_leaves_the_scene_as_it_is_for_those_after_it() -> None:
-    scenes = Scenes()
+    scenes = Heard(SceneChanged, Refused)
     run = OfflineRun(make_scenario({"ghost.inertia_model": "bounding_box"}), parse_script(SCRIPT), scenes)
     assert run.advance(3 * SECOND)
-    assert scenes.refusals == ["integrator"]
+    assert [event.reason for event in scenes.of(Refused)] == ["integrator"]
     assert run.scenario.parameters.integrator == run.simulation.setup.integrator.name == "auto"
     assert run.simulation.state.linear_velocity[2] == -1.0
-    assert len(scenes.scenes) == 1 and "free_body" not in scenes.scenes[0]
+    (changed,) = scenes.of(SceneChanged)
+    assert "free_body" not in changed.scene
     assert run.ghost is not None and run.ghost.simulation.setup.integrator.name == "auto"
 
 

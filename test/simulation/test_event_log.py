@@ -3,7 +3,7 @@
 
 import json
 
-from flights import SECOND, flight, wrench
+from flights import SECOND, EventLines, flight, wrench
 
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.simulation import observer
@@ -12,18 +12,10 @@ from rigid_proto_ros.simulation.observer import Logged, Observer, Observers
 BODY = make_body(2.0, (0.0, 0.0, 0.0), ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9)))
 
 
-class Reader(Observer):
+class Reader(EventLines):
     """Keeps the lines of events while ``listening``."""
 
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.listening = True
-
-    takes = frozenset({Logged})
-
-    def on(self, event) -> None:
-        if isinstance(event, Logged):
-            self.lines.append(event.line)
+    listening = True
 
     def wants(self, kind: type) -> bool:
         return kind is Logged and self.listening

@@ -5,27 +5,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from flights import SECOND, Heard
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rigid_proto_ros.scene.scenario import publication_ns, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import expand_script
-from rigid_proto_ros.simulation.observer import Event, Observer, Published
+from rigid_proto_ros.simulation.observer import Published
 
-SECOND = 10**9
 SCENE = read_scene("t_handle")
-
-
-class Told(Observer):
-    takes = frozenset({Published})
-
-    def __init__(self) -> None:
-        self.times_ns: list[int] = []
-
-    def on(self, event: Event) -> None:
-        if isinstance(event, Published):
-            self.times_ns.append(event.time_ns)
 
 
 @given(st.floats(1e-6, 1e4), st.integers(0, 10**7))
@@ -53,13 +42,13 @@ def test_publication_times_of_well_known_rates():
 def test_a_rate_that_a_script_changes_holds_from_then_on(
     before: float, rate: float, after: list, portions: int
 ) -> None:
-    told = Told()
+    told = Heard(Published)
     script = expand_script([{"t": 0.95, "set": {"publish_rate": rate}}])
     run = OfflineRun(read_scene("t_handle", {"publish_rate": before}), script, told)
     for k in range(1, portions + 1):
         assert run.advance(12 * SECOND // 10 * k // portions)
     until = [k / before for k in range(10) if k / before < 0.95]
-    assert [time_ns * 1e-9 for time_ns in told.times_ns] == pytest.approx(until + after)
+    assert [event.time_ns * 1e-9 for event in told.events] == pytest.approx(until + after)
 
 
 def test_the_quaternion_is_never_flipped():
