@@ -50,7 +50,7 @@ def _thruster(rng: np.random.Generator, topic_frame: str) -> tuple[list, object]
 def test_odometry_with_gaps_and_jitter_beside_a_thruster_gives_the_body(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     messages, load = _thruster(rng, "base_link")
-    times = np.sort(np.arange(0.0, 2.0, 0.01) + 0.003 * rng.random(200))[fb.keep(200, rng)]
+    times = np.sort(np.arange(0.0, 3.0, 0.01) + 0.003 * rng.random(300))[fb.keep(300, rng)]
     times_ns, samples = mf.flown(_truth(), mf.tumbling(), times, load)
     q, com = samples[:, 3:7], np.array(COM)
     p = samples[:, :3] - rot.turned(q, com) + 5e-4 * rng.standard_normal((len(times), 3))

@@ -3,47 +3,22 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
-from flights import SECOND
+from flights import SECOND, Heard
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import ScenarioRun
 from rigid_proto_ros.simulation.commands import WrenchCommand
-from rigid_proto_ros.simulation.observer import GhostChanged, GhostPublished, Observer, Published, Refused
+from rigid_proto_ros.simulation.observer import GhostChanged, GhostPublished, Published, Refused
 
 MOVING = {
     "initial.linear_velocity": [1.0, 0.0, 0.0],
     "initial.angular_velocity": [0.1, 5.0, 0.2],
     "real_time_factor": 0.0,
 }
-
-
-class Watcher(Observer):
-    """Notes when ghosts begin and end, and where body and ghost are."""
-
-    def __init__(self) -> None:
-        self.began: list[int] = []
-        self.ended: list[int] = []
-        self.body: dict[int, list[float]] = {}
-        self.ghost: dict[int, list[float]] = {}
-        self.refusals: list[tuple[str, str]] = []
-
-    takes = frozenset({Refused, GhostChanged, Published, GhostPublished})
-
-    def on(self, event) -> None:
-        match event:
-            case Refused(_, reason, message):
-                self.refusals.append((reason, message))
-            case GhostChanged(time_ns, None):
-                self.ended.append(time_ns)
-            case GhostChanged(time_ns, _):
-                self.began.append(time_ns)
-            case Published(time_ns, row):
-                self.body[time_ns] = row.tolist()
-            case GhostPublished(time_ns, row):
-                self.ghost[time_ns] = row.tolist()
 
 
 def test_a_ghost_that_cannot_carry_the_scene_is_refused_by_its_own_name():
@@ -55,9 +30,9 @@ def test_a_ghost_that_cannot_carry_the_scene_is_refused_by_its_own_name():
 
 
 def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset():
-    watcher = Watcher()
+    heard = Heard(Refused)
     scenario = make_scenario({"ghost.integrator": "free_body"})
-    run = ScenarioRun(scenario, watcher)
+    run = ScenarioRun(scenario, heard)
     run.begin_ghost()
     simulation = run.simulation
     push = WrenchCommand(False, parse_frame("world@com"), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "")
@@ -71,60 +46,54 @@ def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset
 
     fly()
     fly()
-    ((reason, text),) = watcher.refusals
-    assert reason == "ghost" and "the ghost continues without" in text and "free_body" in text
+    (refused,) = heard.events
+    assert refused.reason == "ghost"
+    assert "the ghost continues without" in refused.message and "free_body" in refused.message
     assert not simulation.refused  # the body itself carries it
     simulation.reset()
     run.begin_ghost()
     fly()
-    assert len(watcher.refusals) == 2
+    assert len(heard.events) == 2
 
 
-def test_a_ghost_asked_for_in_flight_begins_at_the_next_reset():
+def test_a_ghost_begins_at_a_reset_and_is_gone_at_once_when_it_is_switched_off():
     from rigid_proto_ros.live.simulation_loop import SimulationLoop
 
-    watcher = Watcher()
-    flight = SimulationLoop(make_scenario(MOVING), watcher)
-    flight.start()
-    while flight.simulation.time_ns < SECOND:
-        flight.tick()
-    flight.replace(flight.scenario.with_changes({"ghost.inertia_model": "bounding_box"}))
-    while flight.simulation.time_ns < 2 * SECOND:
-        flight.tick()
-    assert not watcher.began and not watcher.ghost
-    flight.reset()
-    watcher.body.clear()
-    while flight.simulation.time_ns < SECOND:
-        flight.tick()
-    assert watcher.began == [0]
-    assert watcher.ghost.keys() == watcher.body.keys()
-    # No force acts, so the COMs stay together; the tensors part the attitudes.
-    last = max(watcher.body)
-    assert watcher.ghost[last][:3] == watcher.body[last][:3] and watcher.ghost[last][3:7] != watcher.body[last][3:7]
-
-
-def test_a_ghost_switched_off_is_gone_at_once_and_begins_again_at_a_reset():
-    from rigid_proto_ros.live.simulation_loop import SimulationLoop
-
-    watcher = Watcher()
-    flight = SimulationLoop(make_scenario({**MOVING, "ghost.inertia_model": "bounding_box"}), watcher)
+    heard = Heard(GhostChanged, Published, GhostPublished)
+    loop = SimulationLoop(make_scenario(MOVING), heard)
 
     def fly_to(time_ns: int) -> None:
-        while flight.simulation.time_ns < time_ns:
-            flight.tick()
+        while loop.simulation.time_ns < time_ns:
+            loop.tick()
 
-    flight.start()
+    def switch(model: str) -> None:
+        loop.replace(loop.scenario.with_changes({"ghost.inertia_model": model}))
+
+    loop.start()
     fly_to(SECOND)
-    flight.replace(flight.scenario.with_changes({"ghost.inertia_model": ""}))
-    off_ns = flight.simulation.time_ns
+    switch("bounding_box")
     fly_to(2 * SECOND)
-    assert watcher.began == [0] and watcher.ended == [off_ns] and max(watcher.ghost) <= off_ns
-    flight.reset()
-    watcher.ghost.clear()
+    assert not heard.of(GhostChanged) and not heard.of(GhostPublished)
+    heard.events.clear()
+    loop.reset()
     fly_to(SECOND)
-    flight.replace(flight.scenario.with_changes({"ghost.inertia_model": "bounding_box"}))
+    (began,), body, ghost = heard.of(GhostChanged), heard.of(Published), heard.of(GhostPublished)
+    assert began.time_ns == 0 and began.setup is not None
+    assert [state.time_ns for state in ghost] == [state.time_ns for state in body]
+    # No force acts, so the COMs stay together; the tensors part the attitudes.
+    assert np.array_equal(ghost[-1].row[:3], body[-1].row[:3])
+    assert not np.array_equal(ghost[-1].row[3:7], body[-1].row[3:7])
+    heard.events.clear()
+    switch("")
+    off_ns = loop.simulation.time_ns
     fly_to(2 * SECOND)
-    assert watcher.began == [0] and not watcher.ghost
-    flight.reset()
+    assert heard.events[0] == GhostChanged(off_ns, None)
+    loop.reset()
     fly_to(SECOND)
-    assert watcher.began == [0, 0] and watcher.ghost
+    switch("bounding_box")
+    fly_to(2 * SECOND)
+    assert len(heard.of(GhostChanged)) == 1
+    assert all(state.time_ns == off_ns for state in heard.of(GhostPublished))
+    loop.reset()
+    fly_to(SECOND)
+    assert len(heard.of(GhostChanged)) == 2 and max(state.time_ns for state in heard.of(GhostPublished)) >= SECOND

@@ -4,14 +4,14 @@
 import json
 
 import pytest
-from flights import SECOND
+from flights import SECOND, Heard
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.session.recorded_session import Resimulation
-from rigid_proto_ros.simulation.observer import LoadBegan, LoadEnded, Logged, Observer
+from rigid_proto_ros.simulation.observer import LoadBegan, LoadEnded, Logged
 
 BODY = {
     "mesh": "",
@@ -22,27 +22,18 @@ BODY = {
 }
 
 
-class Told(Observer):
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.acting: dict[int, object] = {}
-        self.kinds: set[str] = set()
+class Told(Heard):
+    @property
+    def lines(self) -> list[str]:
+        return [event.line for event in self.of(Logged)]
 
-    takes = frozenset({Logged, LoadBegan, LoadEnded})
-
-    def on(self, event) -> None:
-        match event:
-            case Logged(_, line):
-                self.lines.append(line)
-            case LoadBegan(_, load_id, load):
-                self.acting[load_id] = load
-                self.kinds.add(load.kind)
-            case LoadEnded(_, load_id):
-                del self.acting[load_id]
+    @property
+    def acting(self) -> set[int]:
+        return {event.load_id for event in self.of(LoadBegan)} - {event.load_id for event in self.of(LoadEnded)}
 
 
 def flown(script: str, until_s: float, **scene) -> tuple[OfflineRun, Told]:
-    told = Told()
+    told = Told(Logged, LoadBegan, LoadEnded)
     run = OfflineRun(make_scenario({**BODY, **scene}), parse_script(script), told)
     run.advance(round(until_s * 1e9))
     assert not run.simulation.refused
@@ -55,7 +46,7 @@ def test_thrusters_push_together_in_the_order_of_their_names() -> None:
     run, told = flown("[{t: 0, thrusters: [4, 0.002]}]", 0.01, **thrusters)
     assert run.simulation.state.linear_velocity == pytest.approx([0.02, 0.0, 1e-5], rel=1e-4)  # it turns a little
     assert run.simulation.state.angular_velocity == pytest.approx([0.0, -2e-5, 0.0], rel=1e-4)
-    assert told.kinds == {"thruster"} and len(told.acting) == 2
+    assert {event.load.kind for event in told.of(LoadBegan)} == {"thruster"} and len(told.acting) == 2
 
 
 BOTH = {"thrusters.a": [0, 0, 0, 1, 0, 0, 3.0], "thrusters.b": [0, 0, 0, 0, 1, 0, 0.0]}
@@ -101,6 +92,13 @@ def test_thrusters_time_out_as_an_event_and_clear_wrench_stops_them_at_once() ->
     run, told = flown("[{t: 0, thrusters: [2]}, {t: 0.25, service: clear_wrench}]", 2.0, **scene)
     assert run.simulation.state.linear_velocity[0] == pytest.approx(0.25, rel=1e-12)
     assert not told.acting and not any('"timeout"' in line for line in told.lines)
+    # Without a timeout nothing is due when the wrench is cleared; the least on-time counts from the next command.
+    script = (
+        "[{t: 0, thrusters: [2]}, {t: 1, service: clear_wrench}, {t: 1.1, thrusters: [2]}, {t: 1.2, thrusters: [0]}]"
+    )
+    run, told = flown(script, 3.0, **{**scene, "wrench_timeout": 0.0, "thruster.minimum_on_time": 0.5})
+    assert run.simulation.state.linear_velocity[0] == pytest.approx(1.0 + 0.5, rel=1e-12)
+    assert not told.acting
 
 
 @pytest.mark.parametrize("minimum_on_time", [0.0, 0.13])
@@ -134,15 +132,3 @@ def test_the_wrong_number_of_forces_is_refused_with_the_names() -> None:
         flown("[{t: 0, thrusters: [1, 2]}]", 1.0, **{"thrusters.a": [0, 0, 0, 1, 0, 0]})
     with pytest.raises(InputError, match="none is declared"):
         flown("[{t: 0, thrusters: [1]}]", 1.0)
-
-
-def test_after_clear_wrench_the_least_on_time_counts_from_the_next_command() -> None:
-    # Without a timeout nothing is due when the wrench is cleared.
-    script = (
-        "[{t: 0, thrusters: [2]}, {t: 1, service: clear_wrench}, {t: 1.1, thrusters: [2]}, {t: 1.2, thrusters: [0]}]"
-    )
-    scene = {"thrusters.a": [0.0, 0.0, 0.0, 1.0, 0.0, 0.0], "thruster.minimum_on_time": 0.5}
-    run, told = flown(script, 3.0, **scene)
-    # 2 N at 2 kg for 1 s, and again for 0.5 s.
-    assert run.simulation.state.linear_velocity[0] == pytest.approx(1.5, rel=1e-12)
-    assert not told.acting
