@@ -18,14 +18,12 @@ import pytest
 from viser._messages import GuiUpdateMessage
 from workbench_page import bare_page
 
-from rigid_proto_ros.base.rotation import rotate
 from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
 from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.scene.scenario import Scenario, nanoseconds, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.simulation.commands import Command
-from rigid_proto_ros.simulation.observer import Event, Observer, Published, Reset
 from rigid_proto_ros.workbench import controls
 from rigid_proto_ros.workbench import page as page_module
 from rigid_proto_ros.workbench.lessons import FREE
@@ -33,22 +31,6 @@ from rigid_proto_ros.workbench.main import Workbench
 from rigid_proto_ros.workbench.pointer import DrawnPose
 
 PATIENCE_S = 180.0
-
-
-class Rows(Observer):
-    """rows: every state published since the last reset, (time_ns, 13 numbers in world axes)."""
-
-    takes = frozenset({Published, Reset})
-
-    def __init__(self) -> None:
-        self.rows: list[tuple[int, np.ndarray]] = []
-
-    def on(self, event: Event) -> None:
-        if isinstance(event, Published):
-            row = event.row
-            self.rows.append((event.time_ns, np.array([*row[:10], *rotate(*row[3:7], *row[10:13])])))
-        elif isinstance(event, Reset):
-            self.rows.clear()
 
 
 @contextmanager
@@ -68,8 +50,7 @@ class FlownPage:
     def __init__(self, scene: str = "t_handle", lesson: str = "", anew: bool = False) -> None:
         scenario = read_scene(scene)
         warm_up(scenario.setup)  # compiled on the page's thread, kernels would let its socket time out
-        self.seen = Rows()
-        self.live = LiveSimulation(scenario, observers=[self.seen])
+        self.live = LiveSimulation(scenario)
         self.live.announce()
         self.live.loop.begin_ghost()
         self.workbench = Workbench(self.live, lesson=lesson, anew=anew)
@@ -115,13 +96,11 @@ class FlownPage:
     def scenario(self) -> Scenario:
         return self.live.scenario
 
-    def fly(self, seconds: float) -> list[tuple[int, np.ndarray]]:
-        """Watch for so long; the states since the last reset."""
-
+    def fly(self, seconds: float) -> None:
+        """Watch for so long."""
         self.wait_until_asked()
         self.do(lambda: self.advance(seconds))
         self.wait_until_still()
-        return self.seen.rows
 
     def advance(self, seconds: float) -> None:
         """What the physics thread does in so long."""
@@ -145,12 +124,11 @@ class FlownPage:
     def wait_until_still(self) -> None:
         """The same, and until the page shows what the body does."""
         self.wait_until_asked()
-        page, rows = self.page, self.seen.rows
-
-        def shown() -> bool:
-            return page.flight.moment_ns is not None or not rows or page.state.time_ns == rows[-1][0]
-
-        self.until(shown, "page that has heard all")
+        page, live = self.page, self.live
+        self.until(
+            lambda: page.flight.moment_ns is not None or page.state.time_ns == live.state.time_ns,
+            "page that has heard all",
+        )
         self.until(lambda: not self.page._told._queue, "page that has heard all")
 
     def widget(self, label: str):

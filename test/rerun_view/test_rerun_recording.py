@@ -223,19 +223,23 @@ def test_a_recording_made_of_a_bag_and_named_after_it_is_read(recording, tmp_pat
     assert len(read_runs(path)[0].times) == COUNT
 
 
-def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_run(tmp_path, states):
-    path = tmp_path / "session.rrd"
-    errors = []
+@pytest.mark.parametrize("lost", [False, True], ids=["file there", "file lost too"])
+def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_run(tmp_path, states, monkeypatch, lost):
+    uncaught, errors, path = [], [], tmp_path / "session.rrd"
+    monkeypatch.setattr(threading, "excepthook", uncaught.append)
     observer = FileRecorder(str(path), on_error=errors.append)
     flight.fly(observer, states[:20])
     flight.flush(observer)
+    if lost:
+        path.unlink()
     observer.on(BodyChanged(200_000_000, None))
     for k in range(20, 40):
         observer.on(Published(k * flight.PERIOD_NS, states[k]))
     observer.close()
-    assert len(errors) == 1 and observer.error == errors[0]
-    session = read_session(path)
-    assert session.complete and session.rows.tobytes() == states[:20].tobytes()
+    assert errors == [observer.error] and not uncaught
+    if not lost:
+        session = read_session(path)
+        assert session.complete and session.rows.tobytes() == states[:20].tobytes()
 
 
 def test_a_recorder_gets_something_done_with_every_piece_that_it_sends(tmp_path, states, monkeypatch):
@@ -247,18 +251,6 @@ def test_a_recorder_gets_something_done_with_every_piece_that_it_sends(tmp_path,
     observer._write(noted)
     assert done.count(threading.get_ident()) > len(noted) + 5
     observer.close()
-
-
-def test_an_error_in_the_recorder_whose_file_is_lost_too_ends_it_quietly(tmp_path, states, monkeypatch):
-    uncaught, errors, path = [], [], tmp_path / "session.rrd"
-    monkeypatch.setattr(threading, "excepthook", uncaught.append)
-    observer = FileRecorder(str(path), on_error=errors.append)
-    flight.fly(observer, states[:20])
-    flight.flush(observer)
-    path.unlink()
-    observer.on(BodyChanged(200_000_000, None))
-    observer.close()
-    assert len(errors) == 1 and not uncaught
 
 
 def test_a_file_that_cannot_grow_in_flight_stops_the_recording_and_keeps_what_is_there(tmp_path):

@@ -223,17 +223,17 @@ def test_plots_are_drawn_against_seconds_before_now_also_after_a_jump_of_time(fl
 
 def test_a_branch_begins_at_the_moment_looked_at_to_which_reset_returns(flown: FlownPage) -> None:
     flown.fly(3.0)
-    rows = list(flown.seen.rows)
+    before = flown.page.flight.memory.session()
     flown.look_back(2.0)
     moment_ns = flown.page.flight.moment_ns
     assert moment_ns == pytest.approx(1_000_000_000, abs=10_000_000)
     flown.press("Play", of="Simulation")
     flown.fly(0.5)
-    k = next(k for k, (time_ns, _) in enumerate(rows) if time_ns == moment_ns)
+    k = before.times.tolist().index(moment_ns)
     # Undisturbed it does again what it did: the exact free flight from the recorded state.
-    assert np.abs(flown.seen.rows[50][1] - rows[k + 50][1]).max() < 1e-9
+    assert np.abs(flown.live.state.row - before.rows[k + 50]).max() < 1e-9
     flown.reset()
-    assert np.array_equal(flown.live.state.row[:7], rows[k][1][:7])
+    assert np.array_equal(flown.live.state.row[:7], before.rows[k][:7])
 
 
 def test_the_energy_holds_the_string_of_its_moment_also_of_one_that_is_looked_back_at(flown: FlownPage) -> None:
@@ -625,7 +625,7 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
 def test_before_time_begins_the_body_is_seen_above_the_floor() -> None:
     class Waiting(FlownPage):
         def fly(self, seconds: float):
-            return self.seen.rows
+            pass
 
     flown = Waiting("t_handle")
     try:
@@ -652,7 +652,8 @@ def test_a_lesson_that_is_picked_while_kernels_are_compiled_begins_when_they_are
     assert resolve_mesh(flown.scenario.parameters.mesh) == resolve_mesh("hammer")
     assert lesson("hammer").question in page.lessons._text.content
     flown.do(lambda: page.lessons.answer(0))
-    assert flown.fly(0.5)[-1][0] == 500_000_000
+    flown.fly(0.5)
+    assert flown.page.state.time_ns == 500_000_000
 
 
 def test_a_gravity_whose_square_is_0_is_no_reason_not_to_draw(flown: FlownPage) -> None:
