@@ -19,6 +19,7 @@ from viser._messages import GuiUpdateMessage
 from workbench_page import bare_page
 
 from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
+from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.scene.scenario import Scenario, nanoseconds, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
@@ -190,9 +191,19 @@ class FlownPage:
         self.pick("t_handle")
         self.said.clear()
 
+    def upload(self, name: str, body: str) -> None:
+        """A file of this name with the mesh of a bundled body."""
+        text = b"# z up\n" + resolve_mesh(body).read_bytes()
+        self.do(lambda: self.page.body_tab.upload.take(name, text))
+
     def begin(self, scene: dict) -> None:
         """A scene by its parameters."""
         assert self.do(lambda: self.page.flight.fly(scene))
+        self.fly(0.0)
+
+    def change(self, values: dict) -> None:
+        """Set parameters."""
+        self.do(lambda: self.page.flight.set(values))
         self.fly(0.0)
 
     def act(self, entry: dict) -> None:
@@ -248,16 +259,17 @@ class FlownPage:
         self.fly(0.0)
 
 
-def flies_again(flown: FlownPage, folder: Path) -> tuple[dict, list[Command]]:
-    """What is saved of the run since the last reset, parameters and commands, which give the same motion by `simulate`
-    in the folder in which it is unpacked."""
+def flies_again(flown: FlownPage, folder: Path) -> tuple[dict, list[Command], list[str]]:
+    """What is saved of the run since the last reset, parameters, commands and mesh files, which give the same motion by
+    `simulate` in the folder in which it is unpacked."""
     packed, note = flown.do(lambda: flown.page.session_tab._take())
     assert "simulate scene.yaml --script script.yaml" in note
     with zipfile.ZipFile(io.BytesIO(packed)) as archive:
         archive.extractall(folder)
+        names = sorted(archive.namelist())
     with chdir(folder):
         scenario, script = read_scene("scene.yaml"), parse_script(Path("script.yaml").read_text("utf-8"))
         again = OfflineRun(scenario, script)
         again.advance(flown.live.state.time_ns)
     assert again.simulation.state.row.tobytes() == flown.live.state.row.tobytes()
-    return scenario.parameters.named(), script
+    return scenario.parameters.named(), script, [name for name in names if not name.endswith(".yaml")]

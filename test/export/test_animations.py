@@ -4,15 +4,14 @@ every frame, and the body has the mass properties that it has."""
 
 from __future__ import annotations
 
-import base64
 import io
 import json
-import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
 from gltf_player import Player, z_up
+from mesh_files import Gltf
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
@@ -282,44 +281,33 @@ def test_a_glb_keeps_its_materials_and_pictures_and_is_where_the_body_is(tmp_pat
             assert np.abs(drawn - expected).max() < 1e-6
 
 
-def edited(file: Path, document: dict) -> None:
-    """Another document in a .glb."""
-    player = Player(file)
-    text = json.dumps(player.document | document).encode()
-    text += b" " * (-len(text) % 4)
-    head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(player.binary), len(text), b"JSON")
-    file.write_bytes(head + text + struct.pack("<I4s", len(player.binary), b"BIN\0") + player.binary)
-
-
-def flown(tmp_path: Path) -> Player:
-    words = ["--set", f"mesh={tmp_path / 'cube.glb'}", "--duration", "0.1", "--gltf", str(tmp_path / "flight.glb")]
+def flown(folder: Path, model: bytes) -> Player:
+    (folder / "model.glb").write_bytes(model)
+    words = ["--set", f"mesh={folder / 'model.glb'}", "--duration", "0.1", "--gltf", str(folder / "flight.glb")]
     assert main(["simulate", "t_handle", *words]) == 0
-    return Player(tmp_path / "flight.glb")
+    return Player(folder / "flight.glb")
 
 
 def test_a_glb_with_a_lamp_keeps_it(tmp_path):
-    painted_cube(tmp_path / "cube.glb")
-    nodes = Player(tmp_path / "cube.glb").document["nodes"]
-    nodes[0]["extensions"] = {"KHR_lights_punctual": {"light": 0}}
-    lamps = {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}
-    edited(tmp_path / "cube.glb", {"nodes": nodes, "extensions": lamps, "extensionsUsed": list(lamps)})
-    made = flown(tmp_path).document
+    cube, lamps = Gltf(), {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}
+    cube.node.update(name="cube", extensions={"KHR_lights_punctual": {"light": 0}})
+    cube.json |= {"extensions": lamps, "extensionsUsed": list(lamps)}
+    made = flown(tmp_path, cube.glb()).document
     assert made["extensions"] == lamps and made["extensionsUsed"] == list(lamps)
 
 
 @pytest.mark.parametrize("without", ["scenes", "buffers"])
 def test_a_glb_without_a_scene_or_with_its_data_elsewhere_is_drawn_as_the_surface_that_was_flown(without, tmp_path):
-    painted_cube(tmp_path / "cube.glb")
-    player = Player(tmp_path / "cube.glb")
-    data = {"uri": "data:application/octet-stream;base64," + base64.b64encode(player.binary).decode()}
+    cube = Gltf()
     if without == "scenes":
         # A file that says of no scene what belongs to it shows all its nodes.
-        edited(tmp_path / "cube.glb", {"scenes": []})
+        cube.json["scenes"] = []
+        model = cube.glb()
     else:
-        edited(tmp_path / "cube.glb", {"buffers": [{**player.document["buffers"][0], **data}]})
-    made = flown(tmp_path)
+        model = cube.glb(uri=json.loads(cube.gltf())["buffers"][0]["uri"])
+    made = flown(tmp_path, model)
     assert "model" not in made.nodes and len(made.document["buffers"]) == 1
-    assert np.ptp(made.mesh_points("body mesh"), axis=0) == pytest.approx([0.1, 0.1, 0.1])
+    assert np.ptp(made.mesh_points("body mesh"), axis=0) == pytest.approx([1.0, 1.0, 1.0])
 
 
 def test_usdchecker_finds_what_breaks_its_rules_and_nothing_in_a_flight(flight, tmp_path, capsys):

@@ -90,7 +90,7 @@ def test_a_near_miss_of_the_centre_of_mass_ticks_nothing_and_the_speed_is_read_o
 
 
 def test_nothing_of_the_body_before_stays_when_another_scene_begins(flown: FlownPage) -> None:
-    flown.do(lambda: flown.page.flight.set({"ballast.nut": [0.1, 0.0, 0.0, 0.05]}))
+    flown.change({"ballast.nut": [0.1, 0.0, 0.0, 0.05]})
     flown.wait_until_still()
     assert "nut" in flown.scenario.parameters.ballast
     flown.pick("teapot")
@@ -109,7 +109,7 @@ def test_nothing_of_the_body_before_stays_when_another_scene_begins(flown: Flown
 
 def test_an_upload_flies_alone_and_its_take_holds_it(flown: FlownPage, tmp_path) -> None:
     folder = flown.page.body_tab.upload
-    flown.do(lambda: folder.take("my hammer.obj", b"# z up\n" + resolve_mesh("hammer").read_bytes()))
+    flown.upload("my hammer.obj", "hammer")
     assert folder.present is not None and folder.present.up == "z"
     flown.press("Simulate it")
     flown.fly(0.0)
@@ -117,9 +117,8 @@ def test_an_upload_flies_alone_and_its_take_holds_it(flown: FlownPage, tmp_path)
     assert not parameters.contacts and not parameters.thrusters and not parameters.ballast
     flown.act({"at": {"point": [0.06, 0.0, 0.29]}, "force": [1.0, 0.0, 0.0]})
     flown.fly(1.0)
-    values, _ = flies_again(flown, tmp_path)
-    assert values["mesh"] == "my_hammer.obj"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["my_hammer.obj", "scene.yaml", "script.yaml"]
+    values, _, files = flies_again(flown, tmp_path)
+    assert [values["mesh"]] == files == ["my_hammer.obj"]
 
 
 OPEN_BOX = b"# z up\n" + obj(faces=CUBE_QUADS[:-1])
@@ -152,17 +151,16 @@ def test_for_an_open_mesh_the_page_offers_repair_or_hull_and_flies_it(
 
 def test_what_was_done_before_a_reset_is_no_part_of_what_is_saved(flown: FlownPage, tmp_path: Path) -> None:
     push = {"at": {"point": [0.0, 0.0, 0.068]}, "force": [0.0, 1.0, 0.0]}
-    flown.do(lambda: flown.page.flight.set({"mass": 0.2}))
+    flown.change({"mass": 0.2})
     flown.act(push)
     flown.fly(0.5)
     flown.reset()
     flown.act(push)
     flown.fly(0.5)
-    values, script = flies_again(flown, tmp_path)
+    values, script, files = flies_again(flown, tmp_path)
     assert values["mass"] == 0.2 and [command.kind for command in script] == ["poke"]
     # A bundled mesh stays a name.
-    assert resolve_mesh(values["mesh"]) == resolve_mesh("t_handle")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.yaml", "script.yaml"]
+    assert resolve_mesh(values["mesh"]) == resolve_mesh("t_handle") and not files
 
 
 def test_what_is_done_after_going_back_is_saved_from_there(flown: FlownPage, tmp_path: Path) -> None:
@@ -176,7 +174,7 @@ def test_what_is_done_after_going_back_is_saved_from_there(flown: FlownPage, tmp
     flown.fly(0.3)
     flown.act({"at": "tip", "force": [1.0, 0.0, 0.0]})
     flown.fly(0.7)
-    _, script = flies_again(flown, tmp_path)
+    _, script, _ = flies_again(flown, tmp_path)
     assert [command.force for command in script] == [(1.0, 0.0, 0.0)]
 
 
@@ -397,7 +395,7 @@ def test_the_string_is_of_the_page_that_grabbed_first_and_goes_with_it(flown: Fl
 
 
 def test_a_hand_that_stands_still_goes_on_holding_longer_than_the_strings_timeout(flown: FlownPage) -> None:
-    flown.do(lambda: flown.page.flight.set({"string.timeout": 0.15}))
+    flown.change({"string.timeout": 0.15})
     place = flown.grab((0.0, 0.045, 0.0))
     flown.pull(place + [0.0, 0.0, 0.1])
     for _ in range(3):

@@ -185,12 +185,6 @@ def test_a_density_is_refused_while_a_tensor_is_in_force(flown: FlownPage) -> No
 # What is saved
 
 
-def save_and_fly_elsewhere(flown: FlownPage, folder: Path) -> tuple[dict, list, list[str]]:
-    folder.mkdir()
-    values, script = flies_again(flown, folder)
-    return values, script, sorted(path.name for path in folder.iterdir() if path.suffix != ".yaml")
-
-
 @pytest.mark.parametrize("name", ["part.obj", "größe.obj", 'a "b".obj', "~x.obj"])
 def test_a_mesh_of_any_path_is_saved_with_its_run(
     flown: FlownPage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
@@ -202,23 +196,23 @@ def test_a_mesh_of_any_path_is_saved_with_its_run(
     mesh = name if name == "part.obj" else str(here / name)
     flown.begin({"mesh": mesh, "initial.angular_velocity": [1.0, 2.0, 3.0]})
     flown.fly(0.3)
-    values, _, files = save_and_fly_elsewhere(flown, tmp_path / "elsewhere")
+    values, _, files = flies_again(flown, tmp_path / "elsewhere")
     assert [values["mesh"]] == files
 
 
 def test_the_mesh_of_the_start_and_those_of_later_changes_are_saved(flown: FlownPage, tmp_path: Path) -> None:
     folder = flown.page.body_tab.upload
-    flown.do(lambda: folder.take("x.obj", b"# z up\n" + resolve_mesh("hammer").read_bytes()))
+    flown.upload("x.obj", "hammer")
     flown.press("Simulate it")
     flown.fly(0.2)
     flown.set("Body", "book")
     flown.fly(0.2)
     # Another file of the same name, given in flight.
-    flown.do(lambda: folder.take("x.obj", b"# z up\n" + resolve_mesh("tennis_racket").read_bytes()))
+    flown.upload("x.obj", "tennis_racket")
     second = folder.present.path
-    flown.do(lambda: flown.page.flight.set({"mesh": second}))
+    flown.change({"mesh": second})
     flown.fly(0.2)
-    values, script, files = save_and_fly_elsewhere(flown, tmp_path / "elsewhere")
+    values, script, files = flies_again(flown, tmp_path)
     assert values["mesh"] == "x.obj" and files == ["x.obj", "x_2.obj"]
     assert [command.content["mesh"] for command in script] == ["book", "x_2.obj"]
 
@@ -246,13 +240,13 @@ def test_nothing_is_saved_without_a_mesh_that_is_gone_or_that_reads_other_files(
 
 def test_one_can_go_on_from_the_past_of_an_upload_when_another_file_was_uploaded(flown: FlownPage) -> None:
     folder = flown.page.body_tab.upload
-    flown.do(lambda: folder.take("first.obj", b"# z up\n" + resolve_mesh("hammer").read_bytes()))
+    flown.upload("first.obj", "hammer")
     first = folder.present.path
     flown.press("Simulate it")
     flown.fly(1.0)
     flown.set("Body", "hammer")
     flown.fly(1.0)
-    flown.do(lambda: folder.take("second.obj", b"# z up\n" + resolve_mesh("book").read_bytes()))
+    flown.upload("second.obj", "book")
     flown.look_back(1.5)
     flown.press("Play", of="Simulation")
     flown.fly(0.3)

@@ -12,11 +12,6 @@ from flown_page import FlownPage
 from rigid_proto_ros.workbench.readouts import ENERGY, MOMENTUM
 
 
-def set_parameters(flown: FlownPage, **values) -> None:
-    flown.do(lambda: flown.page.flight.set({name.replace("__", "."): value for name, value in values.items()}))
-    flown.fly(0.0)
-
-
 def readings(flown: FlownPage) -> list[str]:
     return [flown.page.readings.values[name] for name in (ENERGY, MOMENTUM)]
 
@@ -24,9 +19,9 @@ def readings(flown: FlownPage) -> list[str]:
 def test_the_past_is_shown_with_the_body_that_moved_then(flown: FlownPage) -> None:
     flown.fly(1.0)
     numbers, picture, first = readings(flown), flown.page.picture, flown.scenario.setup
-    set_parameters(flown, mass=10.0 * first.body.mass, scale=[2.0, 2.0, 2.0])
+    flown.change({"mass": 10.0 * first.body.mass, "scale": [2.0, 2.0, 2.0]})
     flown.fly(0.5)
-    set_parameters(flown, mesh="hammer")
+    flown.change({"mesh": "hammer"})
     flown.fly(0.5)
     last = flown.scenario.setup
     assert readings(flown) != numbers and picture.setup is last
@@ -45,7 +40,7 @@ def test_what_is_done_while_the_past_is_shown_is_refused_with_what_to_do(flown: 
     for act in (
         lambda: flown.click((0.0, 0.045, 0.0), (1.0, 0.0, 0.0)),
         lambda: flown.grab((0.0, 0.045, 0.0)),
-        lambda: flown.do(lambda: flown.page.flight.set({"mass": 1.0})),
+        lambda: flown.change({"mass": 1.0}),
     ):
         act()
         flown.wait_until_asked()
@@ -54,7 +49,7 @@ def test_what_is_done_while_the_past_is_shown_is_refused_with_what_to_do(flown: 
         assert len(flown.events) == before and flown.scenario.setup.body.mass == mass
         assert not flown.page.pointer.dragging
     # How one looks at the motion can be changed.
-    set_parameters(flown, real_time_factor=2.0)
+    flown.change({"real_time_factor": 2.0})
     assert flown.scenario.parameters.real_time_factor == 2.0 and not flown.said
     flown.look_back(0.0)
     flown.fly(0.1)
