@@ -177,7 +177,7 @@ def surface(kind, sizes, pose) -> np.ndarray:
 
 
 @given(PLACED, st.integers(4, 9), st.floats(0.0, 4.0))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_no_distribution_inside_the_shapes_is_called_impossible(placed, count, unequal):
     kind, sizes, pose, seed = placed
     points = surface(kind, sizes, pose)
@@ -187,7 +187,7 @@ def test_no_distribution_inside_the_shapes_is_called_impossible(placed, count, u
 
 
 @given(PLACED, st.floats(1.05, 3.0), st.tuples(*[st.floats(-1.0, 1.0)] * 3))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_masses_at_both_ends_of_something_longer_are_found(placed, longer, direction):
     kind, sizes, pose, _ = placed
     axis = np.array(direction) + [0.0, 0.0, 1.5]
