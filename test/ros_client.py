@@ -5,7 +5,6 @@ dicts and lists, in the fields of their types.
 
 from __future__ import annotations
 
-import itertools
 import json
 import threading
 import time
@@ -314,15 +313,10 @@ class RosClient:
 
     def reset(self) -> None:
         """Time 0, and states heard that were published since; some must have been heard before."""
-
-        def runs() -> int:
-            stamps = [list(map(stamp_ns, list(self._received[self.name(topic)]))) for topic in STATES]
-            return min(sum(b < a for a, b in itertools.pairwise(own)) for own in stamps)
-
         self.fly_until(1)
-        before = runs()
+        reached_ns = self.now_ns()
         assert self.trigger("reset")["success"]
-        self.until(lambda: runs() > before, "states since the reset")
+        self.until(lambda: all(self.newest_ns(topic) < reached_ns for topic in STATES), "states since the reset")
 
     def set(self, atomically: bool = False, **values) -> list:
         """Parameters by name, double underscores for dots; [[successful, reason]]."""

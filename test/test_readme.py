@@ -105,12 +105,8 @@ def in_a_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def write_robot(folder: Path) -> None:
-    """The reader's robot.urdf, and urdf/robot.urdf: three boxes of 2700 kg/m³ with the inertials of their shapes."""
-    shapes = {
-        "arm": "<box size='0.3 0.2 0.1'/>",
-        "upper_arm": "<mesh filename='upper_arm.stl'/>",
-        "gripper": "<box size='0.3 0.2 0.1'/>",
-    }
+    """The reader's robot.urdf, and urdf/robot.urdf: two boxes of 2700 kg/m³ with the inertials of their shapes."""
+    shapes = {"arm": "<box size='0.3 0.2 0.1'/>", "upper_arm": "<mesh filename='upper_arm.stl'/>"}
     inertia = "<inertia ixx='{:.17g}' ixy='0' ixz='0' iyy='{:.17g}' iyz='0' izz='{:.17g}'/>".format(
         *(np.array([0.2**2 + 0.1**2, 0.3**2 + 0.1**2, 0.3**2 + 0.2**2]) * (16.2 / 12.0))
     )
@@ -119,14 +115,11 @@ def write_robot(folder: Path) -> None:
         f"<link name='{name}'>{inertial}<visual><geometry>{shape}</geometry></visual></link>"
         for name, shape in shapes.items()
     )
-    joints = "".join(
-        f"<joint name='{name}' type='revolute'><parent link='{parent}'/><child link='{child}'/><axis xyz='0 0 1'/></joint>"
-        for name, parent, child in (("shoulder", "arm", "upper_arm"), ("lift", "upper_arm", "gripper"))
-    )
+    joint = "<joint name='shoulder' type='fixed'><parent link='arm'/><child link='upper_arm'/></joint>"
     for place in (folder, folder / "urdf"):
         place.mkdir(exist_ok=True)
         trimesh.creation.box((0.3, 0.2, 0.1)).export(place / "upper_arm.stl")
-        (place / "robot.urdf").write_text(f"<robot name='r'>{links}{joints}</robot>")
+        (place / "robot.urdf").write_text(f"<robot name='r'>{links}{joint}</robot>")
 
 
 def test_every_command_is_of_a_kind_that_some_test_looks_at() -> None:

@@ -69,27 +69,6 @@ def submit(live: LiveSimulation, command: WrenchCommand | ThrusterCommand) -> No
     live.call(lambda: live.loop.commands.receive(command.kind, lambda: command))
 
 
-def test_commands_act_and_are_counted_and_a_refusal_is_raised(live):
-    mass = live.scenario.setup.body.mass
-    submit(live, WrenchCommand(False, parse_frame("world;impulse"), (mass, 0.0, 0.0), ZERO))
-    live.schedule(f"[{{t: 0, impulse: [0, {mass!r}, 0]}}, {{t: 0, set: {{gravity: [0, 0, -1]}}}}]")
-    live.step(10)
-    assert live.state.time_ns == 10 * PERIOD_NS
-    assert live.state.linear_velocity == pytest.approx([1.0, 1.0, -0.1], abs=1e-12)
-    with pytest.raises(CommandRefused, match="nowhere"):
-        submit(live, WrenchCommand(True, parse_frame("world@nowhere"), (1.0, 0.0, 0.0), ZERO))
-    with pytest.raises(CommandRefused, match="t"):
-        live.schedule("[{t: -1, force: [1, 0, 0]}]")
-    assert live.loop.commands.received == {"poke": 1, "wrench": 1, "schedule": 3}
-    # Too many forces and an attitude that is none aren't frames that are none.
-    with pytest.raises(CommandRefused, match="2 numbers"):
-        live.schedule("{t: 0, thrusters: [1, 0]}")
-    with pytest.raises(CommandRefused, match="all zero"):
-        live.schedule("{t: 0, state: {orientation_xyzw: [0, 0, 0, 0]}}")
-    counted = {"frame": 1, "schedule": 1, "thrusters": 1, "state": 1}
-    assert live.call(lambda: dict(live.loop.simulation.refused)) == counted
-
-
 @pytest.mark.parametrize("late", [False, True], ids=["list first", "list last"])
 @pytest.mark.parametrize("changed", [{"mass": 5.0}, {"gravity": [0.0, 0.0, -7.0]}], ids=["another", "the same"])
 def test_parameters_set_while_a_list_waits_act_after_it_and_undo_nothing(live, watcher, changed, late):

@@ -86,6 +86,8 @@ REFUSED = {
         ("poke", wrench_message(0, "ray/10,10,10/1,0,0", (1e-3, 0, 0))),
         ("wrench", wrench_message(0, "world@ray/0,0,3/0,0,1", (1e-3, 0, 0))),
     ],
+    "thrusters": [("thrusters", {"data": [1.0, 0.0]}), ("schedule", {"data": "{t: 0, thrusters: [1, 0]}"})],
+    "state": [("schedule", {"data": "{t: 0, state: {orientation_xyzw: [0, 0, 0, 0]}}"})],
     "tensor": [
         ("inertia/set", inertia_message(0, "", 0.0, (0, 0, 0), UNIT)),
         ("inertia/set", inertia_message(0, "", 1e200, (0, 0, 0), UNIT)),

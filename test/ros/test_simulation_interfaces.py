@@ -32,9 +32,37 @@ OK, UNSUPPORTED, NOT_FOUND, FAILED, ALREADY, INVALID_POSE = 1, 0, 2, 4, 101, 101
 SCOPES = {"SCOPE_DEFAULT": 0, "SCOPE_TIME": 1, "SCOPE_STATE": 2, "SCOPE_SPAWNED": 4, "SCOPE_ALL": 255}
 
 
+class Client:
+    """Calls the services by their names, with the fields of the request."""
+
+    def __init__(self, offered: dict) -> None:
+        self._offered = offered
+
+    def call(self, service: str, **fields) -> SimpleNamespace:
+        """The response."""
+        request = {"entity": "tool", "set_pose": False, "set_twist": False, "set_acceleration": False, **SCOPES}
+        response = SimpleNamespace(
+            result=SimpleNamespace(result=None, error_message=""),
+            state=entity_state() if service == "get_entity_state" else SimpleNamespace(state=None),
+            features=SimpleNamespace(),
+            ALREADY_IN_TARGET_STATE=ALREADY,
+            INVALID_POSE=INVALID_POSE,
+        )
+        return self._offered[service](SimpleNamespace(**{**request, **fields}), response)
+
+    def result(self, service: str, **fields) -> int:
+        return self.call(service, **fields).result.result
+
+    def step(self, steps: int) -> int:
+        return self.result("step_simulation", steps=steps)
+
+    def set_state(self, value: int) -> SimpleNamespace:
+        return self.call("set_simulation_state", state=SimpleNamespace(state=value)).result
+
+
 @pytest.fixture
 def services():
-    """The services of a flight on a real physics thread, as they are offered, without ROS; and the flight."""
+    """A client of the services of a flight on a real physics thread, as they are offered, without ROS; and the flight."""
     from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
     from rigid_proto_ros.ros.simulation_interfaces import SERVICES, SimulationInterfaces
     from rigid_proto_ros.scene.scenario import make_scenario
@@ -47,18 +75,8 @@ def services():
     offered = {}
     node = SimpleNamespace(create_service=lambda _, name, answer: offered.update({name.removeprefix("~/"): answer}))
     SimulationInterfaces(live, MESSAGES).offer(node, SimpleNamespace(**{name: name for name, _ in SERVICES}))
-    yield SimpleNamespace(**offered), live
+    yield Client(offered), live
     live.stop()
-
-
-def response():
-    return SimpleNamespace(
-        result=SimpleNamespace(result=None, error_message=""),
-        state=SimpleNamespace(state=None),
-        features=SimpleNamespace(),
-        ALREADY_IN_TARGET_STATE=ALREADY,
-        INVALID_POSE=INVALID_POSE,
-    )
 
 
 def entity_state(position=(0.0, 0.0, 0.0), orientation=(0.0, 0.0, 0.0, 1.0), linear=(0.0,) * 3, angular=(0.0,) * 3):
@@ -73,91 +91,63 @@ def entity_state(position=(0.0, 0.0, 0.0), orientation=(0.0, 0.0, 0.0, 1.0), lin
     return SimpleNamespace(header=Header(), pose=pose, twist=twist, acceleration=Accel())
 
 
-def asked(entity="tool", **fields):
-    return SimpleNamespace(entity=entity, set_pose=False, set_twist=False, set_acceleration=False, **fields)
-
-
-def state(value):
-    return SimpleNamespace(state=SimpleNamespace(state=value))
-
-
 def test_what_is_listed_is_served_and_nothing_else_is(services):
-    answer, node = services
-    listed = answer.get_simulator_features(None, response()).features
+    client, _ = services
+    listed = client.call("get_simulator_features").features
     assert listed.spawn_formats == []
-
-    def reset(scope):
-        return answer.reset_simulation(SimpleNamespace(scope=scope, **SCOPES), response())
-
-    def set_state(value):
-        return answer.set_simulation_state(state(value), response())
-
-    def step(steps):
-        return answer.step_simulation(SimpleNamespace(steps=steps), response())
-
     # What a client that finds the feature listed may call, by the package's definition of the feature.
-    calls = {
-        10: lambda: answer.get_entity_state(asked(), SimpleNamespace(**vars(response()) | {"state": entity_state()})),
-        11: lambda: answer.set_entity_state(asked(state=entity_state()), response()),
-        20: lambda: reset(SCOPES["SCOPE_ALL"]),
-        21: lambda: reset(SCOPES["SCOPE_TIME"]),
-        22: lambda: reset(SCOPES["SCOPE_STATE"]),
-        23: lambda: reset(SCOPES["SCOPE_SPAWNED"]),
-        24: lambda: answer.get_simulation_state(None, response()),
-        25: lambda: set_state(1),
-        26: lambda: set_state(2),
-        31: lambda: step(1),
-        32: lambda: step(3),
+    results = {
+        10: client.result("get_entity_state"),
+        11: client.result("set_entity_state", state=entity_state()),
+        20: client.result("reset_simulation", scope=SCOPES["SCOPE_ALL"]),
+        21: client.result("reset_simulation", scope=SCOPES["SCOPE_TIME"]),
+        22: client.result("reset_simulation", scope=SCOPES["SCOPE_STATE"]),
+        23: client.result("reset_simulation", scope=SCOPES["SCOPE_SPAWNED"]),
+        24: client.result("get_simulation_state"),
+        25: client.set_state(1).result,
+        26: client.set_state(2).result,
+        31: client.step(1),
+        32: client.step(3),
     }
-    assert [feature for feature, call in calls.items() if call().result.result == OK] == listed.features
+    assert [feature for feature, result in results.items() if result == OK] == listed.features
 
 
-def test_steps_are_publications_and_need_a_pause(services):
-    answer, node = services
-    assert answer.step_simulation(SimpleNamespace(steps=5), response()).result.result == OK
-    assert node.loop.simulation.time_ns == 50_000_000
-    assert answer.step_simulation(SimpleNamespace(steps=0), response()).result.result == FAILED
-    answer.set_simulation_state(state(1), response())
-    assert answer.step_simulation(SimpleNamespace(steps=1), response()).result.result == FAILED
-
-
-def test_it_plays_and_pauses(services):
-    answer, _ = services
-    assert answer.get_simulation_state(None, response()).state.state == 2
-    assert answer.set_simulation_state(state(2), response()).result.result == ALREADY
-    assert answer.set_simulation_state(state(1), response()).result.result == OK
-    assert answer.get_simulation_state(None, response()).state.state == 1
+def test_it_plays_and_pauses_and_steps_are_publications_and_need_a_pause(services):
+    client, live = services
+    assert client.step(5) == OK
+    assert live.loop.simulation.time_ns == 50_000_000
+    assert client.step(0) == FAILED
+    assert client.call("get_simulation_state").state.state == 2
+    assert client.set_state(2).result == ALREADY
+    assert client.set_state(1).result == OK
+    assert client.call("get_simulation_state").state.state == 1
+    assert client.step(1) == FAILED
     for other in (0, 3):
-        refused = answer.set_simulation_state(state(other), response())
-        assert refused.result.result == UNSUPPORTED
-        assert "signal" in refused.result.error_message
+        refused = client.set_state(other)
+        assert refused.result == UNSUPPORTED and "signal" in refused.error_message
 
 
 def test_what_the_simulation_refuses_is_a_failed_operation_with_its_reason(services, monkeypatch):
-    answer, live = services
+    client, live = services
     live.schedule("{t: 0, state: {linear_velocity: [9.9e99, 0, 0], position: [9.9e99, 0, 0]}}")
-    for refused in (
-        answer.step_simulation(SimpleNamespace(steps=100), response()),
-        answer.set_simulation_state(state(1), response()),
-    ):
-        assert refused.result.result == FAILED and "until a reset" in refused.result.error_message
+    for refused in (client.call("step_simulation", steps=100).result, client.set_state(1)):
+        assert refused.result == FAILED and "until a reset" in refused.error_message
     monkeypatch.setattr("rigid_proto_ros.live.live_simulation.BUSY_S", 0.0)
     held = threading.Event()
     live._requests.append((held.wait, Future()))
     live._wake.set()
-    refused = answer.get_entity_state(asked(), SimpleNamespace(**vars(response()) | {"state": entity_state()}))
+    refused = client.call("get_entity_state").result
     held.set()
-    assert refused.result.result == FAILED and "too busy" in refused.result.error_message
+    assert refused.result == FAILED and "too busy" in refused.error_message
 
 
 def test_time_and_state_are_reset_together_or_not_at_all(services):
-    answer, node = services
+    client, live = services
     for scope, result in ((0, OK), (255, OK), (3, OK), (1, UNSUPPORTED), (2, UNSUPPORTED), (4, UNSUPPORTED)):
-        answer.step_simulation(SimpleNamespace(steps=3), response())
-        reached = node.loop.simulation.time_ns
-        request = SimpleNamespace(scope=scope, **SCOPES)
-        assert answer.reset_simulation(request, response()).result.result == result
-        assert node.loop.simulation.time_ns == (0 if result == OK else reached)
+        client.step(3)
+        reached = live.loop.simulation.time_ns
+        assert client.result("reset_simulation", scope=scope) == result
+        assert live.loop.simulation.time_ns == (0 if result == OK else reached)
 
 
 def test_without_the_package_nothing_is_offered(monkeypatch):
@@ -170,37 +160,37 @@ def test_without_the_package_nothing_is_offered(monkeypatch):
 def test_a_state_that_is_set_acts_as_a_command_that_replays_to_the_bit(services):
     from rigid_proto_ros.session.recorded_session import Resimulation
 
-    answer, node = services
-    entity, told = answer, EventLines()
-    node.call(lambda: node.loop.watch(told))
+    client, live = services
+    told = EventLines()
+    live.call(lambda: live.loop.watch(told))
     wanted = entity_state((1.0, 2.0, 3.0), (0.0, 0.0, 3.0, 4.0), (0.5, 0.0, 0.0), (0.0, 0.0, 2.0))
-    pose = SimpleNamespace(**vars(asked(state=wanted)) | {"set_pose": True})
-    assert entity.set_entity_state(pose, response()).result.result == OK
-    answer.step_simulation(SimpleNamespace(steps=10), response())
-    reached = node.loop.simulation.state
+    assert client.result("set_entity_state", state=wanted, set_pose=True) == OK
+    client.step(10)
+    reached = live.loop.simulation.state
     assert reached.position == pytest.approx([1.0, 2.0, 3.0])
     assert reached.angular_velocity[1] == pytest.approx(3.0, abs=0.2)  # the twist was left alone
-    twist = SimpleNamespace(**vars(asked(state=wanted)) | {"set_twist": True})
-    assert entity.set_entity_state(twist, response()).result.result == OK
-    answer.step_simulation(SimpleNamespace(steps=10), response())
-    heard = entity.get_entity_state(asked(), SimpleNamespace(**vars(response()) | {"state": entity_state()})).state
+    assert client.result("set_entity_state", state=wanted, set_twist=True) == OK
+    client.step(10)
+    heard = client.call("get_entity_state").state
     assert heard.header.frame_id == "map" and heard.header.stamp.nanosec == 200_000_000
     assert heard.pose.position.x == pytest.approx(1.05) and heard.twist.linear.x == 0.5
-    again = Resimulation(node.loop.scenario, told.lines)
-    assert again.advance(200_000_000).tobytes() == node.loop.simulation.state.row.tobytes()
-    broken = SimpleNamespace(**vars(asked(state=entity_state(orientation=(0.0,) * 4))) | {"set_pose": True})
-    assert entity.set_entity_state(broken, response()).result.result == INVALID_POSE
-    assert entity.set_entity_state(asked("chair", state=wanted), response()).result.result == NOT_FOUND
+    again = Resimulation(live.loop.scenario, told.lines)
+    assert again.advance(200_000_000).tobytes() == live.loop.simulation.state.row.tobytes()
+    broken = entity_state(orientation=(0.0,) * 4)
+    assert client.result("set_entity_state", state=broken, set_pose=True) == INVALID_POSE
+    assert client.result("set_entity_state", state=wanted, entity="chair") == NOT_FOUND
 
 
 def test_a_request_of_a_release_without_switches_sets_pose_and_twist(services):
-    answer, node = services
-    wanted = entity_state((1.0, 2.0, 3.0), linear=(0.5, 0.0, 0.0))
-    said = answer.set_entity_state(SimpleNamespace(entity="tool", state=wanted), response())
-    assert said.result.result == OK
-    answer.step_simulation(SimpleNamespace(steps=10), response())
-    assert node.loop.simulation.state.position == pytest.approx([1.05, 2.0, 3.0])
-    # Those for Jazzy up to 1.2 have no word for a broken pose either.
-    broken = SimpleNamespace(entity="tool", state=entity_state(orientation=(0.0,) * 4))
-    plain = SimpleNamespace(result=response().result)
-    assert answer.set_entity_state(broken, plain).result.result == FAILED
+    client, live = services
+    set_state = client._offered["set_entity_state"]
+
+    def result(state) -> int:
+        # Those for Jazzy up to 1.2 have no word for a broken pose either.
+        response = SimpleNamespace(result=SimpleNamespace(result=None, error_message=""))
+        return set_state(SimpleNamespace(entity="tool", state=state), response).result.result
+
+    assert result(entity_state((1.0, 2.0, 3.0), linear=(0.5, 0.0, 0.0))) == OK
+    client.step(10)
+    assert live.loop.simulation.state.position == pytest.approx([1.05, 2.0, 3.0])
+    assert result(entity_state(orientation=(0.0,) * 4)) == FAILED
