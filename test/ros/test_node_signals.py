@@ -10,7 +10,6 @@ import time
 
 import pytest
 from conftest import needs_rerun
-from rerun_flight import meshes
 from ros_process import READY_S, RosProcess, alive, catches, descendants, start_node
 
 from rigid_proto_ros.base.bundled import scene_path
@@ -45,7 +44,7 @@ def test_a_recording_node_a_waiting_client_and_an_offline_run_end(ros_environmen
     assert node.end(signal.SIGTERM if number == signal.SIGINT else signal.SIGINT) == 0, node.errors
     assert offline.errors == client.errors == ""
     assert read_session(run).complete
-    assert read_session(flown).complete and meshes(flown) == 1
+    assert read_session(flown).complete
 
 
 @pytest.mark.stress
