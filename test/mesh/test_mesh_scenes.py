@@ -14,7 +14,7 @@ from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, GEOMETRY, Gltf, collada, c
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mesh import reading
-from rigid_proto_ros.mesh.reading import Mesh
+from rigid_proto_ros.mesh.reading import Mesh, load_mesh
 
 
 def box_of(mesh: Mesh) -> list[list[float]]:
@@ -105,6 +105,17 @@ def test_3mf_parts_in_files_of_their_own_count_once(tmp_path):
     assert volume(load_3mf(tmp_path, root, part=part)) == pytest.approx(1e-6)
     item = model("", 'objectid="2" p:path="/3D/part.model"')
     assert volume(load_3mf(tmp_path, item, part=part)) == pytest.approx(1e-6)
+
+
+def test_a_3mf_without_a_relation_is_its_one_model(tmp_path):
+    path = tmp_path / "a.3mf"
+    for name in ("a", "b"):
+        with zipfile.ZipFile(path, "a") as archive:
+            archive.writestr(f"{name}.model", model(cube_object(1), 'objectid="1"'))
+        if name == "a":
+            assert volume(load_mesh(str(path))) == 1.0
+    with pytest.raises(MeshError, match="2 files .model"):
+        load_mesh(str(path))
 
 
 def test_3mf_units_and_placements_count_along_the_whole_way_from_file_to_file(tmp_path):

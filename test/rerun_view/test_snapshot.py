@@ -137,6 +137,11 @@ def test_a_picture_that_a_full_disk_takes_half_of_leaves_the_earlier_one_as_it_i
     assert picture.read_bytes() == b"earlier" and list(tmp_path.iterdir()) == [picture]
 
 
+def test_a_recording_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(InputError, match="No such file"):
+        run(str(tmp_path / "none.rrd"), "--at", "0", "-o", str(tmp_path / "x.png"))
+
+
 @pytest.mark.parametrize("without", ["any adapter", "Vulkan"])
 def test_a_machine_without_drivers_is_told_what_to_install(recording, tmp_path, monkeypatch, without):
     # The Vulkan loader finds no driver at this place.
