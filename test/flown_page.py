@@ -75,6 +75,17 @@ class FlownPage:
         """Close it."""
         self._socket.__exit__(None, None, None)
 
+    def go_away(self) -> None:
+        """Close it, and wait until it stops listening."""
+        self.leave()
+        self.until(lambda: self.page._told not in self.live._observers, "end of listening")
+
+    def come_back(self) -> None:
+        """Open it, wait until it hears again, and watch."""
+        self.come()
+        self.until(lambda: self.page._told in self.live._observers, "page that hears again")
+        self.fly(0.1)
+
     def do(self, function: Callable):
         """Run a function on the page's thread."""
 

@@ -59,6 +59,10 @@ def test_a_lesson_that_asks_begins_at_its_time_0_with_its_ghost_however_fast_tim
         flown.do(lambda: flown.page.lessons.answer(0))
         flown.fly(1.0)
         assert not np.allclose(np.roll(ghost.wxyz, -1), start[3:7])
+    # A page that comes back shows it, too.
+    flown.go_away()
+    flown.come_back()
+    assert flown.node(style.GHOST_MESH).visible
     # Of the ghost no past is kept, so none is shown beside the body's.
     flown.look_back(0.5)
     flown.until(lambda: style.GHOST_MESH not in flown.page.backend._nodes, "past without a ghost")
@@ -273,13 +277,10 @@ def test_the_last_page_that_closes_while_it_looks_back_leaves_the_body_as_it_was
     flown.look_back(0.5)
     flown.wait_until_asked()
     assert flown.live.paused
-    flown.leave()
-    flown.until(lambda: page._told not in flown.live._observers, "end of listening")
+    flown.go_away()
     flown.wait_until_asked()
     assert page.flight.moment_ns is None and flown.live.paused == paused
-    flown.come()
-    flown.until(lambda: page._told in flown.live._observers, "page that hears again")
-    flown.fly(0.1)
+    flown.come_back()
 
 
 def test_a_page_that_comes_back_shows_nothing_that_ended_or_began_while_none_was_there(flown: FlownPage) -> None:
@@ -288,22 +289,14 @@ def test_a_page_that_comes_back_shows_nothing_that_ended_or_began_while_none_was
     flown.fly(0.2)
     arrow = flown.node("world/loads/wrench/force")
     assert page._words() == "a force acts" and arrow.visible
-
-    def gone() -> None:
-        flown.leave()
-        flown.until(lambda: page._told not in flown.live._observers, "end of listening")
-
-    gone()
+    flown.go_away()
     flown.advance(1.0)
-    flown.come()
-    flown.until(lambda: page._told in flown.live._observers, "page that hears again")
-    flown.fly(0.1)
+    flown.come_back()
     assert page._words() == "free rotation, exact" and not arrow.visible
     assert float(page.readings.values[DRIFT].rstrip("°")) > 1.0
-    gone()
+    flown.go_away()
     flown.live.reset()
-    flown.come()
-    flown.until(lambda: page._told in flown.live._observers, "page that hears again")
+    flown.come_back()
     flown.fly(2.0)
     assert page.readings.values[DRIFT] == "0°"
 
@@ -339,8 +332,7 @@ def test_where_the_first_browser_is_refused_the_body_by_a_busy_machine_the_next_
             raise InputError("request", "the simulation was too busy")
         add(observer)
 
-    flown.leave()
-    flown.until(lambda: page._told not in flown.live._observers, "end of listening")
+    flown.go_away()
     monkeypatch.setattr(flown.live, "add_observer", refuse_first)
     with bare_page(flown.server.get_port()):
         flown.until(lambda: asked, "first browser")
