@@ -24,10 +24,6 @@ class Drawn(Backend):
         self.size = 0.0
         self._times = np.zeros(0, np.int64)
 
-    def rows(self, name: str) -> dict[int, Any]:
-        """What was drawn of a part, by time [ns]."""
-        return self.parts[name]
-
     def at_end(self, name: str) -> Any:
         """What was drawn of it last."""
         return list(self.parts.get(name, {-1: np.zeros(0)}).values())[-1]

@@ -182,7 +182,7 @@ def test_arrows_stand_at_their_points_and_only_while_the_load_acts():
     picture.on(LoadEnded(400_000_000, 1))
     picture.draw(times(20, 30), states[30:])
     name = style.load_part("poke", "force")
-    rows = drawn.rows(name)
+    rows = drawn.parts[name]
     assert {t for t, own in rows.items() if len(own)} == set(range(200_000_000, 400_000_000, flight.PERIOD_NS))
     for time_ns, vectors in rows.items():
         if not len(vectors):
@@ -201,7 +201,7 @@ def test_a_load_shorter_than_the_time_between_two_states_is_shown_at_the_next_on
     picture.on(LoadBegan(203_000_000, 1, flight.POKE))
     picture.on(LoadEnded(205_000_000, 1))
     picture.draw(times(30), flight.rows(30))
-    rows = drawn.rows(style.load_part("poke", "force"))
+    rows = drawn.parts[style.load_part("poke", "force")]
     assert [t for t, own in rows.items() if len(own)] == [210_000_000]
 
 
@@ -218,7 +218,7 @@ def test_the_arrow_of_a_load_stays_at_its_point_of_a_body_that_changes():
     for load, before, after in (("wrench", [0.1, 0.2, -0.3], [0.7, 0.6, -0.5]), ("poke", np.zeros(3), np.zeros(3))):
         name = style.load_part(load, "force")
         for time_ns, point in ((40_000_000, before), (50_000_000, after)):
-            (origin,), (vector,) = drawn.origins[name][time_ns], drawn.rows(name)[time_ns]
+            (origin,), (vector,) = drawn.origins[name][time_ns], drawn.parts[name][time_ns]
             assert min(np.linalg.norm([origin - point, origin + vector - point], axis=1)) < 1e-12
 
 
@@ -227,7 +227,7 @@ def test_an_impulse_is_shown_from_its_instant_for_a_moment():
     push = ShownLoad("impulse", "body", np.array([0.1, 0, 0]), np.array([0.0, 0.0, 2.0]), np.zeros(3))
     picture.on(LoadBegan(100_000_000, 1, push))
     picture.draw(times(60), flight.rows(60))
-    rows = drawn.rows(style.load_part("impulse", "force"))
+    rows = drawn.parts[style.load_part("impulse", "force")]
     shown = [t for t, own in rows.items() if len(own)]
     assert shown[0] == 100_000_000 and shown[-1] == 240_000_000
     assert len(shown) == 15 and not len(rows[250_000_000])
@@ -243,10 +243,10 @@ def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let
     picture.on(StringChanged(0, tie(settings, body.mesh_point(knot), hand, body, State(0, rows[0]), 0), knot))
     picture.on(StringChanged(495_000_000, None, None))
     picture.draw(times(60), rows)
-    strips = drawn.rows(style.STRING)
+    strips = drawn.parts[style.STRING]
     assert [t for t, own in strips.items() if own] == times(50).tolist()
     stretch = 0.8 - 0.1 - rows[:50, 2] - 0.4
-    energies = np.array(list(drawn.rows(style.ENERGY).values()))
+    energies = np.array(list(drawn.parts[style.ENERGY].values()))
     assert np.allclose(energies[:50, 4], 25.0 * np.maximum(stretch, 0.0) ** 2, atol=1e-12)
     assert np.allclose(energies[:, 3], energies[:, :3].sum(axis=1) + energies[:, 4], rtol=1e-14)
     for k in range(50):
@@ -259,7 +259,7 @@ def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let
 def test_without_a_string_the_energies_are_three_and_their_total():
     picture, drawn = pictured()
     picture.draw(times(20), flight.rows(20))
-    assert {len(own) for own in drawn.rows(style.ENERGY).values()} == {4}
+    assert {len(own) for own in drawn.parts[style.ENERGY].values()} == {4}
     assert style.STRING_LINE_DISTANCE not in drawn.parts
 
 
@@ -269,7 +269,7 @@ def test_the_momentum_of_a_body_that_was_at_rest_drifts_from_where_it_first_poin
     states[15:, 10], states[25:, 10:12] = 1.0, [0.0, 2.0]
     for first in (0, 10, 20):
         picture.draw(times(10, first), states[first : first + 10])
-    angles = np.ravel(list(drawn.rows(style.ANGULAR_MOMENTUM_ANGLE).values()))
+    angles = np.ravel(list(drawn.parts[style.ANGULAR_MOMENTUM_ANGLE].values()))
     assert np.allclose(angles, 25 * [0.0] + 5 * [90.0])
 
 
@@ -278,10 +278,10 @@ def test_the_drawn_ellipsoid_touches_the_drawn_plane_where_the_spin_ends():
     rows[-10:, 10:13] = 0.0
     picture, drawn = pictured()
     picture.draw(times(60), rows)
-    omegas, polhodes = drawn.rows(style.POINSOT_OMEGA), drawn.rows(style.POINSOT_POLHODE)
+    omegas, polhodes = drawn.parts[style.POINSOT_OMEGA], drawn.parts[style.POINSOT_POLHODE]
     _, _, sizes = drawn.places[style.POINSOT_ELLIPSOID]
     moments, axes = principal_axes(flight.INERTIA)
-    touched, planes = 0, drawn.rows(style.POINSOT_PLANE)
+    touched, planes = 0, drawn.parts[style.POINSOT_PLANE]
     turned = drawn.attitudes[style.POINSOT_UPRIGHT]
     for time_ns, lines in planes.items():
         row = rows[time_ns // flight.PERIOD_NS]
@@ -316,7 +316,7 @@ def test_the_ghost_is_compared_with_the_body_at_equal_times():
     picture.draw_ghost(times(12), ghost[:12])
     picture.draw(times(10, 20), body[20:])
     picture.draw_ghost(times(18, 12), ghost[12:])
-    found = drawn.rows(style.GHOST_ANGLE)
+    found = drawn.parts[style.GHOST_ANGLE]
     assert list(found) == times(30).tolist()
     apart = [attitude_angle(*pair) for pair in zip(body[:, 3:7], ghost[:, 3:7], strict=True)]
     assert np.allclose(np.radians(np.ravel(list(found.values()))), apart, rtol=1e-14)
@@ -327,7 +327,7 @@ def test_a_ghost_that_ended_leaves_nothing_and_may_come_back():
     for time_ns, setup in enumerate((flight.setup_of(inertia=np.eye(3)), None, flight.setup_of(inertia=np.eye(3)))):
         picture.on(GhostChanged(time_ns, setup))
         assert (drawn.meshes[style.GHOST_MESH] is not None) == (setup is not None)
-        assert len(drawn.rows(style.GHOST_BOX)[time_ns]) == (12 if setup else 0)
+        assert len(drawn.parts[style.GHOST_BOX][time_ns]) == (12 if setup else 0)
 
 
 def test_a_mesh_far_from_its_origin_is_drawn_to_single_precision_of_its_size():
@@ -360,7 +360,7 @@ def test_trails_go_through_the_com_and_its_farthest_vertex_at_each_state():
     assert np.linalg.norm(tip) == pytest.approx(
         np.linalg.norm(flight.SCALE * flight.VERTICES - flight.COM, axis=1).max()
     )
-    com, path = (np.concatenate(list(drawn.rows(name).values())) for name in (style.COM_TRAIL, style.TRAIL))
+    com, path = (np.concatenate(list(drawn.parts[name].values())) for name in (style.COM_TRAIL, style.TRAIL))
     assert np.array_equal(com, states[:, 0:3])
     assert np.allclose(path, states[:, 0:3] + matrix_from_quaternion(states[:, 3:7]) @ tip, atol=1e-15)
 
