@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
+import json
 import math
-import os
 import re
 from itertools import combinations
 from pathlib import Path
@@ -52,19 +52,15 @@ def test_there_is_no_page_without_a_scene_and_no_title_twice() -> None:
     assert sorted(page.stem for page in PAGES.glob("*.md") if page.stem != "README") == scene_names()
 
 
-@pytest.mark.slow
 def test_the_notebook_runs_from_top_to_bottom(monkeypatch: pytest.MonkeyPatch) -> None:
-    nbformat = pytest.importorskip("nbformat")
-    nbclient = pytest.importorskip("nbclient")
-    pytest.importorskip("ipykernel")
-    pytest.importorskip("matplotlib")
-    monkeypatch.setenv("PYTHONPATH", str(PAGES.parent.parent), prepend=os.pathsep)
-    notebook = nbformat.read(PAGES / "inertia.ipynb", as_version=4)
-    nbformat.validate(notebook)
-    nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(PAGES)}}).execute()
-    ran = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    assert len(ran) >= 7
-    assert all(cell.execution_count for cell in ran)
+    pytest.importorskip("matplotlib").use("Agg")
+    monkeypatch.chdir(PAGES)
+    notebook = json.loads((PAGES / "inertia.ipynb").read_text("utf-8"))
+    cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert len(cells) >= 7
+    names = {"__name__": "__main__"}
+    for cell in cells:
+        exec(cell, names)
 
 
 def pushed(scene: str, at: str, impulse: list[float], seconds: float = 0.01, **changes) -> Simulation:
