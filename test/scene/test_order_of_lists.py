@@ -30,6 +30,7 @@ DONE = [
     {"service": "clear_wrench"},
     {"string": "release"},
     {"wrench": {"at": "com", "force": [0.0, 0.0, 1e-2]}},
+    {"state": {"position": [0.1, 0.0, 0.0]}},
 ]
 
 
@@ -64,24 +65,18 @@ def test_lists_act_first_as_they_arrived_then_single_messages_by_kind_whatever_a
         parts = [
             [(own[0], (2, 0)), (own[1], (2, 1))],
             [(own[4], (1, 0)), (own[6], (1, 1)), (own[2], (1, 2))],
-            [(command, None) for command in (own[8], own[4], own[3], inertia, own[0], own[6], own[1], own[5])],
+            [
+                (command, None)
+                for command in (own[8], own[4], own[3], inertia, own[0], own[6], own[1], own[5], own[7], own[9])
+            ],
         ]
         for k in order:
             for command, listed in parts[k]:
                 simulation.submit(command, SECOND, listed)
         found.add(simulation.advance(2 * SECOND).sha256())
         lists = ["poke", "clear_wrench", "string_target", "poke", "set"]
-        assert kinds(lines) == [
-            *lists,
-            "clear_wrench",
-            "set",
-            "inertia",
-            "string_attach",
-            "wrench",
-            "wrench",
-            "poke",
-            "poke",
-        ]
+        changes = ["clear_wrench", "set", "string_release", "state"]
+        assert kinds(lines) == [*lists, *changes, "inertia", "string_attach", "wrench", "wrench", "poke", "poke"]
         assert not simulation.refused
     assert len(found) == 1
 
