@@ -182,14 +182,6 @@ def test_a_nodes_own_dump_can_be_loaded_and_what_differs_acts(rig):
     assert rig.get("inertia_model", "mesh") == {"inertia_model": "shell", "mesh": "book"}
 
 
-def test_what_ros_itself_declares_is_refused_together_with_what_is_set_beside_it(rig):
-    before = rig.get("linear_damping", "use_sim_time")
-    for name, value in (("use_sim_time", 3), ("start_type_description_service", False), ("qos_overrides.none", 1)):
-        ((accepted, reason),) = rig.set_named({"linear_damping": 0.5, name: value}, atomically=True)
-        assert not accepted and name in reason
-    assert rig.get(*before) == before
-
-
 def test_two_nodes_of_one_domain_do_not_mix(rig, tmp_path):
     hammer = {"mesh": "hammer", "world_frame": "map", "qos_overrides./lab/tool/pose.publisher.depth": 3}
     names = ("-r", "__node:=tool", "-r", "__ns:=/lab", "-r", "~/poke:=/lab/hit")

@@ -214,33 +214,29 @@ def test_a_string_tied_by_parameters_stays_tied_in_a_branch_that_begins_while_it
     assert branch.string.release_ns is None and branch.string.target.tolist() == [0.0, 0.0, 0.3]
 
 
-@pytest.mark.parametrize("option", ["--as-scene", "--record"])
-def test_a_place_that_cannot_be_written_is_named_with_its_option_before_the_work(session, option, capsys):
-    place = "/proc/x.yaml" if option == "--as-scene" else "/proc/x.mcap"
-    at = ["--at", "1"] if option == "--as-scene" else []
-    assert main(["replay", str(session), *at, option, place]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.startswith(f"rigid_proto replay: {option}: got '{place}'; accepted: a file that can be")
-
-
-def test_a_scene_doesnt_take_the_place_of_the_recording_that_it_is_taken_from(session, capsys):
-    before = session.read_bytes()
-    assert main(["replay", str(session), "--at", "1", "--as-scene", str(session)]) == 2
-    assert "--as-scene" in capsys.readouterr().err and session.read_bytes() == before
-
-
 @pytest.mark.parametrize(
-    "arguments",
-    [["--at", "9"], ["--at", "-1"], ["--at", "nan"], ["--at", "1"], ["--as-scene", "x.yaml"]],
+    ("arguments", "words"),
+    [
+        ("--at 1 --as-scene /proc/x.yaml", "--as-scene: got '/proc/x.yaml'; accepted: a file that can be"),
+        ("--record /proc/x.mcap", "--record: got '/proc/x.mcap'; accepted: a file that can be"),
+        ("--at 1 --as-scene SESSION", "--as-scene"),
+        ("--at 9 --as-scene x.yaml", "--at"),
+        ("--at -1 --as-scene x.yaml", "--at"),
+        ("--at nan --as-scene x.yaml", "--at"),
+        ("--at 1", "--as-scene"),
+        ("--as-scene x.yaml", "--at"),
+    ],
 )
-def test_a_time_that_is_none_is_refused(session, tmp_path, arguments, capsys, monkeypatch):
+def test_a_time_or_a_place_that_is_none_is_refused_and_nothing_written(
+    session, arguments, words, tmp_path, monkeypatch, capsys
+):
+    before = session.read_bytes()
     monkeypatch.chdir(tmp_path)
-    if "--at" in arguments and arguments[1] != "1":
-        arguments = [*arguments, "--as-scene", "x.yaml"]
     try:
-        status = main(["replay", str(session), *arguments])
+        status = main(["replay", str(session), *arguments.replace("SESSION", str(session)).split()])
     except SystemExit as refused:
         status = refused.code
-    assert status == 2
-    assert len(capsys.readouterr().err.splitlines()) == 1
-    assert not (tmp_path / "x.yaml").exists()
+    out, err = capsys.readouterr()
+    assert status == 2 and len(err.splitlines()) == 1 and words in err
+    assert out == "" or "/proc" not in arguments, "a place is tried before the work"
+    assert session.read_bytes() == before and not list(tmp_path.iterdir())
