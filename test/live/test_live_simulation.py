@@ -128,6 +128,8 @@ def test_commands_are_checked_in_the_scene_that_parameters_have_made(live):
 def test_commands_are_checked_under_the_changes_that_wait_before_them(live):
     live.set_parameters({"integrator": "free_body"})
     live.step()
+    with pytest.raises(CommandRefused, match="rk4"):
+        live.set_parameters({"gyroscopic": False})
     entries = [{"t": 0.02, "set": {"integrator": "auto"}}, {"t": 0.03, "at": "tip", "force": [0.0, 0.0, 0.1]}]
     for entry in (*entries, {"t": 0.04, "set": {"angular_damping": 1e-6}}):
         live.schedule(json.dumps([entry]))
@@ -136,7 +138,7 @@ def test_commands_are_checked_under_the_changes_that_wait_before_them(live):
     with pytest.raises(CommandRefused, match="free_body"):
         live.schedule(json.dumps([{**entries[1], "t": 0.015}]))
     live.step(5)
-    assert live.call(lambda: dict(live.loop.simulation.refused)) == {"integrator": 1}
+    assert live.call(lambda: dict(live.loop.simulation.refused)) == {"integrator": 2}
     assert live.scenario.parameters.angular_damping == 1e-6 and live.state.linear_velocity[1] > 0.0
 
 
