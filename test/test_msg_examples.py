@@ -173,10 +173,16 @@ def test_a_filter_is_compared_with_the_truth(client, run) -> None:
     assert 'config/plumb_line.yaml -p noise.imu:="[0.001, 0.0, 0.02, 0.0]"' in EXAMPLES[9].read_text("utf-8")
     values = {**read_scene_file(scene_path("plumb_line")).values, "noise.imu": [0.001, 0.0, 0.02, 0.0]}
     changes = {name: value for name, value in values.items() if not name.startswith("contacts.")}
-    changes |= {"density": 700.0, "ballast.tip": [0.0] * 4, "initial.angular_velocity": [0.0] * 3}
+    # So slow that the filter takes each message also on a busy machine.
+    changes |= {
+        "real_time_factor": 5.0,
+        "density": 700.0,
+        "ballast.tip": [0.0] * 4,
+        "initial.angular_velocity": [0.0] * 3,
+    }
     assert client.set_named(changes, atomically=True) == [[True, ""]]
     client.trigger("reset")
     client.pause(False)
     alone, filtered = re.findall(r"([\d.e-]+) rad", run(10))
-    # Measured 0.77 and 0.0026 rad.
-    assert float(filtered) < 0.02 < 0.5 < float(alone)
+    # Measured 0.73 and 0.007 rad.
+    assert float(filtered) < 0.05 < 0.5 < float(alone)
