@@ -185,4 +185,4 @@ def test_a_filter_is_compared_with_the_truth(client, run) -> None:
     client.pause(False)
     alone, filtered = re.findall(r"([\d.e-]+) rad", run(10))
     # Measured 0.73 and 0.007 rad.
-    assert float(filtered) < 0.05 < 0.5 < float(alone)
+    assert float(filtered) < 0.02 < 0.5 < float(alone)
