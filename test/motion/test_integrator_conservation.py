@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from flights import flight, spinning
+from flights import SECOND, bundled_body, flight, spinning
 
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators import INTEGRATORS
@@ -60,3 +60,14 @@ def test_energy_and_momentum_walk_at_random_over_a_million_steps(name):
 @pytest.mark.parametrize("name", STEPPED)
 def test_the_quaternion_keeps_its_length_for_a_hundred_thousand_steps(name):
     drifts(name, 1e-3, SPINS[:1], range(10_000, 100_001, 10_000))
+
+
+@pytest.mark.parametrize("name", ["rk4", "auto"])
+def test_momentum_keeps_its_direction_in_the_world(name):
+    simulation = flight(bundled_body("t_handle"), integrator=name, initial=spinning((0.3, 4.0, 0.2)))
+    momentum = simulation.angular_momentum
+    for tenth in range(1, 21):
+        simulation.advance(tenth * SECOND // 10)
+        now = simulation.angular_momentum
+        # Measured 2e-11 (rk4).
+        assert np.linalg.norm(np.cross(now, momentum)) <= 1e-9 * (now @ momentum)
