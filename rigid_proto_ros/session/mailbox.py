@@ -133,7 +133,7 @@ class WritingObserver(Observer):
     """
 
     purpose = "recording"
-    period_s = 0.5
+    period_s: float
 
     def __init__(self, place: str, on_error: Callable[[str], None] | None) -> None:
         self.error = ""
