@@ -94,36 +94,41 @@ def expand_schedule(entries: dict | list) -> list[Command]:
     return sorted(commands, key=attrgetter("entry"))
 
 
-def expand_script(
-    entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES, now_ns: int | None = None
-) -> list[Command]:
-    """As ``parse_script``, from what its YAML says: a list of entries, or nothing. now_ns: when an entry without a time
-    acts; None where each has one.
-    """
+def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES) -> list[Command]:
+    """As ``parse_script``, from what its YAML says: a list of entries, or nothing."""
     if entries is None:
         entries = []
     if not isinstance(entries, list):
         raise InputError(name, type(entries).__name__, "a list of entries such as - {t: 0.5, force: [0, 0, 1]}")
     commands: list[Command] = []
     for number, entry in enumerate(entries, 1):
-        key = ""
-        try:
-            times_ns = _times_ns(entry, number, max_commands, now_ns)
-            if not entry.keys() <= _POKE_KEYS:
-                key = min(entry.keys() & _READERS.keys(), default="")
-                _check_keys(entry, _TIMING_KEYS | {key} if key else _POKE_KEYS, set() if key else _READERS.keys())
-            for t_ns in times_ns:
-                stamp = {"stamp_ns": t_ns, "entry": number}
-                commands += _READERS[key](entry[key], stamp) if key else [_load(False, entry, stamp)]
-            if len(commands) > max_commands:
-                raise InputError("", f"more than {max_commands} commands")
-        except CommandRefused:
-            raise
-        except InputError as error:
-            place = ", ".join(filter(None, (f"{name}, entry {number}", key, error.field)))
-            raise InputError(place, error.received, error.accepted) from None
+        commands += expand_entry(entry, name, number, max_commands)
+        if len(commands) > max_commands:
+            raise InputError(f"{name}, entry {number}", f"more than {max_commands} commands")
     commands.sort(key=attrgetter("stamp_ns"))
     return commands
+
+
+def expand_entry(
+    entry: Any, name: str, number: int = 1, max_commands: int = MAX_ENTRIES, now_ns: int | None = None
+) -> list[Command]:
+    """The commands of the ``number``-th entry of a script in order of time. now_ns: when an entry without a time acts;
+    None where each has one. Raises InputError.
+    """
+    key = ""
+    try:
+        times_ns = _times_ns(entry, number, max_commands, now_ns)
+        if entry.keys() <= _POKE_KEYS:
+            return [_load(False, entry, {"stamp_ns": t_ns, "entry": number}) for t_ns in times_ns]
+        key = min(entry.keys() & _READERS.keys(), default="")
+        _check_keys(entry, _TIMING_KEYS | {key} if key else _POKE_KEYS, set() if key else _READERS.keys())
+        read, content = _READERS[key], entry[key]
+        return [command for t_ns in times_ns for command in read(content, {"stamp_ns": t_ns, "entry": number})]
+    except CommandRefused:
+        raise
+    except InputError as error:
+        place = ", ".join(filter(None, (f"{name}, entry {number}", key, error.field)))
+        raise InputError(place, error.received, error.accepted) from None
 
 
 def _times_ns(entry: Any, number: int, max_commands: int, now_ns: int | None) -> list[int]:
@@ -154,7 +159,7 @@ def _times_ns(entry: Any, number: int, max_commands: int, now_ns: int | None) ->
         return times_ns
     seed = int(_number(entry.get("seed", 0), "seed", 0, 2**63))
     shifts = (random.Random(f"{seed}/0/{number}/0/{k}").uniform(-jitter, jitter) for k in range(int(repeat)))
-    return [max(0, time_ns + nanoseconds(shift)) for time_ns, shift in zip(times_ns, shifts, strict=True)]
+    return sorted(max(0, time_ns + nanoseconds(shift)) for time_ns, shift in zip(times_ns, shifts, strict=True))
 
 
 def _held_wrench(entry: Any, stamp: Stamp) -> list[Command]:

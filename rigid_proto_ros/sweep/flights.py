@@ -28,7 +28,7 @@ from ..base.errors import CommandRefused, InputError
 from ..motion.state import State
 from ..scene.scenario import Scenario, read_scene
 from ..scene.scenario_run import OfflineRun
-from ..scene.script import MAX_TIME_S, expand_script
+from ..scene.script import MAX_TIME_S, expand_entry
 from ..scene.yaml_text import plain
 from ..simulation.commands import nanoseconds
 from ..simulation.observer import Observer
@@ -75,7 +75,7 @@ class Flight:
         """
         if not isinstance(entry, Mapping):
             raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
-        self._run.submit(expand_script([plain(entry)], "command", now_ns=self._run.simulation.time_ns))
+        self._run.submit(expand_entry(plain(entry), "command", now_ns=self._run.simulation.time_ns))
 
     def step(self, seconds: float) -> State:
         """Simulate so long, and return the state at the end. Raises InputError for no such time, when the motion fails,
