@@ -20,7 +20,7 @@ import numpy as np
 from ..base.compilation import njit
 from ..base.errors import CommandRefused
 from ..base.rotation import matrix_elements, transposed_times
-from ..base.vectors import Numbers, Vector, vector
+from ..base.vectors import FloatArray, Numbers, StateRow, Vector, Vector3, vector
 from . import body as of_body
 from .body import MAX_ACCELERATION, Body
 from .frames import Frame, contact_point, point_text
@@ -52,7 +52,7 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 
 @njit(error_model="numpy", allocates=False)
-def arm_of(load: np.ndarray, body: np.ndarray) -> Vector:
+def arm_of(load: FloatArray, body: FloatArray) -> Vector:
     """Vector from the COM to the point of application [m, body axes]: three numbers."""
     if load[HAS_POINT] == 0.0:
         return 0.0, 0.0, 0.0
@@ -60,7 +60,7 @@ def arm_of(load: np.ndarray, body: np.ndarray) -> Vector:
 
 
 @njit(error_model="numpy", allocates=False)
-def own_force(load: np.ndarray, body: np.ndarray) -> Vector:
+def own_force(load: FloatArray, body: FloatArray) -> Vector:
     """The force, in body axes, of a load whose axes rotate with the body: three numbers."""
     f = load[FORCE]
     if load[LOAD_AXES] == NORMAL_AXES:
@@ -76,7 +76,7 @@ def _bound(x: float, y: float, z: float) -> float:
 
 
 @njit(error_model="numpy", allocates=False)
-def magnitudes(load: np.ndarray, body: np.ndarray) -> tuple[float, float]:
+def magnitudes(load: FloatArray, body: FloatArray) -> tuple[float, float]:
     """Upper bounds of the linear [m/s²] and angular [rad/s²] acceleration over all attitudes, computed from |r||F| and
     the smallest principal moment.
     """
@@ -89,20 +89,20 @@ def magnitudes(load: np.ndarray, body: np.ndarray) -> tuple[float, float]:
 
 
 @njit(error_model="numpy", allocates=False)
-def is_within_magnitude(load: np.ndarray, body: np.ndarray) -> bool:
+def is_within_magnitude(load: FloatArray, body: FloatArray) -> bool:
     """Whether both accelerations are within MAX_ACCELERATION; False if they overflow to NaN."""
     linear, angular = magnitudes(load, body)
     return linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION
 
 
 @njit(error_model="numpy", allocates=False)
-def is_zero(load: np.ndarray) -> bool:
+def is_zero(load: FloatArray) -> bool:
     """Whether the load has neither force nor torque."""
     return not load[FORCE : FORCE + 6].any()
 
 
 @njit(error_model="numpy", allocates=False)
-def accumulate_load(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> None:
+def accumulate_load(load: FloatArray, body: FloatArray, share: FloatArray) -> None:
     """Write the load's contribution to the sums into share (LOADS_SIZE,): forces and torques by axes, and the moment r
     Fᵀ of a world force.
     """
@@ -125,7 +125,7 @@ def accumulate_load(load: np.ndarray, body: np.ndarray, share: np.ndarray) -> No
 
 
 @njit(error_model="numpy", allocates=False)
-def apply_impulse(load: np.ndarray, body: np.ndarray, row: np.ndarray) -> None:
+def apply_impulse(load: FloatArray, body: FloatArray, row: StateRow) -> None:
     """Apply impulse J and angular impulse H to a state row: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
     a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])
     hx, hy, hz = load[TORQUE], load[TORQUE + 1], load[TORQUE + 2]
@@ -177,7 +177,7 @@ class Load(NamedTuple):
         )
 
     @property
-    def row(self) -> np.ndarray:
+    def row(self) -> FloatArray:
         """The load as compiled functions read it (LOAD,)."""
         return np.frombuffer(self.packed).copy()
 
@@ -188,11 +188,11 @@ class Load(NamedTuple):
         point = ("com",) if self.mesh_point is None else ("point", self.mesh_point)
         return f"{axes}@{point_text(point)}"
 
-    def arm(self, body: Body) -> np.ndarray:
+    def arm(self, body: Body) -> Vector3:
         """Vector from the COM to the point of application (3,) [m, body axes]."""
         return np.array(arm_of(self.row, body.row))
 
-    def own_force(self, body: Body) -> np.ndarray:
+    def own_force(self, body: Body) -> Vector3:
         """The force (3,), in body axes, of a load whose axes rotate with the body."""
         return np.array(own_force(self.row, body.row))
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.rotation import matrix_elements, matrix_from_quaternion, rotate, times, to_unit
-from ..base.vectors import Numbers
+from ..base.vectors import FloatArray, Matrix3, Numbers, StateRow, Vector3
 
 
 @dataclass(slots=True)
@@ -23,35 +23,35 @@ class State:
     """
 
     time_ns: int
-    row: np.ndarray
+    row: StateRow
 
     @property
-    def position(self) -> np.ndarray:
+    def position(self) -> Vector3:
         """COM position x [m, world]."""
         return self.row[0:3]
 
     @property
-    def orientation_xyzw(self) -> np.ndarray:
+    def orientation_xyzw(self) -> FloatArray:
         """Attitude q, body to world."""
         return self.row[3:7]
 
     @property
-    def linear_velocity(self) -> np.ndarray:
+    def linear_velocity(self) -> Vector3:
         """COM velocity v [m/s, world]."""
         return self.row[7:10]
 
     @property
-    def angular_velocity_body(self) -> np.ndarray:
+    def angular_velocity_body(self) -> Vector3:
         """ω [rad/s, body axes]."""
         return self.row[10:13]
 
     @property
-    def rotation(self) -> np.ndarray:
+    def rotation(self) -> Matrix3:
         """Rotation matrix (3, 3), body to world."""
         return matrix_from_quaternion(self.orientation_xyzw)
 
     @property
-    def angular_velocity(self) -> np.ndarray:
+    def angular_velocity(self) -> Vector3:
         """ω in world axes [rad/s]."""
         return times(self.rotation, self.angular_velocity_body)
 
@@ -72,11 +72,11 @@ class State:
                 row[10:13] = self.angular_velocity_body
         return State(self.time_ns, row)
 
-    def kinetic_energy(self, mass: float, inertia: np.ndarray) -> float:
+    def kinetic_energy(self, mass: float, inertia: Matrix3) -> float:
         """½ m|v|² + ½ ωᵀIω [J]."""
         return kinetic_energy(self.row, mass, np.ravel(inertia))
 
-    def angular_momentum(self, inertia: np.ndarray) -> np.ndarray:
+    def angular_momentum(self, inertia: Matrix3) -> Vector3:
         """L = R I ω about the COM, world axes [N m s]."""
         return np.array(angular_momentum(self.row, np.ravel(inertia)))
 
@@ -89,7 +89,7 @@ class State:
 
 @njit(error_model="numpy", allocates=False)
 def fill_initial_row(
-    position: np.ndarray, orientation: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray, row: np.ndarray
+    position: Vector3, orientation: FloatArray, velocity: Vector3, angular_velocity: Vector3, row: StateRow
 ) -> bool:
     """Fill a state row (13,), given an orientation (4,) of any length and ω (3,) in world axes; returns False when the
     orientation has length zero.
@@ -108,7 +108,7 @@ def fill_initial_row(
 
 
 @njit(error_model="numpy", allocates=False)
-def shift_com(row: np.ndarray, x: float, y: float, z: float) -> None:
+def shift_com(row: StateRow, x: float, y: float, z: float) -> None:
     """Change the reference point of a state row (13,) to the one at d = (x, y, z) [m, body axes] from the COM on the
     same moving body: the position changes by R d, the velocity by ω × R d.
     """
@@ -121,7 +121,7 @@ def shift_com(row: np.ndarray, x: float, y: float, z: float) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def kinetic_energy(row: np.ndarray, mass: float, inertia: np.ndarray) -> float:
+def kinetic_energy(row: StateRow, mass: float, inertia: FloatArray) -> float:
     """½ m|v|² + ½ ωᵀIω [J] of a state row (≥ 13,); inertia (9,) row by row."""
     x, y, z = row[10], row[11], row[12]
     turning = (
@@ -133,7 +133,7 @@ def kinetic_energy(row: np.ndarray, mass: float, inertia: np.ndarray) -> float:
 
 
 @njit(error_model="numpy", allocates=False)
-def angular_momentum(row: np.ndarray, inertia: np.ndarray) -> tuple[float, float, float]:
+def angular_momentum(row: StateRow, inertia: FloatArray) -> tuple[float, float, float]:
     """L = R I ω about the COM, world axes [N m s], of a state row (≥ 13,); inertia (9,) row by row."""
     x, y, z = row[10], row[11], row[12]
     return rotate(

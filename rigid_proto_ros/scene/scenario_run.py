@@ -16,12 +16,11 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from heapq import heappop, heappush
-from typing import TypeVar
-
-import numpy as np
+from typing import Any, TypeVar
 
 from ..base.command_line import Progress
 from ..base.errors import InputError
+from ..base.vectors import StateRow
 from ..simulation.commands import Change, Command, Listed
 from ..simulation.observer import (
     Event,
@@ -164,7 +163,7 @@ class ScenarioRun:
             self.simulation.follower = self.ghost.submit
             self.ghost.announce()
 
-    def publish(self, time_ns: int, row: np.ndarray) -> None:
+    def publish(self, time_ns: int, row: StateRow) -> None:
         """Tell the observer a state, and where the ghost is then."""
         self.observer.on(Published(time_ns, row))
         self.simulation.notify_floor()
@@ -319,7 +318,7 @@ def run_with_progress(run: OfflineRun, duration_ns: int) -> float:
     return time.perf_counter() - start
 
 
-def summary(run: OfflineRun, wall_time: float) -> dict:
+def summary(run: OfflineRun, wall_time: float) -> dict[str, Any]:
     """What ``simulate --json`` prints: the final state, energies and what the run cost."""
     simulation = run.simulation
     state = simulation.state

@@ -34,6 +34,9 @@ from ..simulation.commands import (
 from .parameters import ZERO
 from .yaml_text import flow, load_json, load_yaml, read_text
 
+Entries = dict[str, Any] | list[Any]
+"""An entry of a script, or a list of entries."""
+
 Stamp = dict[str, Any]
 """A command's stamp_ns and entry."""
 
@@ -72,7 +75,7 @@ def parse_script(text: str, name: str = "script") -> list[Command]:
     return expand_script(load_yaml(text, name), name)
 
 
-def read_schedule(text: str) -> dict | list:
+def read_schedule(text: str) -> Entries:
     """What a message on the schedule topic says: an entry, or a list of entries. JSON, which is YAML, may be longer and
     is read faster. Raises InputError.
     """
@@ -87,7 +90,7 @@ def read_schedule(text: str) -> dict | list:
     return entries
 
 
-def expand_schedule(entries: dict | list) -> list[Command]:
+def expand_schedule(entries: Entries) -> list[Command]:
     """The commands of what ``read_schedule`` gives, in the order in which they are listed; raises InputError."""
     commands = expand_script(entries if isinstance(entries, list) else [entries], "schedule", MAX_SCHEDULED)
     # As listed, which only matters among those that act at once because their time is past.
@@ -228,7 +231,7 @@ ENTRY_KEYS: Set[str] = _POKE_KEYS | _READERS.keys()
 """The keys that an entry may have."""
 
 
-def _load(held: bool, entry: dict, stamp: Stamp) -> WrenchCommand:
+def _load(held: bool, entry: dict[str, Any], stamp: Stamp) -> WrenchCommand:
     impulse = "impulse" in entry or "angular_impulse" in entry
     lasting = "force" in entry or "push" in entry or "torque" in entry
     duration_s = None
@@ -257,7 +260,7 @@ def _load(held: bool, entry: dict, stamp: Stamp) -> WrenchCommand:
     return WrenchCommand(held, Frame(axes, point, duration_s, impulse, slot), force, torque, **stamp)
 
 
-def _point(at: object) -> tuple:
+def _point(at: object) -> tuple[Any, ...]:
     if isinstance(at, str) and (at in FIXED_POINTS or (CONTACT_NAME.match(at) and at not in RESERVED_WORDS)):
         return (at,) if at in FIXED_POINTS else ("contact", at)
     if isinstance(at, dict) and len(at) == 1:
@@ -275,7 +278,7 @@ def _point(at: object) -> tuple:
     raise InputError("at", at, accepted)
 
 
-def _check_keys(entry: dict, known: Set[str], others: Set[str] = frozenset()) -> None:
+def _check_keys(entry: dict[str, Any], known: Set[str], others: Set[str] = frozenset()) -> None:
     """others: keys of other kinds of entries, one of which may be meant."""
     if entry.keys() <= known:
         return
@@ -324,7 +327,7 @@ def with_contacts(script: Iterable[Command], contacts: Mapping[str, Vector]) -> 
 # Written
 
 
-def entry_of(command: Command) -> dict:
+def entry_of(command: Command) -> dict[str, Any]:
     """The command as an entry of a script, without its time.
 
     Raises InputError for what no entry can say: an impulse along a normal, an inertia message, a knot in other than
@@ -356,7 +359,7 @@ def _no_entry(command: Command) -> InputError:
     return InputError("script", f"{command.kind} in {frame_id!r}", "a command that a script entry can express")
 
 
-def _load_entry(command: WrenchCommand) -> dict:
+def _load_entry(command: WrenchCommand) -> dict[str, Any]:
     frame = command.frame
     match frame.point:
         case ("vertex" | "point" as word, place):
@@ -365,7 +368,7 @@ def _load_entry(command: WrenchCommand) -> dict:
             at = {"ray": {"origin": list(origin), "direction": list(direction)}}
         case (*_, name):  # a contact, com or origin
             at = name
-    entry: dict = {"at": at}
+    entry: dict[str, Any] = {"at": at}
     force, torque = list(map(float, command.force)), list(map(float, command.torque))
     if frame.axes == "normal":
         if frame.impulse or any(force[1:]) or any(torque):
@@ -385,7 +388,7 @@ def _load_entry(command: WrenchCommand) -> dict:
     return entry
 
 
-def script_text(entries: Iterable[Mapping]) -> str:
+def script_text(entries: Iterable[Mapping[str, Any]]) -> str:
     """The text of a script file with these entries."""
     return "".join(f"- {flow(entry)}\n" for entry in entries) or "[]\n"
 

@@ -118,7 +118,7 @@ def key_of(key: yaml.Node, name: str) -> str:
     """A mapping's key as text; raises InputError for one that is a list or a mapping."""
     if not isinstance(key, yaml.ScalarNode):
         raise refused(key, name, "a name")
-    return key.value
+    return str(key.value)
 
 
 def typed(node: yaml.ScalarNode) -> bool | int | float | str:

@@ -13,6 +13,7 @@ from numba import float64, from_dtype, int64, types
 
 from ..base.compilation import entry_of, njit, place_of
 from ..base.simd import aligned
+from ..base.vectors import FloatArray, Records
 from ..motion.integrators.integrator import METHOD, provide_kernel
 from ..motion.loads import Load, load_of_bytes
 from ..motion.state import State
@@ -72,11 +73,11 @@ one now. END_DUE: end the loads whose end is due. END_ALL: end all active loads.
 
 @njit(error_model="numpy", allocates=False)
 def _call(
-    flights: np.ndarray,
-    loads: np.ndarray,
-    events: np.ndarray,
-    methods: np.ndarray,
-    room: np.ndarray,
+    flights: Records,
+    loads: Records,
+    events: Records,
+    methods: Records,
+    room: FloatArray,
     what: int,
     until_ns: int,
 ) -> int:
@@ -222,7 +223,7 @@ class FlightArrays:
         return self.integers[_DUE_END] - self.integers[_DUE]
 
     @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
+    def arrays(self) -> tuple[Records, Records, Records, Records, FloatArray]:
         """Arguments of compiled functions: flight (1,), tables of loads, events and methods, workspace."""
         return self._flights, self._loads, self._events, self.methods, self.room
 
@@ -243,9 +244,9 @@ class FlightArrays:
         events = self._events[: self.integers[_EVENTS]]
         return list(zip(*(events[name].tolist() for name in ("time_ns", "what", "load_id", "row")), strict=True))
 
-    def attitude_at(self, number: int) -> np.ndarray:
+    def attitude_at(self, number: int) -> FloatArray:
         """Attitude (4,) xyzw of the body when a command was applied, by the index of the event in the last call."""
-        attitude: np.ndarray = self._events["attitude"][number].copy()
+        attitude: FloatArray = self._events["attitude"][number].copy()
         return attitude
 
     # Observables

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.errors import CommandRefused
 from ..base.rotation import length, transposed_times
-from ..base.vectors import Vector
+from ..base.vectors import Records, StateRow, Vector
 from ..motion.body import LENGTH, Body
 from ..motion.integrators import check_supported
 from ..motion.integrators.auto import FASTEST
@@ -44,9 +44,9 @@ class FlightStart(NamedTuple):
     room: of the largest workspace [doubles].
     """
 
-    flight: np.ndarray
+    flight: Records
     integers: memoryview
-    methods: np.ndarray
+    methods: Records
     room: int
 
 
@@ -68,7 +68,7 @@ class Setup(Environment):
     step_ns: int
     wrench_timeout_ns: int
     poke_duration_ns: int
-    initial: np.ndarray
+    initial: StateRow
     accuracy: float = 1e-9
     string: StringSettings = StringSettings()
     initial_string_mass: float = 0.0

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.errors import CommandRefused, InputError
 from ..base.rotation import cross, dot, length, times, transposed_times
-from ..base.vectors import Numbers, Vector
+from ..base.vectors import Numbers, Vector, Vector3
 from ..motion.integrators import check_supported
 from ..motion.integrators.integrator import STRING
 from ..motion.integrators.series_steps import degree_of_motion, fastest_swing
@@ -567,7 +567,7 @@ class Simulation:
         return self.state.kinetic_energy(self.setup.body.mass, self.setup.body.inertia)
 
     @property
-    def angular_momentum(self) -> np.ndarray:
+    def angular_momentum(self) -> Vector3:
         """R I ω about the COM (3,) [N m s, world]."""
         return self.state.angular_momentum(self.setup.body.inertia)
 
@@ -601,22 +601,22 @@ class Simulation:
         still = not (self.state.row[7:].any() or self.setup.gravity.any())
         return still and not self.flight.acting and self.string is None and not self._pending
 
-    def accelerations(self) -> tuple[np.ndarray, np.ndarray]:
+    def accelerations(self) -> tuple[Vector3, Vector3]:
         """Current acceleration of the COM (3,) [m/s²] and angular acceleration (3,) [rad/s²], both in world axes."""
         linear, angular = self._accelerations()
         return linear, times(self.state.rotation, angular)
 
-    def specific_force(self, point: Numbers) -> np.ndarray:
+    def specific_force(self, point: Numbers) -> Vector3:
         """Specific force (3,) [m/s², body axes] at ``point`` r (3,) [m, body axes from the COM], as an accelerometer
         shows it: Rᵀ(a − g) + ω' × r + ω × (ω × r).
         """
         linear, angular = self._accelerations()
         w = self.state.angular_velocity_body
         own = transposed_times(self.state.rotation, linear - self.setup.gravity)
-        shown: np.ndarray = own + cross(angular, point) + cross(w, cross(w, point))
+        shown: Vector3 = own + cross(angular, point) + cross(w, cross(w, point))
         return shown
 
-    def _accelerations(self) -> tuple[np.ndarray, np.ndarray]:
+    def _accelerations(self) -> tuple[Vector3, Vector3]:
         """Current acceleration of the COM (3,) [m/s², world] and angular acceleration (3,) [rad/s², body axes]."""
         six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(VARIABLES)))
         return six[:3], six[3:]
