@@ -45,8 +45,6 @@ TEST = [
     *IDENTIFY,
     "mcap-ros2-support>=0.5",
     "playwright>=1.50",
-    "nbclient>=0.10",
-    "ipykernel>=6",
 ]
 
 
