@@ -249,6 +249,7 @@ class LiveSimulation:
         """Change parameters all at once, or none: raises InputError, and then all stays as it was. Setting density sets
         mass to 0.
         """
+        self.give_up_failed_recording()
         # Loading a mesh and compiling take time that the physics thread hasn't got: this fills the caches before it.
         loop = self.loop
         changes = with_mass_of_density(changes)

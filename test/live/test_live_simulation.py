@@ -341,6 +341,17 @@ def test_a_recording_that_is_lost_while_time_stands_can_be_begun_again_and_ended
     assert (np.asarray(run.times) // PERIOD_NS).tolist() == [2, 3]
 
 
+def test_a_lost_recording_is_begun_again_by_its_own_name(live, tmp_path):
+    path = tmp_path / "flight.mcap"
+    live.set_parameters({"record": str(path)})
+    live._recorder.error = "lost"
+    live.set_parameters({"record": str(path)})
+    live.step()
+    live.set_parameters({"record": ""})
+    assert len(read_runs(path)) == 1
+    assert not live.recording_trouble
+
+
 @needs_rerun
 @pytest.mark.parametrize("ending", ["rrd", "mcap"])
 def test_what_was_done_behind_the_last_state_is_in_a_converted_session_too(live, tmp_path, ending):
