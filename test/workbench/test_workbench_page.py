@@ -202,6 +202,7 @@ def test_from_nearer_by_wheel_or_pinch_a_click_pokes_where_it_points(page) -> No
     def pinch(x: float, y: float) -> None:
         for k in range(6):
             page.touch("touchMove" if k else "touchStart", (x - 120.0 - 20.0 * k, y), (x + 120.0 + 20.0 * k, y))
+            page.drawn()  # viser takes one move of a finger a picture
         page.touch("touchEnd")
 
     for come_nearer in (turn_the_wheel, pinch):
