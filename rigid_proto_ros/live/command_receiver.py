@@ -7,14 +7,12 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from ..base.errors import CommandRefused, InputError
-from ..scene.scenario import nanoseconds, with_inertia
 from ..scene.script import expand_schedule, read_schedule, with_contacts
-from ..simulation.commands import Change, Command, Listed
-from ..simulation.setup import Setup, check_command
+from ..simulation.commands import Change, Command, Listed, nanoseconds
+from ..simulation.setup import Setup
 
 if TYPE_CHECKING:
     from .simulation_loop import SimulationLoop
@@ -54,7 +52,6 @@ class CommandReceiver:
         try:
             sent = command()
             if isinstance(sent, Change):
-                with_inertia(loop.scenario, sent.content)
                 sent = loop.bound(sent)
             when_ns, counter = self._effective(sent.stamp_ns, loop.stamps.offset_ns)
             self._count(counter, 1)
@@ -96,11 +93,10 @@ class CommandReceiver:
 
     def _checked(self, command: Command, when_ns: int, waiting: Sequence[tuple[int, Change]]) -> tuple[bytes, Setup]:
         """The command's load and the setup for which it holds; raises InputError."""
-        # In the scene that parameters have made, though they may not have acted yet.
-        scenario = self._loop.scenario
-        if waiting:
-            ((_, scenario),) = self._loop.planned([replace(command, stamp_ns=when_ns)], waiting)
-        return check_command(command, scenario.setup), scenario.setup
+        # Its own stamp stays: it is logged as sent. Only changes that wait ask when it acts.
+        timed = replace(command, stamp_ns=when_ns) if waiting else command
+        ((_, checked),) = self._loop.checked([timed], waiting)
+        return checked
 
     def _planned(
         self, commands: list[Command], is_list: bool, waiting: Sequence[tuple[int, Change]]
@@ -112,12 +108,8 @@ class CommandReceiver:
         taken: list[Submission] = []
         counted: dict[str, set[int]] = {}
         order = sorted(range(len(commands)), key=lambda k: commands[k].stamp_ns)
-        for k, (command, scenario) in zip(
-            order, self._loop.planned([commands[k] for k in order], waiting), strict=True
-        ):
-            if isinstance(command, Change):
-                command = replace(command, apply=partial(self._loop.setup_of, command, scenario))
-            checked = (check_command(command, scenario.setup), scenario.setup)
+        in_order = self._loop.checked([commands[k] for k in order], waiting)
+        for k, (command, checked) in zip(order, in_order, strict=True):
             when_ns, counter = self._effective(command.stamp_ns, 0)
             counted.setdefault(counter, set()).add(command.entry)
             taken.append((command, when_ns, (self._schedules, k) if is_list else None, checked))

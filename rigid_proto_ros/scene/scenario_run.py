@@ -170,11 +170,12 @@ class ScenarioRun:
         if self.ghost is not None:
             self.ghost.advance(time_ns)
 
-    def planned(
+    def checked(
         self, commands: Iterable[Command], waiting: Iterable[tuple[int, Change]] = ()
-    ) -> Iterator[tuple[Command, Scenario]]:
-        """Commands in order of time, each with the scenario that changes before it make of the present one: those among
-        them, and those that wait. Raises InputError.
+    ) -> Iterator[tuple[Command, tuple[bytes, Setup]]]:
+        """Commands in order of time, changes ``bound``; each with what ``Simulation.submit`` takes as ``checked``, in
+        the scenario that changes before it make of the present one: those among them, and those that wait. Raises
+        InputError.
         """
         scenario, changes = self.scenario, deque(waiting)
         for command in commands:
@@ -183,7 +184,8 @@ class ScenarioRun:
                     scenario = after_change(scenario, changes.popleft()[1])
             if isinstance(command, Change):
                 scenario = after_change(scenario, command)
-            yield command, scenario
+                command = self.bound(command, scenario)
+            yield command, (check_command(command, scenario.setup), scenario.setup)
 
     def accepted(self, check: Callable[[Sequence[tuple[int, Change]]], Value]) -> Value:
         """What check(waiting) returns, a check of commands: under the present parameters, and where these don't take
@@ -201,15 +203,15 @@ class ScenarioRun:
         """Raises InputError where this scenario can't follow the present one."""
         self.simulation.check_change(scenario.setup)
 
-    def bound(self, change: Change) -> Change:
+    def bound(self, change: Change, at_hand: Scenario | None = None) -> Change:
         """The change with a setup from this run's parameters (``setup_of``) at the time when it acts."""
-        return replace(change, apply=partial(self.setup_of, change))
+        return replace(change, apply=partial(self.setup_of, change, at_hand))
 
-    def setup_of(self, command: Change) -> Setup:
+    def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
         """Put in force what a change says that acts now; returns the setup. Raises InputError, and then all stays as it
-        was.
+        was. at_hand: a scenario whose mesh may be its.
         """
-        return self.replace(after_change(self.scenario, command))
+        return self.replace(after_change(self.scenario, command, at_hand))
 
     def replace(self, scenario: Scenario) -> Setup:
         """Put another scenario in force, its publication rate too; the ghost follows, and the observer is notified."""
@@ -259,22 +261,19 @@ class OfflineRun(ScenarioRun):
         InputError.
         """
         commands = with_contacts(script, self.scenario.setup.contacts)
-        taken = self.accepted(lambda waiting: self._checked(commands, waiting))
-        self._submitted += len(taken)
-        for command, number, checked in taken:
-            when_ns = self.simulation.submit(command, command.stamp_ns, (0, number), checked)
+        for command, checked in self.accepted(partial(self._all_checked, commands)):
+            self._submitted += 1
+            when_ns = self.simulation.submit(command, command.stamp_ns, (0, self._submitted), checked)
             if isinstance(command, Change) and "publish_rate" in command.content:
                 heappush(self._rates_ns, when_ns)
 
-    def _checked(
+    def _all_checked(
         self, commands: Sequence[Command], waiting: Sequence[tuple[int, Change]]
-    ) -> list[tuple[Command, int, tuple[bytes, Setup]]]:
-        taken: list[tuple[Command, int, tuple[bytes, Setup]]] = []
+    ) -> list[tuple[Command, tuple[bytes, Setup]]]:
+        taken: list[tuple[Command, tuple[bytes, Setup]]] = []
         try:
-            for command, scenario in self.planned(commands, waiting):
-                acting = self.bound(command) if isinstance(command, Change) else command
-                number = self._submitted + len(taken) + 1
-                taken.append((acting, number, (check_command(acting, scenario.setup), scenario.setup)))
+            for each in self.checked(commands, waiting):
+                taken.append(each)
         except InputError as error:
             number, at_s = self._submitted + len(taken) + 1, commands[len(taken)].stamp_ns / 1e9
             place = f"script, command {number} at {at_s:g} s, {error.field}"

@@ -241,11 +241,11 @@ class Resimulation(ScenarioRun):
             self.simulation.submit(command, time_ns, (0, number), checked)
         return self.simulation.advance(until_ns).row
 
-    def setup_of(self, command: Change) -> Setup:
+    def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
         """Put in force what a change says, with the mesh that was flown then."""
         mesh = self._mesh_of(command.content["mesh"]) if command.content.get("mesh") else None
         if mesh is None:
-            return super().setup_of(command)
+            return super().setup_of(command, at_hand)
         return self.replace(self.scenario.with_changes(command.content, mesh))
 
 
