@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     return _report(session)
 
 
-def _start(command: list[str], environment: dict[str, str], processes: contextlib.ExitStack) -> subprocess.Popen:
+def _start(command: list[str], environment: dict[str, str], processes: contextlib.ExitStack) -> subprocess.Popen[bytes]:
     """Start a process that ends when ``processes`` is closed, also if a signal ends this command. The process has its
     own session, so a Ctrl-C in the terminal reaches only this command.
     """
@@ -99,7 +99,7 @@ def _start(command: list[str], environment: dict[str, str], processes: contextli
     return process
 
 
-def _end(process: subprocess.Popen) -> None:
+def _end(process: subprocess.Popen[bytes]) -> None:
     """Send SIGTERM, which ends Python silently if it has no handler yet, and after a while SIGKILL."""
     process.terminate()
     try:

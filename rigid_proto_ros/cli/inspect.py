@@ -7,6 +7,7 @@ import argparse
 import json
 import math
 import sys
+from typing import Any
 
 from ..base.errors import InputError
 from ..mass.from_mesh import FALLBACKS, mesh_body
@@ -123,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
     return status
 
 
-def _print(inspection: Inspection, report: dict, args: argparse.Namespace) -> None:
+def _print(inspection: Inspection, report: dict[str, Any], args: argparse.Namespace) -> None:
     if not print_inertial(args, inspection.chosen):
         print_report(inspection, report)
         return
@@ -132,7 +133,7 @@ def _print(inspection: Inspection, report: dict, args: argparse.Namespace) -> No
             print(f"{finding.severity}: {finding.message}", file=sys.stderr)
 
 
-def _verify(inspection: Inspection, report: dict) -> int:
+def _verify(inspection: Inspection, report: dict[str, Any]) -> int:
     """Add ``verification`` to the report, null if it is refused; returns the exit status."""
     report["verification"] = None
     report["verification"] = verify_moments(inspection.body, inspection.scale)

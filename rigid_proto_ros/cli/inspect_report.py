@@ -6,9 +6,11 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
+from ..base.vectors import Matrix3
 from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mass.inspection import Inspection
 from ..mass.properties import MassProperties
@@ -24,7 +26,7 @@ def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> None:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip())
 
 
-def print_report(inspection: Inspection, report: dict) -> None:
+def print_report(inspection: Inspection, report: dict[str, Any]) -> None:
     """The report on stdout: mesh, findings, mass properties, models."""
     body, chosen = inspection.body, inspection.chosen
     count = report["components"]
@@ -89,7 +91,7 @@ def row_of(values: Iterable[float], largest: float = 0.0) -> str:
     return " ".join(f"{without_rounding(value, largest):< 13.6g}" for value in values).rstrip()
 
 
-def tensor_rows(inertia: np.ndarray) -> list[tuple[str, ...]]:
+def tensor_rows(inertia: Matrix3) -> list[tuple[str, ...]]:
     """Rows of a table for a tensor (3, 3)."""
     labels = [("inertia", "kg m², about the centre of mass"), ("", ""), ("", "")]
     largest = float(np.abs(inertia).max())

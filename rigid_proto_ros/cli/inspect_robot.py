@@ -11,7 +11,7 @@ import math
 import sys
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..base.errors import InputError, printable
 from ..base.files import is_same_file, whole_file
@@ -93,9 +93,10 @@ def compare(args: argparse.Namespace) -> int:
     return max(status for status, _ in found)
 
 
-def _judge(args: argparse.Namespace, robot: str) -> tuple[int, dict]:
+def _judge(args: argparse.Namespace, robot: str) -> tuple[int, dict[str, Any]]:
     """Exit status and JSON object of one robot; prints the report unless JSON is asked for."""
-    from ..robots.diagnosis import LIMIT, NOT_UNIFORM, UNKNOWN, WRONG, compare_robot
+    from ..robots.causes import LIMIT
+    from ..robots.diagnosis import NOT_UNIFORM, UNKNOWN, WRONG, compare_robot
 
     diagnoses = compare_robot(
         Path(robot),
@@ -178,7 +179,7 @@ def lump(args: argparse.Namespace) -> int:
     return 0
 
 
-def _lump_as_dict(robot: str, whole: Lump) -> dict:
+def _lump_as_dict(robot: str, whole: Lump) -> dict[str, Any]:
     moments, axes = principal_axes(whole.properties.inertia)
     return {
         "lump": robot,
@@ -220,7 +221,7 @@ def _write_scene(whole: Lump, name: str) -> tuple[str, ...]:
         own = next((file for file in whole.files if is_same_file(file, name) or is_same_file(file, mesh)), None)
         if own is not None:
             raise InputError("--as-scene", name, f"another name, which leaves the robot's own {own.name} as it is")
-        values: dict = {
+        values: dict[str, Any] = {
             "mesh": str(mesh) if len(whole.triangles) else "",
             "inertia_model": "explicit",
             "explicit_inertia.mass": whole.properties.mass,

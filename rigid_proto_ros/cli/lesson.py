@@ -40,9 +40,10 @@ def run(args: argparse.Namespace) -> int:
     from ..base.bundled import example_path
     from ..export.flight_record import FlightRecord, frames, source_of_scene
     from ..scene.lessons import lesson
-    from ..scene.scenario import nanoseconds, read_scene
+    from ..scene.scenario import read_scene
     from ..scene.scenario_run import OfflineRun
     from ..scene.script import read_script
+    from ..simulation.commands import nanoseconds
 
     if not args.html.lower().endswith((".html", ".htm")):
         raise InputError("--html", args.html, "a file that ends in .html")

@@ -65,7 +65,7 @@ def main(argv: list[str] | None = None) -> int:
         importlib.import_module("..base.compilation", __package__)
         return interrupts.run(lambda: _run(args), lambda error: tell(program, error))
     try:
-        return args.run(args)
+        return int(args.run(args))
     except KeyboardInterrupt:
         return 130
     except Exception as error:
@@ -78,6 +78,6 @@ def _run(args: argparse.Namespace) -> int:
 
     text = f"rigid_proto {args.command}: compiling kernels, at the first start only; a minute or two if all are missing"
     with notify_when_compiling(lambda: print(text, file=sys.stderr, flush=True)):
-        status = args.run(args)
+        status = int(args.run(args))
     print(end="", flush=True)  # inside _run, so that an output that can't be written is reported like any file
     return status

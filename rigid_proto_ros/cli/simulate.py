@@ -9,7 +9,7 @@ import shlex
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..base.command_line import Parser, number_from
 from ..base.errors import InputError
@@ -151,7 +151,7 @@ def _warn(message: str) -> None:
     print(f"rigid_proto simulate: {message}", file=sys.stderr)
 
 
-def _print_summary(result: dict, recordings: list[str]) -> None:
+def _print_summary(result: dict[str, Any], recordings: list[str]) -> None:
     from ..rerun_view.session_files import is_mcap
 
     def vector(name: str, unit: str = "") -> str:

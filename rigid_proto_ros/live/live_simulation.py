@@ -68,7 +68,7 @@ class LiveSimulation:
         self._recording_error = ""
         self._recorder: Observer | None = None
         self.loop = SimulationLoop(scenario, Observers(*observers), self.endpoints, self.stamps)
-        self._requests: list[tuple[Callable[[], Any], Future]] = []
+        self._requests: list[tuple[Callable[[], Any], Future[Any]]] = []
         self._wake = threading.Event()
         # Held while a request is taken, and while the thread begins or is to end.
         self._handing_over = threading.Lock()
@@ -126,7 +126,7 @@ class LiveSimulation:
         Raises InputError when the simulation has ended, or the thread is too busy to begin it within BUSY_S; then it is
         never run.
         """
-        future: Future = Future()
+        future: Future[Any] = Future()
         with self._handing_over:
             if self._stopping:
                 raise InputError("request", "the simulation has ended")

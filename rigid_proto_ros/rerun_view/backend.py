@@ -21,6 +21,7 @@ import rerun_bindings
 from rerun.recording_stream import RecordingStream
 
 from ..base.provenance import cpu, versions
+from ..base.vectors import FloatArray, IntArray, Points, Vector3
 from ..picture import style
 from ..picture.backend import Backend, DrawnMesh
 from ..picture.style import Colour
@@ -141,7 +142,7 @@ def last_line(error: BaseException) -> str:
 # The backend
 
 
-def time_columns(times_ns: np.ndarray, walls_ns: np.ndarray) -> list[Any]:
+def time_columns(times_ns: IntArray, walls_ns: IntArray) -> list[Any]:
     """Both timelines: simulated times (n,) and wall clock times (n,), in ns."""
     return [
         rr.TimeColumn(SIM_TIME, duration=np.asarray(times_ns, np.int64).astype("timedelta64[ns]")),
@@ -149,7 +150,7 @@ def time_columns(times_ns: np.ndarray, walls_ns: np.ndarray) -> list[Any]:
     ]
 
 
-def scalar_columns(values: np.ndarray) -> Any:
+def scalar_columns(values: FloatArray) -> Any:
     """Scalars of the rows of values (n, k)."""
     return rr.Scalars.columns(scalars=np.ascontiguousarray(values).ravel()).partition([values.shape[1]] * len(values))
 
@@ -174,7 +175,7 @@ class RerunBackend(Backend):
         """Another run: nothing has been plotted, and paths begin anew."""
         self.plotted: dict[str, tuple[float, float]] = {}
         self._begun = np.zeros(0, np.int64)
-        self._path_ends: dict[str, np.ndarray] = {}
+        self._path_ends: dict[str, Points] = {}
 
     def send(self, entity: str, *parts: Any) -> None:
         """Log columns of an entity at the times of ``begin``."""
@@ -182,7 +183,7 @@ class RerunBackend(Backend):
             self.stream.send(entity, self._times, *parts)
             self._on_sent()
 
-    def begin(self, times_ns: np.ndarray, walls_ns: np.ndarray | None = None) -> None:
+    def begin(self, times_ns: IntArray, walls_ns: IntArray | None = None) -> None:
         """What follows is of these times (n,) [ns]; walls_ns (n,) [ns]: when they were by the wall's clock, None for
         times of which that was said before.
         """
@@ -214,7 +215,7 @@ class RerunBackend(Backend):
         stream.meshes[name] = number + 1, surface
         entity, own = _mesh_entity(name, number + 1), style.STYLES[name]
         if number:
-            stream.send(entity, time_columns(np.zeros(1), self._begun), nowhere)
+            stream.send(entity, time_columns(np.zeros(1, np.int64), self._begun), nowhere)
         drawn = rr.Mesh3D(
             vertex_positions=surface.vertices,
             triangle_indices=surface.triangles,
@@ -226,9 +227,9 @@ class RerunBackend(Backend):
     def place(
         self,
         name: str,
-        positions: np.ndarray | None = None,
-        attitudes: np.ndarray | None = None,
-        scale: np.ndarray | None = None,
+        positions: Points | None = None,
+        attitudes: FloatArray | None = None,
+        scale: Vector3 | None = None,
     ) -> None:
         """Log transforms."""
         scales = None if scale is None else np.tile(scale, (self._count, 1))
@@ -242,19 +243,19 @@ class RerunBackend(Backend):
             self.stream.styled[entity] = known
             self.stream.log_static(entity, look())
 
-    def _draw(self, name: str, archetype: Any, counts: np.ndarray, **values: Any) -> None:
+    def _draw(self, name: str, archetype: Any, counts: IntArray, **values: Any) -> None:
         """Log parts of a kind, and how they look."""
         size = self._size if name.startswith(style.WORLD) else 1.0
         own = style.STYLES[name]
         self._look(name, size, lambda: archetype.from_fields(colors=list(own.colours), radii=own.width * size))
         self.send(name, archetype.columns(**values).partition(counts))
 
-    def arrows(self, name: str, counts: np.ndarray, vectors: np.ndarray, origins: np.ndarray | None = None) -> None:
+    def arrows(self, name: str, counts: IntArray, vectors: Points, origins: Points | None = None) -> None:
         """Log arrows."""
         self._draw(name, rr.Arrows3D, counts, vectors=vectors, origins=origins)
 
     def lines(
-        self, name: str, counts: np.ndarray, strips: Sequence[np.ndarray], colours: Sequence[Colour] | None = None
+        self, name: str, counts: IntArray, strips: Sequence[Points], colours: Sequence[Colour] | None = None
     ) -> None:
         """Log line strips; made by the library itself, a strip costs .1 ms."""
         points = np.concatenate([np.zeros((0, 3)), *strips]).astype(np.float32)
@@ -263,7 +264,7 @@ class RerunBackend(Backend):
         rows = pa.FixedSizeListArray.from_arrays(points.ravel(), type=kind.value_type)
         self._draw(name, rr.LineStrips3D, counts, strips=pa.ListArray.from_arrays(ends, rows, kind), colors=colours)
 
-    def points(self, name: str, counts: np.ndarray, positions: np.ndarray) -> None:
+    def points(self, name: str, counts: IntArray, positions: Points) -> None:
         """Log points; of a trail the straight way from each to the next one."""
         if name in (style.TRAIL, style.COM_TRAIL):
             before = self._path_ends.get(name, positions[0])
@@ -272,7 +273,7 @@ class RerunBackend(Backend):
         else:
             self._draw(name, rr.Points3D, counts, positions=positions)
 
-    def labels(self, name: str, counts: np.ndarray, positions: np.ndarray, texts: Sequence[str]) -> None:
+    def labels(self, name: str, counts: IntArray, positions: Points, texts: Sequence[str]) -> None:
         """Log labels as points of no size, below the part; those of loads change, others are logged once."""
         entity, changes = f"{name}/label", name.startswith(style.LOADS)
         if len(texts):
@@ -285,7 +286,7 @@ class RerunBackend(Backend):
         labels = list(texts) if changes else None
         self.send(entity, rr.Points3D.columns(positions=positions, labels=labels).partition(counts))
 
-    def scalars(self, name: str, values: np.ndarray) -> None:
+    def scalars(self, name: str, values: FloatArray) -> None:
         """Log plotted values, and keep their range."""
         finite = values[np.isfinite(values)]
         if finite.size:

@@ -11,6 +11,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from ..base.vectors import Vector3
 from ..picture import style
 from . import backend as e
 
@@ -184,7 +185,7 @@ def _poinsot_view() -> Any:
     return _view(style.POINSOT, "$origin/**", name, eye, target, overrides)
 
 
-def _view(origin: str, contents: str, name: str, eye: np.ndarray, target: np.ndarray, overrides: dict[Any, Any]) -> Any:
+def _view(origin: str, contents: str, name: str, eye: Vector3, target: Vector3, overrides: dict[Any, Any]) -> Any:
     return rrb.Spatial3DView(
         origin="/" + origin,
         contents=contents,

@@ -30,6 +30,7 @@ import rerun as rr
 from ..base.errors import InputError
 from ..base.files import file_for_one_writer
 from ..base.rotation import matrix_from_quaternion
+from ..base.vectors import StateRow
 from ..picture import style
 from ..picture.picture import Picture
 from ..scene.scenario import mesh_file, mesh_sha256_of
@@ -80,7 +81,7 @@ class RerunObserver(WritingObserver):
         self._backend = RerunBackend(on_sent=lambda: self._mailbox.moved())
         self._picture = Picture(self._backend)
         self._scene = ""
-        self._rows: dict[type, np.ndarray] = {}
+        self._rows: dict[type, StateRow] = {}
         self._lines: dict[str, list[tuple[int, int, str]]] = {}
         self._commanded = False
         self._thread.start()

@@ -14,8 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import InputError
+from ..base.vectors import IntArray
 from ..session.recorded_session import RecordedSession
 from .backend import EVENTS, REFUSALS, SCENE, SESSION_MESH, SIM_TIME, STATE
 from .observer import FRAME_HEAD, mark_end
@@ -115,13 +117,15 @@ def _read_properties(entity: str, batch: Any, session: RecordedSession) -> None:
         session.node_name = name if all(map(str.isidentifier, name.split("/"))) else session.node_name
 
 
-def _sim_times(batch: Any) -> np.ndarray:
-    return batch.column(SIM_TIME).to_numpy(zero_copy_only=False).astype("timedelta64[ns]").astype(np.int64)
+def _sim_times(batch: Any) -> IntArray:
+    times: IntArray = batch.column(SIM_TIME).to_numpy(zero_copy_only=False).astype("timedelta64[ns]").astype(np.int64)
+    return times
 
 
-def _flat(batch: Any, column: str) -> np.ndarray:
+def _flat(batch: Any, column: str) -> NDArray[Any]:
     """All values of a column of lists, in order."""
-    return batch.column(column).flatten().to_numpy(zero_copy_only=False)
+    values: NDArray[Any] = batch.column(column).flatten().to_numpy(zero_copy_only=False)
+    return values
 
 
 # Frames

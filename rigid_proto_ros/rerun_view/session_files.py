@@ -83,7 +83,8 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
         if node and node.strip("/") != session.node_name:
             raise InputError("--node", node, f"{session.node_name}, the only one of this recording")
         return [session]
-    return _bag_reader().session_runs(path, node)
+    runs: list[RecordedSession] = _bag_reader().session_runs(path, node)
+    return runs
 
 
 def repair(path: str | Path, repaired: str | Path) -> None:

@@ -161,7 +161,7 @@ def _stable_picture(client: Any) -> bytes:
     before = client.take_screenshot(None)
     while True:
         time.sleep(0.3)
-        after = client.take_screenshot(None)
+        after: bytes = client.take_screenshot(None)
         if after == before and not is_one_colour(after) or time.monotonic() > deadline:
             return after
         before = after

@@ -39,7 +39,7 @@ def has_display() -> bool:
     return sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def _run(command: list[str], log: int, started: Future[subprocess.Popen]) -> None:
+def _run(command: list[str], log: int, started: Future[subprocess.Popen[bytes]]) -> None:
     # RERUN_APP_ONLY: no analytics question on the terminal of a program that only wants a picture. TMPDIR: the viewer
     # doesn't remove its folder there when it is ended by a signal.
     with tempfile.TemporaryDirectory(prefix="rigid_proto_", ignore_cleanup_errors=True) as folder:
@@ -67,7 +67,7 @@ class ViewerProcess:
         program = viewer_program()
         if program is None:
             raise FileNotFoundError(is_missing("rerun-sdk", "rerun"))
-        started: Future[subprocess.Popen] = Future()
+        started: Future[subprocess.Popen[bytes]] = Future()
         # On a thread that waits for it: the one that calls this may end before the viewer.
         run = ([program, *arguments], log, started)
         self._thread = threading.Thread(target=_run, args=run, name="viewer", daemon=True)

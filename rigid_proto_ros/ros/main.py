@@ -86,7 +86,7 @@ class NodeProcess(threading.Thread):
 
         from ..base.compilation import notify_when_compiling
         from ..live.live_simulation import warm_up
-        from ..scene.scenario import nanoseconds
+        from ..simulation.commands import nanoseconds
         from .arguments import begin_ros
         from .node import RigidBodyNode
 
@@ -168,12 +168,12 @@ class NodeProcess(threading.Thread):
         return status
 
     def _leave_ros(self) -> None:
-        import rclpy
+        from rclpy.utilities import try_shutdown
 
         self._leave_executor()
         if self._node is not None:
             self._node.destroy_node()
-        rclpy.try_shutdown()
+        try_shutdown()
 
 
 def make_viewer(scenario: Scenario, node_name: str) -> Observer | None:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..base import interrupts
 from ..base.command_line import Parser, number_from
@@ -117,7 +117,7 @@ def _script(args: argparse.Namespace) -> list[Command]:
     return parse_script(yaml.safe_dump([entry]), args.what)
 
 
-def _point(text: str) -> str | dict:
+def _point(text: str) -> str | dict[str, Any]:
     """Convert a point from the notation of a frame to that of a script entry."""
     try:
         match text.split("/"):

@@ -21,6 +21,7 @@ from rclpy.client import Client
 from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
+from rclpy.utilities import try_shutdown
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
@@ -89,7 +90,7 @@ def ros_context(*arguments: str) -> Iterator[None]:
     try:
         yield
     finally:
-        rclpy.try_shutdown()
+        try_shutdown()
 
 
 def send_script(

@@ -87,7 +87,7 @@ class SimulationInterfaces:
 
     def _simulation_state(self) -> int:
         states = self._messages.SimulationState
-        return states.STATE_PAUSED if self._live.paused else states.STATE_PLAYING
+        return int(states.STATE_PAUSED if self._live.paused else states.STATE_PLAYING)
 
     def get_simulation_state(self, _: Any, response: Any) -> Any:
         """Playing or paused."""

@@ -23,6 +23,7 @@ import viser
 
 from ..base.bundled import body_names
 from ..base.errors import InputError, MeshError
+from ..base.vectors import Vector3
 from ..mass.from_mesh import PASSING, mesh_body
 from ..mass.inspection import Inspection, inspect_mesh, model_difference
 from ..mass.properties import MassProperties
@@ -97,7 +98,7 @@ class BodyTab:
 
     def _size_factor(self, values: Mapping[str, Any]) -> float:
         scale = values["scale"]
-        return float(math.prod(abs(s) for s in scale)) ** (1.0 / len(scale)) / self._base_scale
+        return float(math.prod(map(abs, scale)) ** (1.0 / len(scale)) / self._base_scale)
 
     def _set_size(self, factor: float) -> dict[str, object]:
         scale = self._flight.scenario.setup.body.scale
@@ -139,7 +140,7 @@ class BodyTab:
         return changes
 
 
-def _sides(sides_m: np.ndarray) -> str:
+def _sides(sides_m: Vector3) -> str:
     return f"{' × '.join(f'{side:.3g}' for side in sides_m)} m"
 
 
@@ -259,7 +260,7 @@ class Upload:
     inspection: Inspection
 
     @property
-    def sides(self) -> np.ndarray:
+    def sides(self) -> Vector3:
         """Sides (3,) of its bounding box, in the file's numbers."""
         lower, upper = self.inspection.lower, self.inspection.upper
         return np.zeros(3) if lower is None or upper is None else upper - lower

@@ -157,13 +157,14 @@ class Controls:
             array = parameter_named(name).type == "doubles"
             return {name: [scalar(word) for word in words] if array else scalar(typed.strip())}
 
-        @chosen.on_update
-        async def _(event: viser.GuiEvent[Any]) -> None:
+        async def choose(event: viser.GuiEvent[Any]) -> None:
             nonlocal name
             if event.client is not None:
                 self.settle()  # a value that was typed is the former parameter's
                 name = chosen.value
                 text.value = str(shown(self._values))
+
+        chosen.on_update(choose)
 
         self.bind(text, shown, changes, TYPING_S)
 

@@ -14,6 +14,7 @@ import numpy as np
 import viser
 
 from ..base.rotation import rotate
+from ..base.vectors import FloatArray, IntArray, Points, Vector3
 from ..picture import style
 from ..picture.backend import Backend, DrawnMesh
 
@@ -77,10 +78,10 @@ class ViserBackend(Backend):
         self._meshes = 0
         self._there: set[str] = set()
         self._labels: list[Any] = []
-        self._labels_of: dict[str, list[tuple[str, np.ndarray, str]]] = {}
-        self._paths: dict[str, list[np.ndarray]] = {}
+        self._labels_of: dict[str, list[tuple[str, Vector3, str]]] = {}
+        self._paths: dict[str, list[Points]] = {}
         self._path_due_s: dict[str, float] = {}
-        self._path_base: dict[str, np.ndarray] = {}
+        self._path_base: dict[str, Vector3] = {}
         for name in (style.BODY, style.CENTRE, style.GHOST):
             self._nodes[name] = scene.add_frame(f"/{name}", show_axes=False)
 
@@ -137,7 +138,7 @@ class ViserBackend(Backend):
             if not name.startswith((style.BODY, style.GHOST)):
                 self._set_there(name, False)
 
-    def drawn(self, name: str, points: np.ndarray) -> np.ndarray:
+    def drawn(self, name: str, points: Points) -> Points:
         """Points (..., 3) [m] of a part's parent frame as browsers have them."""
         return points / self.unit if name.startswith(MOVING) else (points - self.origin) / self.unit
 
@@ -186,9 +187,9 @@ class ViserBackend(Backend):
     def place(
         self,
         name: str,
-        positions: np.ndarray | None = None,
-        attitudes: np.ndarray | None = None,
-        scale: np.ndarray | None = None,
+        positions: Points | None = None,
+        attitudes: FloatArray | None = None,
+        scale: Vector3 | None = None,
     ) -> None:
         """The last of these poses."""
         node = self._nodes.get(name)
@@ -203,7 +204,7 @@ class ViserBackend(Backend):
         if scale is not None:
             node.scale = tuple((scale / self.unit).tolist())
 
-    def arrows(self, name: str, counts: np.ndarray, vectors: np.ndarray, origins: np.ndarray | None = None) -> None:
+    def arrows(self, name: str, counts: IntArray, vectors: Points, origins: Points | None = None) -> None:
         """The arrows of the last state."""
         count = int(counts[-1])
         if count:
@@ -223,8 +224,8 @@ class ViserBackend(Backend):
     def lines(
         self,
         name: str,
-        counts: np.ndarray,
-        strips: Sequence[np.ndarray],
+        counts: IntArray,
+        strips: Sequence[Points],
         colours: Sequence[style.Colour] | None = None,
     ) -> None:
         """The strips of the last state."""
@@ -238,7 +239,7 @@ class ViserBackend(Backend):
         if name in self._nodes:
             self._set_there(name, count > 0)
 
-    def _segments(self, name: str, segments: np.ndarray, colour: style.Colour) -> None:
+    def _segments(self, name: str, segments: FloatArray, colour: style.Colour) -> None:
         node = self._nodes.get(name)
         if node is None:
             self._nodes[name] = self._scene.add_line_segments(
@@ -249,7 +250,7 @@ class ViserBackend(Backend):
             if tuple(int(c) for c in np.ravel(node.colors)) != tuple(colour):
                 node.colors = np.array(colour, np.uint8)
 
-    def points(self, name: str, counts: np.ndarray, positions: np.ndarray) -> None:
+    def points(self, name: str, counts: IntArray, positions: Points) -> None:
         """A path of the last points; of one point alone, a ball."""
         if name in (style.TRAIL, style.COM_TRAIL):
             path = self._paths.setdefault(name, [])
@@ -267,7 +268,7 @@ class ViserBackend(Backend):
         if name in self._nodes:
             self._set_there(name, there)
 
-    def labels(self, name: str, counts: np.ndarray, positions: np.ndarray, texts: Sequence[str]) -> None:
+    def labels(self, name: str, counts: IntArray, positions: Points, texts: Sequence[str]) -> None:
         """Texts of the last state; ``finish`` writes those that are to be seen."""
         count = int(counts[-1])
         first = len(texts) - count
@@ -296,7 +297,7 @@ class ViserBackend(Backend):
         ]
         self._write(written[:MOST_LABELS])
 
-    def _write(self, labels: Sequence[tuple[str, np.ndarray, str]]) -> None:
+    def _write(self, labels: Sequence[tuple[str, Vector3, str]]) -> None:
         while len(self._labels) < len(labels):
             name = f"/labels/{len(self._labels)}"
             look: dict[str, Any] = {"anchor": "bottom-left", "font_screen_scale": self._label_scale}
@@ -309,7 +310,7 @@ class ViserBackend(Backend):
                 move(node, self._in_the_picture(name, position))
             node.visible = k < len(labels)
 
-    def _in_the_picture(self, name: str, position: np.ndarray) -> np.ndarray:
+    def _in_the_picture(self, name: str, position: Vector3) -> Vector3:
         """A label stands in the world, whatever frame it belongs to: its size doesn't turn with that."""
         point = self.drawn(name, position)
         frame = next((frame for frame in (style.BODY, style.CENTRE, style.GHOST) if name.startswith(f"{frame}/")), None)
@@ -319,7 +320,7 @@ class ViserBackend(Backend):
         return np.asarray(self._nodes[frame].position) + rotate(x, y, z, w, *point)
 
 
-def move(node: Any, position: np.ndarray) -> None:
+def move(node: Any, position: Vector3) -> None:
     """Set the position (3,) of a node that isn't there already; viser 1.1 compares, too, but takes much longer."""
     if not np.array_equal(node.position, position):
         node.position = position

@@ -22,6 +22,7 @@ import numpy as np
 
 from ..base.compilation import notify_when_compiling
 from ..base.errors import InputError
+from ..base.vectors import FloatArray, IntArray, StateRow
 from ..live.live_simulation import LiveSimulation
 from ..scene.parameters import parameter_named
 from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
@@ -78,7 +79,7 @@ class RunMemory(Observer):
         self._scene = self._text
         self._scenes = [self._text]
         self._events: list[tuple[int, str]] = []
-        self._states: deque[tuple[int, np.ndarray]] = deque(maxlen=round(KEPT_S * 1e9 / SPACING_NS))
+        self._states: deque[tuple[int, StateRow]] = deque(maxlen=round(KEPT_S * 1e9 / SPACING_NS))
         self._whole = True
 
     def on(self, event: Event) -> None:
@@ -339,7 +340,7 @@ class Flight:
         self._past = self.moment_ns = None
         return goes_on
 
-    def past_rows(self, lasting_ns: int) -> tuple[np.ndarray, np.ndarray]:
+    def past_rows(self, lasting_ns: int) -> tuple[IntArray, FloatArray]:
         """Times (n,) and states (n, 13) up to the one that is looked at."""
         past, moment_ns = self._past, self.moment_ns
         assert past is not None

@@ -14,6 +14,7 @@ from html import escape
 import numpy as np
 import viser
 
+from ..base.vectors import FloatArray, Vector3
 from ..export.flight_record import FlightRecord
 from ..picture import style
 from ..picture.picture import Picture
@@ -119,8 +120,8 @@ def _recorded(server: viser.ViserServer, record: FlightRecord, course: Course) -
 
 
 def _corners(
-    rows: np.ndarray, changes: Sequence[Event], picture: Picture, origin: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+    rows: FloatArray, changes: Sequence[Event], picture: Picture, origin: Vector3
+) -> tuple[FloatArray, FloatArray]:
     """Two corners (3,) [m, from the origin] of what is to be seen: the body's whole path, and the hand."""
     shape = picture.shape
     reach = 0.0 if shape is None else 0.5 * shape.size

@@ -235,10 +235,11 @@ class LessonPanel:
             gui.add_html(SPACE)
         self._choice = choice
 
-        @choice.on_update
-        async def _(event: viser.GuiEvent[Any]) -> None:
+        async def choose(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
                 await self.begin()
+
+        choice.on_update(choose)
 
         @self._script.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
@@ -246,10 +247,11 @@ class LessonPanel:
             if lesson is not None and lesson.script:
                 await self._fly(lesson, example_path(lesson.script).read_text("utf-8"), False)
 
-        @self._class.on_update
-        async def _(_: viser.GuiEvent[Any]) -> None:
+        async def for_class_mode(_: viser.GuiEvent[Any]) -> None:
             for_class(self._class.value)
             self._show_buttons()
+
+        self._class.on_update(for_class_mode)
 
         @self._again.on_click
         async def _(_: viser.GuiEvent[Any]) -> None:
@@ -257,9 +259,10 @@ class LessonPanel:
 
         for number, button in enumerate(self._choices):
 
-            @button.on_click
-            async def _(_: viser.GuiEvent[Any], number: int = number) -> None:
+            async def answer(_: viser.GuiEvent[Any], number: int = number) -> None:
                 self.answer(number)
+
+            button.on_click(answer)
 
     @property
     def lesson(self) -> Lesson | None:

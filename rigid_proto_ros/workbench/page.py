@@ -17,6 +17,7 @@ import numpy as np
 import viser
 
 from ..base.rotation import matrix_from_quaternion
+from ..base.vectors import FloatArray, IntArray, StateRow, Vector3
 from ..live.live_simulation import LiveSimulation
 from ..motion.state import State
 from ..picture import style
@@ -134,7 +135,7 @@ class Page:
         self.state = live.state
         self._scenario = live.scenario
         self._strings: list[StringChanged] = []
-        self._ghost_row: np.ndarray | None = None
+        self._ghost_row: StateRow | None = None
         self._drawn_moment_ns: int | None = None
         self._new_scene = True
         self._dragged = False
@@ -281,7 +282,7 @@ class Page:
 
     def _take(self, events: list[tuple[Event, str]]) -> None:
         times: list[int] = []
-        rows: list[np.ndarray] = []
+        rows: list[StateRow] = []
         for event, jump in events:
             if isinstance(event, Published):
                 times.append(event.time_ns)
@@ -387,7 +388,7 @@ class Page:
 
     # Drawing
 
-    def _draw(self, times: list[int], rows: list[np.ndarray]) -> None:
+    def _draw(self, times: list[int], rows: list[StateRow]) -> None:
         setup = self.picture.setup
         if not times or setup is None:
             return
@@ -407,14 +408,14 @@ class Page:
         self.readings.take(setup, self.state, held[-1], ghost)
         self.lessons.watched(times)
 
-    def _ghost_state(self) -> np.ndarray | None:
+    def _ghost_state(self) -> StateRow | None:
         """The ghost's state (13,): as it was published last, or where it begins."""
         ghost = self.live.loop.ghost
         if self.picture.ghost is None or ghost is None:
             return None
         return ghost.simulation.state.row if self._ghost_row is None else self._ghost_row
 
-    def _string_energies(self, times: np.ndarray, rows: np.ndarray) -> list[float]:
+    def _string_energies(self, times: IntArray, rows: FloatArray) -> list[float]:
         """Of the string at each of the times (n,), of states (n, 13) [J]."""
         string = self.picture.string
         if not string.was_tied:
@@ -472,7 +473,7 @@ class Page:
 
         self.flight.ask(functools.partial(self.live.call, introduce))
 
-    def _follow(self, position: np.ndarray) -> None:
+    def _follow(self, position: Vector3) -> None:
         if not self.pointer.dragging:
             self.backend.origin = self.room.follow(position, self.backend.origin, self.backend.unit)
         self.room.place(self.backend.origin, self.backend.unit)

@@ -158,11 +158,12 @@ class ForcesTab:
 
         self._slider = force
 
-        @force.on_update
-        async def _(event: viser.GuiEvent[Any]) -> None:
+        async def change(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
                 pointer.force = float(f"{pointer.usual_force * 10.0 ** force.value[0]:.3g}")
                 self.show_force()
+
+        force.on_update(change)
 
     def show_force(self) -> None:
         """The poke's force, as it is now."""
@@ -305,11 +306,12 @@ class ShowTab:
 
         for name, box in self._switches.items():
 
-            @box.on_update
-            async def _(_: viser.GuiEvent[Any], name: str = name, box: Any = box) -> None:
+            async def show_part(_: viser.GuiEvent[Any], name: str = name, box: Any = box) -> None:
                 self._set(name, box.value)
                 if box.value:
                     on_shown(name)
+
+            box.on_update(show_part)
 
         @darkened.on_update
         async def _(_: viser.GuiEvent[Any]) -> None:

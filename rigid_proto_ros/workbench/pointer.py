@@ -16,6 +16,7 @@ import numpy as np
 import viser
 
 from ..base.rotation import matrix_from_quaternion
+from ..base.vectors import FloatArray, Vector3
 from ..scene.scenario import Scenario
 from ..simulation.setup import Setup
 from .flight import Entry, Flight
@@ -44,29 +45,29 @@ class DrawnPose:
     as one. setup: of the body that is drawn."""
 
     time_s: float
-    position: np.ndarray
-    orientation_xyzw: np.ndarray
-    origin: np.ndarray
+    position: Vector3
+    orientation_xyzw: FloatArray
+    origin: Vector3
     unit: float
     setup: Setup
 
-    def world_point(self, drawn_point: Iterable[float]) -> np.ndarray:
+    def world_point(self, drawn_point: Iterable[float]) -> Vector3:
         """A point of the picture (3,) in the world [m]."""
-        return self.origin + self.unit * np.array(list(drawn_point))
+        return self.origin + self.unit * np.array(list(drawn_point), float)
 
-    def body_point(self, drawn_point: Iterable[float]) -> np.ndarray:
+    def body_point(self, drawn_point: Iterable[float]) -> Vector3:
         """A point of the picture (3,) in metres from the COM, body axes."""
         return (self.world_point(drawn_point) - self.position) @ matrix_from_quaternion(self.orientation_xyzw)
 
-    def body_direction(self, direction: Iterable[float]) -> np.ndarray:
+    def body_direction(self, direction: Iterable[float]) -> Vector3:
         """A direction of the picture (3,) in body axes."""
-        return np.array(list(direction)) @ matrix_from_quaternion(self.orientation_xyzw)
+        return np.array(list(direction), float) @ matrix_from_quaternion(self.orientation_xyzw)
 
 
 @dataclass
 class _Drag:
     client_id: int
-    target: np.ndarray
+    target: Vector3
     view: DrawnPose
     last_target_s: float
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from ..base.vectors import FloatArray, StateRow, Vector3
 from ..mass.tensor import principal_axes
 from ..motion.state import State
 from ..picture import style
@@ -83,7 +84,7 @@ class PlotRange:
         return f"{name} [{f'{power} ' if power else ''}{unit}]"
 
 
-def plot_range(values: np.ndarray, least: float = 0.0) -> PlotRange:
+def plot_range(values: FloatArray, least: float = 0.0) -> PlotRange:
     """For finite values in any order; ``least``: the range is at least as wide, in the values' unit."""
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
     largest = max(abs(low), abs(high), least)
@@ -147,7 +148,7 @@ class LivePlot:
     def _scales(self) -> Any:
         return {"x": {"time": False, "range": (-PLOTTED_S, 0.0)}, "y": {"range": (self._range.low, self._range.high)}}
 
-    def show(self, ages_s: np.ndarray, values: np.ndarray) -> None:
+    def show(self, ages_s: FloatArray, values: FloatArray) -> None:
         """Draw values (n, columns) at times (n,) [s] up to 0, which is now."""
         suited = plot_range(values, self._least)
         if suited != self._range:
@@ -162,9 +163,9 @@ class Readings:
     """What can be read off a flight. ``restart`` at every reset."""
 
     def __init__(self) -> None:
-        self._last: tuple[Setup, State, float, np.ndarray | None] | None = None
+        self._last: tuple[Setup, State, float, StateRow | None] | None = None
         self._samples: deque[tuple[float, ...]] = deque()
-        self._start: np.ndarray | None = None
+        self._start: Vector3 | None = None
 
     def restart(self) -> None:
         """The flight began anew."""
@@ -172,7 +173,7 @@ class Readings:
         self._start = None
 
     @property
-    def samples(self) -> np.ndarray:
+    def samples(self) -> FloatArray:
         """Up to the last state (n, 10): time [s]; energies [J] translational, rotational, of gravity, total, of the
         string; ω in principal axes (3); angle of L [°].
         """
@@ -183,7 +184,7 @@ class Readings:
         """Whether a point of the plots belongs to this time."""
         return not self._samples or time_ns * 1e-9 >= self._samples[-1][0] + SAMPLE_S
 
-    def take(self, setup: Setup, state: State, string_energy: float, ghost: np.ndarray | None) -> None:
+    def take(self, setup: Setup, state: State, string_energy: float, ghost: StateRow | None) -> None:
         """A state, what the string holds [J], and the ghost's state (13,)."""
         self._last = (setup, state, string_energy, ghost)
         time_s = state.time_ns * 1e-9
@@ -204,7 +205,7 @@ class Readings:
         """A state of the past; the samples stay."""
         self._last = (setup, state, string_energy, None)
 
-    def _turned(self, momentum: np.ndarray) -> float:
+    def _turned(self, momentum: Vector3) -> float:
         """The angle [°] that L (3,) has turned by."""
         return 0.0 if self._start is None else float(np.degrees(angle_to(self._start, momentum[np.newaxis])[0]))
 

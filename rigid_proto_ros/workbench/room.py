@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import viser
 
+from ..base.vectors import Vector3
 from ..picture.surface import BOX_CORNERS
 from ..simulation.setup import Setup
 from .drawing import move
@@ -77,7 +78,7 @@ def fall_s(setup: Setup) -> float:
     return min(max(2.0 * rise / pull, LEAST_FALL_S), LONGEST_FALL_S) if pull else LONGEST_FALL_S
 
 
-def distance_to_see(half_sides: np.ndarray) -> float:
+def distance_to_see(half_sides: Vector3) -> float:
     """How far off a camera sees all of a box with these half sides (3,), in a picture as high as wide."""
     right = np.cross(-VIEW, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -117,7 +118,7 @@ class Room:
         rows = (1.0 - share) * np.array(theme.sky) + share * np.array(theme.floor)
         self._scene.set_background_image(np.repeat(rows[:, np.newaxis].astype(np.uint8), 4, axis=1))
 
-    def furnish(self, size_m: float, low: np.ndarray, high: np.ndarray, falls: bool) -> None:
+    def furnish(self, size_m: float, low: Vector3, high: Vector3, falls: bool) -> None:
         """For a body of this size [m] that will be between two corners (3,) [units, from the picture's middle]."""
         half_sides = 0.5 * (high - low)
         self._middle = 0.5 * (low + high)
@@ -144,12 +145,12 @@ class Room:
         with client.atomic():
             camera.position, camera.look_at = self._middle + narrow * self._distance * VIEW, self._middle
 
-    def follow(self, position: np.ndarray, origin: np.ndarray, unit: float) -> np.ndarray:
+    def follow(self, position: Vector3, origin: Vector3, unit: float) -> Vector3:
         """The world point (3,) [m] at the picture's middle, for a body there, so that it stays in sight."""
         away = position - (origin + unit * self._middle)
         return origin + away - np.clip(away, -unit * self._reach, unit * self._reach)
 
-    def place(self, origin: np.ndarray, unit: float) -> None:
+    def place(self, origin: Vector3, unit: float) -> None:
         """The picture's middle is at the world point ``origin`` (3,) [m], one of its units is ``unit`` [m]."""
         x, y, z = (-np.asarray(origin) / unit) % (5.0 * self.cell)
         move(self._floor, np.array([x, y, self._floor_height]))

@@ -94,7 +94,7 @@ def _requests_looked_at(host: str, title: str) -> Iterator[None]:
             is_page = request.path.partition("?")[0] == "/"
             if is_page:
                 request.headers.pop("Accept-Encoding", None)  # as it is, so that its title can be set
-            response = process_request(connection, request)
+            response: Response | None = process_request(connection, request)
             if response is not None and is_page:
                 own = f"<title>{html.escape(title)}</title>".encode()
                 response.body = response.body.replace(b"<title>Viser</title>", own, 1)
