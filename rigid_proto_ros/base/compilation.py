@@ -24,6 +24,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from .vectors import FloatArray
+
 _ABSENT: Any = None
 """Entry in sys.modules for a module that can't be imported."""
 # numba imports these if they are installed, which takes a third of its own time. coverage is needed only for
@@ -318,7 +320,7 @@ store per byte.
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def copy_numbers(of: np.ndarray, to: np.ndarray) -> None:
+def copy_numbers(of: FloatArray, to: FloatArray) -> None:
     """Copy the first numbers of one array to all of another, one by one: numba's assignment of slices first checks
     whether the two share memory, and allocates a copy if they do.
     """

@@ -12,10 +12,10 @@ import numpy as np
 
 from .arithmetic import sine_cosine
 from .compilation import njit
-from .vectors import Numbers
+from .vectors import Attitude, FloatArray, Matrix3, Numbers, Vector3
 
 
-def cross(a: Numbers, b: Numbers) -> np.ndarray:
+def cross(a: Numbers, b: Numbers) -> Vector3:
     """a × b (3,)."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
@@ -36,14 +36,14 @@ def length(v: Numbers) -> float:
     return norm(float(v[0]), float(v[1]), float(v[2]))
 
 
-def times(matrix: np.ndarray, v: Numbers) -> np.ndarray:
+def times(matrix: Matrix3, v: Numbers) -> Vector3:
     """The matrix (3, 3) times v (3,), summed in a fixed order: that of BLAS depends on the processor."""
     return matrix[:, 0] * v[0] + matrix[:, 1] * v[1] + matrix[:, 2] * v[2]
 
 
-def transposed_times(matrix: np.ndarray, v: Numbers) -> np.ndarray:
+def transposed_times(matrix: Matrix3, v: Numbers) -> Vector3:
     """The transposed matrix (3, 3) times v (3,), in the same order."""
-    product: np.ndarray = matrix[0] * v[0] + matrix[1] * v[1] + matrix[2] * v[2]
+    product: Vector3 = matrix[0] * v[0] + matrix[1] * v[1] + matrix[2] * v[2]
     return product
 
 
@@ -123,14 +123,14 @@ def matrix_elements(x: float, y: float, z: float, w: float) -> tuple[float, ...]
 
 
 @njit()
-def _matrices(q: np.ndarray, R: np.ndarray) -> None:
+def _matrices(q: FloatArray, R: FloatArray) -> None:
     for k in range(q.shape[0]):
         elements = matrix_elements(q[k, 0], q[k, 1], q[k, 2], q[k, 3])
         for j in range(9):
             R[k, j] = elements[j]
 
 
-def matrix_from_quaternion(q: Numbers) -> np.ndarray:
+def matrix_from_quaternion(q: Numbers) -> FloatArray:
     """Rotation matrix (3, 3), body to world, of a unit quaternion q (4,) xyzw, or (n, 3, 3) of (n, 4)."""
     q = np.ascontiguousarray(q, dtype=float)
     R = np.empty(q.shape[:-1] + (9,))
@@ -139,7 +139,7 @@ def matrix_from_quaternion(q: Numbers) -> np.ndarray:
 
 
 @njit(error_model="numpy")
-def quaternion_of_axes(R: np.ndarray, q: np.ndarray) -> None:
+def quaternion_of_axes(R: Matrix3, q: Attitude) -> None:
     """Write the unit quaternion xyzw of a proper rotation matrix R (3, 3) into q (4,).
 
     The largest of the four squared components is the divisor (Shepperd 1978), which avoids cancellation.
@@ -163,7 +163,7 @@ def quaternion_of_axes(R: np.ndarray, q: np.ndarray) -> None:
     q[0], q[1], q[2], q[3] = normalize(q[0], q[1], q[2], q[3])
 
 
-def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
+def quaternion_from_matrix(R: Matrix3) -> Attitude:
     """Unit quaternion (4,) xyzw of a proper rotation matrix (3, 3)."""
     q = np.empty(4)
     quaternion_of_axes(np.array(R, dtype=float, order="C"), q)

@@ -11,7 +11,7 @@ import math
 import operator
 from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from llvmlite import ir
@@ -19,12 +19,14 @@ from numba import types
 from numba.extending import models, overload, register_model
 
 from .compilation import INTERPRETED, Emitted, intrinsic, njit
+from .vectors import FloatArray
 
 _DOUBLE, _NUMBER, _BITS = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
 LINE = 8
 """Doubles in a cache line."""
 Packed = Any
 """Type of a vector in a kernel, for type checkers."""
+_Plain = TypeVar("_Plain")
 
 
 class Doubles(types.Type):
@@ -42,7 +44,7 @@ class _DoublesModel(models.PrimitiveModel):
         initialize(manager, kind, ir.VectorType(_DOUBLE, kind.count))
 
 
-def aligned(count: int, before: int = 0) -> np.ndarray:
+def aligned(count: int, before: int = 0) -> FloatArray:
     """Memory for ``count`` doubles of which the first, or the one with index ``before``, is aligned to a cache line: a
     vector that crosses two lines takes twice as long.
     """
@@ -51,11 +53,11 @@ def aligned(count: int, before: int = 0) -> np.ndarray:
     return whole[first : first + count]
 
 
-def _operation_on_vectors(plain: Callable[..., Any], **options: bool) -> Callable[[Any], Callable[..., Any]]:
+def _operation_on_vectors(plain: Callable[..., _Plain], **options: bool) -> Callable[[Any], Callable[..., _Plain]]:
     """Decorator of an intrinsic; if kernels are interpreted, vectors are arrays and ``plain`` is used instead."""
     if INTERPRETED:
         return lambda _: plain
-    of_types: Callable[[Any], Callable[..., Any]] = intrinsic(**options) if options else intrinsic
+    of_types: Callable[[Any], Callable[..., _Plain]] = intrinsic(**options) if options else intrinsic
     return of_types
 
 
@@ -206,7 +208,7 @@ def four(a: float, b: float, c: float, d: float) -> Packed:
 
 
 @njit(error_model="numpy", allocates=False)
-def triple(array: np.ndarray, at: int, last: float) -> Packed:
+def triple(array: FloatArray, at: int, last: float) -> Packed:
     """A vector of three numbers of an array from index ``at`` on, and ``last``."""
     return four(array[at], array[at + 1], array[at + 2], last)
 

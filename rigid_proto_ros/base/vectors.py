@@ -25,7 +25,10 @@ Points = NDArray[np.float64]
 Triangles = NDArray[np.int64]
 """(m, 3) indices of points."""
 
-Numbers = Sequence[float] | np.ndarray
+Attitude = NDArray[np.float64]
+"""(4,) xyzw"""
+
+Numbers = Sequence[float] | FloatArray
 """Components of a vector or a quaternion, as they may be given."""
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -10,16 +10,17 @@ import math
 import numpy as np
 
 from ..base.compilation import njit
+from ..base.vectors import FloatArray, Matrix3, Vector3
 from .tensor import MAX_MOMENT_RATIO, TRIANGLE_SLACK_COMPUTED, principal_axes_kernel
 
-Principal = tuple[np.ndarray, np.ndarray]
+Principal = tuple[Vector3, Matrix3]
 """Principal moments (3,) and axes (3, 3) of a tensor, as the kernel in mass/tensor.py gives them."""
 
 
 @njit(nogil=True)
 def loaded(
-    mass: float, center: np.ndarray, second: np.ndarray, stretch: np.ndarray, reference: np.ndarray, points: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray, Principal]:
+    mass: float, center: Vector3, second: Matrix3, stretch: Vector3, reference: Vector3, points: FloatArray
+) -> tuple[float, Vector3, Matrix3, Principal]:
     """Mass, COM relative to the stretched reference, inertia (3, 3), its principal moments and axes, ballast included.
 
     mass [kg]; center (3,) relative to the reference and second (3, 3) about it, both stretched already; ``points`` (k,
@@ -60,14 +61,14 @@ def loaded(
 def spread_mass(
     mass: float,
     measure: float,
-    scale: np.ndarray,
-    left: np.ndarray,
-    center: np.ndarray,
-    center_low: np.ndarray,
-    reference: np.ndarray,
-    second: np.ndarray,
-    points: np.ndarray,
-) -> tuple[float, np.ndarray, np.ndarray, Principal]:
+    scale: Vector3,
+    left: Vector3,
+    center: Vector3,
+    center_low: Vector3,
+    reference: Vector3,
+    second: FloatArray,
+    points: FloatArray,
+) -> tuple[float, Vector3, Matrix3, Principal]:
     """Mass [kg] distributed over a mesh: total, COM (3,), inertia (3, 3), its principal moments and axes.
 
     measure, reference, center and center_low (3,), second (6,): the moments at unit density. scale (3,) of the mesh;
@@ -90,8 +91,8 @@ def spread_mass(
 
 @njit(nogil=True)
 def given_mass(
-    mass: float, center: np.ndarray, inertia: np.ndarray, scale: np.ndarray, points: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray, Principal]:
+    mass: float, center: Vector3, inertia: Matrix3, scale: Vector3, points: FloatArray
+) -> tuple[float, Vector3, Matrix3, Principal]:
     """The same for a given mass [kg], COM (3,) in mesh coordinates and inertia (3, 3) about it, which doesn't depend on
     ``scale``.
     """
@@ -107,7 +108,7 @@ def given_mass(
 
 
 @njit(error_model="numpy")
-def is_plainly_good(principal: np.ndarray) -> bool:
+def is_plainly_good(principal: Vector3) -> bool:
     """Whether ``check_tensor`` has nothing to report about principal moments (3,)."""
-    a, b, c = principal[0], principal[1], principal[2]
+    a, b, c = principal[0], principal[1], principal[2]  # type: float, float, float
     return a > 0.0 and c <= MAX_MOMENT_RATIO * a and c < math.inf and a + b >= c * (1.0 - TRIANGLE_SLACK_COMPUTED)

@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
+
+from ..base.vectors import Matrix3, Points, Triangles, Vector3
 
 CHUNK = 4096
 """Triangles per chunk: the size of the object arrays."""
@@ -27,7 +30,7 @@ class ExactMoments:
     inertia: tuple[tuple[Fraction, ...], ...]
 
 
-def _as_integers(vertices: np.ndarray) -> tuple[np.ndarray, int]:
+def _as_integers(vertices: Points) -> tuple[NDArray[np.object_], int]:
     """Vertices (n, 3) as Python integers in units of 2**power, exactly."""
     mantissa, exponent = np.frexp(vertices)
     power = int(exponent[vertices != 0.0].min(initial=0)) - 53
@@ -38,7 +41,7 @@ def _as_integers(vertices: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def exact_solid_moments(
-    vertices: np.ndarray, triangles: np.ndarray, scale: Iterable[float] = (1.0, 1.0, 1.0)
+    vertices: Points, triangles: Triangles, scale: Iterable[float] = (1.0, 1.0, 1.0)
 ) -> ExactMoments:
     """Exact moments of the solid bounded by triangles (m, 3) over vertices (n, 3) float64, as if wound outward, after
     its coordinates are multiplied by ``scale`` (3 doubles, taken exactly).
@@ -76,7 +79,7 @@ def exact_solid_moments(
 
 
 def relative_errors(
-    exact: ExactMoments, volume: float, centroid: np.ndarray, inertia: np.ndarray, diagonal: float
+    exact: ExactMoments, volume: float, centroid: Vector3, inertia: Matrix3, diagonal: float
 ) -> dict[str, float]:
     """Relative errors of doubles against ``exact``: volume_error |ΔV|/V, inertia_error max|ΔI|/max|I| (unit density,
     about the centroid), center_of_mass_error the largest |Δc_k| beyond one ulp of c_k, over the box's ``diagonal``."""

@@ -22,6 +22,7 @@ import numpy as np
 from ..base.compilation import INTERPRETED, source_stamp, user_cache
 from ..base.errors import InputError
 from ..base.files import whole_file
+from ..base.vectors import Points, Triangles
 from ..mesh.reading import Mesh, load_mesh
 from ..mesh.solids import box_surface, can_unite, convex_hull, united_surface
 from .moments import referenced_vertices
@@ -45,12 +46,12 @@ class MeshBody:
     moments: MeshMoments
 
     @property
-    def vertices(self) -> np.ndarray:
+    def vertices(self) -> Points:
         """Vertices (n, 3) in mesh coordinates; repair keeps their numbers and positions."""
         return self.moments.vertices
 
     @property
-    def triangles(self) -> np.ndarray:
+    def triangles(self) -> Triangles:
         """Triangles (m, 3), reversed if the file winds them inward throughout."""
         triangles = self.moments.triangles
         return np.ascontiguousarray(triangles[:, [0, 2, 1]]) if self.verdict.inward else triangles

@@ -10,11 +10,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import InputError
+from ..base.vectors import Matrix3, Vector3
 from .exact_moments import exact_solid_moments, relative_errors
 from .from_mesh import MeshBody
 from .moments import MODELS, referenced_vertices
@@ -40,9 +42,9 @@ class ModelDifference:
     rotation that takes the principal axes to the true ones. center_of_mass (3,): offset from the true one [m].
     """
 
-    principal_moments: np.ndarray
+    principal_moments: Vector3
     axes_turned: float
-    center_of_mass: np.ndarray
+    center_of_mass: Vector3
 
 
 def model_difference(properties: MassProperties, true: MassProperties) -> ModelDifference:
@@ -60,7 +62,7 @@ EQUAL = 1e-9
 orthogonal pair in the plane that they span."""
 
 
-def _symmetry_axis(moments: np.ndarray) -> int | None:
+def _symmetry_axis(moments: Vector3) -> int | None:
     """The axis about which a tensor is symmetric, None without one, ANY if all moments are equal."""
     first, last = np.diff(moments) <= EQUAL * moments[2]
     if first and last:
@@ -68,7 +70,7 @@ def _symmetry_axis(moments: np.ndarray) -> int | None:
     return 2 if first else 0 if last else None
 
 
-def _axes_turned(axes: np.ndarray, mine: int | None, others: np.ndarray, theirs: int | None) -> float:
+def _axes_turned(axes: Matrix3, mine: int | None, others: Matrix3, theirs: int | None) -> float:
     """The smallest angle [rad] of a rotation that takes one set of principal axes (3, 3), columns, to another.
 
     Axes have no sign. Axes perpendicular to an axis of symmetry are arbitrary: a rotation in the plane that they span
@@ -98,15 +100,15 @@ class Inspection:
     for a mesh that isn't usable."""
 
     body: MeshBody
-    scale: np.ndarray
+    scale: Vector3
     model: str
     models: dict[str, MassProperties]
     findings: list[Finding]
     refusal: InputError | None
     volume: float | None
     area: float | None
-    lower: np.ndarray
-    upper: np.ndarray
+    lower: Vector3
+    upper: Vector3
     density: float | None
 
     @property
@@ -166,7 +168,7 @@ def inspect_mesh(
     return Inspection(body, s, model, models, findings, refusal, volume, area, lower, upper, implied)
 
 
-def as_json(inspection: Inspection) -> dict:
+def as_json(inspection: Inspection) -> dict[str, Any]:
     """The inspection as the command's JSON object."""
     verdict = [vars(finding) for finding in inspection.findings]
     if inspection.refusal is not None:
@@ -192,7 +194,7 @@ def as_json(inspection: Inspection) -> dict:
     }
 
 
-def verify_moments(body: MeshBody, scale: np.ndarray) -> dict[str, float]:
+def verify_moments(body: MeshBody, scale: Vector3) -> dict[str, float]:
     """Errors of the solid's volume, centroid and inertia against rational arithmetic on the same vertices."""
     moments = body.moments
     unit = moments.mass_properties("solid", scale=scale, density=1.0)  # raises InputError if there is no solid

@@ -28,6 +28,7 @@ from ..base.arithmetic import pair_add, pair_divide, pair_multiply, two_sum
 from ..base.compilation import njit
 from ..base.errors import MeshError
 from ..base.simd import Packed, filled, load, number, store
+from ..base.vectors import FloatArray, IntArray, Points, Triangles, Vector3
 
 SMALL_MESH = 16
 """Up to this many triangles the compensated sums cost less than the call, so they are always used."""
@@ -53,13 +54,13 @@ class Moments:
     """
 
     measure: float
-    reference: np.ndarray
-    center: np.ndarray
-    center_low: np.ndarray
-    second: np.ndarray
+    reference: Vector3
+    center: Vector3
+    center_low: Vector3
+    second: FloatArray
 
     @property
-    def centroid(self) -> np.ndarray:
+    def centroid(self) -> Vector3:
         """Centroid (3,) in mesh coordinates, without ``center_low``."""
         return self.reference + self.center
 
@@ -69,7 +70,7 @@ class Moments:
 
 
 @njit(nogil=True)
-def _bounds(points: np.ndarray) -> tuple[_Point, _Point]:
+def _bounds(points: Points) -> tuple[_Point, _Point]:
     """Lower and upper corner; raises MeshError for coordinates that aren't finite."""
     x0 = y0 = z0 = np.inf
     x1 = y1 = z1 = -np.inf
@@ -85,15 +86,15 @@ def _bounds(points: np.ndarray) -> tuple[_Point, _Point]:
 
 
 @njit(nogil=True)
-def _leads_outside(triangles: np.ndarray, count: int) -> bool:
+def _leads_outside(triangles: Triangles, count: int) -> bool:
     """Whether a triangle uses a vertex number outside 0 to ``count`` − 1."""
-    signs, last = 0, count - 1
+    signs, last = 0, count - 1  # type: int, int
     for vertex in triangles.ravel():  # contiguous, so that this makes no copy
         signs |= vertex | (last - vertex)
     return signs < 0
 
 
-def _checked(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _checked(vertices: Points, triangles: Triangles) -> tuple[Points, Triangles]:
     """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for an empty mesh and for a
     vertex number out of range.
     """
@@ -107,7 +108,7 @@ def _checked(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, n
 
 
 @njit(nogil=True)
-def _exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
+def _exact_reference(vertices: Points) -> tuple[Vector3, float, float]:
     """A point near the bounding box's centre from which the differences of all vertices are exact in double precision.
 
     Per axis: the centre c if the box's half extent is below |c|/2, since v − c is then exact (Sterbenz), otherwise 0.
@@ -129,12 +130,12 @@ def _exact_reference(vertices: np.ndarray) -> tuple[np.ndarray, float, float]:
 
 @njit(nogil=True)
 def _central(
-    sums: np.ndarray,
-    reference: np.ndarray,
+    sums: FloatArray,
+    reference: Vector3,
     factor: float,
     divisors: tuple[float, float, float],
     dimension: int,
-    numbers: np.ndarray,
+    numbers: FloatArray,
 ) -> None:
     """Compute the numbers (16,) of Moments, in its order, from the raw sums (10, 2) of (v − reference)·factor;
     dimension: that of the measure; divisors: of the measure, the first and the second moments.
@@ -162,7 +163,7 @@ def _central(
             slot += 1
 
 
-def _moments(numbers: np.ndarray, no_measure: str) -> Moments:
+def _moments(numbers: FloatArray, no_measure: str) -> Moments:
     """Of the numbers by ``_central``; raises MeshError, which says ``no_measure``, if the measure is 0."""
     if numbers[0] == 0.0:
         raise MeshError("mesh", no_measure)
@@ -170,12 +171,12 @@ def _moments(numbers: np.ndarray, no_measure: str) -> Moments:
 
 
 @njit(nogil=True)
-def _gather(vertices: np.ndarray, triangles: np.ndarray, start: int, corners: np.ndarray) -> int:
+def _gather(vertices: Points, triangles: Triangles, start: int, corners: FloatArray) -> int:
     """Copy the corners a, b, c of the triangles from ``start`` on into the columns of ``corners`` (9, n).
 
     Returns their number, padded to a multiple of _LANES with triangles of zero size.
     """
-    count = min(corners.shape[1], triangles.shape[0] - start)
+    count: int = min(corners.shape[1], triangles.shape[0] - start)
     for t in range(count):
         for corner in range(3):
             i = triangles[start + t, corner]
@@ -187,7 +188,7 @@ def _gather(vertices: np.ndarray, triangles: np.ndarray, start: int, corners: np
 
 
 @njit(nogil=True)
-def _corner(corners: np.ndarray, corner: int, t: int, reference: np.ndarray, factor: float) -> tuple[Packed, ...]:
+def _corner(corners: FloatArray, corner: int, t: int, reference: Vector3, factor: float) -> tuple[Packed, ...]:
     """x, y and z of one corner of _LANES triangles, relative to the reference in units of 1/factor."""
     zero, first = filled(0.0, _LANES), 3 * corner * corners.shape[1] + t
     x = load(corners, first, zero)
@@ -205,8 +206,8 @@ def _across(lanes: Packed) -> float:
 
 @njit(nogil=True)
 def _blocked_sums(
-    vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float
-) -> tuple[np.ndarray, float]:
+    vertices: Points, triangles: Triangles, reference: Vector3, factor: float
+) -> tuple[FloatArray, float]:
     """The solid's ten sums (10, 2) in plain doubles, block by block; the sums of blocks are added without error.
 
     Also Σ(|b − a|² + |c − a|²), which measures the rounding error of d.
@@ -274,7 +275,7 @@ def _scalar_product(a: tuple[_Pair, ...], b: tuple[_Pair, ...]) -> _Pair:
 
 
 @njit(nogil=True)
-def _add(sums: np.ndarray, slot: int, p: _Pair) -> None:
+def _add(sums: FloatArray, slot: int, p: _Pair) -> None:
     """Add p to one sum of ``sums`` (10, 2, _LANES)."""
     high = 2 * slot * _LANES
     total = load(sums, high, p[0]), load(sums, high + _LANES, p[0])
@@ -284,7 +285,7 @@ def _add(sums: np.ndarray, slot: int, p: _Pair) -> None:
 
 
 @njit(nogil=True)
-def _compensated_sums(vertices: np.ndarray, triangles: np.ndarray, reference: np.ndarray, factor: float) -> np.ndarray:
+def _compensated_sums(vertices: Points, triangles: Triangles, reference: Vector3, factor: float) -> FloatArray:
     """The solid's ten sums (10, 2) in pairs (about 104 bits), for bodies so thin that products of doubles round too
     much; relative to the reference every corner is exact."""
     of_lanes = np.zeros((10, 2, _LANES))
@@ -320,7 +321,7 @@ def _compensated_sums(vertices: np.ndarray, triangles: np.ndarray, reference: np
 
 
 @njit(nogil=True)
-def _solid(vertices: np.ndarray, triangles: np.ndarray, chooses: bool, in_pairs: bool, numbers: np.ndarray) -> None:
+def _solid(vertices: Points, triangles: Triangles, chooses: bool, in_pairs: bool, numbers: FloatArray) -> None:
     """Compute the solid's ``numbers`` as in ``_central``, its sums in pairs of doubles or not, or as needed."""
     reference, factor, size = _exact_reference(vertices)
     sums = np.zeros((10, 2))
@@ -335,7 +336,7 @@ def _solid(vertices: np.ndarray, triangles: np.ndarray, chooses: bool, in_pairs:
     _central(sums, reference, factor, (6.0, 24.0, 120.0), 3, numbers)
 
 
-def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, compensated: bool | None = None) -> Moments:
+def solid_moments(vertices: Points, triangles: Triangles, *, compensated: bool | None = None) -> Moments:
     """Moments of the solid bounded by ``triangles`` (m, 3) over ``vertices`` (n, 3), accurate to about 1e-14.
 
     Signed: a surface wound inward gives a negative volume and negative second moments. One pass in plain doubles; where
@@ -350,12 +351,12 @@ def solid_moments(vertices: np.ndarray, triangles: np.ndarray, *, compensated: b
 
 
 @njit(nogil=True)
-def _point(points: np.ndarray, i: int) -> _Point:
+def _point(points: Points, i: int) -> _Point:
     return points[i, 0], points[i, 1], points[i, 2]
 
 
 @njit(nogil=True)
-def _normal(points: np.ndarray, triangle: np.ndarray) -> _Point:
+def _normal(points: Points, triangle: IntArray) -> _Point:
     """The triangle's normal; its length is twice the area."""
     a, b, c = _point(points, triangle[0]), _point(points, triangle[1]), _point(points, triangle[2])
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -364,7 +365,7 @@ def _normal(points: np.ndarray, triangle: np.ndarray) -> _Point:
 
 
 @njit(nogil=True)
-def _shell_sums(points: np.ndarray, triangles: np.ndarray, starts: np.ndarray) -> np.ndarray:
+def _shell_sums(points: Points, triangles: Triangles, starts: IntArray) -> FloatArray:
     """The ten sums (10, 2) over polygons; polygon k consists of the triangles starts[k] to starts[k + 1] − 1, a fan."""
     sums = np.zeros((10, 2))
     for polygon in range(starts.shape[0] - 1):
@@ -390,7 +391,7 @@ def _shell_sums(points: np.ndarray, triangles: np.ndarray, starts: np.ndarray) -
     return sums
 
 
-def shell_moments(vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None) -> Moments:
+def shell_moments(vertices: Points, triangles: Triangles, polygon_starts: IntArray | None = None) -> Moments:
     """Moments of the surface as a thin shell of uniform thickness; the measure is its area.
 
     vertices (n, 3), triangles (m, 3); polygon_starts (p + 1,) says which fan triangles form a polygon; None if each
@@ -406,7 +407,7 @@ def shell_moments(vertices: np.ndarray, triangles: np.ndarray, polygon_starts: n
     return _moments(numbers, "the surface has no area")
 
 
-def referenced_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def referenced_vertices(vertices: Points, triangles: Triangles) -> Points:
     """The vertices (k, 3) that at least one triangle uses, in the file's order."""
     used = np.zeros(vertices.shape[0], dtype=bool)
     used[triangles.ravel()] = True
@@ -414,7 +415,7 @@ def referenced_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarr
 
 
 @njit(nogil=True)
-def _point_sums(points: np.ndarray) -> np.ndarray:
+def _point_sums(points: Points) -> FloatArray:
     sums = np.zeros((10, 2))
     sums[0, 0] = points.shape[0]
     for t in range(points.shape[0]):
@@ -428,7 +429,7 @@ def _point_sums(points: np.ndarray) -> np.ndarray:
     return sums
 
 
-def point_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
+def point_moments(vertices: Points, triangles: Triangles) -> Moments:
     """Equal point masses at the referenced vertices, the measure being their number (the 2019 paper's eq. 7)."""
     vertices, triangles = _checked(vertices, triangles)
     points = referenced_vertices(vertices, triangles)
@@ -438,7 +439,7 @@ def point_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     return _moments(numbers, "there are no points")
 
 
-def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
+def box_moments(vertices: Points, triangles: Triangles) -> Moments:
     """The bounding box of the referenced vertices as a solid cuboid (the 2019 paper's eq. 8, centred on the box)."""
     vertices, triangles = _checked(vertices, triangles)
     lower, upper = _bounds(referenced_vertices(vertices, triangles))
@@ -452,7 +453,7 @@ def box_moments(vertices: np.ndarray, triangles: np.ndarray) -> Moments:
     return Moments(measure, 0.5 * low + 0.5 * high, np.zeros(3), np.zeros(3), second)
 
 
-MODELS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray | None], Moments]] = {
+MODELS: dict[str, Callable[[Points, Triangles, IntArray | None], Moments]] = {
     "solid": lambda vertices, triangles, _: solid_moments(vertices, triangles).outward(),
     "shell": shell_moments,
     "points": lambda vertices, triangles, _: point_moments(vertices, triangles),

@@ -7,18 +7,20 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import InputError, MeshError, TensorError
+from ..base.vectors import FloatArray, IntArray, Matrix3, Points, Triangles, Vector3
 from . import MODEL_COMS
 from .closed_form import given_mass, is_plainly_good, spread_mass
 from .moments import MODELS, STRETCHED, Moments
 from .tensor import check_tensor, tensor_from_six
 
 SCALE_LIMITS = (1e-9, 1e9)
-Surface = tuple[np.ndarray, np.ndarray]
+Surface = tuple[Points, Triangles]
 """Vertices (n, 3) and triangles (m, 3)."""
 
 
@@ -30,17 +32,17 @@ class MassProperties:
     """
 
     mass: float
-    center_of_mass: np.ndarray
-    inertia: np.ndarray
+    center_of_mass: Vector3
+    inertia: Matrix3
     warnings: tuple[str, ...] = ()
 
-    def as_dict(self) -> dict:
+    def as_dict(self) -> dict[str, Any]:
         """Mass, COM and inertia as a JSON object."""
         inertia = self.inertia.tolist()
         return {"mass": self.mass, "center_of_mass": self.center_of_mass.tolist(), "inertia": inertia}
 
 
-def scale_vector(scale: ArrayLike) -> np.ndarray:
+def scale_vector(scale: ArrayLike) -> Vector3:
     """One or three numbers as (3,); raises InputError unless each is nonzero with 1e-9 ≤ |s| ≤ 1e9."""
     s = [float(value) for value in np.ravel(scale).tolist()]
     if len(s) == 1:
@@ -51,7 +53,7 @@ def scale_vector(scale: ArrayLike) -> np.ndarray:
     return np.array(s)
 
 
-def _checked_ballast(ballast: Sequence[Sequence[float]]) -> np.ndarray:
+def _checked_ballast(ballast: Sequence[Sequence[float]]) -> FloatArray:
     """Ballast entries with a mass above 0, (k, 4): m, x, y, z."""
     for entry in ballast:
         if not entry[0] >= 0.0 or not all(map(math.isfinite, entry)):
@@ -70,13 +72,13 @@ class MeshMoments:
     outward one.
     """
 
-    vertices: np.ndarray
-    triangles: np.ndarray
-    polygon_starts: np.ndarray | None = None
+    vertices: Points
+    triangles: Triangles
+    polygon_starts: IntArray | None = None
     no_solid: str = ""
     name: str = "mesh"
     stand_in: Callable[[], Surface] | None = None
-    _moments: dict[tuple, Moments] = field(default_factory=dict)
+    _moments: dict[tuple[Any, ...], Moments] = field(default_factory=dict)
 
     def solid_surface(self) -> Surface:
         """Vertices and triangles of the solid's surface; raises MeshError when the mesh's isn't closed."""
@@ -120,7 +122,7 @@ class MeshMoments:
             return float(mass)
         if not (0.0 < density < math.inf):
             raise InputError("density", density, "a finite number > 0 [kg/m³]")
-        body = float(density) * self.moments("solid").measure * abs(math.prod(scale_vector(scale).tolist()))
+        body: float = density * self.moments("solid").measure * abs(math.prod(scale_vector(scale).tolist()))
         if not (1e-300 < body < math.inf):
             raise InputError("mass", body, "density * volume within 1e-300 .. 1e300 kg")
         return body

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.rotation import length, times
+from ..base.vectors import BoolArray, IntArray, Points, Triangles
 from ..mesh.intersection import component_nesting
 from ..mesh.topology import Topology, component_sums, fan, joined_sets, mesh_topology, rims, surplus_copies
 from .verdict import MAX_NESTED_COMPONENTS, counted, wound_wrong
@@ -25,18 +26,18 @@ WELD = 1e-5
 class RepairedSurface:
     """Triangles (m, 3) over vertices (n, 3) with polygon_starts (p + 1,) or None, modified step by step."""
 
-    vertices: np.ndarray
-    triangles: np.ndarray
-    polygon_starts: np.ndarray | None
+    vertices: Points
+    triangles: Triangles
+    polygon_starts: IntArray | None
 
-    def drop(self, triangles: np.ndarray) -> None:
+    def drop(self, triangles: BoolArray) -> None:
         """Remove the triangles marked True in ``triangles`` (m,)."""
         if self.polygon_starts is not None:
             kept = np.concatenate([[0], np.cumsum(~triangles)])
             self.polygon_starts = kept[self.polygon_starts]
         self.triangles = self.triangles[~triangles]
 
-    def turn(self, triangles: np.ndarray) -> None:
+    def turn(self, triangles: BoolArray) -> None:
         """Reverse the triangles marked True in ``triangles`` (m,)."""
         self.triangles = np.where(triangles[:, None], self.triangles[:, [0, 2, 1]], self.triangles)
 
@@ -53,8 +54,8 @@ class RepairedSurface:
 
 
 def repair_surface(
-    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray | None, tuple[str, ...]]:
+    vertices: Points, triangles: Triangles, polygon_starts: IntArray | None = None
+) -> tuple[Triangles, IntArray | None, tuple[str, ...]]:
     """Repaired triangles (k, 3), their polygon starts, and what was done, one phrase per step; empty if nothing was."""
     surface = RepairedSurface(vertices, triangles, polygon_starts)
     done = [*_drop_copies(surface), *_weld_rims(surface), *_orient(surface), *_cap_holes(surface)]
@@ -74,7 +75,7 @@ _SWEEP = np.array([0.8163, 0.3719, 0.4421])  # oblique, so that few points proje
 
 
 @njit(nogil=True)
-def _near_pairs(points: np.ndarray, order: np.ndarray, tolerance: float, target: np.ndarray) -> None:
+def _near_pairs(points: Points, order: IntArray, tolerance: float, target: IntArray) -> None:
     """Set target (k,) of points (k, 3) to the first point within ``tolerance``, in their order along _SWEEP."""
     rounding = 0.0
     for k in range(3):
@@ -117,7 +118,7 @@ def _weld_rims(surface: RepairedSurface) -> list[str]:
     return [f"welded {moved} rim vertices, the farthest by {far:.2g}"]
 
 
-def _turns(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, bool]:
+def _turns(edges: IntArray, count: int) -> tuple[BoolArray, IntArray, bool]:
     """Whether to reverse each triangle (m,) so that it agrees with the first one of its patch, that first one (m,), and
     whether all can agree; edges (e, 6) as in Topology, of which only those of two triangles matter.
 
@@ -148,8 +149,8 @@ def _orient(surface: RepairedSurface) -> list[str]:
 
 
 def close_surface(
-    vertices: np.ndarray, triangles: np.ndarray, polygon_starts: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray | None]:
+    vertices: Points, triangles: Triangles, polygon_starts: IntArray | None
+) -> tuple[Triangles, IntArray | None]:
     """Triangles and polygon starts with caps added where the surface is open or its edges are unbalanced."""
     surface = RepairedSurface(vertices, triangles, polygon_starts)
     for walk in rims(surface.topology().unbalanced):

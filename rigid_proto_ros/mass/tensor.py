@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.errors import TensorError
+from ..base.vectors import Matrix3, Vector3
 
 TRIANGLE_SLACK_GIVEN = 1e-5
 """Fraction of C by which given tensors may violate A + B ≥ C: published ones are rounded to five or six digits."""
@@ -23,7 +24,7 @@ _EQUAL_COMPONENT = 1e-9  # components closer than this count as equal; the first
 
 
 @njit()
-def _rotate(a: np.ndarray, v: np.ndarray, p: int, q: int) -> bool:
+def _rotate(a: Matrix3, v: Matrix3, p: int, q: int) -> bool:
     """Jacobi rotation of a (3, 3) to a[p, q] = 0, and of v (3, 3), in place; False if it is below rounding already."""
     g = a[p, q]
     if abs(g) <= 1e-17 * math.sqrt(abs(a[p, p]) * abs(a[q, q])) or g == 0.0:
@@ -52,7 +53,7 @@ def _rotate(a: np.ndarray, v: np.ndarray, p: int, q: int) -> bool:
 
 
 @njit()
-def _sign_columns(axes: np.ndarray) -> None:
+def _sign_columns(axes: Matrix3) -> None:
     """Fix the signs of axes (3, 3), columns, in place: largest component of the first two positive, right-handed."""
     for column in range(2):
         largest = max(abs(axes[0, column]), abs(axes[1, column]), abs(axes[2, column]))
@@ -73,7 +74,7 @@ def _sign_columns(axes: np.ndarray) -> None:
 
 
 @njit()
-def principal_axes_kernel(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def principal_axes_kernel(inertia: Matrix3) -> tuple[Vector3, Matrix3]:
     """Principal moments (3,) ascending and axes (3, 3), columns, of a symmetric ``inertia`` (3, 3).
 
     Cyclic Jacobi rotations until every off-diagonal element is below the rounding of its two diagonal elements: for a
@@ -107,24 +108,24 @@ def principal_axes_kernel(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return moments, axes
 
 
-def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def principal_axes(inertia: Matrix3) -> tuple[Vector3, Matrix3]:
     """Principal moments (3,) ascending [kg m²] and axes (3, 3), columns, of ``inertia`` (3, 3); see the kernel."""
     return principal_axes_kernel(np.ascontiguousarray(inertia, dtype=np.float64))
 
 
-def tensor_from_six(six: Sequence[float]) -> np.ndarray:
+def tensor_from_six(six: Sequence[float]) -> Matrix3:
     """(ixx, ixy, ixz, iyy, iyz, izz) as a symmetric (3, 3) matrix; off-diagonals carry the tensor's sign, −∫xy dm."""
     ixx, ixy, ixz, iyy, iyz, izz = (float(value) for value in six)
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
 
-def six_from_tensor(inertia: np.ndarray) -> tuple[float, float, float, float, float, float]:
+def six_from_tensor(inertia: Matrix3) -> tuple[float, float, float, float, float, float]:
     """A symmetric (3, 3) matrix as (ixx, ixy, ixz, iyy, iyz, izz)."""
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = np.asarray(inertia, dtype=np.float64).tolist()
     return xx, xy, xz, yy, yz, zz
 
 
-def check_tensor(inertia: np.ndarray, *, source: str = "inertia tensor") -> tuple[str, ...]:
+def check_tensor(inertia: Matrix3, *, source: str = "inertia tensor") -> tuple[str, ...]:
     """Warnings about ``inertia`` (3, 3) [kg m², about the COM]; empty if there are none.
 
     Raises TensorError, its field ``source``, when no rigid body has such a tensor: not finite, not symmetric, a moment
@@ -152,7 +153,7 @@ def check_tensor(inertia: np.ndarray, *, source: str = "inertia tensor") -> tupl
     return ()
 
 
-def equimomental_shapes(mass: float, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def equimomental_shapes(mass: float, moments: Vector3) -> tuple[Vector3, Vector3]:
     """Sides (3,) of the uniform box and semi-axes (3,) of the uniform ellipsoid with ``mass`` [kg] and principal
     ``moments`` (3,) [kg m²]; both lengths [m], in the order of the moments.
 

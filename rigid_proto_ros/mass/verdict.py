@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..base.errors import MeshError
+from ..base.vectors import BoolArray, FloatArray, Points, Triangles
 from ..mesh.intersection import Nesting, component_nesting
 from ..mesh.solids import can_unite, united_surface
 from ..mesh.topology import (
@@ -83,7 +84,7 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray) -> None:
+def _check_edges(verdict: Verdict, topology: Topology, vertices: Points) -> None:
     """Check for open edges, inconsistent winding and duplicate faces, and for the effect of closing holes."""
     verdict.watertight = topology.odd == 0
     verdict.winding_consistent = topology.flipped == 0
@@ -116,7 +117,7 @@ def _check_edges(verdict: Verdict, topology: Topology, vertices: np.ndarray) -> 
         verdict.add("inconsistent_winding", ERROR, f"inconsistent winding: {edges}{known}", remedy)
 
 
-def _hole_effect(topology: Topology, vertices: np.ndarray) -> float | None:
+def _hole_effect(topology: Topology, vertices: Points) -> float | None:
     """``Verdict.hole_effect`` of a surface that flat caps close: the largest effect of any surface over the holes that
     has the caps' area and lies no farther from the centre of mass. None for one without a volume.
 
@@ -139,7 +140,7 @@ def _hole_effect(topology: Topology, vertices: np.ndarray) -> float | None:
         return None
     xx, _, _, yy, _, zz = np.abs(moments.second)
     shifted = first * first / (volume - added)
-    return max(added / volume, (second + shifted) / max(yy + zz, xx + zz, xx + yy))
+    return float(max(added / volume, (second + shifted) / max(yy + zz, xx + zz, xx + yy)))
 
 
 def _rounded_up(value: float) -> str:
@@ -148,7 +149,7 @@ def _rounded_up(value: float) -> str:
     return f"{step * math.ceil(value / step + 1e-9):.2g}"
 
 
-def _check_components(verdict: Verdict, topology: Topology, sums: Components, vertices: np.ndarray) -> None:
+def _check_components(verdict: Verdict, topology: Topology, sums: Components, vertices: Points) -> None:
     """Check balanced surfaces for orientation, cavities, parts that count twice, and self-intersection."""
     count, volume = topology.components, sums.volume
     whole = float(np.sum(volume))
@@ -173,7 +174,7 @@ def _check_components(verdict: Verdict, topology: Topology, sums: Components, ve
         verdict.add("inward", WARNING, "all faces were wound inward and have been turned outward")
 
 
-def wound_wrong(nesting: Nesting, volume: np.ndarray) -> np.ndarray:
+def wound_wrong(nesting: Nesting, volume: FloatArray) -> BoolArray:
     """Which components (k,), of signed volume (k,), count with the wrong sign: inward in no solid, or outward in one.
 
     Outermost first, so that those around a component count as they should. One wound outward that crosses others is a
@@ -183,11 +184,11 @@ def wound_wrong(nesting: Nesting, volume: np.ndarray) -> np.ndarray:
     for c in np.argsort(nesting.depth, kind="stable").tolist():
         if sign[c] != 0.0 and not (sign[c] > 0.0 and crosses[c]):
             sign[c] = -1.0 if np.sum(sign[nesting.inside[c]]) > 0.0 else 1.0
-    wrong: np.ndarray = sign != np.sign(volume)
+    wrong: BoolArray = sign != np.sign(volume)
     return wrong
 
 
-def _check_winding(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> None:
+def _check_winding(verdict: Verdict, nesting: Nesting, volume: FloatArray) -> None:
     """Find components, of signed volume (k,), that subtract: cavities, and those that are no cavities."""
     verdict.inward = bool(volume.any() and not wound_wrong(nesting, -volume).any())
     if verdict.inward:
@@ -209,7 +210,7 @@ def _check_winding(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> No
         verdict.add("cavities", INFO, f"{counted(cavities, 'closed inner surface')} wound inward, taken as cavities")
 
 
-def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> None:
+def _check_nesting(verdict: Verdict, nesting: Nesting, volume: FloatArray) -> None:
     """Find components, of signed volume (k,), that lie inside others and add to them in the sum of all."""
     nested = int(np.count_nonzero(wound_wrong(nesting, volume) & (volume > 0.0)))
     if nested:
@@ -222,9 +223,7 @@ def _check_nesting(verdict: Verdict, nesting: Nesting, volume: np.ndarray) -> No
         verdict.add(NESTED, WARNING, f"{inside}: what they share counts twice")
 
 
-def _check_overlap(
-    verdict: Verdict, nesting: Nesting, volume: float, vertices: np.ndarray, triangles: np.ndarray
-) -> None:
+def _check_overlap(verdict: Verdict, nesting: Nesting, volume: float, vertices: Points, triangles: Triangles) -> None:
     """For components that intersect: how much the sum of volumes differs from that of the union, if it can be computed.
 
     Parts that overlap count twice in the sum, what cavities share is missing in it: the two may cancel in the volume
@@ -236,8 +235,8 @@ def _check_overlap(
         volume, triangles = -volume, triangles[:, [0, 2, 1]]
     if verdict.closed:
         with contextlib.suppress(MeshError):
-            *surface, parts = united_surface(vertices, triangles, nesting)
-            whole = solid_moments(*surface).measure
+            points, faces, parts = united_surface(vertices, triangles, nesting)
+            whole = solid_moments(points, faces).measure
     if not whole > 0.0:
         measure = "" if can_unite() else " (the extra [meshes] measures by how much)"
         verdict.add("overlapping_components", WARNING, f"{overlap}; what they share counts twice{measure}")
@@ -263,7 +262,7 @@ def _check_size(verdict: Verdict, side: float) -> None:
         verdict.add("size", ERROR, f"the mesh is {side:.3g} across; moments are finite for sizes {sizes}")
 
 
-def check_surface(vertices: np.ndarray, triangles: np.ndarray) -> Verdict:
+def check_surface(vertices: Points, triangles: Triangles) -> Verdict:
     """The verdict on triangles (m, 3) over vertices (n, 3)."""
     verdict = Verdict()
     bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
@@ -297,7 +296,7 @@ def check_surface(vertices: np.ndarray, triangles: np.ndarray) -> Verdict:
     return verdict
 
 
-def _no_volume(vertices: np.ndarray, triangles: np.ndarray, diagonal: float) -> bool:
+def _no_volume(vertices: Points, triangles: Triangles, diagonal: float) -> bool:
     """Whether the volume, computed in pairs of doubles, is below the rounding of area × diagonal."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     area = 0.5 * float(np.sum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))

@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import MeshError
 
 
-def as_numbers(text: bytes, count: int = -1, kind: type = float) -> tuple[np.ndarray, bool]:
+def as_numbers(text: bytes, count: int = -1, kind: type[float] = float) -> tuple[NDArray[Any], bool]:
     """The whitespace separated numbers (k,) at the beginning of a text, up to the first word that isn't a number, and
     whether they are all of it, and ``count`` numbers unless that is −1.
 
@@ -19,7 +21,7 @@ def as_numbers(text: bytes, count: int = -1, kind: type = float) -> tuple[np.nda
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", DeprecationWarning)  # older versions of NumPy only warn
-            numbers: np.ndarray = np.fromstring(text, kind, sep=" ")
+            numbers: NDArray[Any] = np.fromstring(text, kind, sep=" ")
             if count in (-1, len(numbers)) and b"\0" not in text:  # NumPy stops at NUL
                 return numbers, True
     except (DeprecationWarning, ValueError):

@@ -10,8 +10,10 @@ import xml.etree.ElementTree as ElementTree
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import MeshError, is_missing
+from ..base.vectors import FloatArray, Points, Triangles
 
 _LIBRARIES = ("images", "effects", "materials", "cameras", "lights", "animations", "animation_clips", "controllers")
 _UNUSED = (*(f"library_{kind}" for kind in _LIBRARIES), "bind_material", "instance_camera", "instance_light", "extra")
@@ -26,11 +28,11 @@ class Assembly:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self._vertices: list[np.ndarray] = [np.empty((0, 3))]
-        self._triangles: list[np.ndarray] = [np.empty((0, 3), np.int64)]
+        self._vertices: list[Points] = [np.empty((0, 3))]
+        self._triangles: list[Triangles] = [np.empty((0, 3), np.int64)]
         self._count = self._held = 0
 
-    def add(self, vertices: np.ndarray, triangles: np.ndarray, matrix: np.ndarray, part: str) -> None:
+    def add(self, vertices: NDArray[Any], triangles: NDArray[Any], matrix: FloatArray, part: str) -> None:
         """Append ``part``: vertices (n, 3) transformed by matrix (4, 4), triangles (m, 3) reversed if it mirrors.
 
         Raises MeshError for a vertex number out of range, and beyond MAX_TRIANGLES.
@@ -53,7 +55,7 @@ class Assembly:
         self._triangles.append(triangles + self._count)
         self._count += len(vertices)
 
-    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self) -> tuple[Points, Triangles]:
         """Vertices (n, 3) and triangles (m, 3) of all parts, in the order in which they were added."""
         return np.concatenate(self._vertices), np.concatenate(self._triangles)
 

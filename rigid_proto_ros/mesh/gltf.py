@@ -13,9 +13,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import MeshError
 from ..base.rotation import matrix_from_quaternion, normalize
+from ..base.vectors import FloatArray, Triangles
 from .assembly import Assembly
 
 TRIANGLES = 4
@@ -26,7 +28,7 @@ _LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KH
 """Prefixes of the names of extensions that change no triangle."""
 
 
-def _chunks(data: bytes, name: str) -> tuple[dict, bytes]:
+def _chunks(data: bytes, name: str) -> tuple[dict[str, Any], bytes]:
     """The JSON object and the binary buffer of a file, .glb or .gltf."""
     if data[:4] != b"glTF":
         return json.loads(data), b""
@@ -78,7 +80,7 @@ class _Document:
             raise MeshError(self.name, f"buffer {index} ends before bufferView {number}; the file may be truncated")
         return content[start : start + view["byteLength"]]
 
-    def numbers(self, accessor_number: int) -> np.ndarray:
+    def numbers(self, accessor_number: int) -> NDArray[Any]:
         """The rows (n, k) of an accessor."""
         accessor = self.item("accessors", accessor_number)
         for key, kind in (("sparse", "is sparse"), ("normalized", "is of normalized integers")):
@@ -93,7 +95,7 @@ class _Document:
         return np.ndarray((count, width), dtype, content if count else None, start, (stride, dtype.itemsize))
 
 
-def _node_matrix(node: dict) -> np.ndarray:
+def _node_matrix(node: dict[str, Any]) -> FloatArray:
     """The matrix (4, 4) of a node: scale, then rotation, then translation; or the given matrix."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
@@ -104,7 +106,7 @@ def _node_matrix(node: dict) -> np.ndarray:
     return matrix
 
 
-def _triangles(document: _Document, primitive: dict) -> tuple[np.ndarray, np.ndarray]:
+def _triangles(document: _Document, primitive: dict[str, Any]) -> tuple[NDArray[Any], Triangles]:
     """Vertices (n, 3) and triangles (m, 3) of a primitive; empty for points and lines."""
     mode = primitive.get("mode", TRIANGLES)
     if mode < TRIANGLES:
@@ -123,7 +125,7 @@ def _triangles(document: _Document, primitive: dict) -> tuple[np.ndarray, np.nda
     return vertices, corners.reshape(-1, 3)
 
 
-def _add_node(document: _Document, number: int, above: np.ndarray, seen: set[int], assembly: Assembly) -> None:
+def _add_node(document: _Document, number: int, above: FloatArray, seen: set[int], assembly: Assembly) -> None:
     """Add the meshes of a node and of its descendants."""
     if number in seen:
         raise MeshError(document.name, f"node {number} occurs twice in the scene; its nodes must be a tree")

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.compilation import njit
+from ..base.vectors import BoolArray, FloatArray, IntArray, Points, Triangles
 from .topology import Components, Topology
 
 LEAF = 8
@@ -44,7 +45,7 @@ _DIRECTIONS = ((0.8163, 0.3719, 0.4421), (-0.2917, 0.9013, -0.3204), (0.1373, -0
 # Barycentric coordinates of the sample in its triangle: not on any of its symmetry lines.
 _SAMPLE = (0.4479, 0.3413, 0.2108)
 
-Hierarchy = tuple[np.ndarray, np.ndarray, np.ndarray]
+Hierarchy = tuple[IntArray, FloatArray, FloatArray]
 """Order of the triangles (m,), leaf after leaf; their boxes (m, 6), lower and upper corner, in that order; the nodes'
 boxes (2·leaves − 1, 6)."""
 _Vector = tuple[float, float, float]
@@ -52,12 +53,12 @@ _Triangle = tuple[_Vector, _Vector, _Vector]
 
 
 @njit(nogil=True)
-def _corner(vertices: np.ndarray, i: int) -> _Vector:
+def _corner(vertices: Points, i: int) -> _Vector:
     return vertices[i, 0], vertices[i, 1], vertices[i, 2]
 
 
 @njit(nogil=True)
-def corners_of(vertices: np.ndarray, corners: np.ndarray, i: int) -> _Triangle:
+def corners_of(vertices: Points, corners: Triangles, i: int) -> _Triangle:
     """The three corners of triangle i."""
     return _corner(vertices, corners[i, 0]), _corner(vertices, corners[i, 1]), _corner(vertices, corners[i, 2])
 
@@ -85,7 +86,7 @@ def _largest(a: _Vector) -> float:
     return max(abs(a[0]), abs(a[1]), abs(a[2]))
 
 
-def hierarchy(vertices: np.ndarray, corners: np.ndarray) -> Hierarchy:
+def hierarchy(vertices: Points, corners: Triangles) -> Hierarchy:
     """The hierarchy of triangles (m, 3); an empty node's lower corner lies above its upper one."""
     points = vertices[corners]
     own = np.concatenate([points.min(axis=1), points.max(axis=1)], axis=1)
@@ -110,7 +111,7 @@ def hierarchy(vertices: np.ndarray, corners: np.ndarray) -> Hierarchy:
 
 
 @njit(nogil=True)
-def _boxes_meet(boxes: np.ndarray, i: int, others: np.ndarray, j: int) -> bool:
+def _boxes_meet(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
     """Whether box i and box j of ``others`` have a point in common."""
     x = (boxes[i, 0] <= others[j, 3]) & (others[j, 0] <= boxes[i, 3])
     y = (boxes[i, 1] <= others[j, 4]) & (others[j, 1] <= boxes[i, 4])
@@ -146,7 +147,7 @@ def _piece(triangle: _Triangle, heights: _Vector, axis: int, origin: float) -> t
 
 
 @njit(nogil=True)
-def triangles_cross(vertices: np.ndarray, corners: np.ndarray, i: int, j: int) -> bool:
+def triangles_cross(vertices: Points, corners: Triangles, i: int, j: int) -> bool:
     """Whether triangles i and j of ``corners`` (m, 3) over vertices (n, 3) properly intersect."""
     one, other = corners_of(vertices, corners, i), corners_of(vertices, corners, j)
     normal, above = _heights(one, other)
@@ -164,7 +165,7 @@ def triangles_cross(vertices: np.ndarray, corners: np.ndarray, i: int, j: int) -
 
 
 @njit(nogil=True)
-def _share_a_corner(corners: np.ndarray, i: int, j: int) -> bool:
+def _share_a_corner(corners: Triangles, i: int, j: int) -> bool:
     for k in range(3):
         if corners[i, k] == corners[j, 0] or corners[i, k] == corners[j, 1] or corners[i, k] == corners[j, 2]:
             return True
@@ -173,8 +174,8 @@ def _share_a_corner(corners: np.ndarray, i: int, j: int) -> bool:
 
 @njit(nogil=True)
 def crossings(
-    vertices: np.ndarray, corners: np.ndarray, component: np.ndarray, count: int, tree: Hierarchy, limit: int
-) -> tuple[int, np.ndarray, bool]:
+    vertices: Points, corners: Triangles, component: IntArray, count: int, tree: Hierarchy, limit: int
+) -> tuple[int, BoolArray, bool]:
     """Number of intersecting pairs of triangles of one component without a common corner; which components intersect,
     (count, count); whether ``limit`` visits sufficed. corners (m, 3): over welded vertices; component (m,).
     """
@@ -237,16 +238,16 @@ def _hit(triangle: _Triangle, origin: _Vector, direction: _Vector, reach: float)
 
 @njit(nogil=True)
 def _shoot(
-    vertices: np.ndarray,
-    corners: np.ndarray,
-    component: np.ndarray,
+    vertices: Points,
+    corners: Triangles,
+    component: IntArray,
     tree: Hierarchy,
     own: int,
     origin: _Vector,
     direction: _Vector,
     reach: float,
-    winding: np.ndarray,
-    sure: np.ndarray,
+    winding: IntArray,
+    sure: BoolArray,
 ) -> int:
     """Sum the signed hits of all components but ``own`` in winding (k,); sure (k,): whether they are certain. Returns
     the number of boxes visited.
@@ -283,14 +284,14 @@ def _shoot(
 
 @njit(nogil=True)
 def _sides(
-    vertices: np.ndarray,
-    corners: np.ndarray,
-    component: np.ndarray,
+    vertices: Points,
+    corners: Triangles,
+    component: IntArray,
     tree: Hierarchy,
-    samples: np.ndarray,
-    near: np.ndarray,
+    samples: IntArray,
+    near: BoolArray,
     reach: float,
-) -> tuple[np.ndarray, np.ndarray, bool]:
+) -> tuple[BoolArray, BoolArray, bool]:
     """Which components have samples outside and inside which others, (k, k) each, and whether the work limit sufficed.
 
     samples (s,): triangles in which a ray begins; near (k, k): pairs whose boxes overlap.
@@ -324,23 +325,23 @@ class Nesting:
     """inside (k, k) bool: component i lies in component j. crossing (k, k) bool: their surfaces intersect. within:
     pairs of triangles of one component that intersect. complete: False if the work limit was reached before."""
 
-    inside: np.ndarray
-    crossing: np.ndarray
+    inside: BoolArray
+    crossing: BoolArray
     within: int
     complete: bool
 
     @property
-    def depth(self) -> np.ndarray:
+    def depth(self) -> IntArray:
         """Number of other components in which each one lies, (k,)."""
-        return np.count_nonzero(self.inside, axis=1)
+        return np.asarray(np.count_nonzero(self.inside, axis=1))
 
     @property
-    def crosses(self) -> np.ndarray:
+    def crosses(self) -> BoolArray:
         """Which components intersect another one, (k,) bool."""
         return np.asarray(self.crossing.any(axis=1))
 
 
-def component_nesting(vertices: np.ndarray, topology: Topology, sums: Components) -> Nesting:
+def component_nesting(vertices: Points, topology: Topology, sums: Components) -> Nesting:
     """Nesting, intersections and self-intersections of closed components."""
     component, count = topology.component, topology.components
     tree = hierarchy(vertices, topology.corners)

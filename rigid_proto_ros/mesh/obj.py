@@ -15,6 +15,7 @@ import re
 import numpy as np
 
 from ..base.errors import MeshError
+from ..base.vectors import IntArray, Points
 from .ascii_floats import as_numbers, error_at
 
 _VERTEX = "v with three coordinates"
@@ -34,7 +35,7 @@ def _error(text: bytes, letter: bytes, number: int, name: str, accepted: str) ->
     return error_at(text.replace(_CONTINUED, b" \n"), place, name, accepted, first_line=0)
 
 
-def _vertices(text: bytes, name: str) -> np.ndarray:
+def _vertices(text: bytes, name: str) -> Points:
     """Vertices (n, 3)."""
     found = _V.findall(text)
     lines = re.findall(rb"\nv(?!\S)[^\n]*", text)
@@ -45,7 +46,7 @@ def _vertices(text: bytes, name: str) -> np.ndarray:
     return points.reshape(-1, 3)
 
 
-def _faces(text: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
+def _faces(text: bytes, name: str) -> tuple[IntArray, IntArray]:
     """Vertex numbers (c,) as written, and the number of corners of each face (p,)."""
     found = _F.findall(text)
     sizes = np.array([len(line.split()) for line in found], np.int64)
@@ -63,13 +64,13 @@ def _faces(text: bytes, name: str) -> tuple[np.ndarray, np.ndarray]:
     return numbers, sizes
 
 
-def _known(text: bytes) -> np.ndarray:
+def _known(text: bytes) -> IntArray:
     """Number of vertices before each face (p,)."""
     letters = np.frombuffer(b"".join(_EITHER.findall(text)), np.uint8)
-    return np.cumsum(letters == ord("v"))[letters == ord("f")]
+    return np.asarray(np.cumsum(letters == ord("v"))[letters == ord("f")])
 
 
-def read_obj(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def read_obj(data: bytes, name: str) -> tuple[Points, IntArray, IntArray]:
     """Vertices (n, 3) float64, polygon corners (c,) int64 and their starts (p + 1,) of the file's bytes.
 
     Raises MeshError with the file's name and line.

@@ -8,12 +8,13 @@ import re
 import numpy as np
 
 from ..base.errors import MeshError
+from ..base.vectors import IntArray, Points
 from .ascii_floats import as_numbers, excerpt
 
 _HEADER = re.compile(rb"\s*C?OFF\b(?![ \t]*BINARY)")
 
 
-def read_off(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def read_off(data: bytes, name: str) -> tuple[Points, IntArray, IntArray]:
     """Vertices (n, 3), polygon corners (c,) and their starts (p + 1,); raises MeshError naming what is wrong."""
     header = _HEADER.match(data)
     if header is None:

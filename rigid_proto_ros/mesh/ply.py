@@ -6,9 +6,12 @@ Not read by trimesh, which renumbers textured vertices and assumes the first fac
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..base.errors import MeshError
+from ..base.vectors import IntArray, Points, Records
 from .ascii_floats import as_numbers, excerpt
 
 _KINDS = {"i1": "char int8", "u1": "uchar uint8", "i2": "short int16", "u2": "ushort uint16", "i4": "int int32"}
@@ -58,13 +61,13 @@ def _header(data: bytes, name: str) -> tuple[str, list[_Element], int]:
     return layout, elements, body
 
 
-def _rows(data: bytes, position: int, element: _Element, order: str, text: bool, name: str) -> np.ndarray:
+def _rows(data: bytes, position: int, element: _Element, order: str, text: bool, name: str) -> Records:
     """The element's rows from ``position`` on: fields p0, p1, … and, for lists, which must all be as long as in the
     first row, their lengths n0, n1, …. ``text``: all numbers are doubles."""
     label, count, properties = element
     label = excerpt(label.encode(), 0)
     short = MeshError(name, f"it can't hold the {count} rows of {label} that it announces; the file may be truncated")
-    fields: list[tuple] = []
+    fields: list[tuple[Any, ...]] = []
     for k, (_, kind, length) in enumerate(properties):
         kind = order + ("f8" if text else kind)
         if not length:
@@ -88,7 +91,7 @@ def _rows(data: bytes, position: int, element: _Element, order: str, text: bool,
     return rows
 
 
-def read_ply(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def read_ply(data: bytes, name: str) -> tuple[Points, IntArray, IntArray]:
     """Vertices (n, 3), polygon corners (c,) and their starts (p + 1,); raises MeshError naming what is wrong."""
     layout, elements, position = _header(data, name)
     text, order = layout == "ascii", ">" if layout == "binary_big_endian" else "<"

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.errors import InputError, MeshError
 from ..base.files import read_bounded
+from ..base.vectors import IntArray, Points, Triangles
 from .assembly import MAX_TRIANGLES, Assembly, add_by_trimesh, add_collada, other_formats
 from .gltf import add_gltf
 from .locate import NOWHERE_ELSE, Search, resolve_mesh
@@ -44,14 +45,14 @@ class Mesh:
 
     name: str
     path: str
-    vertices: np.ndarray
-    triangles: np.ndarray
-    polygon_starts: np.ndarray | None
+    vertices: Points
+    triangles: Triangles
+    polygon_starts: IntArray | None
     sha256: str
     unit: float = 1.0
 
 
-def fan_polygons(corners: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+def fan_polygons(corners: IntArray, starts: IntArray) -> tuple[Triangles, IntArray | None]:
     """Triangles (m, 3), fanned from each polygon's first corner, and the polygons' starts among them (p + 1,).
 
     corners (c,) vertex numbers, polygon k being corners[starts[k]:starts[k + 1]], each of three or more. The starts are
@@ -67,7 +68,7 @@ def fan_polygons(corners: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, n
     return np.stack([corners[first], corners[place + 1], corners[place + 2]], axis=1), polygon_starts
 
 
-def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[np.ndarray, np.ndarray, float, dict[str, str]]:
+def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[Points, Triangles, float, dict[str, str]]:
     """Read a file of placed parts: vertices (n, 3) in metres, triangles (m, 3), the file's unit [m], and names and
     hashes of the other files that were read.
     """

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.errors import MeshError, is_missing
+from ..base.vectors import IntArray, Points, Triangles, Vector3
 from .intersection import Nesting, component_nesting
 from .topology import component_sums, fan, mesh_topology
 
@@ -34,8 +35,8 @@ def can_unite() -> bool:
 
 
 def united_surface(
-    vertices: np.ndarray, triangles: np.ndarray, nesting: Nesting | None = None
-) -> tuple[np.ndarray, np.ndarray, float]:
+    vertices: Points, triangles: Triangles, nesting: Nesting | None = None
+) -> tuple[Points, Triangles, float]:
     """Vertices (n, 3) and triangles (m, 3) of the union of closed components that overlap, and the sum of the volumes
     of its parts; nesting: theirs, if it is known.
 
@@ -76,7 +77,7 @@ def united_surface(
 
 
 def _united(
-    vertices: np.ndarray, faces: list[np.ndarray], owner: np.ndarray, order: np.ndarray, origin: np.ndarray
+    vertices: Points, faces: list[Triangles], owner: IntArray, order: IntArray, origin: Vector3
 ) -> list[manifold3d.Manifold]:
     """The parts, less their cavities, about an origin (3,), from the faces of each component; owner (c,): the part of
     which each is a cavity, or itself; order: parts before cavities. Raises MeshError where one bounds no solid.
@@ -97,7 +98,7 @@ def _united(
     return list(parts.values())
 
 
-def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def convex_hull(points: Points) -> tuple[Points, Triangles]:
     """Vertices (n, 3), a subset of points (k, 3), and outward triangles (m, 3) of their convex hull, accurate to
     rounding of the extent, by Qhull (Barber, Dobkin, Huhdanpaa, ACM TOMS 22, 1996).
 
@@ -137,7 +138,7 @@ def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return points[used], triangles
 
 
-def box_surface(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def box_surface(points: Points) -> tuple[Points, Triangles]:
     """Vertices (8, 3) and outward triangles (12, 3) of the bounding box of points (k, 3); vertex bits are x, y, z."""
     ends = points.min(axis=0), points.max(axis=0)
     vertices = np.array([[ends[(i >> k) & 1][k] for k in range(3)] for i in range(8)])

@@ -11,6 +11,7 @@ import struct
 import numpy as np
 
 from ..base.errors import MeshError
+from ..base.vectors import IntArray, Points
 from .ascii_floats import as_numbers, error_at
 from .topology import first_equal_rows
 
@@ -27,7 +28,7 @@ _FACET_PART = re.compile(rb"\bfacet\s+normal|\bouter\s+loop|\bvertex(?:\s+[-+.\d
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def _merge(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _merge(points: Points) -> tuple[Points, IntArray, IntArray]:
     """Vertices (n, 3), corners (3m,) and their starts (m + 1,) of corner points (3m, 3)."""
     first = first_equal_rows(np.ascontiguousarray(points).view(np.int64))
     new = first == np.arange(len(first))
@@ -43,7 +44,7 @@ def is_ascii_stl(data: bytes) -> bool:
     return head.startswith(b"solid") and (b"facet" in head or b"endsolid" in head) and b"\0" not in head
 
 
-def read_stl(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def read_stl(data: bytes, name: str) -> tuple[Points, IntArray, IntArray]:
     """Vertices (n, 3), triangles' corners (c,) and their starts (m + 1,); raises MeshError for a file cut short or not
     STL.
     """
@@ -64,7 +65,7 @@ def read_stl(data: bytes, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return _merge(facets["corners"].reshape(-1, 3).astype(np.float64))
 
 
-def _ascii_points(data: bytes, name: str) -> np.ndarray:
+def _ascii_points(data: bytes, name: str) -> Points:
     """Corner points (3m, 3) in file order; line ends count as blanks. Only the names of solids may stand beside whole
     facets, so that no part of a damaged file is silently left out.
     """

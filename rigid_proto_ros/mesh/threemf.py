@@ -10,6 +10,7 @@ import zipfile
 import numpy as np
 
 from ..base.errors import MeshError
+from ..base.vectors import FloatArray, Points, Triangles
 from .assembly import Assembly, tag_of
 
 UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
@@ -26,7 +27,7 @@ _PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
 _READ = (_CORE, _PRODUCTION, "http://schemas.microsoft.com/3dmanufacturing/material/2015/02")
 
 
-def _matrix(text: str | None) -> np.ndarray:
+def _matrix(text: str | None) -> FloatArray:
     """The matrix (4, 4), for column vectors, of a transform's twelve numbers, which apply to row vectors."""
     matrix = np.eye(4)
     if text is not None:
@@ -91,7 +92,7 @@ class _Package:
             raise self.refusal(f"unit {unit}", f"a file in one of {', '.join(UNITS)}")
         return UNITS[unit]
 
-    def place(self, reference: ElementTree.Element, path: str, above: np.ndarray, depth: int) -> None:
+    def place(self, reference: ElementTree.Element, path: str, above: FloatArray, depth: int) -> None:
         """Add the object that an item or component in the file ``path`` refers to."""
         self._places += 1
         if self._places > MAX_PLACES or depth > 100:
@@ -114,7 +115,7 @@ class _Package:
             elif tag_of(child) != "metadatagroup":
                 raise self.refusal(f"object {number} is made of {tag_of(child)}", "objects of mesh and components")
 
-    def _mesh(self, mesh: ElementTree.Element) -> tuple[np.ndarray, np.ndarray]:
+    def _mesh(self, mesh: ElementTree.Element) -> tuple[Points, Triangles]:
         """Vertices (n, 3) and triangles (m, 3) of a mesh element."""
         vertices, triangles = [], []
         for child in mesh:

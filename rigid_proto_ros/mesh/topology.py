@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.compilation import njit
+from ..base.vectors import BoolArray, FloatArray, IntArray, Points, Triangles, Vector3
 
 
 @njit(nogil=True)
-def first_equal_rows(rows: np.ndarray) -> np.ndarray:
+def first_equal_rows(rows: IntArray) -> IntArray:
     """For each row of ``rows`` (n, 3) int64 the index of the first row equal to it, (n,), by open addressing."""
     n = rows.shape[0]
     size = 16
@@ -43,13 +44,13 @@ def first_equal_rows(rows: np.ndarray) -> np.ndarray:
     return first
 
 
-def weld_equal(vertices: np.ndarray) -> np.ndarray:
+def weld_equal(vertices: Points) -> IntArray:
     """For each vertex (n, 3) the first one at the bit-equal position (−0 equals 0), (n,) int64."""
     return first_equal_rows((vertices + 0.0).view(np.int64))
 
 
 @njit(nogil=True)
-def _root(parent: np.ndarray, i: int) -> int:
+def _root(parent: IntArray, i: int) -> int:
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -57,7 +58,7 @@ def _root(parent: np.ndarray, i: int) -> int:
 
 
 @njit(nogil=True)
-def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray:
+def joined_sets(first: IntArray, second: IntArray, count: int) -> IntArray:
     """Union-find: the smallest member of the set of each of 0 to count − 1, if first[k] and second[k] share a set."""
     parent = np.arange(count)
     for k in range(first.shape[0]):
@@ -68,7 +69,7 @@ def joined_sets(first: np.ndarray, second: np.ndarray, count: int) -> np.ndarray
     return parent
 
 
-def _edges(corners: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+def _edges(corners: Triangles, vertex_count: int) -> tuple[IntArray, IntArray]:
     """Edges (e, 6) of ``corners`` (m, 3) as in Topology, and for each triangle (m,) the first one of its component:
     triangles that share an edge belong to one, unless more than two share it and all that meet there are balanced at it
     by themselves: bodies that touch, or overlap, along an edge stay two.
@@ -107,25 +108,25 @@ class Topology:
     appearance. duplicates (m,): True for a triangle that repeats an earlier one with the same winding.
     """
 
-    corners: np.ndarray
-    edges: np.ndarray
-    component: np.ndarray
+    corners: Triangles
+    edges: IntArray
+    component: IntArray
     components: int
-    duplicates: np.ndarray
+    duplicates: BoolArray
 
     @property
-    def boundary(self) -> np.ndarray:
+    def boundary(self) -> IntArray:
         """Edges (k, 6) of only one triangle."""
-        return self.edges[self._uses == 1]
+        return np.asarray(self.edges[self._uses == 1])
 
     @property
-    def unbalanced(self) -> np.ndarray:
+    def unbalanced(self) -> IntArray:
         """Edges (k, 6) used more often in one direction than in the other: none if the surface bounds a volume."""
-        return self.edges[self.edges[:, 2] != self.edges[:, 3]]
+        return np.asarray(self.edges[self.edges[:, 2] != self.edges[:, 3]])
 
     @property
-    def _uses(self) -> np.ndarray:
-        uses: np.ndarray = self.edges[:, 2] + self.edges[:, 3]
+    def _uses(self) -> IntArray:
+        uses: IntArray = self.edges[:, 2] + self.edges[:, 3]
         return uses
 
     @property
@@ -139,7 +140,7 @@ class Topology:
         return len(self.unbalanced) - self.odd
 
 
-def mesh_topology(vertices: np.ndarray, triangles: np.ndarray) -> Topology:
+def mesh_topology(vertices: Points, triangles: Triangles) -> Topology:
     """The topology of triangles (m, 3) over vertices (n, 3)."""
     first = weld_equal(vertices)
     corners = triangles if np.array_equal(first, np.arange(len(first))) else first[triangles]
@@ -165,7 +166,7 @@ def doubled_faces(topology: Topology) -> int:
     return int(np.count_nonzero(np.abs(copies) > 1.0))
 
 
-def surplus_copies(topology: Topology) -> np.ndarray:
+def surplus_copies(topology: Topology) -> BoolArray:
     """Which of the ``duplicates`` (m,) bool are defects: those of components whose edges are balanced at least as well
     without them. The others are needed to close the surface.
     """
@@ -180,8 +181,8 @@ def surplus_copies(topology: Topology) -> np.ndarray:
 
 @njit(nogil=True)
 def _component_sums(
-    vertices: np.ndarray, triangles: np.ndarray, component: np.ndarray, count: int, middle: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    vertices: Points, triangles: Triangles, component: IntArray, count: int, middle: Vector3
+) -> tuple[FloatArray, Points, Points]:
     volume = np.zeros(count)
     lower, upper = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     for t in range(len(triangles)):
@@ -202,19 +203,19 @@ def _component_sums(
 class Components:
     """Per component: signed volume (k,), lower and upper corners (k, 3)."""
 
-    volume: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
+    volume: FloatArray
+    lower: Points
+    upper: Points
 
 
-def component_sums(vertices: np.ndarray, topology: Topology) -> Components:
+def component_sums(vertices: Points, topology: Topology) -> Components:
     """Volumes and boxes of the components; reference of the volumes is the middle of the triangles' first corners."""
     corners = vertices[topology.corners[:, 0]]
     middle = 0.5 * corners.min(axis=0) + 0.5 * corners.max(axis=0)
     return Components(*_component_sums(vertices, topology.corners, topology.component, topology.components, middle))
 
 
-def rims(edges: np.ndarray) -> list[list[int]]:
+def rims(edges: IntArray) -> list[list[int]]:
     """Closed walks of three or more vertices along ``edges`` (e, 6) of a topology, against the more frequent direction.
 
     Each edge is used as often as one direction is used more than the other, so that polygons over all walks close the
@@ -244,7 +245,7 @@ def rims(edges: np.ndarray) -> list[list[int]]:
     return walks
 
 
-def fan(walk: list[int]) -> np.ndarray:
+def fan(walk: list[int]) -> Triangles:
     """Triangles (k, 3) of a polygon, as a fan from its first corner."""
     corners = np.array(walk, dtype=np.int64)
     return np.stack([np.full(len(walk) - 2, walk[0]), corners[1:-1], corners[2:]], axis=1)

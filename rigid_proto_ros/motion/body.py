@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.compilation import njit
 from ..base.rotation import norm, quaternion_of_axes
-from ..base.vectors import Numbers
+from ..base.vectors import Attitude, Matrix3, Numbers, Vector3
 from ..mass.closed_form import Principal
 from ..mass.tensor import principal_axes_kernel
 
@@ -29,6 +30,9 @@ BODY_SCALE = 29  # (3,)
 LENGTH = 32  # ℓ, reference length of displacement errors [m]; 1 without a mesh
 BODY = 33
 
+BodyRow = NDArray[np.float64]
+"""(BODY,)"""
+
 MAX_ACCELERATION = 1e15
 """Limit in m/s² and rad/s²; in m/s and rad/s for impulses. A larger command is most likely a typing error, and would
 leave no significant digits of the motion.
@@ -36,7 +40,7 @@ leave no significant digits of the motion.
 
 
 @njit(error_model="numpy", allocates=False)
-def angular_acceleration(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
+def angular_acceleration(body: BodyRow, x: float, y: float, z: float) -> tuple[float, float, float]:
     """I⁻¹ τ of a torque x, y, z, in body axes."""
     P, m = AXES, MOMENTS
     a = (body[P] * x + body[P + 3] * y + body[P + 6] * z) / body[m]
@@ -50,14 +54,14 @@ def angular_acceleration(body: np.ndarray, x: float, y: float, z: float) -> tupl
 
 
 @njit(error_model="numpy", allocates=False)
-def arm(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
+def arm(body: BodyRow, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Mesh coordinates x, y, z to metres from the COM, body axes."""
     s, c = BODY_SCALE, COM
     return x * body[s] - body[c], y * body[s + 1] - body[c + 1], z * body[s + 2] - body[c + 2]
 
 
 @njit(error_model="numpy", allocates=False)
-def normal(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
+def normal(body: BodyRow, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A unit normal x, y, z of the unscaled mesh as a unit vector in body axes: normals transform by scale⁻¹."""
     x, y, z = x / body[BODY_SCALE], y / body[BODY_SCALE + 1], z / body[BODY_SCALE + 2]
     size = norm(x, y, z)
@@ -65,9 +69,7 @@ def normal(body: np.ndarray, x: float, y: float, z: float) -> tuple[float, float
 
 
 @njit(error_model="numpy", allocates=False)
-def fill_body(
-    mass: float, com: np.ndarray, inertia: np.ndarray, principal: Principal, scale: np.ndarray, body: np.ndarray
-) -> None:
+def fill_body(mass: float, com: Vector3, inertia: Matrix3, principal: Principal, scale: Vector3, body: BodyRow) -> None:
     """Fill the row of a body (BODY,), with length ℓ = 1, from mass, com (3,), inertia (3, 3), its principal moments and
     axes, and scale (3,).
     """
@@ -87,7 +89,7 @@ def fill_body(
 class Body:
     """A rigid body. row (BODY,): the body as compiled kernels read it; it is never modified."""
 
-    row: np.ndarray
+    row: BodyRow
 
     @cached_property
     def mass(self) -> float:
@@ -95,32 +97,32 @@ class Body:
         return float(self.row[MASS])
 
     @cached_property
-    def center_of_mass(self) -> np.ndarray:
+    def center_of_mass(self) -> Vector3:
         """(3,) [m, mesh axes after scaling]."""
         return self.row[COM : COM + 3]
 
     @cached_property
-    def inertia(self) -> np.ndarray:
+    def inertia(self) -> Matrix3:
         """(3, 3) [kg m², about the COM, mesh axes]."""
         return self.row[INERTIA : INERTIA + 9].reshape(3, 3)
 
     @cached_property
-    def scale(self) -> np.ndarray:
+    def scale(self) -> Vector3:
         """(3,): factors from mesh coordinates to metres from the mesh origin."""
         return self.row[BODY_SCALE : BODY_SCALE + 3]
 
     @cached_property
-    def principal_moments(self) -> np.ndarray:
+    def principal_moments(self) -> Vector3:
         """(3,) [kg m²], ascending."""
         return self.row[MOMENTS : MOMENTS + 3]
 
     @cached_property
-    def principal_axes(self) -> np.ndarray:
+    def principal_axes(self) -> Matrix3:
         """(3, 3): principal axes as columns, in body axes."""
         return self.row[AXES : AXES + 9].reshape(3, 3)
 
     @cached_property
-    def principal_quaternion(self) -> np.ndarray:
+    def principal_quaternion(self) -> Attitude:
         """(4,) xyzw, rotation from principal to body axes."""
         return self.row[QUATERNION : QUATERNION + 4]
 
@@ -132,19 +134,19 @@ class Body:
         largest: float = max(*map(abs, self.scale.tolist()), *map(abs, self.center_of_mass.tolist()))
         return 0.1 * MAX_ACCELERATION * min(self.mass, float(self.principal_moments[0]) / (1.0 + 3.0 * largest))
 
-    def point(self, mesh_point: Numbers) -> np.ndarray:
+    def point(self, mesh_point: Numbers) -> Vector3:
         """Mesh coordinates (3,) to metres from the COM, body axes."""
         x, y, z = mesh_point
         return np.array(arm(self.row, float(x), float(y), float(z)))
 
-    def mesh_point(self, point: Numbers) -> np.ndarray:
+    def mesh_point(self, point: Numbers) -> Vector3:
         """Metres from the COM, body axes, to mesh coordinates (3,)."""
-        found: np.ndarray = (np.asarray(point) + self.center_of_mass) / self.scale
+        found: Vector3 = (np.asarray(point) + self.center_of_mass) / self.scale
         return found
 
 
 def make_body(
-    mass: float, center_of_mass: Numbers, inertia: Sequence[Numbers] | np.ndarray, scale: Numbers = (1.0, 1.0, 1.0)
+    mass: float, center_of_mass: Numbers, inertia: Sequence[Numbers] | Matrix3, scale: Numbers = (1.0, 1.0, 1.0)
 ) -> Body:
     """A body of given mass properties, its tensor diagonalized once."""
     row = np.empty(BODY)

@@ -28,13 +28,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arithmetic import expm1
 from ..base.compilation import new_record, njit, record_type
 from ..base.rotation import multiply, norm, rotate, rotate_inverse
-from ..base.vectors import Quaternion, Vector
+from ..base.vectors import FloatArray, Quaternion, Records, StateRow, Vector, Vector3
 from . import body as of_body
 from . import loads as of_loads
+from .body import BodyRow
 from .string import NO_DIRECTION, free_end_at
 
 ENVIRONMENT_FIELDS: list[tuple[Any, ...]] = [
@@ -54,7 +56,7 @@ class Environment:
     whether the term ω × Iω is kept.
     """
 
-    gravity: np.ndarray
+    gravity: Vector3
     linear_damping: float
     angular_damping: float
     gyroscopic: bool = True
@@ -102,6 +104,9 @@ PROBLEM = record_type(
 )
 
 
+Variables = NDArray[np.float64]
+"""(VARIABLES,): variables y of a segment."""
+
 # Where the numbers of a tied string stand in its row.
 KNOT = 0  # (3,) [mesh coordinates]
 ORIGIN = 3  # (3,) of the free end's way [m, world]
@@ -111,7 +116,7 @@ STRING = 13
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def begin_body(p: np.record, body: np.ndarray, environment: np.record, gyroscopic: float) -> None:
+def begin_body(p: np.record, body: BodyRow, environment: np.record, gyroscopic: float) -> None:
     """Fill p, a record of zeros, with what is the same in every segment of a body (BODY,): all but loads, string and
     start. environment: a record with the fields of ENVIRONMENT, and others.
     """
@@ -131,7 +136,7 @@ def begin_body(p: np.record, body: np.ndarray, environment: np.record, gyroscopi
 
 
 @njit(error_model="numpy", allocates=False)
-def begin_problem(p: np.record, loads: np.ndarray, row: np.ndarray) -> None:
+def begin_problem(p: np.record, loads: Records, row: StateRow) -> None:
     """Complete the body's part p with loads and the start, as far as they go without a string."""
     P, mass = p.principal_axes, p.mass
     turns, pushes = False, False
@@ -159,7 +164,7 @@ def begin_problem(p: np.record, loads: np.ndarray, row: np.ndarray) -> None:
 
 @njit(error_model="numpy", allocates=False)
 def begin_string(
-    p: np.record, body: np.ndarray, string: np.ndarray, begin_ns: int, end_ns: int, row: np.ndarray, now_ns: int
+    p: np.record, body: BodyRow, string: FloatArray, begin_ns: int, end_ns: int, row: StateRow, now_ns: int
 ) -> None:
     """Complete the problem p with a tied string (STRING,) whose free end goes from origin to target
     between these times.
@@ -235,7 +240,7 @@ MAX_SPEED = 1e100
 
 
 @njit(error_model="numpy")
-def is_good(y: np.ndarray) -> bool:
+def is_good(y: Variables) -> bool:
     """Whether variables y are finite and no runaway."""
     size = 0.0
     for j in range(4, 13):
@@ -260,7 +265,7 @@ def damping_functions(z: float) -> tuple[float, float]:
 
 
 @njit(error_model="numpy", allocates=False)
-def to_variables(row: np.ndarray, p: np.record, y: np.ndarray) -> None:
+def to_variables(row: StateRow, p: np.record, y: Variables) -> None:
     """State row (13,) to variables y (≥ 15,) at the start of the segment with problem p."""
     P, Q = p.principal_axes, p.principal_quaternion
     y[0], y[1], y[2], y[3] = multiply(row[3], row[4], row[5], row[6], Q[0], Q[1], Q[2], Q[3])
@@ -273,7 +278,7 @@ def to_variables(row: np.ndarray, p: np.record, y: np.ndarray) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def to_row(y: np.ndarray, p: np.record, elapsed: float, row: np.ndarray) -> None:
+def to_row(y: Variables, p: np.record, elapsed: float, row: StateRow) -> None:
     """Variables y (≥ 15,), ``elapsed`` seconds after the segment's start, to a state row (13,)."""
     P, Q = p.principal_axes, p.principal_quaternion
     c = p.reference_damping
@@ -288,7 +293,7 @@ def to_row(y: np.ndarray, p: np.record, elapsed: float, row: np.ndarray) -> None
 
 
 @njit(error_model="numpy", allocates=False)
-def to_good_row(y: np.ndarray, p: np.record, elapsed: float, row: np.ndarray, limit: float) -> bool:
+def to_good_row(y: Variables, p: np.record, elapsed: float, row: StateRow, limit: float) -> bool:
     """``to_row``; returns whether no number of the row is beyond ``limit`` or no number at all."""
     to_row(y, p, elapsed, row)
     good = True
@@ -303,7 +308,7 @@ def to_good_row(y: np.ndarray, p: np.record, elapsed: float, row: np.ndarray, li
 
 
 @njit(error_model="numpy", allocates=False)
-def parts_of(y: np.ndarray) -> tuple[Quaternion, Vector, Vector, Vector]:
+def parts_of(y: Variables) -> tuple[Quaternion, Vector, Vector, Vector]:
     """q, ω, d and u of the variables y."""
     return (y[0], y[1], y[2], y[3]), (y[4], y[5], y[6]), (y[7], y[8], y[9]), (y[10], y[11], y[12])
 
@@ -377,7 +382,7 @@ def accelerations(
 
 
 @njit(error_model="numpy", allocates=False)
-def stretch(y: np.ndarray, p: np.record) -> tuple[float, float]:
+def stretch(y: Variables, p: np.record) -> tuple[float, float]:
     """x = l − rest length, and its rate, of variables y; (1, 0) for a string whose law never changes."""
     if p.bilateral or not p.has_string:
         return 1.0, 0.0
@@ -389,7 +394,7 @@ def stretch(y: np.ndarray, p: np.record) -> tuple[float, float]:
 
 
 @njit(error_model="numpy", allocates=False)
-def tension_margin(y: np.ndarray, p: np.record) -> float:
+def tension_margin(y: Variables, p: np.record) -> float:
     """min(k x, k x + c x'): positive exactly while the string pulls."""
     x, rate = stretch(y, p)
     spring = p.stiffness * x

@@ -20,8 +20,8 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.rotation import matrix_elements, norm
-from ..base.vectors import Numbers, Vector, vector
-from .body import MASS, Body, angular_acceleration
+from ..base.vectors import FloatArray, Numbers, StateRow, Vector, Vector3, vector
+from .body import MASS, Body, BodyRow, angular_acceleration
 from .state import State
 
 RAMP_NS = 100_000_000
@@ -56,9 +56,7 @@ def length_of(x: float, y: float, z: float) -> float:
 
 
 @njit(error_model="numpy", allocates=False)
-def free_end_at(
-    now_ns: int, origin: np.ndarray, target: np.ndarray, begin_ns: int, end_ns: int
-) -> tuple[Vector, Vector]:
+def free_end_at(now_ns: int, origin: Vector3, target: Vector3, begin_ns: int, end_ns: int) -> tuple[Vector, Vector]:
     """The free end's position [m, world] and, from then on, its velocity [m/s, world], for uniform motion from origin
     (3,) at begin_ns to target (3,) at end_ns, where it stays.
     """
@@ -70,7 +68,7 @@ def free_end_at(
 
 
 @njit(error_model="numpy", allocates=False)
-def span_of(rx: float, ry: float, rz: float, row: np.ndarray, ex: float, ey: float, ez: float) -> Vector:
+def span_of(rx: float, ry: float, rz: float, row: StateRow, ex: float, ey: float, ez: float) -> Vector:
     """Vector from the free end at e [m, world] to the knot at r [m from the COM, body axes] for a state row (13,):
     three numbers [m, world].
     """
@@ -83,7 +81,7 @@ def span_of(rx: float, ry: float, rz: float, row: np.ndarray, ex: float, ey: flo
 
 
 @njit(error_model="numpy", allocates=False)
-def _turning(body: np.ndarray, rx: float, ry: float, rz: float, x: float, y: float, z: float) -> float:
+def _turning(body: BodyRow, rx: float, ry: float, rz: float, x: float, y: float, z: float) -> float:
     """(r × n)ᵀ I⁻¹ (r × n) for a unit vector n, body axes."""
     lx, ly, lz = ry * z - rz * y, rz * x - rx * z, rx * y - ry * x
     ax, ay, az = angular_acceleration(body, lx, ly, lz)
@@ -92,7 +90,7 @@ def _turning(body: np.ndarray, rx: float, ry: float, rz: float, x: float, y: flo
 
 @njit(error_model="numpy", allocates=False)
 def effective_mass(
-    body: np.ndarray, rx: float, ry: float, rz: float, row: np.ndarray, span: Vector, rest_length: float
+    body: BodyRow, rx: float, ry: float, rz: float, row: StateRow, span: Vector, rest_length: float
 ) -> float:
     """m_eff [kg] of the point r [m, body axes] of a body (BODY,) along ``span`` [world]. The mean of 1/m_eff over all
     directions is used if the span has no direction: shorter than NO_DIRECTION rest lengths, or than the rounding error
@@ -156,8 +154,8 @@ class StringState:
     """
 
     attach: tuple[float, float, float]
-    origin: np.ndarray
-    target: np.ndarray
+    origin: Vector3
+    target: Vector3
     begin_ns: int
     end_ns: int
     last_target_ns: int
@@ -170,16 +168,16 @@ class StringState:
     bilateral: bool = False
 
     @property
-    def row(self) -> np.ndarray:
+    def row(self) -> FloatArray:
         """The string as compiled functions read it (STRING,), see motion/problem.py."""
         numbers = (self.stiffness, self.damping, self.rest_length, float(self.bilateral))
         return np.array([*self.attach, *self.origin, *self.target, *numbers])
 
-    def arm(self, body: Body) -> np.ndarray:
+    def arm(self, body: Body) -> Vector3:
         """Vector from the COM to the knot (3,) [m, body axes]."""
         return body.point(self.attach)
 
-    def free_end(self, time_ns: int) -> np.ndarray:
+    def free_end(self, time_ns: int) -> Vector3:
         """Position of the free end (3,) [m, world]."""
         return np.array(free_end_at(time_ns, self.origin, self.target, self.begin_ns, self.end_ns)[0])
 

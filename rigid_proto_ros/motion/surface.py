@@ -16,7 +16,7 @@ import numpy as np
 from ..base.arithmetic import inverse_tangent_of
 from ..base.compilation import njit
 from ..base.rotation import length, norm
-from ..base.vectors import Numbers, Vector, vector
+from ..base.vectors import Numbers, Points, Triangles, Vector, Vector3, vector
 from ..mass.moments import referenced_vertices
 from ..mesh.intersection import corners_of, cross, dot, minus
 
@@ -25,27 +25,27 @@ from ..mesh.intersection import corners_of, cross, dot, minus
 class Surface:
     """vertices (n, 3) float64, triangles (m, 3) integer, counter-clockwise seen from outside."""
 
-    vertices: np.ndarray
-    triangles: np.ndarray
+    vertices: Points
+    triangles: Triangles
 
     @cached_property
-    def extent(self) -> np.ndarray:
+    def extent(self) -> Vector3:
         """Sides of the bounding box (3,)."""
-        sides: np.ndarray = np.ptp(referenced_vertices(self.vertices, self.triangles), axis=0)
+        sides: Vector3 = np.ptp(referenced_vertices(self.vertices, self.triangles), axis=0)
         return sides
 
-    def ray_hit(self, origin: Numbers, direction: Numbers) -> np.ndarray | None:
+    def ray_hit(self, origin: Numbers, direction: Numbers) -> Vector3 | None:
         """First point (3,) where the ray meets the surface from either side; None for a miss."""
         origin, direction = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
         direction = direction / np.abs(direction).max()
         distance = _first_hit(self.vertices, self.triangles, origin, direction)
         return origin + distance * direction if distance < math.inf else None
 
-    def nearest_point(self, point: Numbers) -> np.ndarray:
+    def nearest_point(self, point: Numbers) -> Vector3:
         """The point (3,) of the surface nearest to ``point`` (3,)."""
         return np.array(_nearest(self.vertices, self.triangles, vector(point)))
 
-    def inward_normal(self, point: Numbers) -> np.ndarray:
+    def inward_normal(self, point: Numbers) -> Vector3:
         """Unit inward normal (3,) of the surface where it is nearest to ``point`` (3,).
 
         On an edge or at a vertex it is the angle-weighted mean of the normals of adjacent faces (Baerentzen & Aanaes
@@ -58,7 +58,7 @@ class Surface:
 
 
 @njit()
-def _first_hit(vertices: np.ndarray, triangles: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> float:
+def _first_hit(vertices: Points, triangles: Triangles, origin: Vector3, direction: Vector3) -> float:
     """Distance along ``direction`` of the first hit, infinite for none: Woop, Benthin and Wald (2013), watertight at
     edges.
     """
@@ -156,7 +156,7 @@ def _angle_at(u: float, v: float, a: Vector, b: Vector, c: Vector) -> float:
 
 
 @njit()
-def _nearest(vertices: np.ndarray, triangles: np.ndarray, point: Vector) -> Vector:
+def _nearest(vertices: Points, triangles: Triangles, point: Vector) -> Vector:
     best = math.inf
     found = (0.0, 0.0, 0.0)
     for i in range(triangles.shape[0]):
@@ -168,7 +168,7 @@ def _nearest(vertices: np.ndarray, triangles: np.ndarray, point: Vector) -> Vect
 
 
 @njit()
-def _pseudo_normal(vertices: np.ndarray, triangles: np.ndarray, point: Vector, tolerance: float) -> Vector:
+def _pseudo_normal(vertices: Points, triangles: Triangles, point: Vector, tolerance: float) -> Vector:
     foot = _nearest(vertices, triangles, point)
     nx, ny, nz = 0.0, 0.0, 0.0
     for i in range(triangles.shape[0]):

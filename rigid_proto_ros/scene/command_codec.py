@@ -7,6 +7,7 @@ Both are one content: what a message says is what its line keeps. Scripts have w
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from ..base.errors import CommandRefused, InputError
 from ..base.vectors import vector
@@ -82,7 +83,7 @@ def of_message(topic: str, data: bytes, names: Names = WORDS) -> Command:
     return _command(kind, content | {name: numbers[place] for name, place in fields.items()}, names)
 
 
-def of_event(kind: str, content: Mapping, names: Names = WORDS) -> Command | None:
+def of_event(kind: str, content: Mapping[str, Any], names: Names = WORDS) -> Command | None:
     """The command that an event of the log tells of, as the node with these frames read it; None for MARKS, which don't
     affect the motion.
 
@@ -100,7 +101,7 @@ def of_event(kind: str, content: Mapping, names: Names = WORDS) -> Command | Non
         raise InputError(kind, str(content)[:80], "the content of a recorded event") from None
 
 
-def _command(kind: str, content: Mapping, names: Names) -> Command:
+def _command(kind: str, content: Mapping[str, Any], names: Names) -> Command:
     """Raises CommandRefused, and what Python raises for content that is none of this kind."""
     match kind:
         case "set":

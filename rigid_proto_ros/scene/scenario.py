@@ -17,6 +17,7 @@ import numpy as np
 
 from ..base.arithmetic import exact_quotient
 from ..base.errors import CommandRefused, InputError, MeshError
+from ..base.vectors import Vector3
 from ..mass.from_mesh import mesh_body
 from ..mass.properties import MassProperties, MeshMoments, explicit_mass_properties, scale_vector
 from ..mesh.locate import resolve_mesh
@@ -237,7 +238,7 @@ def _timeout_ns(seconds: float) -> int:
     return max(1, nanoseconds(seconds)) if seconds else 0
 
 
-def _mass_properties(parameters: Parameters, body_mesh: BodyMesh | None, scale: np.ndarray) -> MassProperties:
+def _mass_properties(parameters: Parameters, body_mesh: BodyMesh | None, scale: Vector3) -> MassProperties:
     ballast = parameters.point_masses
     if parameters.inertia_model == "explicit":
         given = parameters.explicit_inertia
@@ -254,7 +255,7 @@ def _mass_properties(parameters: Parameters, body_mesh: BodyMesh | None, scale: 
     )
 
 
-def with_inertia(scenario: Scenario, content: Mapping) -> Scenario:
+def with_inertia(scenario: Scenario, content: Mapping[str, Any]) -> Scenario:
     """The scenario with the explicit inertia of an event's content; raises CommandRefused (``nonfinite``, ``tensor``).
 
     com (3,): scaled mesh coordinates, or metres from the present COM when ``relative``. It stands for the whole body,

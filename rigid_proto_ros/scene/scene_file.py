@@ -177,7 +177,7 @@ def _values(path: str, node: yaml.Node, prefix: str) -> Iterator[tuple[str, obje
             yield name, typed(value)
 
 
-def _sequence(path: str, node: yaml.SequenceNode) -> list:
+def _sequence(path: str, node: yaml.SequenceNode) -> list[object]:
     items: list[object] = []
     for item in node.value:
         if isinstance(item, yaml.MappingNode):

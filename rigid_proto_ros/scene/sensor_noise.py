@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import FloatArray
 from .parameters import Parameters
 
 _WHITE, _BIAS = 0, 2
@@ -24,17 +25,17 @@ class ImuNoise:
     square is the covariance, since a bias a filter has to estimate. bias (2, 3): what each axis always errs.
     """
 
-    sigma: np.ndarray
-    bias: np.ndarray
+    sigma: FloatArray
+    bias: FloatArray
     seed: int
 
     def measured(self, time_ns: int, rate: Sequence[float], felt: Sequence[float]) -> list[list[float]]:
         """Angular velocity and specific force (3,) in body axes, as the IMU tells them."""
         errors = self.sigma[:, None] * _normal(self.seed, _WHITE, time_ns) + self.bias
-        return (np.array([rate, felt]) + errors).tolist()
+        return list((np.array([rate, felt]) + errors).tolist())
 
 
-def _normal(seed: int, kind: int, place: int) -> np.ndarray:
+def _normal(seed: int, kind: int, place: int) -> FloatArray:
     """Normal numbers (2, 3) of their own for each kind and place."""
     bits = np.random.Philox(key=seed, counter=[0, 0, place, kind])
     return np.random.Generator(bits).standard_normal((2, 3))

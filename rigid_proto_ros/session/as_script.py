@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.vectors import vector
+from ..base.vectors import StateRow, vector
 from ..motion.body import Body
 from ..motion.frames import Frame
 from ..motion.loads import Load
@@ -119,7 +120,7 @@ class _Writer(Observer):
             command = replace(command, axes="mesh", point=vector(point))
         self.entries.append({"t": time_ns / 1e9, **entry_of(command)})
 
-    def _change(self, time_ns: int, content: dict) -> None:
+    def _change(self, time_ns: int, content: dict[str, Any]) -> None:
         before, after = self.last, self.again.scenario
         self.last = after
         changes = {name: value for name, value in content.items() if name not in NOT_OF_THE_MOTION}
@@ -172,7 +173,7 @@ def recorded_branch(session: RecordedSession, scenario: Scenario, time_ns: int) 
     return SceneAndScript(_scene(scenario, session.rows[before[-1]], {}).text, []), int(session.times[before[-1]])
 
 
-def _scene(scenario: Scenario, row: np.ndarray, changes: dict[str, object]) -> Scenario:
+def _scene(scenario: Scenario, row: StateRow, changes: dict[str, object]) -> Scenario:
     """The scene that begins with this state."""
     numbers = row.tolist()
     velocities = PROJECTIONS["twist"](numbers)

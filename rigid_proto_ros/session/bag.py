@@ -20,6 +20,7 @@ from mcap.writer import MCAP0_MAGIC, Writer
 from ..base.errors import InputError
 from ..base.files import whole_file
 from ..base.rotation import rotate, rotate_inverse
+from ..base.vectors import FloatArray, IntArray
 from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_state, read_string
 from .recorded_session import RecordedSession, StampedRows, decode_event
 
@@ -262,7 +263,7 @@ def _messages(content: BagContent, prefix: str, name: str) -> list[tuple[int, by
     return sorted(content.messages.get(f"{prefix}/{name}", []), key=lambda message: message[0])
 
 
-def _states(content: BagContent, prefix: str, name: str) -> tuple[np.ndarray, StampedRows]:
+def _states(content: BagContent, prefix: str, name: str) -> tuple[IntArray, StampedRows]:
     """When a topic's states were logged, and they."""
     messages = _messages(content, prefix, name)
     read = [read_state(name, data, f"{prefix}/{name}") for _, data in messages]
@@ -271,12 +272,12 @@ def _states(content: BagContent, prefix: str, name: str) -> tuple[np.ndarray, St
     return logs, StampedRows(times, np.array([row for _, row in read], dtype=float))
 
 
-def _cuts_by_log(logs: np.ndarray, stamps: np.ndarray, resets: list[int]) -> list[int]:
+def _cuts_by_log(logs: IntArray, stamps: IntArray, resets: list[int]) -> list[int]:
     """Where a topic's messages of each run begin, and the end: at the resets' places in the log."""
     return [0, *np.searchsorted(logs, np.array(resets, np.int64)).tolist(), len(stamps)]
 
 
-def _cuts(logs: np.ndarray, stamps: np.ndarray, resets: list[int]) -> list[int]:
+def _cuts(logs: IntArray, stamps: IntArray, resets: list[int]) -> list[int]:
     """Where a topic's messages of each run begin, and the end: at the restarts of its stamps."""
     restarts = (np.flatnonzero(np.diff(stamps) < 0) + 1).tolist()
     # One each, however late the topic was logged.
@@ -291,8 +292,8 @@ def _cuts(logs: np.ndarray, stamps: np.ndarray, resets: list[int]) -> list[int]:
     return [*cuts, len(stamps)]
 
 
-def _shown_rows(published: dict[str, StampedRows]) -> tuple[np.ndarray, np.ndarray]:
-    """State rows (n, 13) and their times, one per stamp, from what was published; velocities that weren't are 0."""
+def _shown_rows(published: dict[str, StampedRows]) -> tuple[IntArray, FloatArray]:
+    """Times, one per stamp, and state rows (n, 13) from what was published; velocities that weren't are 0."""
     merged: dict[int, list[float]] = {}
     listed = {name: list(zip(r.times.tolist(), r.rows.tolist(), strict=True)) for name, r in published.items()}
     for name in ("odom", "pose"):

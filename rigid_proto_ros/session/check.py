@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.errors import CommandRefused, InputError
 from ..base.provenance import cpu, versions
+from ..base.vectors import FloatArray, StateRow
 from ..simulation.observer import Event, EventLog, Logged, Observer
 from .messages import FIELDS, PROJECTIONS
 from .recorded_session import RecordedSession, Resimulation, decode_event, resimulation
@@ -122,7 +123,7 @@ def broken_link(lines: Sequence[str]) -> int | None:
 
 def _advance(
     again: Resimulation, time_ns: int, computed: Sequence[str], recorded: Sequence[str], compared: int
-) -> tuple[Difference | None, np.ndarray]:
+) -> tuple[Difference | None, StateRow]:
     """The state computed at ``time_ns``, or the first difference in the commands up to there, of which ``compared``
     were alike.
     """
@@ -143,7 +144,7 @@ def _advance(
     return None, row
 
 
-def _states_in_order(session: RecordedSession) -> list[tuple[int, str, np.ndarray]]:
+def _states_in_order(session: RecordedSession) -> list[tuple[int, str, FloatArray]]:
     """Time, topic ("" for the state itself) and row of everything to compare, in the order of time."""
     streams = {"": (session.times, session.rows)}
     if session.published:
@@ -154,7 +155,7 @@ def _states_in_order(session: RecordedSession) -> list[tuple[int, str, np.ndarra
     return sorted(merged, key=lambda state: state[0])
 
 
-def _row_difference(number: int, name: str, recorded: np.ndarray, computed: np.ndarray) -> str:
+def _row_difference(number: int, name: str, recorded: FloatArray, computed: FloatArray) -> str:
     """How the ``number``-th state differs, by the variable that differs most; empty where it doesn't."""
     if name:
         computed = np.array(PROJECTIONS[name](computed.tolist()))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.rotation import cross, rotate, rotate_inverse
-from ..base.vectors import vector
+from ..base.vectors import Attitude, vector
 from ..motion.body import Body
 from ..motion.loads import Load
 from ..scene import cdr
@@ -140,7 +140,7 @@ def inertia_bytes(time_ns: int, body_frame: str, body: Body) -> bytes:
     return cdr.stamped_doubles(time_ns, f"{body_frame}/mesh", numbers)
 
 
-def applied_bytes(time_ns: int, body_frame: str, load: Load, body: Body, attitude: np.ndarray) -> bytes:
+def applied_bytes(time_ns: int, body_frame: str, load: Load, body: Body, attitude: Attitude) -> bytes:
     """A geometry_msgs/WrenchStamped of a load that began to act while the body lay at ``attitude`` (4,) xyzw: in the
     body's frame, whose origin is the COM and whose axes are those of the mesh.
     """

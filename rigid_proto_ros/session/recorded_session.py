@@ -13,10 +13,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..base.errors import InputError, MeshError
+from ..base.vectors import FloatArray, IntArray, StateRow
 from ..mesh.reading import Mesh, load_mesh, read_mesh
 from ..scene.command_codec import frame_names, of_event
 from ..scene.parameters import Parameters, convert_all
@@ -36,8 +38,8 @@ SAME = 1e-6
 class StampedRows:
     """What one topic published: times (n,) int64 [ns, simulated] and rows (n, k) float64."""
 
-    times: np.ndarray
-    rows: np.ndarray
+    times: IntArray
+    rows: FloatArray
 
     def __len__(self) -> int:
         return len(self.times)
@@ -61,8 +63,8 @@ class RecordedSession:
     scene: str = ""
     events: list[tuple[int, str]] = field(default_factory=list)
     refusals: list[tuple[int, str]] = field(default_factory=list)
-    times: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
-    rows: np.ndarray = field(default_factory=lambda: np.empty((0, 13)))
+    times: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    rows: FloatArray = field(default_factory=lambda: np.empty((0, 13)))
     complete: bool = True
     published: dict[str, StampedRows] = field(default_factory=dict)
     scenes: list[str] = field(default_factory=list)
@@ -89,7 +91,7 @@ class RecordedSession:
         return int(self.times[-1]) if len(self.times) else 0
 
 
-def decode_event(line: str, number: int) -> tuple[int, str, dict]:
+def decode_event(line: str, number: int) -> tuple[int, str, dict[str, Any]]:
     """time_ns, kind and content of a line of the event log; raises InputError naming the event by number."""
     try:
         event = json.loads(line)
@@ -193,7 +195,7 @@ class Resimulation(ScenarioRun):
         self._mesh_of = mesh_of
         self._changes_ns = -1
         self.end_ns = 0
-        waiting: list[tuple[int, str, dict, Command | None, int]] = []
+        waiting: list[tuple[int, str, dict[str, Any], Command | None, int]] = []
         for number, line in enumerate(event_lines, 1):
             time_ns, kind, content = decode_event(line, number)
             if kind == "timeout":
@@ -213,7 +215,7 @@ class Resimulation(ScenarioRun):
         # Stable: what happened at one instant keeps its order.
         self._waiting = deque(sorted(waiting, key=itemgetter(0)))
 
-    def advance(self, until_ns: int) -> np.ndarray:
+    def advance(self, until_ns: int) -> StateRow:
         """Advance the body to ``until_ns``; returns its state row, before what acts at that very time.
 
         Raises CommandRefused for a recorded command that can't be taken.

@@ -14,16 +14,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.arithmetic import exact_quotient
 from ..base.compilation import copy_numbers, copy_record, njit, record_type
 from ..base.simd import aligned
-from ..base.vectors import Vector
+from ..base.vectors import FloatArray, IntArray, Matrix3, Records, Vector, Vector3
 from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
-from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, arm, fill_body
+from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, BodyRow, arm, fill_body
 from ..motion.integrators.auto import FASTEST
 from ..motion.integrators.integrator import provide_kernel
 from ..motion.loads import is_within_magnitude
@@ -83,7 +82,7 @@ CERTAIN = 0.999
 """Fraction of a limit up to which a row is accepted here; closer to the limit the simulation decides."""
 
 
-_Side = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+_Side = tuple[Records, FloatArray, Records, Records, Records]
 """Arrays of a batch."""
 
 
@@ -93,10 +92,10 @@ class Batch:
     setup: the scene's. commands (n or 1, c) LOAD_ROW: loads, in the order in which they act.
     """
 
-    rows: NDArray[np.void]
-    ballast: NDArray[np.float64]
+    rows: Records
+    ballast: FloatArray
     setup: Setup
-    commands: NDArray[np.void]
+    commands: Records
 
     @property
     def arrays(self) -> _Side:
@@ -113,9 +112,9 @@ class Results:
     FLOOR_KINDS): error floors due to rounding (simulation/flight.py).
     """
 
-    status: NDArray[np.int64]
-    measured: NDArray[np.float64]
-    floors: NDArray[np.float64]
+    status: IntArray
+    measured: FloatArray
+    floors: FloatArray
 
 
 def new_results(rows: int, measures: int) -> Results:
@@ -126,11 +125,11 @@ def new_results(rows: int, measures: int) -> Results:
 
 # A row's body
 
-_Made = tuple[float, np.ndarray, np.ndarray, Principal, bool]
+_Made = tuple[float, Vector3, Matrix3, Principal, bool]
 
 
 @njit(error_model="numpy")
-def _explicit(own: np.record, ballast: np.ndarray) -> _Made:
+def _explicit(own: np.record, ballast: FloatArray) -> _Made:
     """Mass, COM (3,), inertia (3, 3), its principal moments and axes, and whether the numbers are certainly valid."""
     given = own.explicit_inertia_tensor
     inertia = np.empty((3, 3))
@@ -149,7 +148,7 @@ def _explicit(own: np.record, ballast: np.ndarray) -> _Made:
 
 
 @njit(error_model="numpy")
-def _spread(own: np.record, ballast: np.ndarray) -> _Made:
+def _spread(own: np.record, ballast: FloatArray) -> _Made:
     """The same for a model whose mass is distributed over a mesh."""
     s, mass = own.scale, own.mass
     if not mass > 0.0:
@@ -167,7 +166,7 @@ def _spread(own: np.record, ballast: np.ndarray) -> _Made:
 
 
 @njit(error_model="numpy", forceinline=True)
-def _make_body(own: np.record, ballast: np.ndarray, body: np.ndarray) -> bool:
+def _make_body(own: np.record, ballast: FloatArray, body: BodyRow) -> bool:
     """Fill ``body`` (BODY,) from a row and ballast (k, 4); returns False when the simulation must check it."""
     s = own.scale
     for k in range(3):
@@ -239,7 +238,7 @@ def _tie(own: np.record, flight: np.record) -> bool:
 
 
 @njit(error_model="numpy")
-def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.ndarray, loads: np.ndarray) -> bool:
+def _begin(own: np.record, ballast: FloatArray, flight: np.record, commands: Records, loads: Records) -> bool:
     """Initialize a row's flight, a copy of its setup's, and loads; returns False when the simulation must run it."""
     body = flight.body
     if not _make_body(own, ballast, body):
@@ -262,16 +261,16 @@ def _begin(own: np.record, ballast: np.ndarray, flight: np.record, commands: np.
 @njit(error_model="numpy", forceinline=True)
 def _fly_row(
     i: int,
-    rows: np.ndarray,
-    ballast: np.ndarray,
-    start: np.ndarray,
-    methods: np.ndarray,
-    commands: np.ndarray,
-    sample_ns: np.ndarray,
-    context: np.ndarray,
-    flights: np.ndarray,
+    rows: Records,
+    ballast: FloatArray,
+    start: Records,
+    methods: Records,
+    commands: Records,
+    sample_ns: IntArray,
+    context: FloatArray,
+    flights: Records,
     tables: tuple[Any, ...],
-    states: np.ndarray,
+    states: FloatArray,
 ) -> bool:
     """Simulate row i: fills states (m, STATE) at the ascending times sample_ns (m,), before events at those same times.
 
@@ -301,8 +300,8 @@ def _fly_rows(
     own: _Side,
     references: _Side,
     has_references: bool,
-    sample_ns: np.ndarray,
-    measures: np.ndarray,
+    sample_ns: IntArray,
+    measures: FloatArray,
     results: tuple[Any, ...],
     room: tuple[Any, ...],
 ) -> None:
@@ -328,8 +327,8 @@ def _fly_rows(
 def fly_rows(
     batch: Batch,
     references: Batch | None,
-    sample_ns: NDArray[np.int64],
-    measures: NDArray[np.float64],
+    sample_ns: IntArray,
+    measures: FloatArray,
 ) -> Results:
     """Simulate all rows, each with its reference if there are any; rows that can't be checked here have status 0.
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..base.compilation import copy_numbers, copy_record, njit, record_type
 from ..base.rotation import norm
+from ..base.vectors import FloatArray, Records, StateRow
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
 from ..motion.integrators.integrator import ADAPTIVE, CONTROL, FIXED_STEPS, NOTHING, commit, reach
@@ -28,6 +29,7 @@ from ..motion.problem import (
     PROBLEM,
     STRING,
     VARIABLES,
+    Variables,
     accelerations,
     begin_problem,
     begin_string,
@@ -157,7 +159,7 @@ def begin_flight(flight: np.record) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def begin_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
+def begin_segment(flight: np.record, loads: Records, methods: Records, room: FloatArray) -> None:
     """Begin a segment at ``start``: sum the active loads anew, in the order in which they began, and select the method.
 
     loads: the table. methods: see motion/integrators/integrator.py. room: memory for the workspace of adaptive methods.
@@ -175,7 +177,7 @@ def begin_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, roo
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def complete_problem(flight: np.record, row: np.ndarray, time_ns: int, p: np.record) -> None:
+def complete_problem(flight: np.record, row: StateRow, time_ns: int, p: np.record) -> None:
     """Complete p, a copy of ``common``, to the problem of a segment with the initial state ``row``, the loads ``sums``
     and the string.
     """
@@ -185,7 +187,7 @@ def complete_problem(flight: np.record, row: np.ndarray, time_ns: int, p: np.rec
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def begin_variables(flight: np.record, methods: np.ndarray, room: np.ndarray) -> None:
+def begin_variables(flight: np.record, methods: Records, room: FloatArray) -> None:
     """Set the initial variables and select the method of a segment whose problem is complete."""
     p, y = flight.problem, flight.variables
     for k in range(VARIABLES):
@@ -204,7 +206,7 @@ def begin_variables(flight: np.record, methods: np.ndarray, room: np.ndarray) ->
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def commit_until(flight: np.record, methods: np.ndarray, room: np.ndarray, until_ns: int) -> bool:
+def commit_until(flight: np.record, methods: Records, room: FloatArray, until_ns: int) -> bool:
     """Commit every full step of the segment that ends at or before ``until_ns``; returns whether all were good."""
     span_ns = until_ns - flight.committed_ns
     # If the pending step ends later, there is nothing to commit.
@@ -220,7 +222,7 @@ def commit_until(flight: np.record, methods: np.ndarray, room: np.ndarray, until
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def sample(flight: np.record, methods: np.ndarray, room: np.ndarray, at_ns: int, row: np.ndarray) -> bool:
+def sample(flight: np.record, methods: Records, room: FloatArray, at_ns: int, row: StateRow) -> bool:
     """Write the state at ``at_ns``, less than one step after the last committed step, into row and commit nothing.
     Returns whether the state is good.
     """
@@ -242,7 +244,7 @@ def sample(flight: np.record, methods: np.ndarray, room: np.ndarray, at_ns: int,
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def advance_segment(flight: np.record, methods: np.ndarray, room: np.ndarray, until_ns: int) -> int:
+def advance_segment(flight: np.record, methods: Records, room: FloatArray, until_ns: int) -> int:
     """Advance within the segment to ``until_ns``: full steps, then one shorter step on a copy, which ends there."""
     method = methods[flight.method]
     flight.waits = method.way != NOTHING and method.address == 0
@@ -256,7 +258,7 @@ def advance_segment(flight: np.record, methods: np.ndarray, room: np.ndarray, un
 
 
 @njit(error_model="numpy", allocates=False)
-def accelerations_now(flight: np.record, problem: np.ndarray, y: np.ndarray) -> tuple[float, ...]:
+def accelerations_now(flight: np.record, problem: Records, y: Variables) -> tuple[float, ...]:
     """Accelerations at now_ns by the equations of motion: of the COM [m/s², world], angular [rad/s², body axes]; six
     numbers. problem (1,) and y (VARIABLES,) are scratch memory.
     """
@@ -296,7 +298,7 @@ def steps_of_segment(flight: np.record) -> int:
 
 
 @njit(error_model="numpy", allocates=False)
-def evaluations_of_segment(flight: np.record, methods: np.ndarray) -> int:
+def evaluations_of_segment(flight: np.record, methods: Records) -> int:
     """Evaluations of the equations of motion in the segment's committed steps."""
     # The shorter step that ends a segment uses the series of the pending step.
     counted = flight.control.evaluations + flight.control.pending
@@ -304,7 +306,7 @@ def evaluations_of_segment(flight: np.record, methods: np.ndarray) -> int:
 
 
 @njit(error_model="numpy", allocates=False)
-def note_floors(flight: np.record, methods: np.ndarray, floors: np.ndarray) -> None:
+def note_floors(flight: np.record, methods: Records, floors: FloatArray) -> None:
     """Update ``floors`` (FLOOR_KINDS,) with limits of double precision in the segment up to now_ns, which no method can
     improve. Rounding ω to ε causes an attitude error of ε|ω|t. A position is rounded to half a unit in its last place.
     The tensor of a slender body, unless given in its principal axes, holds its smallest moment and the difference of
@@ -336,7 +338,7 @@ def floor_text(floors: Iterable[float]) -> str:
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def finish_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
+def finish_segment(flight: np.record, loads: Records, methods: Records, room: FloatArray) -> None:
     """Add the segment's counts to the totals and begin another segment at the state at now_ns."""
     note_floors(flight, methods, flight.floors)
     flight.steps_before += steps_of_segment(flight)
@@ -349,7 +351,7 @@ def finish_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, ro
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def cut_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room: np.ndarray) -> None:
+def cut_segment(flight: np.record, loads: Records, methods: Records, room: FloatArray) -> None:
     """End the segment at now_ns, counting the shorter step that was taken to that time, and begin another."""
     if flight.now_ns > flight.committed_ns and not methods[flight.method].sleeps:
         flight.taken += 1
@@ -357,14 +359,14 @@ def cut_segment(flight: np.record, loads: np.ndarray, methods: np.ndarray, room:
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def _write(flight: np.record, events: np.ndarray, what: int, load_id: int, row: int) -> None:
+def _write(flight: np.record, events: Records, what: int, load_id: int, row: int) -> None:
     event = events[flight.events]
     event.time_ns, event.what, event.load_id, event.row = flight.now_ns, what, load_id, row
     flight.events += 1
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def end_due(flight: np.record, loads: np.ndarray, events: np.ndarray) -> bool:
+def end_due(flight: np.record, loads: Records, events: Records) -> bool:
     """End the loads whose end is at or before now_ns; returns whether any ended."""
     kept = 0
     for row in range(flight.acting):
@@ -384,7 +386,7 @@ def end_due(flight: np.record, loads: np.ndarray, events: np.ndarray) -> bool:
 
 
 @njit(error_model="numpy", allocates=False)
-def end_slot(flight: np.record, loads: np.ndarray, events: np.ndarray, slot: int) -> None:
+def end_slot(flight: np.record, loads: Records, events: Records, slot: int) -> None:
     """End the active load in a slot, if there is one."""
     ended = False
     for row in range(flight.acting):
@@ -398,7 +400,7 @@ def end_slot(flight: np.record, loads: np.ndarray, events: np.ndarray, slot: int
 
 
 @njit(error_model="numpy", allocates=False)
-def end_all(flight: np.record, loads: np.ndarray, events: np.ndarray) -> None:
+def end_all(flight: np.record, loads: Records, events: Records) -> None:
     """End all active loads."""
     for row in range(flight.acting):
         _write(flight, events, ENDED, loads[row].id, row)
@@ -412,7 +414,7 @@ def end_of_held(flight: np.record, begin_ns: int) -> int:
 
 
 @njit(error_model="numpy", allocates=False)
-def take_body(flight: np.record, loads: np.ndarray) -> None:
+def take_body(flight: np.record, loads: Records) -> None:
     """Recompute the contributions and end times of the active loads for another body and other settings."""
     for row in range(flight.acting):
         acting = loads[row]
@@ -422,7 +424,7 @@ def take_body(flight: np.record, loads: np.ndarray) -> None:
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def _begin(flight: np.record, loads: np.ndarray, row: int, end_ns: int) -> None:
+def _begin(flight: np.record, loads: Records, row: int, end_ns: int) -> None:
     """Make the load in a row active from now_ns until ``end_ns``, as the last of the active loads."""
     to = flight.acting
     if to != row:
@@ -434,7 +436,7 @@ def _begin(flight: np.record, loads: np.ndarray, row: int, end_ns: int) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def apply(flight: np.record, loads: np.ndarray, events: np.ndarray, row: int) -> None:
+def apply(flight: np.record, loads: Records, events: Records, row: int) -> None:
     """Apply the command in a row at now_ns. Active loads may be written to the rows before it."""
     kind, load = loads[row].kind, loads[row].load
     if kind != CLEAR:
@@ -462,7 +464,7 @@ def apply(flight: np.record, loads: np.ndarray, events: np.ndarray, row: int) ->
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def next_event_ns(flight: np.record, loads: np.ndarray) -> int:
+def next_event_ns(flight: np.record, loads: Records) -> int:
     """Time of the next event: a load ends, a command is due, or the string's free end arrives at its target."""
     event_ns = loads[flight.due].at_ns if flight.due < flight.due_end else NEVER
     for row in range(flight.acting):
@@ -475,10 +477,10 @@ def next_event_ns(flight: np.record, loads: np.ndarray) -> int:
 @njit(error_model="numpy", allocates=False)
 def fly(
     flight: np.record,
-    loads: np.ndarray,
-    events: np.ndarray,
-    methods: np.ndarray,
-    room: np.ndarray,
+    loads: Records,
+    events: Records,
+    methods: Records,
+    room: FloatArray,
     until_ns: int,
 ) -> int:
     """Advance the flight to ``until_ns``; ``row`` is then the state before events at that same time are applied.

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.vectors import Attitude, Points, StateRow, Triangles, Vector3
 from .commands import Command
 
 if TYPE_CHECKING:
@@ -44,9 +45,9 @@ class ShownLoad:
 
     kind: str
     axes: str
-    point: np.ndarray
-    force: np.ndarray
-    torque: np.ndarray
+    point: Vector3
+    force: Vector3
+    torque: Vector3
 
 
 def shown_load(kind: str, load: Load, body: Body) -> ShownLoad:
@@ -60,8 +61,8 @@ class Started(NamedTuple):
     """A run begins: the scene as parameter-file text; vertices (n, 3) [mesh coordinates], triangles (m, 3)."""
 
     scene: str
-    vertices: np.ndarray | None
-    triangles: np.ndarray | None
+    vertices: Points | None
+    triangles: Triangles | None
     mesh_sha256: str
     time_ns: int = 0
 
@@ -76,7 +77,7 @@ class Published(NamedTuple):
     """A state at the time of a publication; ``row`` (13,) float64 in STATE_FIELDS order is reused: copy it."""
 
     time_ns: int
-    row: np.ndarray
+    row: StateRow
 
 
 class SceneChanged(NamedTuple):
@@ -97,8 +98,8 @@ class MeshChanged(NamedTuple):
     """The body is drawn as this mesh from ``time_ns`` on; comes before the BodyChanged of the same change."""
 
     time_ns: int
-    vertices: np.ndarray | None
-    triangles: np.ndarray | None
+    vertices: Points | None
+    triangles: Triangles | None
     mesh_sha256: str
 
 
@@ -126,7 +127,7 @@ class Applied(NamedTuple):
     command: WrenchCommand
     load: Load
     body: Body
-    attitude: np.ndarray
+    attitude: Attitude
 
 
 class StringChanged(NamedTuple):
@@ -136,7 +137,7 @@ class StringChanged(NamedTuple):
 
     time_ns: int
     string: StringState | None
-    arm: np.ndarray | None
+    arm: Vector3 | None
 
 
 class Logged(NamedTuple):
@@ -174,7 +175,7 @@ class GhostPublished(NamedTuple):
     """One state of the ghost, after the body's own of the same time; ``row`` as in Published."""
 
     time_ns: int
-    row: np.ndarray
+    row: StateRow
 
 
 Event = (

@@ -11,11 +11,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..base.arithmetic import inverse_tangent_of
 from ..base.compilation import copy_numbers, njit
 from ..base.rotation import norm, rotate
+from ..base.vectors import Attitude, FloatArray, IntArray, StateRow, Vector3
 from ..motion.state import angular_momentum, kinetic_energy
 
 QUANTITIES = {
@@ -63,24 +62,24 @@ START, START_ENERGY, START_MOMENTUM, CONTEXT = 0, 13, 14, 17
 
 
 @njit(error_model="numpy", allocates=False)
-def _momentum(row: np.ndarray) -> tuple[float, float, float]:
+def _momentum(row: FloatArray) -> tuple[float, float, float]:
     return angular_momentum(row, row[INERTIA : INERTIA + 9])
 
 
 @njit(error_model="numpy", allocates=False)
-def _kinetic(row: np.ndarray) -> float:
+def _kinetic(row: FloatArray) -> float:
     return kinetic_energy(row, row[MASS], row[INERTIA : INERTIA + 9])
 
 
 @njit(error_model="numpy", allocates=False)
-def _potential(row: np.ndarray) -> float:
+def _potential(row: FloatArray) -> float:
     g = GRAVITY
     fallen = row[g] * row[0] + row[g + 1] * row[1] + row[g + 2] * row[2]
     return float(row[STRING_ENERGY] - row[MASS] * fallen)
 
 
 @njit(error_model="numpy", allocates=False)
-def attitude_angle(a: np.ndarray, b: np.ndarray) -> float:
+def attitude_angle(a: Attitude, b: Attitude) -> float:
     """Angle of the rotation from attitude a (4,) to b (4,), xyzw [rad, 0 to π]."""
     w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     x = a[3] * b[0] - a[0] * b[3] - a[1] * b[2] + a[2] * b[1]
@@ -91,7 +90,7 @@ def attitude_angle(a: np.ndarray, b: np.ndarray) -> float:
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def fill_state(
-    state: np.ndarray, string_energy: float, mass: float, inertia: np.ndarray, gravity: np.ndarray, row: np.ndarray
+    state: StateRow, string_energy: float, mass: float, inertia: FloatArray, gravity: Vector3, row: FloatArray
 ) -> None:
     """Fill a state row (STATE,) from the state (13,) and what is in force with it: tensor (9,), gravity (3,)."""
     copy_numbers(state, row[:13])
@@ -101,7 +100,7 @@ def fill_state(
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def begin(row: np.ndarray, context: np.ndarray) -> None:
+def begin(row: FloatArray, context: FloatArray) -> None:
     """Fill the context (CONTEXT,) from the state row (STATE,) at time 0. Energy and angular momentum of a body that has
     none are NaN, and so is their drift.
     """
@@ -114,7 +113,7 @@ def begin(row: np.ndarray, context: np.ndarray) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
+def quantity(code: int, row: FloatArray, context: FloatArray) -> float:
     """The quantity NAMES[code] of a state row (STATE,)."""
     if code < 13:
         return float(row[code])
@@ -144,7 +143,7 @@ def quantity(code: int, row: np.ndarray, context: np.ndarray) -> float:
 
 
 @njit(error_model="numpy", allocates=False)
-def difference(code: int, a: np.ndarray, b: np.ndarray) -> float:
+def difference(code: int, a: FloatArray, b: FloatArray) -> float:
     """The difference number ``code`` of DIFFERENCES between two state rows."""
     if code == 0:
         return attitude_angle(a[3:7], b[3:7])
@@ -167,7 +166,7 @@ to D the axis in the body; all zero for the axis of the initial spin.
 
 
 @njit(error_model="numpy", allocates=False)
-def count_flips(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> float:
+def count_flips(measure: FloatArray, states: FloatArray, context: FloatArray) -> float:
     """Number of flips of a body axis: the cosine to its initial direction falls below −margin, then exceeds margin, ...
 
     The margin (hysteresis) avoids repeated counts of an axis that is nearly perpendicular. NaN without an axis.
@@ -191,7 +190,7 @@ def count_flips(measure: np.ndarray, states: np.ndarray, context: np.ndarray) ->
 
 
 @njit(error_model="numpy", allocates=False)
-def _extreme(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> float:
+def _extreme(measure: FloatArray, states: FloatArray, context: FloatArray) -> float:
     sign = 1.0 if measure[KIND] == LARGEST else -1.0
     found = sign * quantity(int(measure[CODE]), states[0], context)
     for k in range(1, states.shape[0]):
@@ -200,7 +199,7 @@ def _extreme(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> fl
 
 
 @njit(error_model="numpy", allocates=False)
-def _first(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> int:
+def _first(measure: FloatArray, states: FloatArray, context: FloatArray) -> int:
     """Index of the first sample at which the condition of a measure holds, or −1."""
     for k in range(states.shape[0]):
         if measure[A] * (quantity(int(measure[CODE]), states[k], context) - measure[B]) > 0.0:
@@ -210,12 +209,12 @@ def _first(measure: np.ndarray, states: np.ndarray, context: np.ndarray) -> int:
 
 @njit(error_model="numpy", allocates=False)
 def measure_flight(
-    measures: np.ndarray,
-    states: np.ndarray,
-    others: np.ndarray,
-    sample_ns: np.ndarray,
-    context: np.ndarray,
-    out: np.ndarray,
+    measures: FloatArray,
+    states: FloatArray,
+    others: FloatArray,
+    sample_ns: IntArray,
+    context: FloatArray,
+    out: FloatArray,
 ) -> None:
     """Fill out (k,) with the measures (k, MEASURE) of a flight.
 

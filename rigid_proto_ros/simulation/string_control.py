@@ -9,9 +9,8 @@ import numpy as np
 
 from ..base.errors import CommandRefused
 from ..base.rotation import transposed_times
-from ..base.vectors import vector
-from ..motion.body import Body
-from ..motion.loads import MAX_ACCELERATION
+from ..base.vectors import Vector3, vector
+from ..motion.body import MAX_ACCELERATION, Body
 from ..motion.state import State
 from ..motion.string import StringState, span_of, tie
 from .commands import MoveString, TieString
@@ -87,7 +86,7 @@ class StringControl:
         self.tied = tied
 
 
-def mesh_point(command: TieString, body: Body, state: State) -> np.ndarray:
+def mesh_point(command: TieString, body: Body, state: State) -> Vector3:
     """Point (3,) at which a command ties the string, in mesh coordinates, before it is projected to the surface."""
     point = np.asarray(command.point, dtype=float)
     if command.axes == "world":

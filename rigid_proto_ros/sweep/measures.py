@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import FloatArray, IntArray
 from ..scene.scenario import publication_ns
 from ..simulation import quantities as fm
 from ..simulation.commands import nanoseconds
@@ -30,8 +31,8 @@ class Measures:
     """
 
     columns: tuple[str, ...]
-    table: np.ndarray
-    sample_ns: np.ndarray
+    table: FloatArray
+    sample_ns: IntArray
 
     @property
     def needs_reference(self) -> bool:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import InputError, MeshError
 from ..base.files import output_file
+from ..base.vectors import BoolArray, FloatArray, IntArray, Records
 from ..mass.moments import STRETCHED
 from ..motion.integrators import check_supported
 from ..motion.loads import FORCE, TORQUE
@@ -53,7 +54,7 @@ def _field_of(parameter: str) -> str:
     return parameter.replace(".", "_")
 
 
-def batch_row(parameters: Parameters, body_mesh: BodyMesh | None) -> NDArray[np.void]:
+def batch_row(parameters: Parameters, body_mesh: BodyMesh | None) -> Records:
     """The row (1,) batch.ROW of parameters; raises InputError."""
     row = np.zeros(1, batch.ROW)
     for name, value in parameters.named().items():
@@ -103,7 +104,7 @@ class BatchMaker:
         if any(self._written) and not setup.integrator.supports_loads:
             raise NotBatchable
 
-    def batch(self, columns: list[np.ndarray], count: int) -> tuple[batch.Batch, NDArray[np.bool_]]:
+    def batch(self, columns: list[NDArray[Any]], count: int) -> tuple[batch.Batch, BoolArray]:
         """``count`` rows with these values of what varies, and which of them the batch may check (n,)."""
         good = np.ones(count, bool)
         rows = np.repeat(self._row, count)
@@ -125,7 +126,7 @@ class BatchMaker:
         return batch.Batch(rows, self._ballast, self._setup, np.take_along_axis(commands, order, axis=1)), good
 
 
-def _commands_of(script: list[Any], setup: Setup) -> tuple[NDArray[np.void], list[int]]:
+def _commands_of(script: list[Any], setup: Setup) -> tuple[Records, list[int]]:
     """A table (c,) LOAD_ROW of the script's pokes and wrenches in its own order, and the entries (c,) they are of."""
     commands = sorted(expand_script(script, "script"), key=lambda command: command.entry)
     table = np.zeros(len(commands), fl.LOAD_ROW)
@@ -166,7 +167,7 @@ def _place_of(vary: Vary, script: list[Any], entries: list[int]) -> Place:
     return row, "load", first + component[0] if component else slice(first, first + 3)
 
 
-def _write(commands: NDArray[np.void], place: Place, column: np.ndarray, good: NDArray[np.bool_]) -> None:
+def _write(commands: Records, place: Place, column: FloatArray, good: BoolArray) -> None:
     row, name, where = place
     lower, upper = _BOUNDS[name]
     within = (column >= lower) & (column <= upper)
@@ -179,7 +180,7 @@ def _write(commands: NDArray[np.void], place: Place, column: np.ndarray, good: N
         commands[name][:, row] = np.rint(values * 1e9)
 
 
-def _keep(good: NDArray[np.bool_], within: NDArray[np.bool_]) -> None:
+def _keep(good: BoolArray, within: BoolArray) -> None:
     """Only rows whose numbers (n,) or (n, k) are within bounds are good any more."""
     good &= within if within.ndim == 1 else within.all(axis=1)
 
@@ -198,7 +199,7 @@ class Chunk:
     simulation flew.
     """
 
-    columns: dict[str, np.ndarray]
+    columns: dict[str, NDArray[Any]]
     simulated: int
 
     def __len__(self) -> int:
@@ -267,7 +268,7 @@ def simulate_row(study: Study, row: Variation, i: int, results: batch.Results) -
 
 
 def _simulate(
-    scenario: Scenario, commands: list[Command], sample_ns: np.ndarray, states: np.ndarray, context: np.ndarray
+    scenario: Scenario, commands: list[Command], sample_ns: IntArray, states: FloatArray, context: FloatArray
 ) -> Simulation:
     """Fill ``states`` at the sample times, and the context; the simulation at their end."""
     simulation = OfflineRun(scenario, commands).simulation
@@ -286,7 +287,7 @@ def _simulate(
     return simulation
 
 
-def _fill(simulation: Simulation, row: np.ndarray) -> None:
+def _fill(simulation: Simulation, row: FloatArray) -> None:
     """Fill a state row (STATE,) with the present state, and with the body and gravity that are now in force."""
     setup, string, state = simulation.setup, simulation.string, simulation.state
     energy = string.potential_energy(setup.body, state) if string else 0.0
@@ -294,9 +295,9 @@ def _fill(simulation: Simulation, row: np.ndarray) -> None:
 
 
 def _table(
-    study: Study, rows: np.ndarray, columns: list[np.ndarray], results: batch.Results, failures: np.ndarray
-) -> dict[str, np.ndarray]:
-    table: dict[str, np.ndarray] = {"row": rows}
+    study: Study, rows: IntArray, columns: list[NDArray[Any]], results: batch.Results, failures: NDArray[np.object_]
+) -> dict[str, NDArray[Any]]:
+    table: dict[str, NDArray[Any]] = {"row": rows}
     for vary, column in zip(study.vary, columns, strict=True):
         if vary.is_random_vertex:
             table[f"{vary.target.name}.vertex"] = _vertices(study, columns, column)
@@ -317,13 +318,13 @@ def _table(
     return table
 
 
-def _as_objects(column: np.ndarray) -> np.ndarray:
+def _as_objects(column: NDArray[np.object_]) -> NDArray[np.object_]:
     text = np.empty(len(column), dtype=object)
     text[:] = [as_text(plain(value)) for value in column]
     return text
 
 
-def _vertices(study: Study, columns: list[np.ndarray], uniforms: np.ndarray) -> np.ndarray:
+def _vertices(study: Study, columns: list[NDArray[Any]], uniforms: FloatArray) -> IntArray:
     """Vertex numbers (n,) that uniform numbers (n,) choose on each row's mesh; −1 where that can't be read."""
     numbers = np.full(len(uniforms), -1)
     of_mesh = {v.target.name: c for v, c in zip(study.vary, columns, strict=True) if v.target.name.startswith("mesh")}

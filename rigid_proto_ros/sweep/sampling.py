@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..base.arithmetic import exponential_of, logarithm, sine_cosine
 from ..base.compilation import njit
 from ..base.errors import InputError
+from ..base.vectors import FloatArray, IntArray
 from .fields import mapping, number, whole
 
 MAX_POINTS = 1_000_000
@@ -89,7 +90,7 @@ class Draw:
         }
         return special.get(self.shape, [self.a, self.b])
 
-    def shaped(self, uniforms: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shaped(self, uniforms: FloatArray) -> FloatArray:
         """Values (n,) or (n, k) from uniform numbers (n, ``uniforms``); those themselves for a vertex."""
         out = np.empty((len(uniforms), {_ROTATION: 4, _DIRECTION: 3}.get(self.shape, 1)))
         _shape(self.shape, self.a, self.b, np.ascontiguousarray(uniforms), out)
@@ -166,7 +167,7 @@ def as_text(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def row_uniforms(seed: int, rows: np.ndarray, dimensions: int) -> np.ndarray:
+def row_uniforms(seed: int, rows: IntArray, dimensions: int) -> FloatArray:
     """The first uniform numbers in [0, 1) of each row (n,): (n, dimensions)."""
     key = np.random.SeedSequence(seed).generate_state(2, np.uint64)
     counts = -(-dimensions // _WORDS)
@@ -181,7 +182,7 @@ def row_uniforms(seed: int, rows: np.ndarray, dimensions: int) -> np.ndarray:
 
 
 @njit(error_model="numpy")
-def _shape(kind: int, a: float, b: float, u: np.ndarray, out: np.ndarray) -> None:
+def _shape(kind: int, a: float, b: float, u: FloatArray, out: FloatArray) -> None:
     """Fill out (n, k) from uniforms u (n, j), as ``Draw`` has them.
 
     A rotation is uniform over the group (Shoemake, Graphics Gems III, 1992), a direction over the sphere; a normal

@@ -18,9 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.bundled import example_names, example_path, study_names, study_path
 from ..base.errors import InputError, did_you_mean
+from ..base.vectors import IntArray
 from ..scene.parameters import (
     READ_ONLY,
     Parameters,
@@ -112,7 +114,7 @@ class Study:
         """How many variations there are."""
         return math.prod(self.grids) * self.samples
 
-    def columns(self, rows: np.ndarray) -> list[np.ndarray]:
+    def columns(self, rows: IntArray) -> list[NDArray[Any]]:
         """The varied values of rows (n,), one array for each of ``vary``: numbers (n,) or (n, k), or objects (n,)."""
         points = self._points(rows)
         dimensions = sum(v.form.uniforms for v in self.vary if isinstance(v.form, Draw))
@@ -126,15 +128,15 @@ class Study:
                 found.append(vary.form.array[index])
         return found
 
-    def _points(self, rows: np.ndarray) -> list[Any]:
+    def _points(self, rows: IntArray) -> list[Any]:
         """Which point of its grid or list each of ``vary`` has, None for a random one."""
         rest = rows // self.samples
-        digits: list[np.ndarray] = []
+        digits: list[IntArray] = []
         for size in reversed(self.grids):
             digits.append(rest % size)
             rest = rest // size
         digits.reverse()
-        found: list[np.ndarray | None] = []
+        found: list[IntArray | None] = []
         at = 0
         for vary in self.vary:
             if vary.form.kind == GRID:

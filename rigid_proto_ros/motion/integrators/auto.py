@@ -24,7 +24,8 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
-from ..problem import damping_functions, is_good, stretch
+from ...base.vectors import FloatArray
+from ..problem import Variables, damping_functions, is_good, stretch
 from .free_body import free_body_steps
 from .integrator import (
     ADAPTIVE,
@@ -47,7 +48,7 @@ per second, each of 2 to 3 µs.
 
 
 @njit(error_model="numpy", allocates=False)
-def steady_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+def steady_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Closed form for a body without spin, or with a constant spin because the gyroscopic term is left out."""
     for done in range(n):
         own, c = p.acceleration_body, p.damping_linear
@@ -71,13 +72,13 @@ ASLEEP, COASTING, STEADY, FREE, TURNING_LOADS, ANY_LOADS, SLACK_AT_REST, ON_STRI
 
 
 @njit(error_model="numpy", allocates=False)
-def _any(v: np.ndarray, at: int = 0) -> bool:
+def _any(v: FloatArray, at: int = 0) -> bool:
     """Whether any of three numbers isn't zero."""
     return bool(v[at] != 0.0 or v[at + 1] != 0.0 or v[at + 2] != 0.0)
 
 
 @njit(error_model="numpy", allocates=False)
-def kind_of_segment(p: np.record, y: np.ndarray) -> int:
+def kind_of_segment(p: np.record, y: Variables) -> int:
     """Kind of a segment with problem p and initial variables y."""
     spins = _any(y, 4)
     turned = _any(p.torque_body) or p.has_world_torque or (spins and p.damping_angular != 0.0)

@@ -40,7 +40,7 @@ from ...base.arithmetic import inverse_tangent_of, pair_add, pair_multiply, sine
 from ...base.compilation import njit
 from ...base.rotation import multiply, norm, normalize, rotate
 from ...base.vectors import Quaternion, Vector
-from ..problem import MAX_SPEED, damping_functions, is_good, parts_of, undamped_torque
+from ..problem import MAX_SPEED, Variables, damping_functions, is_good, parts_of, undamped_torque
 from .integrator import ANGULAR_DAMPING, LOADS, ONE_STEP, Integrator, Method
 
 ON_SEPARATRIX = 1e-290
@@ -189,7 +189,7 @@ def _side_of_separatrix(A: float, B: float, C: float, w1: float, w3: float) -> f
 
 
 @njit(error_model="numpy", allocates=False)
-def free_body_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+def free_body_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     q, w, _, _ = parts_of(y)
     moments = p.moments[0], p.moments[1], p.moments[2]
@@ -385,7 +385,7 @@ def carlson_rj(x: float, y: float, z: float, p: float) -> float:
 
 
 @njit(error_model="numpy", allocates=False)
-def _push(y: np.ndarray, p: np.record) -> tuple[float, ...]:
+def _push(y: Variables, p: np.record) -> tuple[float, ...]:
     """Torque (principal axes) and acceleration (world axes) at the attitude of y: six numbers."""
     tx, ty, tz = undamped_torque((y[0], y[1], y[2], y[3]), p)
     if not p.translates:
@@ -396,7 +396,7 @@ def _push(y: np.ndarray, p: np.record) -> tuple[float, ...]:
 
 
 @njit(error_model="numpy", allocates=False)
-def _kick(y: np.ndarray, p: np.record, h: float, pushed: tuple[float, ...]) -> None:
+def _kick(y: Variables, p: np.record, h: float, pushed: tuple[float, ...]) -> None:
     """Apply the rates of ``_push`` to ω and the added velocity for h seconds, in place; damping in closed form."""
     angular, linear = p.damping_angular, p.damping_linear
     for k in range(3):
@@ -412,7 +412,7 @@ def _kick(y: np.ndarray, p: np.record, h: float, pushed: tuple[float, ...]) -> N
 
 
 @njit(error_model="numpy")
-def free_body_strang_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+def free_body_strang_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     moments = p.moments[0], p.moments[1], p.moments[2]
     new = y.copy()

@@ -15,8 +15,8 @@ import numpy as np
 
 from ...base.compilation import copy_numbers, njit
 from ...base.rotation import matrix_elements, norm
-from ...base.vectors import Quaternion, Vector
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, accelerations, parts_of
+from ...base.vectors import FloatArray, Quaternion, Vector
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, accelerations, parts_of
 from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
 from .runge_kutta import ONE_STAGE, repeated
 
@@ -82,7 +82,7 @@ def _quaternion_near(matrix: _Matrix, q: Quaternion) -> Quaternion:
 
 
 @njit(error_model="numpy")
-def _moved(y: np.ndarray, at: np.ndarray, p: np.record, h: float, pulls: bool, out: np.ndarray) -> None:
+def _moved(y: Variables, at: Variables, p: np.record, h: float, pulls: bool, out: Variables) -> None:
     """Write y + h f(at) into out, which may be ``at``; the attitude is advanced as a matrix."""
     q, w, d, u = parts_of(at)
     turning, moving, work, heat = accelerations(q, w, d, u, p, pulls)
@@ -98,18 +98,18 @@ def _moved(y: np.ndarray, at: np.ndarray, p: np.record, h: float, pulls: bool, o
 
 @njit(error_model="numpy")
 def _step(
-    y: np.ndarray, p: np.record, h: float, pulls: bool, tableau: np.ndarray, _k: np.ndarray, out: np.ndarray
+    y: Variables, p: np.record, h: float, pulls: bool, tableau: FloatArray, _k: FloatArray, out: Variables
 ) -> None:
     copy_numbers(y, out)
     for i in range(tableau.shape[1]):
         _moved(y, out, p, tableau[i + 1, i] * h, pulls, out)
 
 
-def _steps(tableau: np.ndarray) -> Kernel:
+def _steps(tableau: FloatArray) -> Kernel:
     """The kernel of a method with this tableau, in which each stage uses only the previous one."""
 
     @njit(error_model="numpy")
-    def steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+    def steps(y: Variables, p: np.record, h: float, n: int) -> int:
         return repeated(_step, tableau, y, p, h, n)
 
     return steps

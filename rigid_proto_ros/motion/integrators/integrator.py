@@ -24,8 +24,9 @@ from numba.core import cgutils
 from numba.core.types.function_type import CompileResultWAP
 
 from ...base.compilation import INTERPRETED, Emitted, compiled_for, intrinsic, njit, record_type
+from ...base.vectors import FloatArray, Records
 from ..loads import Load
-from ..problem import ENVIRONMENT_NEEDS, PROBLEM
+from ..problem import ENVIRONMENT_NEEDS, PROBLEM, Variables
 
 BODY_TORQUE = "a torque"
 WORLD_TORQUE = "a torque fixed in the world or a world force off the centre of mass"
@@ -54,7 +55,7 @@ are constant.
 """
 
 
-Kernel = Callable[[np.ndarray, np.record, float, int], int]
+Kernel = Callable[[Variables, np.record, float, int], int]
 """(y, p, h, n): takes up to n steps of h seconds in place and returns how many were good; a step whose result isn't
 finite or exceeds MAX_SPEED is undone.
 """
@@ -199,7 +200,7 @@ METHOD = record_type(
 
 
 @functools.lru_cache(maxsize=256)
-def method_table(integrator: Integrator, degree: int) -> np.ndarray:
+def method_table(integrator: Integrator, degree: int) -> Records:
     """The integrator's methods (n,) METHOD as compiled loops read them; a kernel gets its address when it is first
     needed.
     """
@@ -210,12 +211,12 @@ def method_table(integrator: Integrator, degree: int) -> np.ndarray:
     return table
 
 
-def workspace_size(table: np.ndarray) -> int:
+def workspace_size(table: Records) -> int:
     """Size of the largest workspace [doubles] of the methods in one table or several."""
     return int((table["rows"] * table["columns"]).max())
 
 
-def provide_kernel(integrator: Integrator, table: np.ndarray, number: int) -> None:
+def provide_kernel(integrator: Integrator, table: Records, number: int) -> None:
     """Compile a method's kernel, or load it from the cache, and put its address into the table."""
     kernel, method = integrator.methods[number].kernel, table[number]
     if kernel is not None and method["address"] == 0:
@@ -225,11 +226,11 @@ def provide_kernel(integrator: Integrator, table: np.ndarray, number: int) -> No
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def commit(
     method: np.record,
-    y: np.ndarray,
+    y: Variables,
     p: np.record,
     control: np.record,
-    following: np.ndarray,
-    room: np.ndarray,
+    following: Variables,
+    room: FloatArray,
     step_ns: int,
     span_ns: int,
 ) -> tuple[int, int, bool]:
@@ -252,11 +253,11 @@ def commit(
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def reach(
     method: np.record,
-    y: np.ndarray,
+    y: Variables,
     p: np.record,
     control: np.record,
-    following: np.ndarray,
-    room: np.ndarray,
+    following: Variables,
+    room: FloatArray,
     rest_ns: int,
 ) -> bool:
     """Take one step of ``rest_ns`` in y, a copy; returns whether it was good."""

@@ -25,7 +25,7 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize, rotate
 from ...base.vectors import Quaternion, Vector
-from ..problem import is_good, parts_of, torque
+from ..problem import Variables, is_good, parts_of, torque
 from .integrator import ANGULAR_DAMPING, LOADS, Integrator
 
 _MAX_ITERATIONS = 60
@@ -86,7 +86,7 @@ def _newton_correction(o: Vector, r: Vector, h: float, p: np.record) -> Vector:
 
 
 @njit(error_model="numpy")
-def _step(y: np.ndarray, p: np.record, h: float, out: np.ndarray) -> bool:
+def _step(y: Variables, p: np.record, h: float, out: Variables) -> bool:
     """One step from y into out; returns whether the iteration converged."""
     A, B, C = p.moments[0], p.moments[1], p.moments[2]
     q, w, _, _ = parts_of(y)
@@ -123,7 +123,7 @@ def _step(y: np.ndarray, p: np.record, h: float, out: np.ndarray) -> bool:
 
 
 @njit(error_model="numpy")
-def lie_midpoint_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+def lie_midpoint_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = y.copy()
     for done in range(n):

@@ -20,12 +20,14 @@ import numpy as np
 from ...base.compilation import copy_numbers, njit
 from ...base.rotation import exponential, multiply, normalize
 from ...base.simd import Packed, filled, four, joined, load, number, store
+from ...base.vectors import FloatArray
 from ..problem import (
     DISPLACEMENT,
     HAND_WORK,
     HEAT,
     SPIN,
     VELOCITY,
+    Variables,
     accelerations,
     is_good,
     parts_of,
@@ -35,7 +37,7 @@ from ..problem import (
 from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
 from .string_law import is_one_sided, shortening_heat
 
-Step = Callable[[np.ndarray, np.record, float, bool, np.ndarray, np.ndarray, np.ndarray], None]
+Step = Callable[[Variables, np.record, float, bool, FloatArray, FloatArray, Variables], None]
 """One step (y, p, h, pulls, tableau, k, out) of h seconds from variables y into out with the string's law given.
 tableau (s + 1, s): the weights aᵢⱼ of s stages, and as its last row those of the step, bⱼ; k (s, 16): memory for rates.
 """
@@ -73,7 +75,7 @@ def _rates(z: Packed, p: np.record, pulls: bool) -> Packed:
 
 @njit(error_model="numpy", forceinline=True)
 def tableau_step(
-    y: np.ndarray, p: np.record, h: float, pulls: bool, tableau: np.ndarray, k: np.ndarray, out: np.ndarray
+    y: Variables, p: np.record, h: float, pulls: bool, tableau: FloatArray, k: FloatArray, out: Variables
 ) -> None:
     """A ``Step``: kᵢ = f(y + h Σ aᵢⱼ kⱼ), out = y + h Σ bᵢ kᵢ."""
     stages = tableau.shape[1]
@@ -102,7 +104,7 @@ def tableau_step(
 
 
 @njit(inline="always", error_model="numpy")
-def repeated(step: Step, tableau: np.ndarray, y: np.ndarray, p: np.record, h: float, n: int) -> int:
+def repeated(step: Step, tableau: FloatArray, y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place, each split where a pull-only string becomes slack or taut; returns the
     number of good ones.
 
@@ -122,7 +124,7 @@ def repeated(step: Step, tableau: np.ndarray, y: np.ndarray, p: np.record, h: fl
 
 @njit(inline="always", error_model="numpy")
 def _step_on_string(
-    step: Step, tableau: np.ndarray, y: np.ndarray, p: np.record, h: float, k: np.ndarray, end: np.ndarray
+    step: Step, tableau: FloatArray, y: Variables, p: np.record, h: float, k: FloatArray, end: Variables
 ) -> None:
     """A step of h seconds from y into ``end``, split where the law of tension changes: the law has a kink there (a
     jump, with a damper), and a step across it would lose its order.
@@ -162,11 +164,11 @@ def _step_on_string(
         copy_numbers(end, here)
 
 
-def explicit(tableau: np.ndarray) -> Kernel:
+def explicit(tableau: FloatArray) -> Kernel:
     """The kernel of the explicit method with this tableau (s + 1, s)."""
 
     @njit(error_model="numpy")
-    def steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+    def steps(y: Variables, p: np.record, h: float, n: int) -> int:
         return repeated(tableau_step, tableau, y, p, h, n)
 
     return steps
@@ -273,7 +275,7 @@ DOP853 = Integrator(
 
 @njit(error_model="numpy")
 def _semi_implicit_step(
-    y: np.ndarray, p: np.record, h: float, pulls: bool, _tableau: np.ndarray, _k: np.ndarray, out: np.ndarray
+    y: Variables, p: np.record, h: float, pulls: bool, _tableau: FloatArray, _k: FloatArray, out: Variables
 ) -> None:
     """A ``Step``: velocities first, then positions with the new velocities, the attitude by the exponential map."""
     q, w, d, u = parts_of(y)
@@ -288,7 +290,7 @@ def _semi_implicit_step(
 
 
 @njit(error_model="numpy")
-def semi_implicit_euler_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+def semi_implicit_euler_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     return repeated(_semi_implicit_step, ONE_STAGE, y, p, h, n)
 

@@ -35,7 +35,8 @@ from ...base.simd import (
     store,
     triple,
 )
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, is_good
+from ...base.vectors import FloatArray
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, is_good
 from ..string import NO_DIRECTION
 from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
 
@@ -53,7 +54,7 @@ def _axes(q: Packed) -> tuple[Packed, Packed, Packed]:
 
 
 @njit(error_model="numpy", allocates=False)
-def power_sum(c: np.ndarray, at: int, columns: int, degree: int, h: float, like: Packed) -> Packed:
+def power_sum(c: FloatArray, at: int, columns: int, degree: int, h: float, like: Packed) -> Packed:
     """Σ cₖ hᵏ up to k = degree ≥ 4 of the numbers at ``at`` in rows of ``columns``: four independent Horner schemes,
     each over every fourth power, which the processor overlaps; the largest term is added last.
     """
@@ -95,7 +96,7 @@ VARIABLES_AT = _Q
 
 
 @njit(error_model="numpy", allocates=False)
-def spin_series(y: np.ndarray, p: np.record, degree: int, c: np.ndarray) -> None:
+def spin_series(y: Variables, p: np.record, degree: int, c: FloatArray) -> None:
     """Coefficients c (degree + 1, SPIN_COLUMNS) of the motion from variables y: q, ω, d, u."""
     translates = p.translates
     moments = triple(p.moments, 0, 1.0)
@@ -176,7 +177,7 @@ def spin_series(y: np.ndarray, p: np.record, degree: int, c: np.ndarray) -> None
 
 
 @njit(error_model="numpy", allocates=False)
-def spin_at(c: np.ndarray, degree: int, h: float, y: np.ndarray) -> None:
+def spin_at(c: FloatArray, degree: int, h: float, y: Variables) -> None:
     """Write the variables after h seconds into y (≥ 13,), with a unit quaternion; degree: 4 or more."""
     sums = power_sum(c, _Q, SPIN_COLUMNS, degree, h, filled(0.0, 16))
     q, w, d, u = component(sums, 0), component(sums, 1), component(sums, 2), component(sums, 3)
@@ -194,7 +195,7 @@ of convergence (|ω|h of about 1 to 3) the best method for that; beyond it the s
 
 
 @njit(error_model="numpy")
-def taylor_steps_of_degree(y: np.ndarray, p: np.record, h: float, n: int, degree: int) -> int:
+def taylor_steps_of_degree(y: Variables, p: np.record, h: float, n: int, degree: int) -> int:
     """Up to n steps of h seconds in place by series of this degree; returns the number of good ones."""
     c, new = np.zeros((degree + 1, SPIN_COLUMNS)), y.copy()
     for done in range(n):
@@ -207,7 +208,7 @@ def taylor_steps_of_degree(y: np.ndarray, p: np.record, h: float, n: int, degree
 
 
 @njit(error_model="numpy")
-def taylor_steps(y: np.ndarray, p: np.record, h: float, n: int) -> int:
+def taylor_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     return taylor_steps_of_degree(y, p, h, n, TAYLOR_DEGREE)
 
@@ -271,7 +272,7 @@ def _columns(xs: Packed, ys: Packed, zs: Packed, one: float) -> tuple[Packed, Pa
 
 
 @njit(error_model="numpy", allocates=False)
-def _put_variables(c: np.ndarray, k: int, q: Packed, w: Packed, d: Packed, u: Packed) -> None:
+def _put_variables(c: FloatArray, k: int, q: Packed, w: Packed, d: Packed, u: Packed) -> None:
     """Store coefficient k of the variables; each vector's fourth number is overwritten by the next one's first."""
     at = k * MOTION_COLUMNS
     store(c, at, q)
@@ -282,7 +283,7 @@ def _put_variables(c: np.ndarray, k: int, q: Packed, w: Packed, d: Packed, u: Pa
 
 
 @njit(error_model="numpy", allocates=False)
-def _put_factors(c: np.ndarray, k: int, q: Packed, w: Packed, span: Packed) -> None:
+def _put_factors(c: FloatArray, k: int, q: Packed, w: Packed, span: Packed) -> None:
     """Store the factors of products from coefficient k of q, ω and (a, l)."""
     at = k * MOTION_COLUMNS
     axes = _axes(q)
@@ -295,7 +296,7 @@ def _put_factors(c: np.ndarray, k: int, q: Packed, w: Packed, span: Packed) -> N
 
 
 @njit(error_model="numpy", allocates=False)
-def distance_series(c: np.ndarray, degree: int) -> None:
+def distance_series(c: FloatArray, degree: int) -> None:
     """Compute the series of the knot's distance for a string that doesn't pull, whose motion doesn't need it."""
     for k in range(1, degree + 1):
         square = 0.0
@@ -307,7 +308,7 @@ def distance_series(c: np.ndarray, degree: int) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def _heat_at_the_end(c: np.ndarray, k: int) -> float:
+def _heat_at_the_end(c: FloatArray, k: int) -> float:
     """Coefficient k of |a'|², for a string of rest length 0."""
     heat = 0.0
     for i in range(k + 1):
@@ -349,7 +350,7 @@ def _weighed(x: Packed, y: Packed, z: Packed, v: Packed) -> Packed:
 
 @njit(error_model="numpy", allocates=False)
 def motion_series(  # noqa: C901 - the recurrences of one order, in their order; a call in between costs more than they do
-    y: np.ndarray, p: np.record, knot: Knot, degree: int, taut: bool, c: np.ndarray
+    y: Variables, p: np.record, knot: Knot, degree: int, taut: bool, c: FloatArray
 ) -> None:
     """Fill c with the coefficients of the motion from variables y up to ``degree``. knot: that of the string, if one is
     tied; taut: whether its law of tension holds.
@@ -464,7 +465,7 @@ def motion_series(  # noqa: C901 - the recurrences of one order, in their order;
 
 
 @njit(error_model="numpy", allocates=False)
-def motion_at(c: np.ndarray, p: np.record, degree: int, h: float, y: np.ndarray) -> None:
+def motion_at(c: FloatArray, p: np.record, degree: int, h: float, y: Variables) -> None:
     """Advance the variables y, about which c is the series, by h seconds."""
     columns = 15 if p.has_string else 13 if p.translates else 7
     sums = power_sum(c, MOTION_COLUMNS, MOTION_COLUMNS, degree - 1, h, filled(0.0, 16))
@@ -477,7 +478,7 @@ def motion_at(c: np.ndarray, p: np.record, degree: int, h: float, y: np.ndarray)
 
 
 @njit(error_model="numpy", allocates=False)
-def stretch_at(c: np.ndarray, p: np.record, degree: int, h: float) -> tuple[float, float]:
+def stretch_at(c: FloatArray, p: np.record, degree: int, h: float) -> tuple[float, float]:
     """x = l − rest length, and its rate, after h seconds."""
     a, b = filled(0.0, 4), filled(0.0, 4)
     at = degree * MOTION_COLUMNS + A_KNOT

@@ -28,7 +28,8 @@ from ...base.arithmetic import BIAS, MANTISSA, MANTISSA_BITS, bits_of, double_of
 from ...base.compilation import copy_numbers, njit
 from ...base.rotation import norm
 from ...base.simd import Packed, filled, four, joined, largest, load
-from ..problem import ATTITUDE, HEAT, VARIABLES, damping_functions, is_good
+from ...base.vectors import FloatArray
+from ..problem import ATTITUDE, HEAT, VARIABLES, Variables, damping_functions, is_good
 from ..string import most_yielding
 from .series import (
     A_KNOT,
@@ -90,7 +91,7 @@ Weights = tuple[float, float, float, float]
 
 
 @njit(error_model="numpy", allocates=False)
-def scales(y: np.ndarray, p: np.record, elapsed: float) -> Weights:
+def scales(y: Variables, p: np.record, elapsed: float) -> Weights:
     """The weights at variables y, ``elapsed`` seconds into the segment."""
     spin = norm(y[4], y[5], y[6])
     if not p.translates:
@@ -139,7 +140,7 @@ def fastest_swing(p: np.record) -> float:
 
 
 @njit(error_model="numpy", allocates=False)
-def floor_of_step(y: np.ndarray, p: np.record, weights: Weights, pulls: bool, h: float) -> float:
+def floor_of_step(y: Variables, p: np.record, weights: Weights, pulls: bool, h: float) -> float:
     """Rounding error, in the error norm, of a step of h seconds from y: 32 ε and, for a string that pulls, the effect
     of a force known only to the rounding of its knot's position. The span from free end to knot errs by ε times itself
     and the arm, k and c multiply that, and an oscillation reverses it after a radian. Near the free end, a string that
@@ -153,7 +154,7 @@ def floor_of_step(y: np.ndarray, p: np.record, weights: Weights, pulls: bool, h:
     size = reach + (arm * reach / length if p.bilateral and length > 0.0 else arm)
     speed = norm(y[10], y[11], y[12]) + norm(y[4], y[5], y[6]) * arm
     time = min(h, 1.0 / fastest_swing(p))
-    impulse = EPSILON * (size * (k * time + c) + speed * c * time)
+    impulse: float = EPSILON * (size * (k * time + c) + speed * c * time)
     # Within the step, velocity errors change position and attitude.
     return FLOOR + impulse * response_at_knot(p, max(weights[1], h), max(weights[3], h * weights[2]))
 
@@ -205,7 +206,7 @@ def degree_of_motion(degree: int) -> int:
 
 @njit(error_model="numpy", allocates=False)
 def _length_for(
-    c: np.ndarray, at: int, columns: int, degree: int, weights: Packed, accuracy: float, part: float
+    c: FloatArray, at: int, columns: int, degree: int, weights: Packed, accuracy: float, part: float
 ) -> float:
     """h [s] with (σh)^(N+1)/(1 − σh) = max(accuracy h, floor) times ``part``, or a little less. at: offset of the
     variables in a row of ``columns`` numbers; weights: one for each of them.
@@ -226,7 +227,7 @@ def _length_for(
 
 
 @njit(error_model="numpy", allocates=False)
-def _allowed_length(c: np.ndarray, degree: int, weights: Weights, accuracy: float, part: float) -> float:
+def _allowed_length(c: FloatArray, degree: int, weights: Weights, accuracy: float, part: float) -> float:
     """h [s] at which the error of a series of the motion is this part of the accuracy times h."""
     attitude, spin, place, speed = weights
     of_row = joined(
@@ -239,7 +240,7 @@ def _allowed_length(c: np.ndarray, degree: int, weights: Weights, accuracy: floa
 
 
 @njit(error_model="numpy", allocates=False)
-def _known_length(c: np.ndarray, degree: int, place: float, accuracy: float, part: float) -> float:
+def _known_length(c: FloatArray, degree: int, place: float, accuracy: float, part: float) -> float:
     """h [s] at which the series of the knot's position has the same error. The position rotates by the full angle, the
     quaternion by half of it: the remainder after degree N is up to 2ᴺ times that of the attitude.
     """
@@ -262,7 +263,7 @@ def begin_control(control: np.record, accuracy: float, degree: int) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def _note_floor(y: np.ndarray, p: np.record, control: np.record, weights: Weights, h: float) -> None:
+def _note_floor(y: Variables, p: np.record, control: np.record, weights: Weights, h: float) -> None:
     """Record the error floor of a step of h seconds from y if it exceeds what the accuracy allows."""
     pulls = p.has_string and (control.law == PULLS or control.switch < math.inf)
     floor = floor_of_step(y, p, weights, pulls, h)
@@ -299,7 +300,7 @@ def _is_spin(p: np.record) -> bool:
 
 
 @njit(error_model="numpy", allocates=False)
-def _spin_length(y: np.ndarray, p: np.record, control: np.record, weights: Weights, c: np.ndarray) -> int:
+def _spin_length(y: Variables, p: np.record, control: np.record, weights: Weights, c: FloatArray) -> int:
     """Compute the series of the spin from y into c; returns the step's length [ns]."""
     if not control.series:
         spin_series(y, p, control.degree, c)
@@ -310,7 +311,7 @@ def _spin_length(y: np.ndarray, p: np.record, control: np.record, weights: Weigh
 
 
 @njit(error_model="numpy", allocates=False)
-def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, c: np.ndarray) -> int:
+def _lay_out(y: Variables, p: np.record, control: np.record, weights: Weights, c: FloatArray) -> int:
     """Compute the series of one step from y into c and control; returns its length [ns], 0 if no step is possible.
     weights: of errors.
     """
@@ -365,7 +366,7 @@ def _lay_out(y: np.ndarray, p: np.record, control: np.record, weights: Weights, 
 
 
 @njit(error_model="numpy", allocates=False)
-def _reach(p: np.record, control: np.record, c: np.ndarray, time_ns: int, out: np.ndarray) -> None:
+def _reach(p: np.record, control: np.record, c: FloatArray, time_ns: int, out: Variables) -> None:
     """Advance out, the variables at the start of the planned step, by ``time_ns`` within this step."""
     degree, t = degree_of_motion(control.degree), time_ns * 1e-9
     if _is_spin(p):
@@ -378,14 +379,14 @@ def _reach(p: np.record, control: np.record, c: np.ndarray, time_ns: int, out: n
 
 
 @njit(error_model="numpy", allocates=False)
-def _move(c: np.ndarray, p: np.record, degree: int, h: float, law: float, out: np.ndarray) -> None:
+def _move(c: FloatArray, p: np.record, degree: int, h: float, law: float, out: Variables) -> None:
     motion_at(c, p, degree, h, out)
     if law == SHORTENS:
         out[HEAT] += shortening_heat(p, stretch_at(c, p, degree, 0.0)[0], stretch_at(c, p, degree, h)[0])
 
 
 @njit(error_model="numpy", allocates=False)
-def _accept(y: np.ndarray, p: np.record, control: np.record, following: np.ndarray, c: np.ndarray) -> bool:
+def _accept(y: Variables, p: np.record, control: np.record, following: Variables, c: FloatArray) -> bool:
     """Plan the next step and write its end into ``following``; returns whether there is one."""
     elapsed = control.elapsed_ns
     weights = scales(y, p, elapsed * 1e-9)
@@ -408,11 +409,11 @@ def _accept(y: np.ndarray, p: np.record, control: np.record, following: np.ndarr
 
 @njit(error_model="numpy", allocates=False)
 def series_steps(
-    y: np.ndarray,
+    y: Variables,
     p: np.record,
     control: np.record,
-    following: np.ndarray,
-    c: np.ndarray,
+    following: Variables,
+    c: FloatArray,
     span_ns: int,
     sampling: bool,
 ) -> int:

@@ -22,7 +22,8 @@ import numpy as np
 
 from ...base.compilation import njit
 from ...base.rotation import norm
-from ..problem import knot, parts_of, stretch
+from ...base.vectors import FloatArray
+from ..problem import Variables, knot, parts_of, stretch
 from ..string import NO_DIRECTION
 from .series import A_KNOT, DISTANCE, STRETCH, TENSION, Knot, distance_series, stretch_at
 
@@ -50,7 +51,7 @@ def is_one_sided(p: np.record) -> bool:
 
 
 @njit(error_model="numpy")
-def knot_at(y: np.ndarray, p: np.record) -> Knot:
+def knot_at(y: Variables, p: np.record) -> Knot:
     """The knot of the string at variables y; zeros without a string."""
     if not p.has_string:
         return 0.0, 0.0, 0.0, 0.0, 0.0
@@ -60,7 +61,7 @@ def knot_at(y: np.ndarray, p: np.record) -> Knot:
 
 
 @njit(error_model="numpy")
-def law_of(y: np.ndarray, p: np.record) -> float:
+def law_of(y: Variables, p: np.record) -> float:
     """The law at variables y: SLACK, PULLS or SHORTENS."""
     if not is_one_sided(p):
         return PULLS
@@ -98,7 +99,7 @@ NONE = -1.0
 
 
 @njit(error_model="numpy")
-def first_rise(g: np.ndarray, degree: int) -> float:
+def first_rise(g: FloatArray, degree: int) -> float:
     """First s in [0, 1] after which Σ gₖ sᵏ is positive, for a polynomial that isn't at 0; NONE if it never is."""
     while degree > 0 and g[degree] == 0.0:
         degree -= 1
@@ -135,7 +136,7 @@ def first_rise(g: np.ndarray, degree: int) -> float:
 
 
 @njit(error_model="numpy")
-def _bernstein(g: np.ndarray, degree: int, b: np.ndarray) -> None:
+def _bernstein(g: FloatArray, degree: int, b: FloatArray) -> None:
     """Bernstein coefficients b on [0, 1]: bᵢ = Σ C(i, k)/C(n, k) gₖ."""
     scale = 1.0
     for k in range(degree + 1):
@@ -147,7 +148,7 @@ def _bernstein(g: np.ndarray, degree: int, b: np.ndarray) -> None:
 
 
 @njit(error_model="numpy")
-def _signs(b: np.ndarray, degree: int) -> tuple[int, int]:
+def _signs(b: FloatArray, degree: int) -> tuple[int, int]:
     """Sign of the first coefficient that isn't zero, and how often the sign changes."""
     first, before, changes = 0, 0, 0
     for k in range(degree + 1):
@@ -163,7 +164,7 @@ def _signs(b: np.ndarray, degree: int) -> tuple[int, int]:
 
 
 @njit(error_model="numpy")
-def _halve(b: np.ndarray, left: np.ndarray, degree: int) -> None:
+def _halve(b: FloatArray, left: FloatArray, degree: int) -> None:
     """Bisection: coefficients of the left half into ``left``, those of the right one into b."""
     left[0] = b[0]
     for j in range(1, degree + 1):
@@ -173,7 +174,7 @@ def _halve(b: np.ndarray, left: np.ndarray, degree: int) -> None:
 
 
 @njit(error_model="numpy")
-def _root(g: np.ndarray, degree: int, low: float, high: float) -> float:
+def _root(g: FloatArray, degree: int, low: float, high: float) -> float:
     """The only root in an interval over which the polynomial rises: Newton's method, safeguarded by bisection."""
     t = 0.5 * (low + high)
     for trial in range(_MOST_TRIALS):
@@ -199,7 +200,7 @@ def _root(g: np.ndarray, degree: int, low: float, high: float) -> float:
 
 @njit(error_model="numpy")
 def next_law(
-    c: np.ndarray, p: np.record, degree: int, h: float, law: float, accuracy: float
+    c: FloatArray, p: np.record, degree: int, h: float, law: float, accuracy: float
 ) -> tuple[float, float, float]:
     """Time of the first change of law within h seconds, NONE for never; the law that follows; and the part of h [s] for
     which this is known.
@@ -228,7 +229,7 @@ def next_law(
 
 
 @njit(error_model="numpy")
-def _square_less_rest(a: np.ndarray, x: float, rest: float) -> np.ndarray:
+def _square_less_rest(a: FloatArray, x: float, rest: float) -> FloatArray:
     """Coefficients of |a|² − rest² from those of a (n, 3); x: the stretch at 0."""
     last = a.shape[0] - 1
     g = np.zeros(2 * last + 1)
@@ -240,7 +241,7 @@ def _square_less_rest(a: np.ndarray, x: float, rest: float) -> np.ndarray:
 
 
 @njit(error_model="numpy")
-def _tautens(c: np.ndarray, p: np.record, degree: int, h: float) -> float:
+def _tautens(c: FloatArray, p: np.record, degree: int, h: float) -> float:
     """Time at which |a|² first rises above the square of the rest length; NONE if it doesn't within h seconds."""
     rest = p.rest_length
     reach, power, last = c[0, DISTANCE], 1.0, 0
@@ -270,7 +271,7 @@ def _tautens(c: np.ndarray, p: np.record, degree: int, h: float) -> float:
 
 
 @njit(error_model="numpy")
-def _stops_shortening(c: np.ndarray, p: np.record, degree: int, h: float, g: np.ndarray) -> tuple[float, float]:
+def _stops_shortening(c: FloatArray, p: np.record, degree: int, h: float, g: FloatArray) -> tuple[float, float]:
     """Fraction of h at which the string's stretch is zero or it begins to pull, whichever is first, and the law after
     that.
     """
@@ -295,7 +296,7 @@ def _stops_shortening(c: np.ndarray, p: np.record, degree: int, h: float, g: np.
 
 
 @njit(error_model="numpy")
-def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: float) -> bool:
+def _converges(c: FloatArray, p: np.record, degree: int, t: float, tolerance: float) -> bool:
     """Whether the series of the knot's distance gives the same tension as the motion's series."""
     stiffness, damping = p.stiffness, p.string_damping
     tension, terms, power = stiffness * c[0, STRETCH], 0.0, 1.0
@@ -312,7 +313,7 @@ def _converges(c: np.ndarray, p: np.record, degree: int, t: float, tolerance: fl
 
 
 @njit(error_model="numpy")
-def clear_of_the_end(c: np.ndarray, p: np.record, degree: int, distance: float, h: float) -> float:
+def clear_of_the_end(c: FloatArray, p: np.record, degree: int, distance: float, h: float) -> float:
     """h, reduced so that along the series c the knot of a string that pushes, which starts at this distance from the
     free end, stays clear of it.
     """
@@ -323,7 +324,7 @@ def clear_of_the_end(c: np.ndarray, p: np.record, degree: int, distance: float, 
 
 
 @njit(error_model="numpy")
-def _moves(c: np.ndarray, degree: int, h: float) -> float:
+def _moves(c: FloatArray, degree: int, h: float) -> float:
     """Upper bound of the knot's displacement within h seconds [m]."""
     reach = 0.0
     for k in range(degree, 0, -1):
