@@ -183,7 +183,7 @@ class KernelCache(FunctionCache):
             # Locators that a user has named know nothing of the files that a kernel is compiled from.
             named, _CONFIG.CACHE_LOCATOR_CLASSES = _CONFIG.CACHE_LOCATOR_CLASSES, ""
             try:
-                super().__init__(self._function)
+                FunctionCache.__init__(self, self._function)
             finally:
                 _CONFIG.CACHE_LOCATOR_CLASSES = named
             # numba numbers the kernels of a function. Two processes that compile two of them at once take one number,
@@ -193,7 +193,7 @@ class KernelCache(FunctionCache):
         # Also for a kernel that doesn't allocate: it may have been compiled from functions that count references.
         rtsys.initialize(target)
         try:
-            return self._load_overload(signature, target)
+            return FunctionCache._load_overload(self, signature, target)  # noqa: SLF001 (as above)
         except (OSError, MemoryError):
             return None
         except Exception:
@@ -205,7 +205,7 @@ class KernelCache(FunctionCache):
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep a kernel; one that can't be kept, as on a full disk, is compiled again at the next start."""
         with suppress(OSError):
-            super().save_overload(signature, result)
+            FunctionCache.save_overload(self, signature, result)
 
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])

@@ -18,15 +18,14 @@ Vector3 = NDArray[np.float64]
 """(3,)"""
 Matrix3 = NDArray[np.float64]
 """(3, 3)"""
+Attitude = NDArray[np.float64]
+"""(4,): unit quaternion xyzw, or one to be normalized."""
 StateRow = NDArray[np.float64]
 """(13,): COM position [m, world], attitude xyzw, velocity [m/s, world], angular velocity [rad/s, body axes]."""
 Points = NDArray[np.float64]
 """(n, 3)"""
 Triangles = NDArray[np.int64]
 """(m, 3) indices of points."""
-
-Attitude = NDArray[np.float64]
-"""(4,) xyzw"""
 
 Numbers = Sequence[float] | FloatArray
 """Components of a vector or a quaternion, as they may be given."""

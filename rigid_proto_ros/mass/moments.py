@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -88,7 +89,8 @@ def _bounds(points: Points) -> tuple[_Point, _Point]:
 @njit(nogil=True)
 def _leads_outside(triangles: Triangles, count: int) -> bool:
     """Whether a triangle uses a vertex number outside 0 to ``count`` − 1."""
-    signs, last = 0, count - 1  # type: int, int
+    vertex: Any
+    signs, last = 0, count - 1
     for vertex in triangles.ravel():  # contiguous, so that this makes no copy
         signs |= vertex | (last - vertex)
     return signs < 0

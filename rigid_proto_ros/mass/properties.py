@@ -122,7 +122,7 @@ class MeshMoments:
             return float(mass)
         if not (0.0 < density < math.inf):
             raise InputError("density", density, "a finite number > 0 [kg/m³]")
-        body: float = density * self.moments("solid").measure * abs(math.prod(scale_vector(scale).tolist()))
+        body: float = float(density) * self.moments("solid").measure * abs(math.prod(scale_vector(scale).tolist()))
         if not (1e-300 < body < math.inf):
             raise InputError("mass", body, "density * volume within 1e-300 .. 1e300 kg")
         return body

@@ -90,9 +90,9 @@ def resolve_mesh(name: str, search: Search = NOWHERE_ELSE) -> Path:
 def _at_path(name: str, search: Search, uri: bool) -> Path:
     path = Path(name).expanduser()
     bundled = BODIES / f"{name}.obj"
-    spelled = (path, Path(unquote(name)).expanduser()) if uri else (path,)  # as written, or with %20 for a blank
+    spelled = [path, Path(unquote(name)).expanduser()] if uri else [path]  # as written, or with %20 for a blank
     places = [search.near / path for path in spelled] if search.near is not None else []
-    for place in [*places, *spelled, *([bundled] if name and "/" not in name else [])]:
+    for place in (*places, *spelled, *([bundled] if name and "/" not in name else [])):
         if place.is_file():
             return place.resolve()
     if path.is_dir():

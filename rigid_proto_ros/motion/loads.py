@@ -22,7 +22,7 @@ from ..base.errors import CommandRefused
 from ..base.rotation import matrix_elements, transposed_times
 from ..base.vectors import FloatArray, Numbers, StateRow, Vector, Vector3, vector
 from . import body as of_body
-from .body import MAX_ACCELERATION, Body
+from .body import MAX_ACCELERATION, Body, BodyRow
 from .frames import Frame, contact_point, point_text
 from .state import State
 from .surface import Surface
@@ -52,7 +52,7 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 
 @njit(error_model="numpy", allocates=False)
-def arm_of(load: FloatArray, body: FloatArray) -> Vector:
+def arm_of(load: FloatArray, body: BodyRow) -> Vector:
     """Vector from the COM to the point of application [m, body axes]: three numbers."""
     if load[HAS_POINT] == 0.0:
         return 0.0, 0.0, 0.0
@@ -60,7 +60,7 @@ def arm_of(load: FloatArray, body: FloatArray) -> Vector:
 
 
 @njit(error_model="numpy", allocates=False)
-def own_force(load: FloatArray, body: FloatArray) -> Vector:
+def own_force(load: FloatArray, body: BodyRow) -> Vector:
     """The force, in body axes, of a load whose axes rotate with the body: three numbers."""
     f = load[FORCE]
     if load[LOAD_AXES] == NORMAL_AXES:
@@ -76,7 +76,7 @@ def _bound(x: float, y: float, z: float) -> float:
 
 
 @njit(error_model="numpy", allocates=False)
-def magnitudes(load: FloatArray, body: FloatArray) -> tuple[float, float]:
+def magnitudes(load: FloatArray, body: BodyRow) -> tuple[float, float]:
     """Upper bounds of the linear [m/s²] and angular [rad/s²] acceleration over all attitudes, computed from |r||F| and
     the smallest principal moment.
     """
@@ -89,7 +89,7 @@ def magnitudes(load: FloatArray, body: FloatArray) -> tuple[float, float]:
 
 
 @njit(error_model="numpy", allocates=False)
-def is_within_magnitude(load: FloatArray, body: FloatArray) -> bool:
+def is_within_magnitude(load: FloatArray, body: BodyRow) -> bool:
     """Whether both accelerations are within MAX_ACCELERATION; False if they overflow to NaN."""
     linear, angular = magnitudes(load, body)
     return linear <= MAX_ACCELERATION and angular <= MAX_ACCELERATION
@@ -102,7 +102,7 @@ def is_zero(load: FloatArray) -> bool:
 
 
 @njit(error_model="numpy", allocates=False)
-def accumulate_load(load: FloatArray, body: FloatArray, share: FloatArray) -> None:
+def accumulate_load(load: FloatArray, body: BodyRow, share: FloatArray) -> None:
     """Write the load's contribution to the sums into share (LOADS_SIZE,): forces and torques by axes, and the moment r
     Fᵀ of a world force.
     """
@@ -125,7 +125,7 @@ def accumulate_load(load: FloatArray, body: FloatArray, share: FloatArray) -> No
 
 
 @njit(error_model="numpy", allocates=False)
-def apply_impulse(load: FloatArray, body: FloatArray, row: StateRow) -> None:
+def apply_impulse(load: FloatArray, body: BodyRow, row: StateRow) -> None:
     """Apply impulse J and angular impulse H to a state row: v⁺ = v + J/m, ω⁺ = ω + I⁻¹(H + r × J), in closed form."""
     a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])
     hx, hy, hz = load[TORQUE], load[TORQUE + 1], load[TORQUE + 2]

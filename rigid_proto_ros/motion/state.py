@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.compilation import njit
 from ..base.rotation import matrix_elements, matrix_from_quaternion, rotate, times, to_unit
-from ..base.vectors import FloatArray, Matrix3, Numbers, StateRow, Vector3
+from ..base.vectors import Attitude, FloatArray, Matrix3, Numbers, StateRow, Vector3
 
 
 @dataclass(slots=True)
@@ -31,7 +31,7 @@ class State:
         return self.row[0:3]
 
     @property
-    def orientation_xyzw(self) -> FloatArray:
+    def orientation_xyzw(self) -> Attitude:
         """Attitude q, body to world."""
         return self.row[3:7]
 
@@ -89,7 +89,7 @@ class State:
 
 @njit(error_model="numpy", allocates=False)
 def fill_initial_row(
-    position: Vector3, orientation: FloatArray, velocity: Vector3, angular_velocity: Vector3, row: StateRow
+    position: Vector3, orientation: Attitude, velocity: Vector3, angular_velocity: Vector3, row: StateRow
 ) -> bool:
     """Fill a state row (13,), given an orientation (4,) of any length and ω (3,) in world axes; returns False when the
     orientation has length zero.

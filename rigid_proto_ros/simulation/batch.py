@@ -84,6 +84,8 @@ CERTAIN = 0.999
 
 _Side = tuple[Records, FloatArray, Records, Records, Records]
 """Arrays of a batch."""
+_Tables = tuple[Records, Records, FloatArray]
+"""Loads, events and workspace of a flight."""
 
 
 @dataclass
@@ -269,7 +271,7 @@ def _fly_row(
     sample_ns: IntArray,
     context: FloatArray,
     flights: Records,
-    tables: tuple[Any, ...],
+    tables: _Tables,
     states: FloatArray,
 ) -> bool:
     """Simulate row i: fills states (m, STATE) at the ascending times sample_ns (m,), before events at those same times.
@@ -302,8 +304,8 @@ def _fly_rows(
     has_references: bool,
     sample_ns: IntArray,
     measures: FloatArray,
-    results: tuple[Any, ...],
-    room: tuple[Any, ...],
+    results: tuple[IntArray, FloatArray, FloatArray],
+    room: tuple[FloatArray, Records, _Tables, FloatArray, FloatArray],
 ) -> None:
     """Simulate all rows of a batch, each together with the same row of the references if there are any."""
     status, measured, floors = results

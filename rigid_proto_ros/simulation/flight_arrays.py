@@ -13,7 +13,7 @@ from numba import float64, from_dtype, int64, types
 
 from ..base.compilation import entry_of, njit, place_of
 from ..base.simd import aligned
-from ..base.vectors import FloatArray, Records
+from ..base.vectors import Attitude, FloatArray, Records
 from ..motion.integrators.integrator import METHOD, provide_kernel
 from ..motion.loads import Load, load_of_bytes
 from ..motion.state import State
@@ -244,9 +244,9 @@ class FlightArrays:
         events = self._events[: self.integers[_EVENTS]]
         return list(zip(*(events[name].tolist() for name in ("time_ns", "what", "load_id", "row")), strict=True))
 
-    def attitude_at(self, number: int) -> FloatArray:
+    def attitude_at(self, number: int) -> Attitude:
         """Attitude (4,) xyzw of the body when a command was applied, by the index of the event in the last call."""
-        attitude: FloatArray = self._events["attitude"][number].copy()
+        attitude: Attitude = self._events["attitude"][number].copy()
         return attitude
 
     # Observables

@@ -128,7 +128,7 @@ class Study:
                 found.append(vary.form.array[index])
         return found
 
-    def _points(self, rows: IntArray) -> list[Any]:
+    def _points(self, rows: IntArray) -> list[IntArray | None]:
         """Which point of its grid or list each of ``vary`` has, None for a random one."""
         rest = rows // self.samples
         digits: list[IntArray] = []
