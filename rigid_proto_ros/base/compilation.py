@@ -23,8 +23,7 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-
-from .vectors import FloatArray
+from numpy.typing import NDArray
 
 _ABSENT: Any = None
 """Entry in sys.modules for a module that can't be imported."""
@@ -320,7 +319,7 @@ store per byte.
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def copy_numbers(of: FloatArray, to: FloatArray) -> None:
+def copy_numbers(of: NDArray[np.float64], to: NDArray[np.float64]) -> None:
     """Copy the first numbers of one array to all of another, one by one: numba's assignment of slices first checks
     whether the two share memory, and allocates a copy if they do.
     """
