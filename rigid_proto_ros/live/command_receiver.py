@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..base.errors import CommandRefused, InputError
-from ..scene.script import expand_schedule, read_schedule, with_contacts
+from ..scene.script import expand_schedule, read_schedule
 from ..simulation.commands import Change, Command, Listed, nanoseconds
 from ..simulation.setup import Setup
 
@@ -76,7 +76,7 @@ class CommandReceiver:
         try:
             listed = read_schedule(text())
             count = len(listed) if isinstance(listed, list) else 1
-            commands = with_contacts(expand_schedule(listed), loop.scenario.setup.contacts)
+            commands = expand_schedule(listed)
             taken, counted = loop.accepted(lambda ahead: self._planned(commands, isinstance(listed, list), ahead))
         except InputError as error:
             reason = error.reason if isinstance(error, CommandRefused) else "schedule"

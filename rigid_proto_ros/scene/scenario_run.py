@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 from ..base.command_line import Progress
 from ..base.errors import InputError
 from ..base.vectors import StateRow
-from ..simulation.commands import Change, Command, Listed
+from ..simulation.commands import Change, Command, Listed, TieString
 from ..simulation.observer import (
     Event,
     GhostChanged,
@@ -35,7 +35,7 @@ from ..simulation.observer import (
 from ..simulation.setup import Setup, check_command
 from ..simulation.simulation import Simulation
 from .scenario import Scenario, publication_ns, with_inertia
-from .script import with_contacts
+from .script import at_contact
 
 Value = TypeVar("Value")
 
@@ -173,9 +173,9 @@ class ScenarioRun:
     def checked(
         self, commands: Iterable[Command], waiting: Iterable[tuple[int, Change]] = ()
     ) -> Iterator[tuple[Command, tuple[bytes, Setup]]]:
-        """Commands in order of time, changes ``bound``; each with what ``Simulation.submit`` takes as ``checked``, in
-        the scenario that changes before it make of the present one: those among them, and those that wait. Raises
-        InputError.
+        """Commands in order of time, changes ``bound`` and contacts by their points; each with what
+        ``Simulation.submit`` takes as ``checked``, in the scenario that changes before it make of the present one:
+        those among them, and those that wait. Raises InputError.
         """
         scenario, changes = self.scenario, deque(waiting)
         for command in commands:
@@ -185,6 +185,8 @@ class ScenarioRun:
             if isinstance(command, Change):
                 scenario = after_change(scenario, command)
                 command = self.bound(command, scenario)
+            elif isinstance(command, TieString) and command.contact:
+                command = at_contact(command, scenario.setup.contacts)
             yield command, (check_command(command, scenario.setup), scenario.setup)
 
     def accepted(self, check: Callable[[Sequence[tuple[int, Change]]], Value]) -> Value:
@@ -260,8 +262,7 @@ class OfflineRun(ScenarioRun):
         checked in the scene that those before it in the script have made by then. Takes all, or none and raises
         InputError.
         """
-        commands = with_contacts(script, self.scenario.setup.contacts)
-        for command, checked in self.accepted(partial(self._all_checked, commands)):
+        for command, checked in self.accepted(partial(self._all_checked, list(script))):
             self._submitted += 1
             when_ns = self.simulation.submit(command, command.stamp_ns, (0, self._submitted), checked)
             if isinstance(command, Change) and "publish_rate" in command.content:

@@ -32,7 +32,7 @@ from ..simulation.commands import (
     nanoseconds,
 )
 from .parameters import ZERO
-from .yaml_text import flow, load_json, load_yaml, read_text
+from .yaml_text import flow, load_json, load_yaml, plain, read_text
 
 Entries = dict[str, Any] | list[Any]
 """An entry of a script, or a list of entries."""
@@ -116,15 +116,16 @@ def expand_entry(
     entry: Any, name: str, number: int = 1, max_commands: int = MAX_ENTRIES, now_ns: int | None = None
 ) -> list[Command]:
     """The commands of the ``number``-th entry of a script in order of time. now_ns: when an entry without a time acts;
-    None where each has one. Raises InputError.
+    None where each has one. Numbers and vectors may be NumPy's. Raises InputError.
     """
     key = ""
     try:
         times_ns = _times_ns(entry, number, max_commands, now_ns)
-        if entry.keys() <= _POKE_KEYS:
+        key = next(filter(_READERS.__contains__, entry), "")
+        if not key:
+            _check_keys(entry, _POKE_KEYS, _READERS.keys())
             return [_load(False, entry, {"stamp_ns": t_ns, "entry": number}) for t_ns in times_ns]
-        key = min(entry.keys() & _READERS.keys(), default="")
-        _check_keys(entry, _TIMING_KEYS | {key} if key else _POKE_KEYS, set() if key else _READERS.keys())
+        _check_keys(entry, _TIMING_KEYS | {key})
         read, content = _READERS[key], entry[key]
         return [command for t_ns in times_ns for command in read(content, {"stamp_ns": t_ns, "entry": number})]
     except CommandRefused:
@@ -173,6 +174,7 @@ def _held_wrench(entry: Any, stamp: Stamp) -> list[Command]:
 
 
 def _thrusters(forces: Any, stamp: Stamp) -> list[Command]:
+    forces = plain(forces)
     if not isinstance(forces, list) or not forces:
         raise InputError("", forces, "a list of forces [N], one per thruster in the order of their names")
     return [ThrusterCommand(tuple(_number(force, "") for force in forces), **stamp)]
@@ -208,7 +210,7 @@ def _set(changes: Any, stamp: Stamp) -> list[Command]:
     if "record" in changes:
         accepted = "parameters of the motion; set record by ros2 param set"
         raise InputError("record", changes["record"], accepted)
-    return [Change({str(name): value for name, value in changes.items()}, **stamp)]
+    return [Change({str(name): plain(value) for name, value in changes.items()}, **stamp)]
 
 
 def _service(name: Any, stamp: Stamp) -> list[Command]:
@@ -265,8 +267,8 @@ def _point(at: object) -> tuple[Any, ...]:
         return (at,) if at in FIXED_POINTS else ("contact", at)
     if isinstance(at, dict) and len(at) == 1:
         ((word, value),) = at.items()
-        if word == "vertex" and type(value) is int and value >= 0:
-            return "vertex", value
+        if word == "vertex" and type(number := plain(value)) is int and number >= 0:
+            return "vertex", number
         if word == "point":
             return "point", _vector(value, "at, point")
         if word == "ray" and isinstance(value, dict) and set(value) == {"origin", "direction"}:
@@ -292,36 +294,34 @@ def _check_keys(entry: dict[str, Any], known: Set[str], others: Set[str] = froze
 def _number(value: Any, field: str, lower: float = -1e100, upper: float = 1e100) -> float:
     if type(value) is float and lower <= value <= upper:
         return value  # as most are: a script may have thousands
-    # NumPy's doubles are floats, too.
+    value = plain(value)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not lower <= value <= upper:
         raise InputError(field, value, f"a number from {lower:g} to {upper:g}")
     return float(value)
 
 
 def _vector(value: Any, field: str) -> Vector:
-    if not isinstance(value, (list, tuple)) or len(value) != 3:
+    if type(value) is not list:
+        value = plain(value)
+    if not isinstance(value, list) or len(value) != 3:
         raise InputError(field, value, "three numbers [x, y, z]")
     x, y, z = value
     return _number(x, field), _number(y, field), _number(z, field)
 
 
 def _numbers(values: Any, field: str, count: int) -> tuple[float, ...]:
+    values = plain(values)
     if not isinstance(values, list) or len(values) != count:
         raise InputError(field, values, f"{count} numbers")
     return tuple(_number(value, field) for value in values)
 
 
-def with_contacts(script: Iterable[Command], contacts: Mapping[str, Vector]) -> list[Command]:
-    """The script with the names of contacts that strings are tied to replaced by their points (mesh coordinates)."""
-    resolved: list[Command] = []
-    for command in script:
-        if isinstance(command, TieString) and command.contact:
-            if command.contact not in contacts:
-                known = ", ".join(sorted(contacts)) or "none"
-                raise InputError("string, attach", command.contact, f"a contact of the body ({known}) or [x, y, z]")
-            command = replace(command, point=contacts[command.contact], contact="")
-        resolved.append(command)
-    return resolved
+def at_contact(command: TieString, contacts: Mapping[str, Vector]) -> TieString:
+    """The command with its point (mesh coordinates) in place of the name of a contact; raises InputError."""
+    if command.contact not in contacts:
+        known = ", ".join(sorted(contacts)) or "none"
+        raise InputError("string, attach", command.contact, f"a contact of the body ({known}) or [x, y, z]")
+    return replace(command, point=contacts[command.contact], contact="")
 
 
 # Written

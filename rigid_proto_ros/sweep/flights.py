@@ -75,7 +75,7 @@ class Flight:
         """
         if not isinstance(entry, Mapping):
             raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
-        self._run.submit(expand_entry(plain(entry), "command", now_ns=self._run.simulation.time_ns))
+        self._run.submit(expand_entry(dict(entry), "command", now_ns=self._run.simulation.time_ns))
 
     def step(self, seconds: float) -> State:
         """Simulate so long, and return the state at the end. Raises InputError for no such time, when the motion fails,
