@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import FloatArray, IntArray, StateRow
 from ..scene.scenario import Scenario, publication_ns
 from ..scene.scenario_run import OfflineRun
 from ..session.recorded_session import RecordedSession, Resimulation, resimulation
@@ -51,8 +52,8 @@ class FlightRecord(Observer):
 
     def __init__(self) -> None:
         self.changes: list[Event] = []
-        self.states: dict[int, np.ndarray] = {}
-        self.ghosts: dict[int, np.ndarray] = {}
+        self.states: dict[int, StateRow] = {}
+        self.ghosts: dict[int, StateRow] = {}
         self.end_ns = 0
 
     def on(self, event: Event) -> None:
@@ -66,14 +67,14 @@ class FlightRecord(Observer):
                 self.changes.append(event)
 
     @property
-    def times_ns(self) -> np.ndarray:
-        """Times (n,) int64 [ns] of the states; raises InputError where there are none."""
+    def times_ns(self) -> IntArray:
+        """Times (n,) [ns] of the states; raises InputError where there are none."""
         if not self.states:
             raise InputError("session", "it has no states to export")
         return np.array(list(self.states), dtype=np.int64)
 
     @property
-    def rows(self) -> np.ndarray:
+    def rows(self) -> FloatArray:
         """The states (n, 13) in STATE_FIELDS order."""
         return np.array(list(self.states.values())).reshape(-1, 13)
 

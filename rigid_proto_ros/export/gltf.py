@@ -13,10 +13,12 @@ import struct
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import __version__
 from ..base.errors import InputError
 from ..base.files import whole_file
+from ..base.vectors import FloatArray, IntArray, Points, Vector3
 from ..mass.moments import referenced_vertices
 from ..mesh.locate import resolve_mesh
 from ..picture import style
@@ -62,7 +64,7 @@ class Document:
         self.lists[kind].append({name: value for name, value in item.items() if value is not None})
         return len(self.lists[kind]) - 1
 
-    def seconds(self, times_ns: np.ndarray) -> np.ndarray:
+    def seconds(self, times_ns: IntArray) -> NDArray[np.float32]:
         """Times (n,) [s], in single precision and strictly ascending: of two that it doesn't tell apart the first,
         which is before a change, goes to the number before.
         """
@@ -71,7 +73,7 @@ class Document:
             seconds[k] = np.nextafter(seconds[k + 1], np.float32(-1.0))
         return seconds
 
-    def accessor(self, values: np.ndarray, target: int | None = None, bounds: bool = False) -> int:
+    def accessor(self, values: NDArray[Any], target: int | None = None, bounds: bool = False) -> int:
         """The number of an accessor of these values (n,) or (n, c), as float32 or uint32."""
         whole = values.dtype.kind in "iu"
         values = np.ascontiguousarray(values, dtype=np.uint32 if whole else np.float32)
@@ -111,7 +113,7 @@ class Document:
         return self.add("meshes", name=name, primitives=[primitive])
 
     def animate(
-        self, node: int, path: str, seconds: np.ndarray, values: np.ndarray, interpolation: str = "LINEAR"
+        self, node: int, path: str, seconds: NDArray[np.float32], values: FloatArray, interpolation: str = "LINEAR"
     ) -> None:
         """Play values (n, c) at seconds (n,) at a node's ``translation``, ``rotation`` or ``scale``."""
         key = seconds.tobytes()
@@ -122,7 +124,7 @@ class Document:
             {"input": self._inputs[key], "output": self.accessor(values), "interpolation": interpolation}
         )
 
-    def animate_steps(self, node: int, seconds: np.ndarray, **values: np.ndarray) -> None:
+    def animate_steps(self, node: int, seconds: NDArray[np.float32], **values: Points) -> None:
         """Give a node what holds from frame to frame, (n, 3) of a path; no animation where that never changes."""
         # Half-way to the frame, for a player's own rounding of the time.
         begins = np.append(seconds[:1], 0.5 * (seconds[1:] + seconds[:-1]))
@@ -207,7 +209,7 @@ def _mass_properties(setup: Setup) -> dict[str, Any]:
     }
 
 
-def _draw_string(document: Document, root: int, string: dict[int, np.ndarray | None]) -> None:
+def _draw_string(document: Document, root: int, string: dict[int, Points | None]) -> None:
     """A straight line from the free end: a unit one along x, turned and stretched to the knot; of no size while no
     string is tied.
     """
@@ -235,7 +237,7 @@ def _draw_string(document: Document, root: int, string: dict[int, np.ndarray | N
 # section 3). Skins, cameras and animations of its own are left out: a rigid body has none.
 
 
-def model_of(record: FlightRecord) -> tuple[dict[str, Any], bytes, np.ndarray] | None:
+def model_of(record: FlightRecord) -> tuple[dict[str, Any], bytes, Vector3] | None:
     """Document and data of the .glb that the body is drawn as, and the middle (3,) of its vertices' box; None where it
     came from another kind of file, where that has changed or gone, has data elsewhere or no scene, and where it isn't
     the only one.

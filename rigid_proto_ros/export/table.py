@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
-
 from ..base.files import whole_file
 from ..base.provenance import cpu, versions
+from ..base.vectors import FloatArray
 from ..simulation.quantities import QUANTITIES
 from . import check_library
 from .flight_record import FlightRecord
@@ -21,14 +20,14 @@ KEY = b"rigid_proto_ros"
 """Of a Parquet file's metadata: a JSON object."""
 
 
-def state_columns(record: FlightRecord) -> dict[str, np.ndarray]:
-    """The columns (n,) float64 by name."""
+def state_columns(record: FlightRecord) -> dict[str, FloatArray]:
+    """The columns (n,) by name."""
     columns = {"time": record.times_ns / 1e9}
     columns.update({name: record.rows[:, k] for k, name in enumerate(STATE_COLUMNS)})
     return columns
 
 
-def write_csv(file: str, columns: dict[str, np.ndarray]) -> None:
+def write_csv(file: str, columns: dict[str, FloatArray]) -> None:
     """Write a .csv: a line of names, then a line a state; numbers are read back as they were, to the last bit."""
     with whole_file("--csv", file) as path, open(path, "w", encoding="utf-8") as stream:
         stream.write(",".join(columns) + "\n")
@@ -36,7 +35,7 @@ def write_csv(file: str, columns: dict[str, np.ndarray]) -> None:
             stream.write(",".join(map(repr, row)) + "\n")
 
 
-def write_parquet(file: str, columns: dict[str, np.ndarray]) -> None:
+def write_parquet(file: str, columns: dict[str, FloatArray]) -> None:
     """Write a .parquet; its metadata hold the units, the processor and the versions."""
     check_library("--parquet")
     import pyarrow as pa

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import FloatArray, IntArray, Points, Vector3
 from ..picture import style
 from ..picture.backend import Backend, DrawnMesh
 from ..picture.picture import Picture
@@ -28,11 +29,11 @@ class Track:
     that mesh's places [m] and scales (n, 3) in its frame, scales of 0 where it isn't shown.
     """
 
-    times_ns: np.ndarray
-    positions: np.ndarray
-    attitudes: np.ndarray
-    mesh_places: np.ndarray
-    mesh_scales: np.ndarray
+    times_ns: IntArray
+    positions: Points
+    attitudes: FloatArray
+    mesh_places: Points
+    mesh_scales: Points
     surface: DrawnMesh | None
 
 
@@ -43,13 +44,13 @@ class Tracks(Backend):
 
     def __init__(self) -> None:
         self.size = 0.0
-        self.string: dict[int, np.ndarray | None] = {}
+        self.string: dict[int, Points | None] = {}
         self._surfaces: dict[str, DrawnMesh] = {}
-        self._mesh_in_force: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-        self._drawn: dict[str, list[tuple[np.ndarray, ...]]] = {}
+        self._mesh_in_force: dict[str, tuple[Vector3, Vector3]] = {}
+        self._drawn: dict[str, list[tuple[IntArray, Points, FloatArray, Points, Points]]] = {}
         self._times = np.zeros(0, np.int64)
 
-    def begin(self, times_ns: np.ndarray) -> None:
+    def begin(self, times_ns: IntArray) -> None:
         """What follows is of these times (n,) [ns]."""
         self._times = times_ns
 
@@ -62,10 +63,10 @@ class Tracks(Backend):
         body, in flight.
         """
         if name == style.GHOST_MESH and style.GHOST in self._drawn:
-            _, *pose, _, scales = self._drawn[style.GHOST][-1]
+            _, positions, attitudes, _, scales = self._drawn[style.GHOST][-1]
             if surface is None or not scales.any():
                 nothing = np.zeros((1, 3))
-                self._drawn[style.GHOST].append((self._times, *(value[-1:] for value in pose), nothing, nothing))
+                self._drawn[style.GHOST].append((self._times, positions[-1:], attitudes[-1:], nothing, nothing))
         gone = surface is None and name == style.BODY_MESH and name in self._surfaces
         if gone or (surface is not None and self._surfaces.setdefault(name, surface) is not surface):
             reason = f"the mesh changes at {self._times[0] / 1e9:.9g} s"
@@ -74,9 +75,9 @@ class Tracks(Backend):
     def place(
         self,
         name: str,
-        positions: np.ndarray | None = None,
-        attitudes: np.ndarray | None = None,
-        scale: np.ndarray | None = None,
+        positions: Points | None = None,
+        attitudes: FloatArray | None = None,
+        scale: Vector3 | None = None,
     ) -> None:
         """Keep the pose of a mesh relative to its body, or the body's frames."""
         if name in MESHES.values() and positions is not None and scale is not None:
@@ -91,8 +92,8 @@ class Tracks(Backend):
     def lines(
         self,
         name: str,
-        counts: np.ndarray,
-        strips: Sequence[np.ndarray],
+        counts: IntArray,
+        strips: Sequence[Points],
         colours: Sequence[Colour] | None = None,  # noqa: ARG002 (a backend gets it)
     ) -> None:
         """Keep the ends of the string."""

@@ -14,6 +14,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.files import whole_file
 from ..base.rotation import quaternion_from_matrix, rotate
+from ..base.vectors import BoolArray, FloatArray, IntArray, Points
 from ..mass.tensor import principal_axes
 from ..picture import style
 from ..picture.backend import DrawnMesh
@@ -44,10 +45,11 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
     stage.SetFramesPerSecond(fps)
     start_ns = int(record.times_ns[0])
 
-    def codes(times_ns: np.ndarray) -> list[float]:
+    def codes(times_ns: IntArray) -> list[float]:
         # A frame's time is rounded to the ns: just behind its whole code, what is held would be seen a frame late.
         exact = np.maximum(times_ns - start_ns, 0) * 1e-9 * fps
-        return np.where(np.abs(exact - np.rint(exact)) <= 0.6e-9 * fps, np.rint(exact), exact).tolist()
+        found: list[float] = np.where(np.abs(exact - np.rint(exact)) <= 0.6e-9 * fps, np.rint(exact), exact).tolist()
+        return found
 
     stage.SetStartTimeCode(0.0)
     stage.SetEndTimeCode(codes(record.times_ns)[-1])
@@ -73,7 +75,7 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
     return ["mass or tensor change: the file has the values at the start"] if changed else []
 
 
-def _animate(prim: UsdGeom.Xform, codes: list[float], positions: np.ndarray, attitudes: np.ndarray) -> None:
+def _animate(prim: UsdGeom.Xform, codes: list[float], positions: Points, attitudes: FloatArray) -> None:
     from pxr import Gf, UsdGeom
 
     place = prim.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble)
@@ -88,7 +90,7 @@ def _place_mesh(prim: UsdGeom.Mesh, codes: list[float], track: Track) -> None:
     """Pose of the mesh relative to its body: once, or at each frame if it changes during the simulation."""
     from pxr import Gf, UsdGeom
 
-    shown: np.ndarray = np.any(track.mesh_scales, axis=1)
+    shown: BoolArray = np.any(track.mesh_scales, axis=1)
     if not shown.all():
         visibility = prim.CreateVisibilityAttr()
         for code, is_shown in zip(codes, shown.tolist(), strict=True):
@@ -148,7 +150,7 @@ def _add_physics(stage: Usd.Stage, record: FlightRecord) -> bool:
     return any(own.body.mass != body.mass or not np.array_equal(own.body.inertia, body.inertia) for own in later)
 
 
-def _draw_string(stage: Usd.Stage, string: dict[int, np.ndarray | None], codes: list[float], width: float) -> None:
+def _draw_string(stage: Usd.Stage, string: dict[int, Points | None], codes: list[float], width: float) -> None:
     """A straight curve from the free end to the knot, seen while a string is tied."""
     from pxr import Gf, UsdGeom, Vt
 

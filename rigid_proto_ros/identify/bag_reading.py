@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError, is_missing
-from ..base.vectors import vector
+from ..base.vectors import BoolArray, FloatArray, IntArray, vector
 from ..motion.frames import parse_frame
 from ..motion.loads import Load
 from . import measurements as ms
@@ -54,8 +54,8 @@ class _Topic:
 
     name: str
     frame: str
-    times_ns: np.ndarray
-    numbers: np.ndarray
+    times_ns: IntArray
+    numbers: FloatArray
     parent: str
     child: str
 
@@ -235,16 +235,16 @@ def _wrench_frame(topic: _Topic, pose: _Topic) -> tuple[str, tuple[float, float,
 
 
 def wrench_history(
-    topic: str, times: np.ndarray, numbers: np.ndarray, axes: str, where: tuple[float, float, float] | None
+    topic: str, times: IntArray, numbers: FloatArray, axes: str, where: tuple[float, float, float] | None
 ) -> ms.LoadHistory:
     """Of messages at times (m,) [ns], ascending, with forces and torques (m, 6) along the axes of ``Load``, at a point
     of the tracked frame or, for None, at the centre of mass.
     """
-    acts: np.ndarray = np.any(numbers != 0.0, axis=1)
+    acts: BoolArray = np.any(numbers != 0.0, axis=1)
     same = np.append(False, np.all(numbers[1:] == numbers[:-1], axis=1))
     begins, sds_s = _begins(times, acts)
     ends = np.minimum(np.append(begins[1:], times[-1] + WRENCH_TIMEOUT_NS), times + WRENCH_TIMEOUT_NS)
-    rows: list[tuple[int, int, np.ndarray]] = []
+    rows: list[tuple[int, int, FloatArray]] = []
     before, which = np.full(len(times), -1), np.full(len(times), -1)
     for k in range(len(times)):
         before[k] = which[k - 1] if k and ends[k - 1] == begins[k] else -1
@@ -263,7 +263,7 @@ def wrench_history(
     return replace(ms.load_history(rows), topic=topic, changes=changes)
 
 
-def _sharpness(numbers: np.ndarray) -> np.ndarray:
+def _sharpness(numbers: FloatArray) -> FloatArray:
     """Which part of each change to the loads (m, 6) is a jump (m,): what changes steadily is known in between."""
     forces, torques = numbers[:, :3], numbers[:, 3:]
     parts = [part / max(float(np.linalg.norm(part, axis=1).max()), 1e-300) for part in (forces, torques)]
@@ -273,7 +273,7 @@ def _sharpness(numbers: np.ndarray) -> np.ndarray:
     return np.where((sizes > 0.0) & (sharp > LEAST_JUMP), np.minimum(sharp / np.maximum(sizes, 1e-300), 1.0), 0.0)
 
 
-def _begins(times_ns: np.ndarray, acts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _begins(times_ns: IntArray, acts: BoolArray) -> tuple[IntArray, FloatArray]:
     """When the loads of messages at times_ns (m,) begin (m,), and how well that is known (m,) [s].
 
     A command acts from its stamp on. A wrench at a steady rate that is also sent while nothing acts was sampled: it

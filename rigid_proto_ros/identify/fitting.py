@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import FloatArray, Points
 from . import shooting as sh
 from .initial_estimate import initial_values, least_noise, local_start, noise_by_differences
 from .measurements import MeasuredFlight
@@ -70,11 +71,11 @@ class Linear:
     residuals (k,) and their jacobian (k, n): of all segments together, the starts eliminated.
     """
 
-    numbers: np.ndarray
-    starts: list[np.ndarray]
-    triangles: list[np.ndarray]
-    residuals: np.ndarray
-    jacobian: np.ndarray
+    numbers: FloatArray
+    starts: list[FloatArray]
+    triangles: list[FloatArray]
+    residuals: FloatArray
+    jacobian: FloatArray
 
     @property
     def cost(self) -> float:
@@ -87,7 +88,7 @@ class Linear:
         own = [triangle[: len(start) - 1, -1] for triangle, start in zip(self.triangles, self.starts, strict=True)]
         return sum(float(part @ part) for part in own)
 
-    def starts_for(self, numbers: np.ndarray) -> list[np.ndarray]:
+    def starts_for(self, numbers: FloatArray) -> list[FloatArray]:
         """The best starts for other unknowns, as far as the derivatives say."""
         change = np.append(numbers - self.numbers, 1.0)
         found = []
@@ -111,11 +112,11 @@ class Problem:
     unknowns: Unknowns
     prior: float = 1.0
 
-    def values(self, numbers: np.ndarray) -> Values:
+    def values(self, numbers: FloatArray) -> Values:
         """With these numbers."""
         return self.unknowns.moved(self.given, self.unknowns.scales(self.given) * numbers)
 
-    def linear(self, numbers: np.ndarray, starts: Sequence[np.ndarray]) -> Linear | None:
+    def linear(self, numbers: FloatArray, starts: Sequence[FloatArray]) -> Linear | None:
         """The residuals and their derivatives about these numbers and starts; None where a flight failed."""
         turn = max(segment.flight.high_rate * segment.duration_s for segment in self.segments)
         variations = sh.Variations(self.unknowns, self.given, numbers, turn)
@@ -133,7 +134,7 @@ class Problem:
         left = upper_triangle(np.concatenate(rows))
         return Linear(numbers, list(starts), triangles, left[:, -1], left[:, :-1])
 
-    def settled(self, numbers: np.ndarray, starts: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def settled(self, numbers: FloatArray, starts: Sequence[FloatArray]) -> list[FloatArray]:
         """Starts improved by steps of their own; raises CannotFlyError."""
         alone = replace(self, given=self.values(numbers), unknowns=Unknowns(()))
         for _ in range(SETTLING):
@@ -145,13 +146,13 @@ class Problem:
                 break
         return list(starts)
 
-    def step(self, here: Linear, damping: float) -> np.ndarray:
+    def step(self, here: Linear, damping: float) -> FloatArray:
         """The best step (n,) with at least this damping, not too long and to a body that can exist."""
         width = len(here.numbers)
         residuals = np.concatenate([here.residuals, np.zeros(width)])
         while True:
             jacobian = np.vstack([here.jacobian, math.sqrt(damping) * np.eye(width)])
-            step = -np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
+            step: FloatArray = -np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
             if np.linalg.norm(step) <= LONGEST_STEP:
                 break
             damping *= 10.0
@@ -162,8 +163,8 @@ class Problem:
         return possible_step(jacobian, residuals, tensor, self.given.inertia, here.numbers[tensor])
 
     def solved(
-        self, starts: Sequence[np.ndarray], most: int = 12, tolerance: float = 1e-2
-    ) -> tuple[Values, list[np.ndarray]]:
+        self, starts: Sequence[FloatArray], most: int = 12, tolerance: float = 1e-2
+    ) -> tuple[Values, list[FloatArray]]:
         """The best values and starts, until a step promises less than this part of the squares: it is taken unseen.
         Raises CannotFlyError.
         """
@@ -195,11 +196,11 @@ class Problem:
         # Rounding may have left it a little outside.
         return replace(values, inertia=possible_tensor(values.inertia)), here.starts_for(numbers)
 
-    def noise_left(self, values: Values, starts: Sequence[np.ndarray]) -> dict[str, float]:
+    def noise_left(self, values: Values, starts: Sequence[FloatArray]) -> dict[str, float]:
         """Standard deviation of each series from its residuals; those of one topic and quantity share it over all
         flights.
         """
-        found: dict[str, list[np.ndarray]] = {name: [] for name in self.sigmas}
+        found: dict[str, list[FloatArray]] = {name: [] for name in self.sigmas}
         for segment, start in zip(self.segments, starts, strict=True):
             for series, residual in zip(segment.series, residuals_of(segment, start, values), strict=True):
                 found[series.name].append(residual.ravel())
@@ -210,7 +211,7 @@ class Problem:
         return {name: max(math.sqrt(square / left), least[name]) for name, square in squares.items()}
 
 
-def upper_triangle(rows: np.ndarray) -> np.ndarray:
+def upper_triangle(rows: FloatArray) -> FloatArray:
     """R of a QR decomposition of rows (n, k).
 
     In slices, as LAPACK would share more rows out among threads that wait for one another: eight times as much
@@ -222,7 +223,7 @@ def upper_triangle(rows: np.ndarray) -> np.ndarray:
     return triangle
 
 
-def residuals_of(segment: sh.Segment, start: np.ndarray, values: Values) -> list[np.ndarray]:
+def residuals_of(segment: sh.Segment, start: FloatArray, values: Values) -> list[Points]:
     """Measured minus shown of each series (m, 3), in its own unit; raises CannotFlyError."""
     found = sh.segment_residuals(segment, start, values)
     if found is None:
@@ -236,7 +237,7 @@ class Estimate:
     root (k, n): rootᵀ root is the Fisher information of the unknowns, the starts eliminated. Raises CannotFlyError.
     """
 
-    def __init__(self, problem: Problem, values: Values, starts: list[np.ndarray]) -> None:
+    def __init__(self, problem: Problem, values: Values, starts: list[FloatArray]) -> None:
         self.problem, self.values, self.starts = replace(problem, given=values, prior=0.0), values, starts
         self.unknowns = problem.unknowns
         self._zero = np.zeros(len(problem.unknowns))
@@ -246,7 +247,7 @@ class Estimate:
         self.root = linear.jacobian / problem.unknowns.scales(values)
         self._cost = linear.cost
 
-    def rise(self, change: np.ndarray) -> float:
+    def rise(self, change: FloatArray) -> float:
         """By how much the squares rise with the unknowns changed (n,), whatever the starts are then; without end for a
         body that can't exist.
         """
@@ -269,7 +270,7 @@ def fit_flights(flights: Sequence[MeasuredFlight], unknowns: Unknowns, values: V
     margin = OFFSET_MARGIN_S if "offset" in unknowns else 0.0
     sigmas = {one.name: noise_by_differences(one) for flight in flights for one in flight.series}
     values = initial_values(flights, unknowns, values)
-    known: dict[tuple[int, int], np.ndarray] = {}
+    known: dict[tuple[int, int], FloatArray] = {}
     while True:
         problem = Problem(sh.cut(flights, length, margin), sigmas, values, unknowns)
         starts = []

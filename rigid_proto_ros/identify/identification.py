@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -199,10 +200,10 @@ def _assumed(flights: Sequence[MeasuredFlight], known: Known, fit: Sequence[str]
     return lines
 
 
-def as_json(found: Identification) -> dict:
+def as_json(found: Identification) -> dict[str, Any]:
     """The command's JSON object; what isn't identified is null."""
 
-    def pair(quantity: Quantity) -> dict | None:
+    def pair(quantity: Quantity) -> dict[str, float | None] | None:
         return None if quantity.value is None else asdict(quantity)
 
     return {

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import BoolArray, FloatArray, IntArray, Points, StateRow, Vector3
 from ..motion import loads as ld
 from . import measurements as ms
 from . import rotations as rot
@@ -81,7 +82,7 @@ def least_noise(series: ms.Series) -> float:
     return LEAST_NOISE * max(1.0, float(np.max(np.abs(series.values))))
 
 
-def local_start(flight: ms.MeasuredFlight, time_ns: int) -> np.ndarray:
+def local_start(flight: ms.MeasuredFlight, time_ns: int) -> StateRow:
     """The tracked frame's state (13,) at a time: position, attitude xyzw, velocity, angular velocity in body axes."""
     position, attitude = flight.pose
     start = np.zeros(13)
@@ -101,7 +102,7 @@ def local_start(flight: ms.MeasuredFlight, time_ns: int) -> np.ndarray:
     return start
 
 
-def _parabola(times_ns: np.ndarray, values: np.ndarray, time_ns: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _parabola(times_ns: IntArray, values: Points, time_ns: int, count: int) -> tuple[Vector3, Vector3]:
     """Value (3,) and slope (3,) [1/s] at a time, of the ``count`` samples (n, 3) nearest to it."""
     count = min(count, len(times_ns))
     first = int(np.clip(np.searchsorted(times_ns, time_ns) - count // 2, 0, len(times_ns) - count))
@@ -119,23 +120,23 @@ class Impulses:
     [N m s, world], or about the centre of mass where ``at_com`` (k,); attitudes (k, 4): of the body then.
     """
 
-    seconds: np.ndarray
-    impulses: np.ndarray
-    angular: np.ndarray
-    at_com: np.ndarray
-    attitudes: np.ndarray
+    seconds: FloatArray
+    impulses: Points
+    angular: Points
+    at_com: BoolArray
+    attitudes: FloatArray
 
-    def about(self, com: np.ndarray) -> np.ndarray:
+    def about(self, com: Vector3) -> Points:
         """Angular impulses (k, 3) about the centre of mass [N m s, world]."""
         moved = self.angular - rot.cross(rot.turned(self.attitudes, com), self.impulses)
         return np.where(self.at_com[:, None], self.angular, moved)
 
-    def momentum(self, seconds: np.ndarray, impulses: np.ndarray) -> np.ndarray:
+    def momentum(self, seconds: FloatArray, impulses: Points) -> Points:
         """Sums (n, 3) of ``impulses`` (k, 3) up to each time."""
         sums = np.vstack([np.zeros(3), np.cumsum(impulses, axis=0)])
         return sums[np.searchsorted(self.seconds, seconds, side="right")]
 
-    def path(self, seconds: np.ndarray) -> np.ndarray:
+    def path(self, seconds: FloatArray) -> Points:
         """∬ F dt² (n, 3) up to each time [N s²]."""
         sums = self.momentum(seconds, self.impulses * self.seconds[:, None])
         return self.momentum(seconds, self.impulses) * seconds[:, None] - sums
@@ -146,9 +147,9 @@ class _Poses:
     """Of a flight, seconds (n,) from its begin, positions (n, 3) [m], attitudes (n, 4) xyzw, and its loads."""
 
     flight: ms.MeasuredFlight
-    seconds: np.ndarray
-    positions: np.ndarray
-    attitudes: np.ndarray
+    seconds: FloatArray
+    positions: Points
+    attitudes: FloatArray
     impulses: Impulses
 
 
@@ -159,7 +160,7 @@ def initial_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, val
     poses = []
     for flight in flights:
         position, attitude = flight.pose
-        seconds = 1e-9 * (attitude.times_ns - flight.begin_ns)
+        seconds = 1e-9 * (attitude.times_ns - flight.begin_ns).astype(float)
         impulses = _impulses_of(flight.load_history, flight.begin_ns, seconds, attitude.values)
         poses.append(_Poses(flight, seconds, position.values, attitude.values, impulses))
     is_slowed = any(flight.own(values).damping[0] > 0.0 for flight in flights)
@@ -169,13 +170,13 @@ def initial_values(flights: Sequence[ms.MeasuredFlight], unknowns: Unknowns, val
     return _from_turns(poses, unknowns, values)
 
 
-def _integral(seconds: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+def _integral(seconds: FloatArray, vectors: Points) -> Points:
     """∫ (n, 3) of vectors (n, 3) from the first time on, by trapezoids."""
     steps = 0.5 * np.diff(seconds)[:, None] * (vectors[1:] + vectors[:-1])
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
 
-def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: np.ndarray, attitudes: np.ndarray) -> Impulses:
+def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: FloatArray, attitudes: FloatArray) -> Impulses:
     """Of a flight's loads, turned by its attitudes (n, 4) at seconds (n,) since ``begin_ns``."""
     begin, end = (1e-9 * (edge - begin_ns) for edge in (history.begin_ns, history.end_ns))
     apart = float(np.median(np.diff(seconds)))
@@ -261,7 +262,7 @@ def _inverse(found: float, sd: float, guess: float) -> float:
     return float(found) if found > TOLD * sd else min(1.0 / guess, most) if most > 0.0 else 1.0 / guess
 
 
-def _rates(poses: _Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _rates(poses: _Poses) -> tuple[FloatArray, FloatArray, FloatArray, Points]:
     """Between two attitudes each: begin and end (m,) [s], attitudes midway (m, 4), and mean angular velocities (m, 3)
     [rad/s, body axes].
     """
@@ -275,14 +276,14 @@ def _rates(poses: _Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarra
     return begin[kept], end[kept], middle[kept], (turn / (end - begin)[:, None])[kept]
 
 
-def _without(basis: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def _without(basis: FloatArray, columns: FloatArray) -> FloatArray:
     """Rows (3 n, k) of columns (n, 3, k) less the part of each that ``basis`` (n, b) can make, axis by axis."""
     Q, _ = np.linalg.qr(basis)
     rest = columns - np.tensordot(Q, np.tensordot(Q.T, columns, 1), 1)
     return rest.reshape(-1, columns.shape[2])
 
 
-def _solved(rows: np.ndarray, free: np.ndarray, known: np.ndarray, widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _solved(rows: FloatArray, free: BoolArray, known: FloatArray, widths: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Numbers (k,) with the least squares of rows (n, k + 1), whose last column is the right side, and standard
     deviations (k,) of those that are ``free``; the others stay as ``known``. widths: standard deviations of what is
     known of the free ones, which counts as much as one sample.

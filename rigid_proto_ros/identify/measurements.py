@@ -10,8 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import FloatArray, IntArray
 from ..motion.loads import LOAD
-from ..simulation.flight import IMPULSE, PULSE
+from ..simulation.commands import IMPULSE, PULSE
 from . import rotations as rot
 from .trajectories import Wrenches
 from .unknowns import Values
@@ -31,8 +32,8 @@ class Series:
 
     topic: str
     kind: str
-    times_ns: np.ndarray
-    values: np.ndarray
+    times_ns: IntArray
+    values: FloatArray
 
     @property
     def name(self) -> str:
@@ -51,9 +52,9 @@ class SampledChanges:
     change, -1 for none, and sds_s (e,) [s] say how well its time is known.
     """
 
-    before: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
-    after: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
-    sds_s: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    before: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    after: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    sds_s: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def __len__(self) -> int:
         return len(self.sds_s)
@@ -65,13 +66,13 @@ class LoadHistory:
     in the tracked frame. topic: whose clock these times are of, empty where they are exact.
     """
 
-    begin_ns: np.ndarray
-    end_ns: np.ndarray
-    loads: np.ndarray
+    begin_ns: IntArray
+    end_ns: IntArray
+    loads: FloatArray
     topic: str = ""
     changes: SampledChanges = field(default_factory=SampledChanges)
 
-    def moved(self, offset_s: float, changes_s: np.ndarray) -> LoadHistory:
+    def moved(self, offset_s: float, changes_s: FloatArray) -> LoadHistory:
         """All loads later by an offset, and the sampled changes (e,) by their own, or as they are for none (0,)."""
         offset = round(1e9 * offset_s)
         begin, end = self.begin_ns + offset, self.end_ns + offset
@@ -96,7 +97,7 @@ class LoadHistory:
         return Wrenches(np.ascontiguousarray(commands, np.int64), np.ascontiguousarray(self.loads[acts][order]))
 
 
-def load_history(rows: Sequence[tuple[int, int, np.ndarray]] = ()) -> LoadHistory:
+def load_history(rows: Sequence[tuple[int, int, FloatArray]] = ()) -> LoadHistory:
     """Of (begin [ns], end [ns], load (LOAD,)); none for a free flight."""
     begin, end = (np.array([row[k] for row in rows], np.int64) for k in (0, 1))
     return LoadHistory(begin, end, np.array([row[2] for row in rows]).reshape(-1, LOAD))

@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..base.errors import CommandRefused, InputError
-from ..base.vectors import vector
+from ..base.vectors import FloatArray, vector
 from ..motion.loads import Load, resolve_load
 from ..scene.command_codec import frame_names, of_event
 from ..scene.scenario import Scenario
@@ -63,11 +61,11 @@ def _series(session: RecordedSession) -> list[Series]:
 
 @dataclass
 class _Acting:
-    """A load and when it acts [ns]; slot: what the next command of the same slot ends."""
+    """A load (LOAD,) and when it acts [ns]; slot: what the next command of the same slot ends."""
 
     begin_ns: int
     end_ns: int
-    load: np.ndarray
+    load: FloatArray
     slot: int
 
 
@@ -75,7 +73,7 @@ def _load_history(
     session: RecordedSession, setup: Setup, frames: tuple[str, str], name: str, end_ns: int
 ) -> LoadHistory:
     """Loads of the event log up to a time, as intervals; impulses are those that begin and end at once."""
-    impulses: list[tuple[int, int, np.ndarray]] = []
+    impulses: list[tuple[int, int, FloatArray]] = []
     acting: list[_Acting] = []
     for number, line in enumerate(session.lines, 1):
         time_ns, kind, content = decode_event(line, number)
@@ -105,8 +103,8 @@ def _load_history(
     return load_history(impulses + pushes)
 
 
-def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> np.ndarray:
-    """The load with its point in the tracked frame."""
+def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> FloatArray:
+    """The load (LOAD,) with its point in the tracked frame."""
     if command.frame.point[0] == "ray":
         where = f"at {1e-9 * time_ns:g} s {name} has a poke along a ray"
         raise InputError("session", f"{where}: the point it hit isn't in the log; end before it with --to")

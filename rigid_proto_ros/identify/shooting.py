@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import FloatArray, IntArray, Points, Records
 from . import measurements as ms
 from . import rotations as rot
 from . import trajectories as tr
@@ -59,15 +60,15 @@ class Segment:
         return 1e-9 * (max(int(series.times_ns[-1]) for series in self.series) - self.begin_ns)
 
     @property
-    def change_sds_s(self) -> np.ndarray:
+    def change_sds_s(self) -> FloatArray:
         """How well the times are known when its sampled loads changed (e,) [s]."""
         return self.flight.load_history.changes.sds_s if self.is_whole else np.zeros(0)
 
-    def begin(self, state: np.ndarray) -> np.ndarray:
+    def begin(self, state: FloatArray) -> FloatArray:
         """A start (13 + e,) of this state (13,)."""
         return np.concatenate([state[:STATE], np.zeros(len(self.change_sds_s))])
 
-    def wrenches(self, start: np.ndarray, values: Values) -> tr.Wrenches:
+    def wrenches(self, start: FloatArray, values: Values) -> tr.Wrenches:
         """The loads that act in it."""
         history = self.flight.load_history
         return history.moved(values.offset(history.topic), start[STATE:]).within(self.begin_ns, self.end_ns)
@@ -90,7 +91,7 @@ def cut(flights: Sequence[ms.MeasuredFlight], length_s: float, margin_s: float =
     return segments
 
 
-def moved_starts(starts: np.ndarray, changes: np.ndarray) -> np.ndarray:
+def moved_starts(starts: FloatArray, changes: FloatArray) -> FloatArray:
     """Starts (n, 13 + e) of the tracked frame changed by (n, 12 + e)."""
     moved = starts.copy()
     moved[:, :3] += changes[:, :3]
@@ -100,7 +101,7 @@ def moved_starts(starts: np.ndarray, changes: np.ndarray) -> np.ndarray:
     return moved
 
 
-def flown_rows(starts: np.ndarray, values: Sequence[Values]) -> np.ndarray:
+def flown_rows(starts: FloatArray, values: Sequence[Values]) -> Records:
     """Bodies for ``trajectories.fly_rows`` (n,): starts (n, 13) of the tracked frame as those of the centre of mass."""
     rows = np.zeros(len(values), tr.FLOWN)
     for row, v in zip(rows, values, strict=True):
@@ -118,14 +119,14 @@ COM, PLACE, GYRO_BIAS, ACCEL_BIAS = slice(0, 3), slice(3, 6), slice(6, 9), slice
 """Of a row of ``sensor_numbers``."""
 
 
-def sensor_numbers(values: Values) -> np.ndarray:
+def sensor_numbers(values: Values) -> FloatArray:
     """What samples depend on beside the flight (12,): centre of mass and place of the IMU in the tracked frame [m], and
     what the IMU adds to rates [rad/s] and accelerations [m/s²].
     """
     return np.concatenate([values.center_of_mass, values.imu_place, values.gyro_bias, values.accel_bias])
 
 
-def shown(series: ms.Series, s: np.ndarray, sensor: np.ndarray) -> np.ndarray:
+def shown(series: ms.Series, s: FloatArray, sensor: FloatArray) -> FloatArray:
     """What a series shows (..., 3), or (..., 4) xyzw, of samples s (..., SAMPLE) of the centre of mass. sensor: its
     ``sensor_numbers`` (..., 12).
     """
@@ -142,14 +143,14 @@ def shown(series: ms.Series, s: np.ndarray, sensor: np.ndarray) -> np.ndarray:
     return felt + rot.cross(angular, arm) + rot.cross(w, rot.cross(w, arm)) + sensor[..., ACCEL_BIAS]
 
 
-def difference(series: ms.Series, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def difference(series: ms.Series, one: FloatArray, other: FloatArray) -> FloatArray:
     """``other`` less ``one`` (..., 3); of attitudes the rotation vector from one to the other in body axes [rad]."""
     if series.kind == ms.ATTITUDE:
         return rot.logarithm(rot.product(rot.inverse(one), other))
     return other - one
 
 
-def segment_residuals(segment: Segment, start: np.ndarray, values: Values) -> list[np.ndarray] | None:
+def segment_residuals(segment: Segment, start: FloatArray, values: Values) -> list[Points] | None:
     """Measured minus shown of each series (m, 3), in its own unit; None where the flight failed."""
     times, where = _times(segment, values)
     rows = flown_rows(start[None], [segment.flight.own(values)])
@@ -161,7 +162,7 @@ def segment_residuals(segment: Segment, start: np.ndarray, values: Values) -> li
     return [difference(series, shown(series, samples[0, own], sensor), series.values) for series, own in pairs]
 
 
-def _times(segment: Segment, values: Values) -> tuple[np.ndarray, list[np.ndarray]]:
+def _times(segment: Segment, values: Values) -> tuple[IntArray, list[IntArray]]:
     """Times to look at, ascending from the segment's begin [ns], and for each series which of them are its own."""
     own = [one.times_ns - segment.begin_ns + round(values.offset(one.topic) * 1e9) for one in segment.series]
     times, where = np.unique(np.maximum(np.concatenate(own), 0), return_inverse=True)
@@ -175,7 +176,7 @@ class Variations:
     which the steps of what changes its rate are shorter, so that flights end no farther apart.
     """
 
-    def __init__(self, unknowns: Unknowns, given: Values, numbers: np.ndarray, turn: float) -> None:
+    def __init__(self, unknowns: Unknowns, given: Values, numbers: FloatArray, turn: float) -> None:
         scales = unknowns.scales(given)
         self.unknowns, self.values = unknowns, unknowns.moved(given, scales * numbers)
         short = STEP * min(1.0, MOST_TURN / max(turn, 1e-9))
@@ -202,15 +203,15 @@ class Variations:
         self._changes = np.zeros((len(self._flown), START))
         self._changes[1 : 1 + START] = np.diag(start_steps)
 
-    def rows(self, flight: ms.MeasuredFlight, start: np.ndarray) -> np.ndarray:
+    def rows(self, flight: ms.MeasuredFlight, start: FloatArray) -> Records:
         """Variations of a flight from about ``start`` as ``trajectories.fly_rows`` takes them (f,)."""
         starts = moved_starts(np.repeat(start[None, :STATE], len(self._flown), axis=0), self._changes)
         return flown_rows(starts, [flight.own(values) for values in self._flown])
 
 
 def linearized(
-    segment: Segment, start: np.ndarray, sigmas: Mapping[str, float], variations: Variations
-) -> np.ndarray | None:
+    segment: Segment, start: FloatArray, sigmas: Mapping[str, float], variations: Variations
+) -> FloatArray | None:
     """How the residuals of all series change with the start and the unknowns' numbers, and as the last row the
     residuals themselves: (12 + e + unknowns + 1, 3 m of all series), in standard deviations, ``sigmas`` by name.
 
@@ -253,8 +254,8 @@ def _parts(segment: Segment) -> list[slice]:
 
 
 def _by_clock(
-    segment: Segment, sigmas: Mapping[str, float], one: tuple[np.ndarray, Values], other: tuple[np.ndarray, Values]
-) -> np.ndarray:
+    segment: Segment, sigmas: Mapping[str, float], one: tuple[FloatArray, Values], other: tuple[FloatArray, Values]
+) -> FloatArray:
     """How the residuals (3 m,) change from one flight to the other, whose clocks are two CLOCK_STEP_S apart."""
     earlier, later = segment_residuals(segment, *one), segment_residuals(segment, *other)
     column = np.zeros(3 * segment.samples)

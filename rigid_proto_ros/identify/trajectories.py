@@ -14,6 +14,7 @@ from numba import from_dtype, int64, types
 
 from ..base.compilation import copy_numbers, entry_of, njit, record_type
 from ..base.rotation import rotate_inverse
+from ..base.vectors import BoolArray, FloatArray, IntArray, Records
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import BODY, fill_body
 from ..motion.integrators.auto import AUTO
@@ -52,24 +53,24 @@ class Wrenches:
     the segment's start.
     """
 
-    commands: np.ndarray
-    loads: np.ndarray
+    commands: IntArray
+    loads: FloatArray
 
     @cached_property
-    def edges_ns(self) -> np.ndarray:
+    def edges_ns(self) -> IntArray:
         """When loads begin and end, ascending."""
         return np.sort(np.concatenate([self.commands[:, 0], self.commands[:, 0] + self.commands[:, 1]]))
 
 
 def _fly_all(
-    flown: np.ndarray,
-    times_ns: np.ndarray,
-    commands: np.ndarray,
-    loads: np.ndarray,
+    flown: Records,
+    times_ns: IntArray,
+    commands: IntArray,
+    loads: FloatArray,
     degree: int,
-    tables: tuple,
-    samples: np.ndarray,
-    good: np.ndarray,
+    tables: tuple[Records, Records, Records, Records, FloatArray],
+    samples: FloatArray,
+    good: IntArray,
 ) -> int:
     """Each of flown (n,), FLOWN, through times_ns (m,) ascending from 0: samples (n, m, SAMPLE); good (n,) whether it
     came through. tables: methods, one flight, loads with room for all commands, events and workspace, as
@@ -122,7 +123,7 @@ def _fly_all(
 
 
 @cache
-def _compiled() -> tuple[Callable[..., int], np.ndarray, int]:
+def _compiled() -> tuple[Callable[..., int], Records, int]:
     """``_fly_all`` compiled, or loaded from the cache, the table of the methods, and the degree of their series."""
     flat, table, cube = types.float64[:, ::1], types.int64[:, ::1], types.float64[:, :, ::1]
     bodies, *records = (from_dtype(kind)[::1] for kind in (FLOWN, METHOD, fl.FLIGHT, fl.LOAD_ROW, fl.EVENT))
@@ -133,7 +134,7 @@ def _compiled() -> tuple[Callable[..., int], np.ndarray, int]:
     return entry_of(njit(nogil=True, error_model="numpy")(_fly_all), signature), methods, degree
 
 
-def fly_rows(flown: np.ndarray, times_ns: np.ndarray, wrenches: Wrenches) -> tuple[np.ndarray, np.ndarray]:
+def fly_rows(flown: Records, times_ns: IntArray, wrenches: Wrenches) -> tuple[FloatArray, BoolArray]:
     """Samples (n, m, SAMPLE) of each body in ``flown`` (n,), FLOWN, at times_ns (m,) ascending from 0, and whether it
     came through (n,).
     """

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..base.errors import InputError
+from ..base.vectors import FloatArray, Matrix3, Vector3
 from ..mass.tensor import principal_axes
 
 GROUPS = ("mass", "inertia", "com", "damping", "gravity", "offset", "gyro_bias", "accel_bias", "imu_place")
@@ -35,14 +36,14 @@ class Values:
     """
 
     mass: float
-    center_of_mass: np.ndarray
-    inertia: np.ndarray
-    damping: np.ndarray
-    gravity: np.ndarray
+    center_of_mass: Vector3
+    inertia: Matrix3
+    damping: FloatArray
+    gravity: Vector3
     offsets: Mapping[str, float]
-    gyro_bias: np.ndarray
-    accel_bias: np.ndarray
-    imu_place: np.ndarray
+    gyro_bias: Vector3
+    accel_bias: Vector3
+    imu_place: Vector3
     by_flight: frozenset[str] = frozenset()
 
     @property
@@ -67,13 +68,13 @@ class Unknowns:
     def __contains__(self, group: str) -> bool:
         return any(name == group for name, _ in self.slots)
 
-    def scales(self, values: Values) -> np.ndarray:
-        """What counts as a large change of each unknown."""
+    def scales(self, values: Values) -> FloatArray:
+        """What counts as a large change of each unknown (n,)."""
         mass, size = values.mass, values.size
         large = {"com": [size] * 3, "damping": [10.0 * mass, 10.0 * mass * size**2 / 3.0]}
         return np.array([large[group][index] if group in large else 1.0 for group, index in self.slots])
 
-    def moved(self, values: Values, change: np.ndarray) -> Values:
+    def moved(self, values: Values, change: FloatArray) -> Values:
         """``values`` with the unknowns changed (n,): the mass by a factor e^change, the tensor as ``moved_tensor``
         says, all others by what is added to them. Where the tensor isn't an unknown it grows with the mass.
         """
@@ -126,34 +127,34 @@ def make_unknowns(fit: Sequence[str], topics: Sequence[str]) -> Unknowns:
     return Unknowns(tuple(slots))
 
 
-def moved_tensor(inertia: np.ndarray, change: np.ndarray) -> np.ndarray:
+def moved_tensor(inertia: Matrix3, change: FloatArray) -> Matrix3:
     """A tensor (3, 3) changed (6,) in its own principal axes, each entry by the root of its two moments: the trace's
     third, the last moment less the mean of the others, the second less the first, and products 23, 13, 12.
     """
     moments, axes = principal_axes(inertia)
     size, ratio, smaller, turn23, turn13, turn12 = change.tolist()
     a, b, c = size - ratio / 3.0 - 0.5 * smaller, size - ratio / 3.0 + 0.5 * smaller, size + 2.0 * ratio / 3.0
-    relative = np.array([[a, turn12, turn13], [turn12, b, turn23], [turn13, turn23, c]])
+    relative: Matrix3 = np.array([[a, turn12, turn13], [turn12, b, turn23], [turn13, turn23, c]])
     moved = inertia + axes @ (relative * np.sqrt(np.outer(moments, moments))) @ axes.T
     return 0.5 * (moved + moved.T)
 
 
-def second_moments(inertia: np.ndarray) -> np.ndarray:
+def second_moments(inertia: Matrix3) -> Matrix3:
     """∫ x xᵀ dm (3, 3) [kg m²] of a tensor: a body can have it where none of its eigenvalues is below 0."""
-    return 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    return 0.5 * float(np.trace(inertia)) * np.eye(3) - inertia
 
 
-def possible_tensor(inertia: np.ndarray, thinnest: float = THINNEST) -> np.ndarray:
+def possible_tensor(inertia: Matrix3, thinnest: float = THINNEST) -> Matrix3:
     """The nearest tensor of a body whose least second moment is at least ``thinnest`` of the largest."""
     values, axes = np.linalg.eigh(second_moments(inertia))
     least = thinnest * np.abs(values).max()
     if values[0] >= least:
         return inertia
     second = (axes * np.maximum(values, least)) @ axes.T
-    return np.trace(second) * np.eye(3) - second
+    return float(np.trace(second)) * np.eye(3) - second
 
 
-def is_possible(inertia: np.ndarray) -> bool:
+def is_possible(inertia: Matrix3) -> bool:
     """Whether a body can have it, to rounding."""
     values = np.linalg.eigvalsh(second_moments(inertia))
     return bool(values[0] >= -1e-12 * values[2])
@@ -165,8 +166,8 @@ _UNITS[np.arange(6), _ROWS, _COLUMNS] = _UNITS[np.arange(6), _COLUMNS, _ROWS] = 
 
 
 def possible_step(
-    jacobian: np.ndarray, residuals: np.ndarray, tensor: slice, inertia: np.ndarray, change: np.ndarray
-) -> np.ndarray:
+    jacobian: FloatArray, residuals: FloatArray, tensor: slice, inertia: Matrix3, change: FloatArray
+) -> FloatArray:
     """The step (n,) with the least ``|jacobian step + residuals|`` that leads to a body that can exist. tensor: where
     the six numbers of ``moved_tensor`` stand in it; so far they have changed ``inertia`` by ``change`` (6,).
 
@@ -180,13 +181,13 @@ def possible_step(
     size = float(np.trace(inertia))
     begin = second_moments(inertia) / size
     changes = [second_moments(moved_tensor(inertia, unit)) / size - begin for unit in np.eye(6)]
-    of_second = np.linalg.inv(np.array(changes)[:, _ROWS, _COLUMNS].T)
+    of_second: FloatArray = np.linalg.inv(np.array(changes)[:, _ROWS, _COLUMNS].T)
 
-    def step_to(root: np.ndarray) -> np.ndarray:
+    def step_to(root: FloatArray) -> FloatArray:
         S = np.tensordot(root, _UNITS, 1)
         return of_second @ (S @ S - begin)[_ROWS, _COLUMNS] - change
 
-    def slopes(root: np.ndarray) -> np.ndarray:
+    def slopes(root: FloatArray) -> FloatArray:
         S = np.tensordot(root, _UNITS, 1)
         return left @ of_second @ np.array([(unit @ S + S @ unit)[_ROWS, _COLUMNS] for unit in _UNITS]).T
 

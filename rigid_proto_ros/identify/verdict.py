@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtrc
 
-from ..base.vectors import Numbers
+from ..base.vectors import FloatArray, Numbers, Points
 from .fitting import Estimate, residuals_of
 from .initial_estimate import noise_by_differences
 from .measurements import ATTITUDE, UNITS, MeasuredFlight
@@ -131,7 +131,7 @@ class Identifiability:
         return found
 
 
-def _coordinates(unknowns: Unknowns, values: Values, length: float) -> tuple[list[str], np.ndarray]:
+def _coordinates(unknowns: Unknowns, values: Values, length: float) -> tuple[list[str], FloatArray]:
     """Names of the unknowns, and what is much of each (n,)."""
     names, units = [], []
     for k, (group, index) in enumerate(unknowns.slots):
@@ -208,7 +208,7 @@ def check_residuals(flights: Sequence[MeasuredFlight], estimate: Estimate) -> li
     return found
 
 
-def _whiteness(scaled: np.ndarray) -> float:
+def _whiteness(scaled: Points) -> float:
     """Probability by Ljung and Box (Biometrika 65, 1978) of the three components together."""
     n = len(scaled)
     lags = min(LAGS, n // 4)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.vectors import BoolArray, FloatArray, IntArray, Points
 from ..motion.body import Body
 from ..simulation.observer import ShownLoad
 from . import style
@@ -32,7 +33,7 @@ class ArrowScales:
     def __init__(self) -> None:
         self._per_metre: dict[str, float] = {}
 
-    def lengths(self, kind: str, values: np.ndarray, size: float, usual: float = 0.0) -> np.ndarray:
+    def lengths(self, kind: str, values: FloatArray, size: float, usual: float = 0.0) -> FloatArray:
         """Lengths (n,) [m] of arrows for values (n,) >= 0 on a body of this size [m]; 0 where nothing is to be drawn.
 
         The first value of a kind sets its scale; one that is none, or next to ``usual`` none, has ``usual`` set it.
@@ -102,9 +103,9 @@ class Loads:
         self,
         backend: Backend,
         wanted: Callable[[str], bool],
-        times_ns: np.ndarray,
-        rows: np.ndarray,
-        R: np.ndarray,
+        times_ns: IntArray,
+        rows: FloatArray,
+        R: FloatArray,
         scales: ArrowScales,
         size: float,
         weight: float,
@@ -112,7 +113,7 @@ class Loads:
         """Draw the arrows at times (n,), states (n, 13) and attitudes R (n, 3, 3), of a body of this size [m] and
         weight on earth [N]: none, once, where they ended.
         """
-        found: dict[str, list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, str]]] = {}
+        found: dict[str, list[tuple[BoolArray, Points, Points, Points, str]]] = {}
         for acting in (*self.acting.values(), *self._ended):
             present = (times_ns >= acting.begin_ns) & (times_ns < acting.end_ns)
             if not present.any() and not acting.shown and acting.end_ns < np.inf:
@@ -139,13 +140,13 @@ class Loads:
 
 def _arrows(
     acting: Acting,
-    present: np.ndarray,
-    rows: np.ndarray,
-    R: np.ndarray,
+    present: BoolArray,
+    rows: FloatArray,
+    R: FloatArray,
     scales: ArrowScales,
     size: float,
     weight: float,
-) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray, np.ndarray, str]]]:
+) -> Iterator[tuple[str, tuple[Points, Points, Points, str]]]:
     """By name a load's arrows at all states: vectors, origins, the places of labels (n, 3), and the label."""
     load, point = acting.load, np.asarray(acting.load.point, dtype=float)
     if acting.pushes is None:

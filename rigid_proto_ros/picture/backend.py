@@ -7,16 +7,18 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..base.vectors import FloatArray, IntArray, Points, Vector3
 from .style import Colour
 
 
 class DrawnMesh(NamedTuple):
     """A surface in single precision: vertices (p, 3), triangles (m, 3) and unit normals (p, 3)."""
 
-    vertices: np.ndarray
-    triangles: np.ndarray
-    normals: np.ndarray
+    vertices: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+    normals: NDArray[np.float32]
 
 
 class Backend:
@@ -28,7 +30,7 @@ class Backend:
     alone takes what belongs to the last state.
     """
 
-    def begin(self, times_ns: np.ndarray) -> None:
+    def begin(self, times_ns: IntArray) -> None:
         """Simulated times (n,) [ns], ascending."""
 
     def resize(self, size: float) -> None:
@@ -40,25 +42,25 @@ class Backend:
     def place(
         self,
         name: str,
-        positions: np.ndarray | None = None,
-        attitudes: np.ndarray | None = None,
-        scale: np.ndarray | None = None,
+        positions: Points | None = None,
+        attitudes: FloatArray | None = None,
+        scale: Vector3 | None = None,
     ) -> None:
         """The part's frame: positions (n, 3), attitudes (n, 4) xyzw, scale (3,) that stays; None leaves it out."""
 
-    def arrows(self, name: str, counts: np.ndarray, vectors: np.ndarray, origins: np.ndarray | None = None) -> None:
+    def arrows(self, name: str, counts: IntArray, vectors: Points, origins: Points | None = None) -> None:
         """Vectors (m, 3) from origins (m, 3), or from the frame's."""
 
     def lines(
-        self, name: str, counts: np.ndarray, strips: Sequence[np.ndarray], colours: Sequence[Colour] | None = None
+        self, name: str, counts: IntArray, strips: Sequence[Points], colours: Sequence[Colour] | None = None
     ) -> None:
         """m strips (p, 3) of p points each; colours of each, or the style's."""
 
-    def points(self, name: str, counts: np.ndarray, positions: np.ndarray) -> None:
+    def points(self, name: str, counts: IntArray, positions: Points) -> None:
         """Positions (m, 3); those of a trail are one of each state, and the path goes through them."""
 
-    def labels(self, name: str, counts: np.ndarray, positions: np.ndarray, texts: Sequence[str]) -> None:
+    def labels(self, name: str, counts: IntArray, positions: Points, texts: Sequence[str]) -> None:
         """m texts at positions (m, 3)."""
 
-    def scalars(self, name: str, values: np.ndarray) -> None:
+    def scalars(self, name: str, values: FloatArray) -> None:
         """Plotted values (n, k), named by SERIES."""

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..base.rotation import matrix_from_quaternion, quaternion_from_matrix
+from ..base.vectors import FloatArray, IntArray, Points, Triangles, Vector3
 from ..mass.tensor import equimomental_shapes, principal_axes
 from ..motion.body import Body
 from ..simulation.observer import (
@@ -42,7 +43,7 @@ LINE_SIZES = 1.1
 """Body sizes that the line of a string that pulls is drawn on beyond its knot."""
 
 
-def energies(rows: np.ndarray, setup: Setup) -> np.ndarray:
+def energies(rows: FloatArray, setup: Setup) -> Points:
     """Energies (n, 3) [J] of states (n, 13): translational, rotational, gravity's."""
     body, velocity, w = setup.body, rows[:, 7:10], rows[:, 10:13]
     translational = 0.5 * body.mass * np.einsum("ni,ni->n", velocity, velocity)
@@ -50,9 +51,10 @@ def energies(rows: np.ndarray, setup: Setup) -> np.ndarray:
     return np.column_stack([translational, rotational, -body.mass * (rows[:, 0:3] @ setup.gravity)])
 
 
-def angle_to(reference: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Angle [rad] between reference (3,) and vectors (n, 3), accurate near 0 and π; 0 where either vanishes."""
-    return np.arctan2(np.linalg.norm(np.cross(reference, vectors), axis=1), vectors @ reference)
+def angle_to(reference: Vector3, vectors: Points) -> FloatArray:
+    """Angles (n,) [rad] between reference (3,) and vectors (n, 3), accurate near 0 and π; 0 where either vanishes."""
+    angles: FloatArray = np.arctan2(np.linalg.norm(np.cross(reference, vectors), axis=1), vectors @ reference)
+    return angles
 
 
 class Shape:
@@ -61,7 +63,7 @@ class Shape:
     of the box along the mesh axes; these without a mesh None. moments (3,), axes (3, 3): principal, ascending.
     """
 
-    def __init__(self, vertices: np.ndarray | None, body: Body) -> None:
+    def __init__(self, vertices: Points | None, body: Body) -> None:
         self.moments, self.axes = principal_axes(body.inertia)
         self.box_sides, self.semi_axes = equimomental_shapes(body.mass, self.moments)
         self.tip = self.centre = self.half_sizes = None
@@ -89,7 +91,7 @@ class Picture:
         self.poke_shown_ns = 0
         self._wanted = wanted
         self._period_ns = 1_000_000_000 // rate
-        self._vertices: np.ndarray | None = None
+        self._vertices: Points | None = None
         self._middle = np.zeros(3)
         self._mesh: DrawnMesh | None = None
         self.restart()
@@ -127,7 +129,7 @@ class Picture:
             case StringChanged():
                 self.string.change(event)
 
-    def _set_mesh(self, time_ns: int, vertices: np.ndarray | None, triangles: np.ndarray | None) -> None:
+    def _set_mesh(self, time_ns: int, vertices: Points | None, triangles: Triangles | None) -> None:
         """Another mesh: vertices (n, 3) [mesh coordinates], triangles (m, 3); a BodyChanged follows."""
         self._vertices = self._mesh = None
         if vertices is not None and triangles is not None and len(triangles):
@@ -221,7 +223,7 @@ class Picture:
 
     # States
 
-    def draw(self, times_ns: np.ndarray, rows: np.ndarray) -> None:
+    def draw(self, times_ns: IntArray, rows: FloatArray) -> None:
         """States (n, 13) at times (n,) [ns] of the present body, all those since the call before."""
         if self.setup is None or self.shape is None or not len(times_ns):
             return
@@ -261,7 +263,7 @@ class Picture:
         if self._wanted("plots"):
             self._plot(rows, L, None if string is None else string.held)
 
-    def _plot(self, rows: np.ndarray, L: np.ndarray, string_energy: np.ndarray | None) -> None:
+    def _plot(self, rows: FloatArray, L: Points, string_energy: FloatArray | None) -> None:
         """Plot states (n, 13) with their angular momenta (n, 3) in world axes.
 
         string_energy (n,) [J] is None as long as the run has had no string.
@@ -280,7 +282,7 @@ class Picture:
         if np.any(self.setup.gravity) or rows[:, 7:10].any():
             backend.scalars(style.POSITION, rows[:, 0:3])
 
-    def _draw_motion(self, spin: np.ndarray, L: np.ndarray) -> None:
+    def _draw_motion(self, spin: Points, L: Points) -> None:
         """Arrows of ω and L at the COM (n, 3)."""
         assert self.shape is not None
         natural = np.sqrt(9.81 / self.shape.size)
@@ -299,7 +301,7 @@ class Picture:
             self.backend.arrows(name, counts, drawn)
             self.backend.labels(name, counts, LABEL_BEYOND * drawn, [symbol] * len(drawn))
 
-    def _draw_string(self, string: StringRows, rows: np.ndarray) -> None:
+    def _draw_string(self, string: StringRows, rows: FloatArray) -> None:
         assert self.setup is not None and self.shape is not None
         backend, tied, counts = self.backend, string.tied, string.tied.astype(int)
         directions, pulls = string.directions, string.pulls
@@ -323,7 +325,7 @@ class Picture:
             plotted[tied, 0] = distances
             backend.scalars(style.STRING_LINE_DISTANCE, plotted)
 
-    def draw_ghost(self, times_ns: np.ndarray, rows: np.ndarray) -> None:
+    def draw_ghost(self, times_ns: IntArray, rows: FloatArray) -> None:
         """States (n, 13) of the ghost, after the body's of the same times."""
         if not len(times_ns):
             return

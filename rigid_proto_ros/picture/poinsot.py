@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.rotation import quaternion_from_matrix
+from ..base.vectors import FloatArray, IntArray, Matrix3, Points, Vector3
 from . import style
 from .backend import Backend
 from .surface import ball_mesh
@@ -29,7 +30,7 @@ REST = 1e-12
 """[rad/s] Below this spin there is nothing to draw."""
 
 
-def polhode(moments: np.ndarray, energy: float, w: np.ndarray) -> np.ndarray:
+def polhode(moments: Vector3, energy: float, w: Vector3) -> Points:
     """The closed curve (n, 3) on the ellipsoid through ω (3,), which has the energy T.
 
     The curve surrounds the axis of the largest moment if L² > 2T·I2, else that of the smallest. L² − 2T·Ii is taken
@@ -55,12 +56,12 @@ def polhode(moments: np.ndarray, energy: float, w: np.ndarray) -> np.ndarray:
     return curve
 
 
-def turn_down(L: np.ndarray) -> np.ndarray:
+def turn_down(L: Vector3) -> FloatArray:
     """Quaternion xyzw (4,) that turns the direction of L (3,) onto −z, the shorter way."""
     x, y, z = L / np.linalg.norm(L)
     if z > 1.0 - 1e-12:
         return np.array([1.0, 0.0, 0.0, 0.0])
-    turned = np.array([-y, x, 0.0, 1.0 - z])
+    turned: FloatArray = np.array([-y, x, 0.0, 1.0 - z])
     return turned / np.linalg.norm(turned)
 
 
@@ -71,7 +72,7 @@ class Poinsot:
         self._moments, self._axes = np.ones(3), np.eye(3)
         self._drawn = -REDRAWN_NS, 0.0, np.zeros(3)
 
-    def set_body(self, moments: np.ndarray, axes: np.ndarray) -> None:
+    def set_body(self, moments: Vector3, axes: Matrix3) -> None:
         """Another tensor, as ``principal_axes`` has it: another ellipsoid, in other axes."""
         self._moments, self._axes = moments, axes
         self._drawn = -REDRAWN_NS, 0.0, np.zeros(3)
@@ -83,7 +84,7 @@ class Poinsot:
         I1, I2, _ = self._moments
         backend.place(style.POINSOT_ELLIPSOID, scale=(I1 * I2) ** 0.25 / np.sqrt(self._moments))
 
-    def draw(self, backend: Backend, times_ns: np.ndarray, rows: np.ndarray, spin: np.ndarray, L: np.ndarray) -> None:
+    def draw(self, backend: Backend, times_ns: IntArray, rows: FloatArray, spin: Points, L: Points) -> None:
         """States (n, 13) at times (n,) with their spins and angular momenta (n, 3) in world axes."""
         w = rows[:, 10:13] @ self._axes
         energy = 0.5 * np.einsum("ni,i,ni->n", w, self._moments, w)
@@ -101,7 +102,7 @@ class Poinsot:
         backend.labels(style.POINSOT_OMEGA, counts, 1.08 * ends, ["ω"] * len(ends))
         backend.points(style.POINSOT_HERPOLHODE, counts, ends)
 
-    def _changes(self, time_ns: int, energy: float, L: np.ndarray) -> bool:
+    def _changes(self, time_ns: int, energy: float, L: Vector3) -> bool:
         """Whether T and L are no longer those drawn."""
         drawn_ns, drawn_energy, drawn_L = self._drawn
         same = abs(energy - drawn_energy) <= CHANGE * drawn_energy
@@ -111,9 +112,7 @@ class Poinsot:
         self._drawn = time_ns, float(energy), L.copy()
         return True
 
-    def _draw_curves(
-        self, backend: Backend, scale: np.ndarray, energy: np.ndarray, w: np.ndarray, L: np.ndarray
-    ) -> None:
+    def _draw_curves(self, backend: Backend, scale: FloatArray, energy: FloatArray, w: Points, L: Points) -> None:
         """Polhode, plane and L from each of these states on; a body at rest has none."""
         turns = scale > 0.0
         counts = turns.astype(int)

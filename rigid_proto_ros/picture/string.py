@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.vectors import BoolArray, FloatArray, IntArray, Points, Vector3
 from ..motion.string import StringState
 from ..simulation.observer import StringChanged
 
@@ -21,7 +22,7 @@ DOWN = np.array([0.0, 0.0, -1.0])
 """Where a slack string hangs without gravity, so that it is seen to be slack."""
 
 
-def string_curves(free: np.ndarray, knots: np.ndarray, lengths: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+def string_curves(free: Points, knots: Points, lengths: FloatArray, gravity: Vector3) -> FloatArray:
     """Points (n, POINTS, 3) of slack strings from their free ends (n, 3) to their knots (n, 3): on a parabola along
     gravity (3,) [m/s², world], so deep that the line through them is ``lengths`` (n,) long.
     """
@@ -45,21 +46,22 @@ class StringRows:
     lengths (m,) [m] of a slack one, 0 of one that is always straight; energies (m,) [J]; pulls (m,): it is taut.
     """
 
-    tied: np.ndarray
-    free: np.ndarray
-    knots: np.ndarray
-    lengths: np.ndarray
-    energies: np.ndarray
-    pulls: np.ndarray
+    tied: BoolArray
+    free: Points
+    knots: Points
+    lengths: FloatArray
+    energies: FloatArray
+    pulls: BoolArray
 
     @property
-    def directions(self) -> np.ndarray:
+    def directions(self) -> Points:
         """Unit vectors (m, 3) from the free ends to the knots."""
         spans = self.knots - self.free
-        return spans / np.maximum(np.linalg.norm(spans, axis=1, keepdims=True), np.finfo(float).tiny)
+        sizes: FloatArray = np.maximum(np.linalg.norm(spans, axis=1, keepdims=True), np.finfo(float).tiny)
+        return spans / sizes
 
     @property
-    def held(self) -> np.ndarray:
+    def held(self) -> FloatArray:
         """Energy stored in the string at each of the n states (n,) [J]: 0 where no string is tied."""
         found = np.zeros(len(self.tied))
         found[self.tied] = self.energies
@@ -84,14 +86,14 @@ class Strings:
         """Whether there is a string now."""
         return bool(self._changes) and self._changes[-1].string is not None
 
-    def _spells(self, times_ns: np.ndarray) -> Iterator[tuple[slice, StringState, np.ndarray]]:
+    def _spells(self, times_ns: IntArray) -> Iterator[tuple[slice, StringState, Vector3]]:
         """The string that is tied at each of the times (n,) with its knot, by slices of them."""
         begins = np.searchsorted(times_ns, [change.time_ns for change in self._changes], side="left").tolist()
         for begin, end, change in zip(begins, [*begins, len(times_ns)][1:], self._changes, strict=True):
             if change.string is not None and change.arm is not None and end > begin:
                 yield slice(begin, end), change.string, change.arm
 
-    def rows(self, times_ns: np.ndarray, rows: np.ndarray, R: np.ndarray) -> StringRows:
+    def rows(self, times_ns: IntArray, rows: FloatArray, R: FloatArray) -> StringRows:
         """The string at times (n,), ascending, of states (n, 13) with attitudes R (n, 3, 3)."""
         tied, pulls = np.zeros((2, len(rows)), dtype=bool)
         (free, knots), (lengths, energies) = np.zeros((2, len(rows), 3)), np.zeros((2, len(rows)))

@@ -7,6 +7,7 @@ import functools
 
 import numpy as np
 
+from ..base.vectors import IntArray, Points, Triangles, Vector3
 from .backend import DrawnMesh
 
 CREASE_ANGLE = np.deg2rad(35.0)
@@ -16,7 +17,7 @@ CREASED_TRIANGLES_MAX = 200_000
 """Above this every vertex is shaded smoothly: the facets are finer than a picture shows, and the pairs too many."""
 
 
-def shaded_surface(vertices: np.ndarray, triangles: np.ndarray) -> DrawnMesh:
+def shaded_surface(vertices: Points, triangles: Triangles) -> DrawnMesh:
     """The surface to draw, in float32 and uint32.
 
     vertices (n, 3), triangles (m, 3) as loaded. A vertex on a sharp edge is split into one per smooth side, so p ≥ the
@@ -46,7 +47,7 @@ def shaded_surface(vertices: np.ndarray, triangles: np.ndarray) -> DrawnMesh:
     )
 
 
-def _corner_normals(corner_vertex: np.ndarray, corner_face: np.ndarray, face_area_normals: np.ndarray) -> np.ndarray:
+def _corner_normals(corner_vertex: IntArray, corner_face: IntArray, face_area_normals: Points) -> Points:
     """Per corner the area-weighted mean of the normals around its vertex that lie within the crease angle of it."""
     unit = _unit(face_area_normals)
     order = np.argsort(corner_vertex, kind="stable")
@@ -69,7 +70,7 @@ def _corner_normals(corner_vertex: np.ndarray, corner_face: np.ndarray, face_are
     return _unit(normals)
 
 
-def _unit(vectors: np.ndarray) -> np.ndarray:
+def _unit(vectors: Points) -> Points:
     """Rows (n, 3) at unit length; a zero row becomes +z, since a viewer can't shade with a zero normal."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
@@ -92,7 +93,7 @@ def box_mesh() -> DrawnMesh:
     return shaded_surface(BOX_CORNERS, BOX_TRIANGLES)
 
 
-def box_edges(centre: np.ndarray, half_sizes: np.ndarray) -> list[np.ndarray]:
+def box_edges(centre: Vector3, half_sizes: Vector3) -> list[Points]:
     """The twelve edges (2, 3) of a box along the axes."""
     return list((centre + half_sizes * BOX_CORNERS)[BOX_EDGES])
 

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import FloatArray, Matrix3, Vector3
 from ..mass.properties import MassProperties, MeshMoments
 from ..mass.tensor import SIX, six_from_tensor, tensor_from_six
 from ..mesh.solids import convex_hull
@@ -59,7 +60,7 @@ def _other_shapes(parts: LinkShapes, mass: float) -> Iterator[tuple[str, MassPro
         yield "the convex hull", MeshMoments(*convex_hull(parts.points)).mass_properties(mass=mass)
 
 
-def _mistakes(truth: MassProperties, stated: np.ndarray, parts: LinkShapes) -> Iterator[tuple[str, np.ndarray]]:
+def _mistakes(truth: MassProperties, stated: Vector3, parts: LinkShapes) -> Iterator[tuple[str, Matrix3]]:
     """Each usual mistake, "" for none, and the tensor that it makes of the true one; stated (3,): the COM that the file
     gives.
     """
@@ -105,8 +106,8 @@ def _mistakes(truth: MassProperties, stated: np.ndarray, parts: LinkShapes) -> I
         yield "parts summed about their own centres", parts.summed_about_own_centers(mass)
 
 
-def _one_entry(have: np.ndarray, want: np.ndarray) -> str:
-    """That one of six entries is a power of ten times the true one, the others right; "" where it isn't so."""
+def _one_entry(have: FloatArray, want: FloatArray) -> str:
+    """That one of six entries (6,) is a power of ten times the true one, the others right; "" where it isn't so."""
     wrong = np.flatnonzero(np.abs(have - want) > LIMIT * np.max(np.abs(want)))
     if len(wrong) != 1 or not have[wrong[0]] * want[wrong[0]] > 0.0:
         return ""
@@ -125,7 +126,7 @@ def _unit(factor: float) -> str | None:
     return next((f"{text}: {times}" for known, text in _FACTORS.items() if abs(factor / known - 1.0) <= LIMIT), None)
 
 
-def explain_inertia(given: np.ndarray, truth: MassProperties, stated: np.ndarray, parts: LinkShapes) -> tuple[str, ...]:
+def explain_inertia(given: Matrix3, truth: MassProperties, stated: Vector3, parts: LinkShapes) -> tuple[str, ...]:
     """The fewest usual mistakes that turn the true tensor into ``given`` (3, 3); empty when none do.
 
     stated (3,): the COM that the file gives [m, link axes].
@@ -152,12 +153,12 @@ def explain_inertia(given: np.ndarray, truth: MassProperties, stated: np.ndarray
     return ()
 
 
-def _is_isotropic(inertia: np.ndarray) -> bool:
+def _is_isotropic(inertia: Matrix3) -> bool:
     """Whether a tensor is the same about every axis."""
     return bool(np.max(np.abs(inertia - inertia[0, 0] * np.eye(3))) <= 1e-9 * abs(inertia[0, 0]))
 
 
-def explain_center(given: np.ndarray, truth: MassProperties, parts: LinkShapes) -> tuple[str, ...]:
+def explain_center(given: Vector3, truth: MassProperties, parts: LinkShapes) -> tuple[str, ...]:
     """The usual mistake that turns the true COM into ``given`` (3,) [m, link axes]; empty when none does."""
     com, use = truth.center_of_mass, parts.first.pose
     guesses = [

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import Points, Triangles
 from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor
 from ..mesh.locate import Search, resolve_mesh
@@ -26,8 +27,8 @@ class Lump:
     robot's own and those of its meshes that are found."""
 
     properties: MassProperties
-    vertices: np.ndarray
-    triangles: np.ndarray
+    vertices: Points
+    triangles: Triangles
     links: tuple[tuple[str, float], ...]
     massless: tuple[str, ...]
     absent: tuple[str, ...]
@@ -89,7 +90,7 @@ def _computed(link: Link, meshes: Meshes) -> Link:
     return replace(link, mass=whole.mass, center_of_mass=whole.center_of_mass, inertia=whole.inertia, problem="")
 
 
-def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[Points, Triangles, tuple[str, ...]]:
     """Vertices, triangles, and what is missing, of what the links show; of those that show nothing what they collide
     with.
     """
@@ -110,7 +111,7 @@ def _merged(links: list[tuple[Link, Pose]], search: Search) -> tuple[np.ndarray,
     return np.concatenate(vertices), np.concatenate(triangles), tuple(absent)
 
 
-def obj_text(vertices: np.ndarray, triangles: np.ndarray) -> str:
+def obj_text(vertices: Points, triangles: Triangles) -> str:
     """A mesh as an .obj file, with all digits."""
     points = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
     return points + "".join(f"f {a} {b} {c}\n" for a, b, c in (triangles + 1).tolist())

@@ -21,10 +21,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import Points, Vector3
 from ..mass.from_mesh import mesh_body
 from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor
@@ -71,7 +73,7 @@ class LinkDiagnosis:
         """The larger of the errors."""
         return max(self.center_of_mass_error or 0.0, self.inertia_error or 0.0)
 
-    def as_dict(self) -> dict:
+    def as_dict(self) -> dict[str, Any]:
         """The diagnosis as a JSON object; ``expected`` is in the link's axes."""
         expected = self.expected and self.expected.as_dict()
         plain = {
@@ -94,7 +96,7 @@ def impossible_inertial(link: Link) -> str:
     return ""
 
 
-def beyond_shapes(link: Link, points: np.ndarray) -> str:
+def beyond_shapes(link: Link, points: Points) -> str:
     """Why no mass distribution within the hull of ``points`` (n, 3) has the link's inertial, which some body has; ""
     when one may have.
     """
@@ -129,7 +131,7 @@ def beyond_shapes(link: Link, points: np.ndarray) -> str:
     )
 
 
-def _spread(count: int) -> np.ndarray:
+def _spread(count: int) -> Points:
     """``count`` directions (count, 3) spread evenly over the sphere: a Fibonacci lattice."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     angle = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
@@ -137,7 +139,7 @@ def _spread(count: int) -> np.ndarray:
     return np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
 
 
-def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _hull(points: Points) -> tuple[Points, Points]:
     """Corners (n, 3) and normals (m, 3) of the hull; of points that have none, or without SciPy, all and none."""
     try:
         corners, triangles = convex_hull(points)
@@ -151,7 +153,7 @@ def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return corners, normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
-def _words(axis: np.ndarray) -> str:
+def _words(axis: Vector3) -> str:
     return f"({', '.join(f'{value + 0.0:.2g}' for value in np.round(axis, 3))})"
 
 
@@ -227,7 +229,7 @@ def _quality(diagnosis: LinkDiagnosis) -> tuple[int, bool, float]:
     return order, diagnosis.expected is None, diagnosis.error
 
 
-def _possible(link: Link, diagnosis: LinkDiagnosis, inside: list[np.ndarray]) -> LinkDiagnosis:
+def _possible(link: Link, diagnosis: LinkDiagnosis, inside: list[Points]) -> LinkDiagnosis:
     """The diagnosis with the verdict that the link's inertial is impossible, where it is; ``inside``: points (n, 3) of
     the shapes.
     """
@@ -241,7 +243,7 @@ def _possible(link: Link, diagnosis: LinkDiagnosis, inside: list[np.ndarray]) ->
 
 
 def _by_mesh(
-    links: list[Link], mesh: str, scale: np.ndarray | None, accept_open: float, tolerance: float
+    links: list[Link], mesh: str, scale: Vector3 | None, accept_open: float, tolerance: float
 ) -> LinkDiagnosis:
     """The verdict on the one link with a shape of the mesh's name, or the only one with an inertial, by that mesh."""
     body = mesh_body(load_mesh(mesh), accept_open=accept_open)
@@ -263,7 +265,7 @@ def compare_robot(
     path: Path,
     *,
     mesh: str | None = None,
-    scale: np.ndarray | None = None,
+    scale: Vector3 | None = None,
     folders: tuple[Path, ...] = (),
     accept_open: float = 0.0,
     tolerance: float = LIMIT,

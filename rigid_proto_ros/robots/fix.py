@@ -48,7 +48,7 @@ def _indent(data: bytes, start: int) -> bytes:
     return data[line - data[:line].endswith(b"\r") : start]
 
 
-def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict, everything: bool) -> str:
+def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict[int, tuple[int, int]], everything: bool) -> str:
     """Why a link that isn't uniform can't, or shan't, be written; "" when it can."""
     if diagnosis.status == NOT_UNIFORM and not everything:
         return "it is possible for its shapes; --all replaces it by that of the uniform solid"

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.vectors import Matrix3, Points, Triangles, Vector3
 from ..mass.from_mesh import MeshBody, mesh_body
 from ..mass.properties import MassProperties
 from ..mesh.locate import Search
@@ -57,7 +58,7 @@ def primitive_solid(kind: str, size: tuple[float, ...]) -> MassProperties:
     return MassProperties(volume, np.zeros(3), np.diag(squares.sum() - squares))
 
 
-def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[Points, Triangles]:
     """Vertices (n, 3) and outward triangles (m, 3) of a primitive about its centre, ``size`` as in Shape; round ones
     are inscribed, with the same bounding box.
     """
@@ -78,7 +79,7 @@ def primitive_surface(kind: str, size: tuple[float, ...]) -> tuple[np.ndarray, n
     return vertices * stretch + upward, np.asarray(made.faces, dtype=np.int64)
 
 
-def placed_surface(shape: Shape, mesh: Mesh | None) -> tuple[np.ndarray, np.ndarray]:
+def placed_surface(shape: Shape, mesh: Mesh | None) -> tuple[Points, Triangles]:
     """Vertices (n, 3) and triangles (m, 3) of a shape, a mesh or for None a primitive, in the link's frame; raises
     InputError where they aren't finite.
     """
@@ -109,7 +110,7 @@ def of_mass(body: MassProperties, mass: float) -> MassProperties:
     return replace(body, mass=mass, inertia=body.inertia * (mass / body.mass))
 
 
-def parallel_axis(mass: float, offset: np.ndarray) -> np.ndarray:
+def parallel_axis(mass: float, offset: Vector3) -> Matrix3:
     """Inertia (3, 3) of a mass about a point that is ``offset`` (3,) away from it."""
     return mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
 
@@ -120,7 +121,8 @@ def combined(bodies: Sequence[MassProperties], whole: str) -> MassProperties:
     if not 0.0 < mass < math.inf:
         raise InputError(f"mass of {whole}", mass, "a finite mass or volume > 0")
     center = sum((body.mass * body.center_of_mass for body in bodies), np.zeros(3)) / mass
-    inertia = sum(body.inertia + parallel_axis(body.mass, body.center_of_mass - center) for body in bodies)
+    each = (body.inertia + parallel_axis(body.mass, body.center_of_mass - center) for body in bodies)
+    inertia = sum(each, np.zeros((3, 3)))
     return MassProperties(mass, center, 0.5 * (inertia + inertia.T))
 
 
@@ -170,10 +172,10 @@ class LinkShapes:
         """``mass`` kg spread evenly over the shapes, what overlaps counted twice, in the link's axes."""
         return of_mass(combined(self.solids, self.names), mass)
 
-    def summed_about_own_centers(self, mass: float) -> np.ndarray:
+    def summed_about_own_centers(self, mass: float) -> Matrix3:
         """What comes out (3, 3) when the parts' tensors are added as if all had one centre of mass."""
         volume = sum(solid.mass for solid in self.solids)
-        return np.sum([solid.inertia for solid in self.solids], axis=0) * (mass / volume)
+        return sum((solid.inertia for solid in self.solids), np.zeros((3, 3))) * (mass / volume)
 
     def box(self, mass: float) -> MassProperties:
         """The box around all, in the first shape's axes, as a solid of ``mass`` kg."""

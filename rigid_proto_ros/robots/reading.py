@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from ..base.errors import InputError
 from ..base.files import read_bounded
 from ..base.rotation import matrix_from_quaternion
+from ..base.vectors import FloatArray, Matrix3, Numbers, Vector3
 from ..mass.tensor import SIX, tensor_from_six
 
 VISUAL, COLLISION = "visual", "collision"
@@ -46,8 +47,8 @@ SIZES = {
 class Pose:
     """Rotation (3, 3) and position (3,) [m] of a frame in another."""
 
-    rotation: np.ndarray
-    position: np.ndarray
+    rotation: Matrix3
+    position: Vector3
 
     def __matmul__(self, inner: Pose) -> Pose:
         return Pose(self.rotation @ inner.rotation, self.rotation @ inner.position + self.position)
@@ -66,7 +67,7 @@ class Shape:
     kind: str
     pose: Pose
     file: str = ""
-    scale: np.ndarray = field(default_factory=lambda: np.ones(3))
+    scale: Vector3 = field(default_factory=lambda: np.ones(3))
     size: tuple[float, ...] = ()
     problem: str = ""
     density: float = WATER
@@ -85,11 +86,11 @@ class Link:
     shapes: tuple[Shape, ...] = ()
     problem: str = NO_INERTIAL
     mass: float = math.nan
-    center_of_mass: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
-    inertia: np.ndarray = field(default_factory=lambda: np.full((3, 3), math.nan))
+    center_of_mass: Vector3 = field(default_factory=lambda: np.full(3, math.nan))
+    inertia: Matrix3 = field(default_factory=lambda: np.full((3, 3), math.nan))
     mass_step: float = 0.0
-    center_step: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    inertia_step: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
+    center_step: Vector3 = field(default_factory=lambda: np.zeros(3))
+    inertia_step: Matrix3 = field(default_factory=lambda: np.zeros((3, 3)))
     element: Element | None = None
     computed: bool = False
 
@@ -131,7 +132,7 @@ def parse_xml(data: bytes, path: Path) -> Element:
         raise InputError("robot file", path.name, f"well-formed XML ({error})") from None
 
 
-def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
+def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Matrix3:
     """Rotation (3, 3) of fixed-axes roll, pitch, yaw [rad], as URDF and SDF have them."""
     cr, sr, cp, sp, cy, sy = (float(f(a)) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
     return np.array(
@@ -143,14 +144,14 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
     )
 
 
-def rotation_from_wxyz(quaternion: ArrayLike) -> np.ndarray:
+def rotation_from_wxyz(quaternion: Numbers) -> Matrix3:
     """Rotation (3, 3) of a quaternion (w, x, y, z), MuJoCo's order, of any length but 0."""
     w, x, y, z = (np.asarray(quaternion, dtype=float) / np.linalg.norm(np.asarray(quaternion, dtype=float))).tolist()
     return matrix_from_quaternion([x, y, z, w])
 
 
-def floats(name: str, text: str, count: int = 3) -> np.ndarray:
-    """``count`` numbers of a text, which the file calls ``name``; raises InputError for others."""
+def floats(name: str, text: str, count: int = 3) -> FloatArray:
+    """``count`` numbers (count,) of a text, which the file calls ``name``; raises InputError for others."""
     try:
         values = np.array([float(word.replace("_", "?")) for word in text.split()])  # Python allows _ in numbers
     except ValueError:
@@ -178,7 +179,7 @@ def number(name: str, text: str) -> float:
     return float(floats(name, text, 1)[0])
 
 
-def printed_steps(words: list[str]) -> np.ndarray:
+def printed_steps(words: list[str]) -> FloatArray:
     """Half a unit of the last digit that a group of numbers is printed with: 0.0005 for 0.012 alone; 0 for zeros."""
     decimals = []
     for word in words:
@@ -189,7 +190,7 @@ def printed_steps(words: list[str]) -> np.ndarray:
 
 
 def printed_link(
-    bare: Link, mass: str, center: str, six: list[str], rotation: np.ndarray, element: Element | None
+    bare: Link, mass: str, center: str, six: list[str], rotation: Matrix3, element: Element | None
 ) -> Link:
     """The link with an inertial from a file's words: mass, COM, and the six entries of the tensor in axes turned by
     ``rotation``.

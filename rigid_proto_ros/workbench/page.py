@@ -420,7 +420,8 @@ class Page:
         string = self.picture.string
         if not string.was_tied:
             return [0.0] * len(times)
-        return string.rows(times, rows, matrix_from_quaternion(rows[:, 3:7])).held.tolist()
+        held: list[float] = string.rows(times, rows, matrix_from_quaternion(rows[:, 3:7])).held.tolist()
+        return held
 
     def _draw_past(self) -> None:
         moment_ns = self.flight.moment_ns
