@@ -23,7 +23,7 @@ def product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def inverse(q: FloatArray) -> FloatArray:
     """Of unit quaternions (..., 4)."""
-    return q * np.array([-1.0, -1.0, -1.0, 1.0], float)
+    return q * np.array([-1.0, -1.0, -1.0, 1.0], np.float64)
 
 
 def exponential(vector: FloatArray) -> FloatArray:

@@ -150,7 +150,7 @@ def possible_tensor(inertia: Matrix3, thinnest: float = THINNEST) -> Matrix3:
     least = thinnest * np.abs(values).max()
     if values[0] >= least:
         return inertia
-    second = (axes * np.maximum(values, least)) @ axes.T
+    second: Matrix3 = (axes * np.maximum(values, least)) @ axes.T
     return float(np.trace(second)) * np.eye(3) - second
 
 
@@ -181,7 +181,7 @@ def possible_step(
     size = float(np.trace(inertia))
     begin = second_moments(inertia) / size
     changes = [second_moments(moved_tensor(inertia, unit)) / size - begin for unit in np.eye(6)]
-    of_second: FloatArray = np.linalg.inv(np.array(changes)[:, _ROWS, _COLUMNS].T)
+    of_second = np.linalg.inv(np.array(changes)[:, _ROWS, _COLUMNS].T)
 
     def step_to(root: FloatArray) -> FloatArray:
         S = np.tensordot(root, _UNITS, 1)
@@ -189,7 +189,8 @@ def possible_step(
 
     def slopes(root: FloatArray) -> FloatArray:
         S = np.tensordot(root, _UNITS, 1)
-        return left @ of_second @ np.array([(unit @ S + S @ unit)[_ROWS, _COLUMNS] for unit in _UNITS]).T
+        changed: FloatArray = np.array([(unit @ S + S @ unit)[_ROWS, _COLUMNS] for unit in _UNITS]).T
+        return left @ of_second @ changed
 
     values, axes = np.linalg.eigh(begin)
     # Away from 0, where the root's slope is nothing.

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.rotation import quaternion_from_matrix
-from ..base.vectors import FloatArray, IntArray, Matrix3, Points, Vector3
+from ..base.vectors import Attitude, FloatArray, IntArray, Matrix3, Points, Vector3
 from . import style
 from .backend import Backend
 from .surface import ball_mesh
@@ -56,12 +56,12 @@ def polhode(moments: Vector3, energy: float, w: Vector3) -> Points:
     return curve
 
 
-def turn_down(L: Vector3) -> FloatArray:
+def turn_down(L: Vector3) -> Attitude:
     """Quaternion xyzw (4,) that turns the direction of L (3,) onto −z, the shorter way."""
     x, y, z = L / np.linalg.norm(L)
     if z > 1.0 - 1e-12:
         return np.array([1.0, 0.0, 0.0, 0.0])
-    turned: FloatArray = np.array([-y, x, 0.0, 1.0 - z])
+    turned: Attitude = np.array([-y, x, 0.0, 1.0 - z])
     return turned / np.linalg.norm(turned)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import viser
 
 from ..base.rotation import matrix_from_quaternion
-from ..base.vectors import FloatArray, Vector3
+from ..base.vectors import Attitude, Vector3
 from ..scene.scenario import Scenario
 from ..simulation.setup import Setup
 from .flight import Entry, Flight
@@ -46,7 +46,7 @@ class DrawnPose:
 
     time_s: float
     position: Vector3
-    orientation_xyzw: FloatArray
+    orientation_xyzw: Attitude
     origin: Vector3
     unit: float
     setup: Setup
