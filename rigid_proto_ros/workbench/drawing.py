@@ -138,7 +138,7 @@ class ViserBackend(Backend):
             if not name.startswith((style.BODY, style.GHOST)):
                 self._set_there(name, False)
 
-    def drawn(self, name: str, points: Points) -> Points:
+    def drawn(self, name: str, points: FloatArray) -> FloatArray:
         """Points (..., 3) [m] of a part's parent frame as browsers have them."""
         return points / self.unit if name.startswith(MOVING) else (points - self.origin) / self.unit
 
