@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import MeshError, is_missing
-from ..base.vectors import FloatArray, Points, Triangles
+from ..base.vectors import Points, Triangles
 
 _LIBRARIES = ("images", "effects", "materials", "cameras", "lights", "animations", "animation_clips", "controllers")
 _UNUSED = (*(f"library_{kind}" for kind in _LIBRARIES), "bind_material", "instance_camera", "instance_light", "extra")
@@ -32,7 +32,7 @@ class Assembly:
         self._triangles: list[Triangles] = [np.empty((0, 3), np.int64)]
         self._count = self._held = 0
 
-    def add(self, vertices: NDArray[Any], triangles: NDArray[Any], matrix: FloatArray, part: str) -> None:
+    def add(self, vertices: NDArray[Any], triangles: NDArray[Any], matrix: NDArray[Any], part: str) -> None:
         """Append ``part``: vertices (n, 3) transformed by matrix (4, 4), triangles (m, 3) reversed if it mirrors.
 
         Raises MeshError for a vertex number out of range, and beyond MAX_TRIANGLES.

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from ..base.arithmetic import expm1
 from ..base.compilation import new_record, njit, record_type
 from ..base.rotation import multiply, norm, rotate, rotate_inverse
-from ..base.vectors import FloatArray, Quaternion, Records, StateRow, Vector, Vector3
+from ..base.vectors import FloatArray, Quaternion, StateRow, Vector, Vector3
 from . import body as of_body
 from . import loads as of_loads
 from .body import BodyRow
@@ -136,8 +136,8 @@ def begin_body(p: np.record, body: BodyRow, environment: np.record, gyroscopic: 
 
 
 @njit(error_model="numpy", allocates=False)
-def begin_problem(p: np.record, loads: Records, row: StateRow) -> None:
-    """Complete the body's part p with loads and the start, as far as they go without a string."""
+def begin_problem(p: np.record, loads: FloatArray, row: StateRow) -> None:
+    """Complete the body's part p with the sums of loads and the start, as far as they go without a string."""
     P, mass = p.principal_axes, p.mass
     turns, pushes = False, False
     for k in range(3):

@@ -121,7 +121,7 @@ def shift_com(row: StateRow, x: float, y: float, z: float) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def kinetic_energy(row: StateRow, mass: float, inertia: FloatArray) -> float:
+def kinetic_energy(row: FloatArray, mass: float, inertia: FloatArray) -> float:
     """½ m|v|² + ½ ωᵀIω [J] of a state row (≥ 13,); inertia (9,) row by row."""
     x, y, z = row[10], row[11], row[12]
     turning = (
@@ -133,7 +133,7 @@ def kinetic_energy(row: StateRow, mass: float, inertia: FloatArray) -> float:
 
 
 @njit(error_model="numpy", allocates=False)
-def angular_momentum(row: StateRow, inertia: FloatArray) -> tuple[float, float, float]:
+def angular_momentum(row: FloatArray, inertia: FloatArray) -> tuple[float, float, float]:
     """L = R I ω about the COM, world axes [N m s], of a state row (≥ 13,); inertia (9,) row by row."""
     x, y, z = row[10], row[11], row[12]
     return rotate(

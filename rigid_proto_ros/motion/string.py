@@ -56,9 +56,11 @@ def length_of(x: float, y: float, z: float) -> float:
 
 
 @njit(error_model="numpy", allocates=False)
-def free_end_at(now_ns: int, origin: Vector3, target: Vector3, begin_ns: int, end_ns: int) -> tuple[Vector, Vector]:
+def free_end_at(
+    now_ns: int, origin: FloatArray, target: FloatArray, begin_ns: int, end_ns: int
+) -> tuple[Vector, Vector]:
     """The free end's position [m, world] and, from then on, its velocity [m/s, world], for uniform motion from origin
-    (3,) at begin_ns to target (3,) at end_ns, where it stays.
+    (≥ 3,) at begin_ns to target (≥ 3,) at end_ns, where it stays.
     """
     if now_ns >= end_ns:
         return (target[0], target[1], target[2]), (0.0, 0.0, 0.0)

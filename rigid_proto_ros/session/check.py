@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.errors import CommandRefused, InputError
 from ..base.provenance import cpu, versions
-from ..base.vectors import FloatArray, StateRow
+from ..base.vectors import FloatArray
 from ..simulation.observer import Event, EventLog, Logged, Observer
 from .messages import FIELDS, PROJECTIONS
 from .recorded_session import RecordedSession, Resimulation, decode_event, resimulation
@@ -123,7 +123,7 @@ def broken_link(lines: Sequence[str]) -> int | None:
 
 def _advance(
     again: Resimulation, time_ns: int, computed: Sequence[str], recorded: Sequence[str], compared: int
-) -> tuple[Difference | None, StateRow]:
+) -> tuple[Difference | None, FloatArray]:
     """The state computed at ``time_ns``, or the first difference in the commands up to there, of which ``compared``
     were alike.
     """
