@@ -188,6 +188,7 @@ def _state(values: Any, stamp: Stamp) -> list[Command]:
 
 
 def _string(entry: Any, stamp: Stamp) -> list[Command]:
+    entry = plain(entry)
     if entry == "release":
         return [ReleaseString(**stamp)]
     if not isinstance(entry, dict) or not entry or not entry.keys() <= _STRING_KEYS:
@@ -214,7 +215,7 @@ def _set(changes: Any, stamp: Stamp) -> list[Command]:
 
 
 def _service(name: Any, stamp: Stamp) -> list[Command]:
-    if name != "clear_wrench":
+    if plain(name) != "clear_wrench":
         raise InputError("", name, "clear_wrench")
     return [ClearWrench(**stamp)]
 
@@ -246,7 +247,7 @@ def _load(held: bool, entry: dict[str, Any], stamp: Stamp) -> WrenchCommand:
     slot = entry.get("slot", "")
     if "slot" in entry and not (isinstance(slot, str) and SLOT_NAME.match(slot)):
         raise InputError("slot", slot, "a name of [a-z][a-z0-9_]*, up to 12 characters")
-    axes = entry.get("axes", "world")
+    axes = plain(entry.get("axes", "world"))
     if axes not in ("world", "body"):
         raise InputError("axes", axes, "world, body")
     force_key, torque_key = ("impulse", "angular_impulse") if impulse else ("force", "torque")
@@ -284,7 +285,7 @@ def _check_keys(entry: dict[str, Any], known: Set[str], others: Set[str] = froze
     """others: keys of other kinds of entries, one of which may be meant."""
     if entry.keys() <= known:
         return
-    unknown = [key for key in entry if key not in known]
+    unknown = [str(key) for key in entry if key not in known]
     hint = did_you_mean(unknown[0], known | others)
     keys = f"the keys here are {', '.join(sorted(known))}"
     keys += f"; other entries have {', '.join(sorted(others))}" if others else ""

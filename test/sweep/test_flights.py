@@ -77,6 +77,24 @@ def test_numbers_and_arrays_of_numpy_are_numbers_and_lists(tmp_path, kind) -> No
         Flight(load_scene("t_handle")).command({"force": [True, 0.0, 0.0]})
 
 
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {1: 2.0},
+        {"state": {None: [0.0, 0.0, 1.0]}},
+        {"force": [0.0, 0.0, 1.0], "axes": np.zeros(3)},
+        {"force": np.zeros((3, 3))},
+        {"at": {"vertex": np.arange(2)}, "push": 1.0},
+        {"service": np.zeros(2)},
+        {"string": np.zeros(2)},
+        {"thrusters": np.array(["a"])},
+    ],
+)
+def test_keys_and_values_of_any_type_are_refused_in_one_line(entry) -> None:
+    with pytest.raises(InputError, match=r"\Acommand, entry 1.*\Z"):
+        Flight(load_scene("t_handle")).command(entry)
+
+
 def test_a_sample_is_the_callers_own() -> None:
     flight = Flight(load_scene("t_handle"))
     for sample in (flight.sample(), flight.step(0.1)):
