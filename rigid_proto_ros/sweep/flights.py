@@ -83,9 +83,10 @@ class Flight:
         """
         simulation = self._run.simulation
         # A difference of two times may be a rounding below 0.
-        if not (isinstance(seconds, (float, Real)) and abs(seconds) <= MAX_TIME_S and nanoseconds(seconds) >= 0):
+        step_ns = nanoseconds(seconds) if isinstance(seconds, (float, Real)) and abs(seconds) <= MAX_TIME_S else -1
+        if step_ns < 0:
             raise InputError("step", seconds, f"a number of seconds from 0 to {MAX_TIME_S:g}")
-        until_ns = simulation.time_ns + nanoseconds(seconds)
+        until_ns = simulation.time_ns + step_ns
         if until_ns > MAX_TIME_S * 1e9:
             raise InputError("step", seconds, f"a step that ends by {MAX_TIME_S:g} s of simulated time")
         before = dict(simulation.refused)
