@@ -146,6 +146,18 @@ def test_every_exception_from_a_check_says_its_reason() -> None:
     assert not bare
 
 
+def test_every_annotation_of_an_array_gives_its_dtype() -> None:
+    """mypy takes a bare np.ndarray for one of any dtype, strict as it is."""
+    bare = []
+    for path in MODULES.values():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for name in ("annotation", "returns"):
+                annotation = getattr(node, name, None)
+                if annotation is not None and "np.ndarray" in ast.unparse(annotation):
+                    bare.append(f"{path}:{node.lineno}")
+    assert not bare
+
+
 def test_each_outside_package_is_imported_in_its_own_place_alone() -> None:
     def allowed(module: str, name: str) -> bool:
         top = name.split(".")[0]

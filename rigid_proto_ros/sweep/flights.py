@@ -73,7 +73,7 @@ class Flight:
         """Let an entry of a poke script act now, after those given before; with ``t`` at that time [s, simulated] or
         later. Raises InputError for one that can't be taken.
         """
-        if not isinstance(entry, Mapping):
+        if not isinstance(entry, (dict, Mapping)):  # a mapping's own check is slow
             raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
         self._run.submit(expand_entry(dict(entry), "command", now_ns=self._run.simulation.time_ns))
 
