@@ -363,7 +363,6 @@ def test_while_paused_the_bar_says_that_what_was_done_acts_on_play(flown: FlownP
         assert flown.do(words) == "paused: acts on Play"
         flown.reset()
         assert flown.do(words) == "paused"
-        flown.page.flight.pause(True)
 
 
 def string_events(flown: FlownPage) -> list[str]:
