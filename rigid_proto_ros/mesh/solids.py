@@ -123,19 +123,35 @@ def convex_hull(points: Points) -> tuple[Points, Triangles]:
         raise flat
     shape = shape / half
     try:
-        # Points that are coplanar to rounding can leave cracks between triangles; joggled by 1e-11 of the extent they
-        # can't.
-        hull = ConvexHull(shape, qhull_options="QJ")
+        hull = ConvexHull(shape, qhull_options="Qt")
     except QhullError:
         raise flat from None
     used, triangles = np.unique(hull.simplices, return_inverse=True)
     triangles = triangles.reshape(-1, 3)
+    _wind_alike(triangles, hull.neighbors)
     a, b, c = (shape[used[triangles[:, k]]] for k in range(3))
-    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
-    triangles[inward] = triangles[inward][:, [0, 2, 1]]
+    if np.sum(a * np.cross(b, c)) < 0.0:
+        triangles = triangles[:, ::-1]
     if len(mesh_topology(shape[used], triangles).unbalanced):
-        raise flat
+        raise MeshError("mesh_fallback", f"the hull of the points isn't closed{remedy}")
     return points[used], triangles
+
+
+def _wind_alike(triangles: Triangles, neighbors: IntArray) -> None:
+    """Wind the triangles (m, 3) of a closed surface alike, from each to its neighbors (m, 3): the normal of a sliver
+    between points of one edge is due to rounding.
+    """
+    wound, waiting = {0}, [0]
+    while waiting:
+        one = waiting.pop()
+        a, b, c = triangles[one].tolist()
+        for other in set(neighbors[one].tolist()) - wound:
+            x, y, z = triangles[other].tolist()
+            # Triangles wound alike pass their common edge in opposite directions.
+            if {(a, b), (b, c), (c, a)} & {(x, y), (y, z), (z, x)}:
+                triangles[other] = z, y, x
+            wound.add(other)
+            waiting.append(other)
 
 
 def box_surface(points: Points) -> tuple[Points, Triangles]:

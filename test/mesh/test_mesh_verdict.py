@@ -11,6 +11,7 @@ from judged_meshes import body, codes, volume
 from mass_solids import box, inward, moved, rotation, sphere, together
 from mesh_files import moebius
 
+from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.base.errors import InputError, MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.moments import solid_moments
@@ -246,6 +247,20 @@ def test_the_hull_is_closed_convex_and_holds_every_point(seed, count, kind, expo
     a, b, c = (corners[triangles[:, k]] for k in range(3))
     heights = np.einsum("fk,fpk->fp", np.cross(b - a, c - a), points[None] - a[:, None])
     assert heights.max() <= 1e-9 * spread[0] ** 2 * spread[2] + 1e-14
+
+
+@pytest.mark.parametrize("cells", [1, 2, 5, 12])
+def test_the_hull_of_a_box_with_points_on_its_edges_and_faces_is_the_box(cells):
+    vertices, _ = box((1.0, 2.0, 3.0), cells=cells)
+    for number in range(5):
+        assert solid_moments(*convex_hull(vertices @ rotation(number).T)).measure == pytest.approx(6.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("name", body_names())
+def test_every_bundled_body_has_a_hull(name):
+    mesh = load_mesh(name)
+    solid = solid_moments(mesh.vertices, mesh.triangles).measure
+    assert solid_moments(*convex_hull(mesh.vertices)).measure > solid
 
 
 def test_many_components_are_judged_in_bounded_work():
