@@ -12,7 +12,7 @@ import numpy as np
 
 from .arithmetic import sine_cosine
 from .compilation import njit
-from .vectors import Attitude, FloatArray, Matrix3, Numbers, Points, Vector3
+from .vectors import Attitude, FloatArray, Matrix3, Numbers, Vector3
 
 
 def cross(a: Numbers, b: Numbers) -> Vector3:
@@ -36,7 +36,7 @@ def length(v: Numbers) -> float:
     return norm(float(v[0]), float(v[1]), float(v[2]))
 
 
-def times(matrix: Points, v: Numbers) -> FloatArray:
+def times(matrix: FloatArray, v: Numbers) -> FloatArray:
     """The matrix (n, 3) times v (3,), summed in a fixed order: that of BLAS depends on the processor."""
     return matrix[:, 0] * v[0] + matrix[:, 1] * v[1] + matrix[:, 2] * v[2]
 

@@ -23,7 +23,7 @@ Attitude = NDArray[np.float64]
 StateRow = NDArray[np.float64]
 """(13,): COM position [m, world], attitude xyzw, velocity [m/s, world], angular velocity [rad/s, body axes]."""
 Points = NDArray[np.float64]
-"""(n, 3)"""
+"""(n, 3): points or vectors, a row each."""
 Triangles = NDArray[np.int64]
 """(m, 3) indices of points."""
 

@@ -43,7 +43,7 @@ LINE_SIZES = 1.1
 """Body sizes that the line of a string that pulls is drawn on beyond its knot."""
 
 
-def energies(rows: FloatArray, setup: Setup) -> Points:
+def energies(rows: FloatArray, setup: Setup) -> FloatArray:
     """Energies (n, 3) [J] of states (n, 13): translational, rotational, gravity's."""
     body, velocity, w = setup.body, rows[:, 7:10], rows[:, 10:13]
     translational = 0.5 * body.mass * np.einsum("ni,ni->n", velocity, velocity)

@@ -32,7 +32,8 @@ class ImuNoise:
     def measured(self, time_ns: int, rate: Sequence[float], felt: Sequence[float]) -> list[list[float]]:
         """Angular velocity and specific force (3,) in body axes, as the IMU tells them."""
         errors = self.sigma[:, None] * _normal(self.seed, _WHITE, time_ns) + self.bias
-        return list((np.array([rate, felt]) + errors).tolist())
+        shown: list[list[float]] = (np.array([rate, felt]) + errors).tolist()
+        return shown
 
 
 def _normal(seed: int, kind: int, place: int) -> FloatArray:

@@ -34,7 +34,7 @@ _SPECIAL = re.compile(r"[+-]?\.?(inf|infinity|nan)\Z", re.IGNORECASE)
 _WORD = re.compile(r"(?!null\Z)[a-z_]{3,}\Z")
 """Text that needs no quotes in YAML, unless it means true or false."""
 
-_PLAIN = {float, int, str, bool, type(None)}
+_PLAIN = (float, int, str, bool, type(None))
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """libyaml's, ten times as fast, where it is installed."""
@@ -181,9 +181,9 @@ def plain(value: object) -> Any:
     if type(value) in _PLAIN:
         return value
     if isinstance(value, (list, tuple)):
-        return [item if type(item) in _PLAIN else plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, (dict, Mapping)):
-        return {key: item if type(item) in _PLAIN else plain(item) for key, item in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     return os.fspath(value) if isinstance(value, os.PathLike) else value

@@ -25,7 +25,7 @@ from ..base.vectors import FloatArray, IntArray
 from .fields import mapping, number, whole
 
 MAX_POINTS = 1_000_000
-"""Points of one grid or list."""
+"""Values of one grid or list."""
 
 _WORDS = 4
 """Of 64 bits that the generator gives a count."""
@@ -41,7 +41,7 @@ _ACCEPTED = (
 
 
 @dataclass(frozen=True)
-class Points:
+class Levels:
     """Given values. kind: ``grid`` (every combination with other grids) or ``list`` (in step with other lists)."""
 
     kind: str
@@ -97,7 +97,7 @@ class Draw:
         return out[:, 0] if out.shape[1] == 1 else out
 
 
-def read_form(spec: Any, field: str) -> Points | Draw:
+def read_form(spec: Any, field: str) -> Levels | Draw:
     """The form that a study gives; raises InputError naming the field."""
     if spec in ("random_rotation", "random_vertex"):
         spec = {spec: None}
@@ -107,7 +107,7 @@ def read_form(spec: Any, field: str) -> Points | Draw:
     ((kind, value),) = spec.items()
     field = f"{field}.{kind}"
     if kind in (GRID, LIST):
-        return Points(kind, tuple(_points(value, field)))
+        return Levels(kind, tuple(_points(value, field)))
     shape = DRAWS.index(kind)
     if shape in (_ROTATION, VERTEX):
         return Draw(shape)

@@ -39,7 +39,7 @@ from ..scene.yaml_text import load_yaml, plain, read_text
 from ..simulation.commands import Command, nanoseconds
 from .fields import mapping, number, whole
 from .measures import Measures, read_measures
-from .sampling import GRID, LIST, VERTEX, Draw, Points, read_form, row_uniforms
+from .sampling import GRID, LIST, VERTEX, Draw, Levels, read_form, row_uniforms
 from .targets import Target, read_target
 
 MAX_ROWS = 10_000_000
@@ -71,7 +71,7 @@ class Vary:
     """One thing that varies, and how."""
 
     target: Target
-    form: Points | Draw
+    form: Levels | Draw
 
     @property
     def is_random_vertex(self) -> bool:
@@ -104,8 +104,8 @@ class Study:
 
     @property
     def grids(self) -> list[int]:
-        """Points of each grid, then of the lists, if any."""
-        given = [v.form for v in self.vary if isinstance(v.form, Points)]
+        """Levels of each grid, then of the lists, if any."""
+        given = [v.form for v in self.vary if isinstance(v.form, Levels)]
         sizes = [len(form.values) for form in given if form.kind == GRID]
         return sizes + [len(form.values) for form in given if form.kind == LIST][:1]
 
@@ -279,7 +279,7 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list[Any]) -> t
             whole_point = target.name.removesuffix(".vertex")
             raise InputError(field, how, f"a grid or list of whole numbers, or {whole_point}: random_vertex")
         # Numbers alone need no conversion, and there may be a million of them.
-        if target.parameter and isinstance(form, Points) and not {type(v) for v in form.values} <= {int, float}:
+        if target.parameter and isinstance(form, Levels) and not {type(v) for v in form.values} <= {int, float}:
             given = [_checked(target, value, field, values, entries) for value in form.values]
             form = replace(form, values=tuple(_of_one_length(given)))
         else:
@@ -289,7 +289,7 @@ def _vary(spec: Any, name: str, parameters: Parameters, entries: list[Any]) -> t
     for vector, part in permutations(map(str, spec), 2):
         if part.startswith(f"{vector}."):
             raise InputError(f"{name}, vary", f"{vector} and {part}", "one of them: each replaces the other")
-    lengths = {len(v.form.values) for v in found if isinstance(v.form, Points) and v.form.kind == LIST}
+    lengths = {len(v.form.values) for v in found if isinstance(v.form, Levels) and v.form.kind == LIST}
     if len(lengths) > 1:
         raise InputError(f"{name}, vary", sorted(lengths), "lists of the same length; they advance together")
     return tuple(found)
@@ -335,7 +335,7 @@ def _reference(spec: Any, field: str) -> dict[str, Any] | None:
 
 
 def _samples(spec: Any, field: str, vary: tuple[Vary, ...]) -> int:
-    if all(isinstance(v.form, Points) for v in vary):
+    if all(isinstance(v.form, Levels) for v in vary):
         if spec not in (None, 1):
             raise InputError(field, spec, "no samples: nothing in the study is random")
         return 1
