@@ -20,9 +20,11 @@ import tempfile
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from llvmlite import ir
 from numpy.typing import NDArray
 
 _ABSENT: Any = None
@@ -43,6 +45,7 @@ try:
     from numba.core.typing import cffi_utils  # noqa: F401  # otherwise looks for cffi at the first kernel
     from numba.extending import intrinsic as numba_intrinsic
     from numba.np import arraymath  # otherwise looks for scipy's linear algebra at the first kernel
+    from numba.np.arrayobj import populate_array
 finally:
     for _name in _HIDDEN:
         del sys.modules[_name]
@@ -275,6 +278,117 @@ def notify_when_compiling(notify: Callable[[], None]) -> Iterator[None]:
 
     with event.install_listener("numba:compile", Listener()):
         yield
+
+
+# Kernels that Python and other programs call, by name
+
+
+@dataclass(frozen=True)
+class Export:
+    """A kernel that is called from outside of compiled code. arguments and returns: as in ``exported``."""
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    returns: str
+
+
+EXPORTS: dict[str, Export] = {}
+"""All of them, by the functions' names."""
+
+
+def exported(*arguments: Any, returns: str = "", nogil: bool = False) -> Callable[[_Function], _Function]:
+    """Declare a kernel that Python, the page or another program calls, with an explicit signature; it allocates
+    nothing, raises nothing and is compiled without numba's runtime.
+
+    arguments: of each one "f8", "i8" or "b1" for a number (b1: bool); "f8[:]", "f8[:,:]", "i8[:]" and so on for a
+    contiguous array of numbers (also u1, i4, f4, b1); the type of a record for one record, by reference; that type in a
+    list, [LOAD_ROW], for an array of records. returns: "" for nothing, or its numbers with blanks between, "f8 f8 b1".
+    nogil: release the interpreter's lock during the call, for what may take longer than some microseconds.
+    """
+
+    def decorated(function: _Function) -> _Function:
+        assert function.__name__ not in EXPORTS, f"two kernels are named {function.__name__}"
+        EXPORTS[function.__name__] = Export(function, arguments, returns)
+        return njit(error_model="numpy", allocates=False, nogil=nogil)(function)
+
+    return decorated
+
+
+def _local_array(count: int, shape: tuple[int, ...], number: Any) -> tuple[Any, Any]:
+    """Type and code of an array in the memory of the calling function."""
+    kind = types.Array(number, len(shape), "C")
+
+    def code(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        of_numbers = context.get_data_type(number)
+        memory = cgutils.alloca_once(builder, ir.ArrayType(of_numbers, count))
+        return _array_at(context, builder, kind, builder.bitcast(memory, of_numbers.as_pointer()), shape)
+
+    return kind, code
+
+
+def _array_at(context: Any, builder: Any, kind: Any, data: Any, shape: tuple[Any, ...]) -> Any:
+    """A contiguous array over given memory."""
+    array = context.make_array(kind)(context, builder)
+    each = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    sizes = [context.get_constant(types.intp, n) if isinstance(n, int) else n for n in shape]
+    strides = [context.get_constant(types.intp, each)]
+    for size in reversed(sizes[1:]):
+        strides.insert(0, builder.mul(strides[0], size))
+    populate_array(array, data=data, shape=sizes, strides=strides, itemsize=each, meminfo=None)
+    return array._getvalue()  # noqa: SLF001 (as in numba's guide to extensions)
+
+
+if INTERPRETED:
+
+    def local_numbers(count: int) -> NDArray[np.float64]:
+        """See below."""
+        return np.empty(count)
+
+    def local_matrix(rows: int, columns: int) -> NDArray[np.float64]:
+        """See below."""
+        return np.empty((rows, columns))
+
+    def local_integers(count: int) -> NDArray[np.int64]:
+        """See below."""
+        return np.empty(count, np.int64)
+
+    def matrix_of(numbers: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
+        """See below."""
+        return numbers[: rows * columns].reshape(rows, columns)
+
+else:
+
+    @intrinsic(prefer_literal=True)
+    def local_numbers(_typing_context: Any, count: Any) -> Emitted:
+        """Memory of the calling function for ``count`` doubles, a literal number; it may be passed on to functions that
+        are called, but never returned.
+        """
+        kind, code = _local_array(count.literal_value, (count.literal_value,), types.float64)
+        return kind(count), code
+
+    @intrinsic(prefer_literal=True)
+    def local_matrix(_typing_context: Any, rows: Any, columns: Any) -> Emitted:
+        """The same for a matrix."""
+        shape = (rows.literal_value, columns.literal_value)
+        kind, code = _local_array(shape[0] * shape[1], shape, types.float64)
+        return kind(rows, columns), code
+
+    @intrinsic(prefer_literal=True)
+    def local_integers(_typing_context: Any, count: Any) -> Emitted:
+        """The same for integers (count,) int64."""
+        kind, code = _local_array(count.literal_value, (count.literal_value,), types.int64)
+        return kind(count), code
+
+    @intrinsic
+    def matrix_of(_typing_context: Any, numbers: Any, _rows: Any, _columns: Any) -> Emitted:
+        """The first rows · columns of contiguous numbers as a matrix over the same memory."""
+        kind = types.Array(types.float64, 2, "C")
+
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+            return _array_at(context, builder, kind, data, (arguments[1], arguments[2]))
+
+        return kind(numbers, types.intp, types.intp), code
 
 
 # Records of numbers by name
