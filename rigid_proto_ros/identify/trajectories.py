@@ -80,15 +80,15 @@ def _fly_all(
     """
     methods, flights, rows, events, room = tables
     count, flight = commands.shape[0], flights[0]
-    body, scale = np.zeros(BODY), np.ones(3)
+    body, scale, principal, axes = np.zeros(BODY), np.ones(3), np.empty(3), np.empty((3, 3))
     problem, variables = np.zeros(1, PROBLEM), np.zeros(VARIABLES)
     for i in range(flown.shape[0]):
         own = flown[i]
         good[i] = 0
         inertia = own.inertia.copy()
-        principal = principal_axes_kernel(inertia)
-        fill_body(own.mass, own.center_of_mass, inertia, principal, scale, body)
-        if not (principal[0][0] > 0.0 and np.isfinite(principal[0][2]) and own.mass > 0.0):
+        principal_axes_kernel(inertia, principal, axes)
+        fill_body(own.mass, own.center_of_mass, inertia, principal, axes, scale, body)
+        if not (principal[0] > 0.0 and np.isfinite(principal[2]) and own.mass > 0.0):
             continue
         fl.begin_flight(flight)
         flight.method, flight.chooses, flight.step_ns = -1, True, 1_000_000

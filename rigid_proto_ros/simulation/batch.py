@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from ..base.arithmetic import exact_quotient
-from ..base.compilation import copy_numbers, copy_record, njit, record_type
+from ..base.compilation import copy_numbers, copy_record, local_matrix, local_numbers, njit, record_type
 from ..base.simd import aligned
 from ..base.vectors import FloatArray, IntArray, Matrix3, Records, Vector, Vector3
-from ..mass.closed_form import Principal, given_mass, is_plainly_good, spread_mass
+from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
+from ..mass import moments as of_mesh
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, BodyRow, arm, fill_body
@@ -62,11 +63,7 @@ ROW = record_type(
         ("string_bilateral", np.bool_),
         ("model", np.int64),  # EXPLICIT, ORDINARY or STRETCHED
         ("solid_measure", np.float64),  # volume at unit scale; NaN when the surface bounds no volume
-        ("measure", np.float64),  # of the model: volume, area or number of points
-        ("reference", np.float64, 3),
-        ("center", np.float64, 3),
-        ("center_low", np.float64, 3),
-        ("second", np.float64, 6),
+        ("moments", of_mesh.MOMENTS),  # of the model, its place that of the chosen COM
         ("has_surface", np.bool_),
         ("extent", np.float64, 3),  # sides of the bounding box
     ]
@@ -127,54 +124,58 @@ def new_results(rows: int, measures: int) -> Results:
 
 # A row's body
 
-_Made = tuple[float, Vector3, Matrix3, Principal, bool]
 
-
-@njit(error_model="numpy")
-def _explicit(own: np.record, ballast: FloatArray) -> _Made:
+@njit(error_model="numpy", allocates=False)
+def _explicit(
+    own: np.record, ballast: FloatArray, com: Vector3, inertia: Matrix3, moments: Vector3, axes: Matrix3
+) -> tuple[float, bool]:
     """Mass, COM (3,), inertia (3, 3), its principal moments and axes, and whether the numbers are certainly valid."""
-    given = own.explicit_inertia_tensor
-    inertia = np.empty((3, 3))
-    inertia[0, 0], inertia[1, 1], inertia[2, 2] = given[0], given[3], given[5]
-    inertia[0, 1] = inertia[1, 0] = given[1]
-    inertia[0, 2] = inertia[2, 0] = given[2]
-    inertia[1, 2] = inertia[2, 1] = given[4]
+    given, matrix = own.explicit_inertia_tensor, local_matrix(3, 3)
+    matrix[0, 0], matrix[1, 1], matrix[2, 2] = given[0], given[3], given[5]
+    matrix[0, 1] = matrix[1, 0] = given[1]
+    matrix[0, 2] = matrix[2, 0] = given[2]
+    matrix[1, 2] = matrix[2, 1] = given[4]
     mass = own.explicit_inertia_mass
     good = 0.0 < mass < math.inf
     # Without ballast the resulting tensor, checked below, is the given one.
     if ballast.shape[0] > 0:
-        good = good and is_plainly_good(principal_axes_kernel(inertia)[0])
+        principal_axes_kernel(matrix, moments, axes)
+        good = good and is_plainly_good(moments)
     center = own.explicit_inertia_center_of_mass
-    total, com, gathered, principal = given_mass(mass, center, inertia, own.scale, ballast)
-    return total, com, gathered, principal, good and is_plainly_good(principal[0])
+    total = given_mass(mass, center, matrix, own.scale, ballast, com, inertia, moments, axes)
+    return total, good and is_plainly_good(moments)
 
 
-@njit(error_model="numpy")
-def _spread(own: np.record, ballast: FloatArray) -> _Made:
+@njit(error_model="numpy", allocates=False)
+def _spread(
+    own: np.record, ballast: FloatArray, com: Vector3, inertia: Matrix3, moments: Vector3, axes: Matrix3
+) -> tuple[float, bool]:
     """The same for a model whose mass is distributed over a mesh."""
-    s, mass = own.scale, own.mass
+    s, mass, left = own.scale, own.mass, local_numbers(3)
     if not mass > 0.0:
         mass = own.density * own.solid_measure * abs(s[0] * s[1] * s[2])
-    left = s.copy()
     uniform = True
-    if own.model == STRETCHED:
-        for k in range(3):
+    for k in range(3):
+        left[k] = s[k]
+        if own.model == STRETCHED:
             uniform = uniform and abs(s[k]) == abs(s[0])
             left[k] = math.copysign(abs(s[0]), s[k])
-    total, com, inertia, principal = spread_mass(
-        mass, own.measure, s, left, own.center, own.center_low, own.reference, own.second, ballast
-    )
-    return total, com, inertia, principal, uniform and 1e-300 < mass < math.inf and is_plainly_good(principal[0])
+    total = spread_mass(mass, own.moments, s, left, ballast, com, inertia, moments, axes)
+    return total, uniform and 1e-300 < mass < math.inf and is_plainly_good(moments)
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def _make_body(own: np.record, ballast: FloatArray, body: BodyRow) -> bool:
     """Fill ``body`` (BODY,) from a row and ballast (k, 4); returns False when the simulation must check it."""
     s = own.scale
     for k in range(3):
         if not SCALE_LIMITS[0] <= abs(s[k]) <= SCALE_LIMITS[1]:
             return False
-    mass, com, inertia, principal, good = _explicit(own, ballast) if own.model == EXPLICIT else _spread(own, ballast)
+    com, inertia, moments, axes = local_numbers(3), local_matrix(3, 3), local_numbers(3), local_matrix(3, 3)
+    if own.model == EXPLICIT:
+        mass, good = _explicit(own, ballast, com, inertia, moments, axes)
+    else:
+        mass, good = _spread(own, ballast, com, inertia, moments, axes)
     if not good:
         return False
     diagonal = 0.0
@@ -182,7 +183,7 @@ def _make_body(own: np.record, ballast: FloatArray, body: BodyRow) -> bool:
         com[k] = exact_quotient(com[k], s[k]) * s[k]
         side = own.extent[k] * s[k]
         diagonal += side * side
-    fill_body(mass, com, inertia, principal, s, body)
+    fill_body(mass, com, inertia, moments, axes, s, body)
     if own.has_surface:
         body[LENGTH] = 0.5 * math.sqrt(diagonal)
     return math.isfinite(body[MASS] + body[COM] + body[COM + 1] + body[COM + 2] + body[LENGTH])

@@ -72,8 +72,9 @@ def batch_row(parameters: Parameters, body_mesh: BodyMesh | None) -> Records:
         row["solid_measure"] = np.nan
     row["model"] = batch.STRETCHED if parameters.inertia_model in STRETCHED else batch.ORDINARY
     places = moments if parameters.inertia_model_com == "model" else body_mesh.moments.moments("solid")
-    row["measure"], row["second"] = moments.measure, moments.second
-    row["reference"], row["center"], row["center_low"] = places.reference, places.center, places.center_low
+    row["moments"] = moments.record
+    for name in ("reference", "center", "center_low"):
+        row["moments"][name] = getattr(places, name)
     return row
 
 
