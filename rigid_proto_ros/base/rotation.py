@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from .arithmetic import sine_cosine
-from .compilation import njit
+from .compilation import exported, njit
 from .vectors import Attitude, FloatArray, Matrix3, Numbers, Vector3
 
 
@@ -122,8 +122,9 @@ def matrix_elements(x: float, y: float, z: float, w: float) -> tuple[float, ...]
     )
 
 
-@njit()
-def _matrices(q: FloatArray, R: FloatArray) -> None:
+@exported("f8[:,:]", "f8[:,:]")
+def rotation_matrices(q: FloatArray, R: FloatArray) -> None:
+    """Fill rotation matrices R (n, 9), row by row, of unit quaternions q (n, 4)."""
     for k in range(q.shape[0]):
         elements = matrix_elements(q[k, 0], q[k, 1], q[k, 2], q[k, 3])
         for j in range(9):
@@ -134,11 +135,11 @@ def matrix_from_quaternion(q: Numbers) -> FloatArray:
     """Rotation matrix (3, 3), body to world, of a unit quaternion q (4,) xyzw, or (n, 3, 3) of (n, 4)."""
     q = np.ascontiguousarray(q, dtype=float)
     R = np.empty(q.shape[:-1] + (9,))
-    _matrices(q.reshape(-1, 4), R.reshape(-1, 9))
+    rotation_matrices(q.reshape(-1, 4), R.reshape(-1, 9))
     return R.reshape(*q.shape[:-1], 3, 3)
 
 
-@njit(error_model="numpy")
+@exported("f8[:,:]", "f8[:]")
 def quaternion_of_axes(R: Matrix3, q: Attitude) -> None:
     """Write the unit quaternion xyzw of a proper rotation matrix R (3, 3) into q (4,).
 

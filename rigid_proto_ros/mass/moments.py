@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arithmetic import pair_add, pair_divide, pair_multiply, two_sum
-from ..base.compilation import njit
+from ..base.compilation import new_record, njit, record_type
 from ..base.errors import MeshError
 from ..base.simd import Packed, filled, load, number, store
 from ..base.vectors import FloatArray, IntArray, Points, Triangles, Vector3
@@ -47,6 +47,18 @@ _Pair = tuple[Packed, Packed]  # the nearest doubles, and their rounding errors
 _Point = tuple[float, float, float]
 
 
+MOMENTS = record_type(
+    [
+        ("measure", np.float64),
+        ("reference", np.float64, 3),
+        ("center", np.float64, 3),
+        ("center_low", np.float64, 3),
+        ("second", np.float64, 6),
+    ]
+)
+"""``Moments`` as kernels have it."""
+
+
 @dataclass(frozen=True)
 class Moments:
     """Mass distribution at unit density; lengths in mesh units. measure: volume, area or number of points. reference
@@ -64,6 +76,14 @@ class Moments:
     def centroid(self) -> Vector3:
         """Centroid (3,) in mesh coordinates, without ``center_low``."""
         return self.reference + self.center
+
+    @property
+    def record(self) -> np.record:
+        """The same as MOMENTS."""
+        found = new_record(MOMENTS)
+        for name in MOMENTS.names or ():
+            found[name] = getattr(self, name)
+        return found
 
     def outward(self) -> Moments:
         """The moments of the same solid wound outward."""

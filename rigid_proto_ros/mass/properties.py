@@ -152,20 +152,20 @@ class MeshMoments:
         own = self.body_mass(scale=s, mass=mass, density=density)
         # A shell's moments include the stretch: the uniform part and the mirroring are left.
         left = np.copysign(abs(s[0]), s) if model in STRETCHED else s
-        place, low, base = moments.center, moments.center_low, moments.reference
+        unit = moments.record
         if com == "solid":
             solid = self.moments("solid")
-            place, low, base = ((s / left) * of for of in (solid.center, solid.center_low, solid.reference))
-        total, center_of_mass, inertia, principal = spread_mass(
-            own, moments.measure, s, left, place, low, base, moments.second, points
-        )
+            for name in ("reference", "center", "center_low"):
+                unit[name] = (s / left) * getattr(solid, name)
+        center, inertia, principal, axes = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+        total = spread_mass(own, unit, s, left, points, center, inertia, principal, axes)
         warnings = ()
-        if not is_plainly_good(principal[0]):
+        if not is_plainly_good(principal):
             try:
                 warnings = check_tensor(inertia, source=f"{model} model of {self.name}")
             except TensorError as error:
                 raise TensorError(f"inertia_model {model}", f"{self.name}: {error.received}", error.accepted) from None
-        return MassProperties(total, center_of_mass, inertia, warnings)
+        return MassProperties(total, center, inertia, warnings)
 
 
 def explicit_mass_properties(
@@ -178,10 +178,11 @@ def explicit_mass_properties(
     """Mass properties from given numbers: mass [kg], center_of_mass (3,) [mesh coordinates], tensor6 (ixx, ixy, ixz,
     iyy, iyz, izz) [kg m², about the COM]. ``scale`` moves COM and ballast with the mesh; mass and tensor are final.
     """
-    inertia = tensor_from_six(tensor6)
-    warnings = check_tensor(inertia, source="explicit_inertia.tensor")
+    given = tensor_from_six(tensor6)
+    warnings = check_tensor(given, source="explicit_inertia.tensor")
     points, center = _checked_ballast(ballast), np.array(center_of_mass, dtype=float)
-    total, center_of_mass, inertia, _ = given_mass(mass, center, inertia, scale_vector(scale), points)
+    com, inertia, moments, axes = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    total = given_mass(float(mass), center, given, scale_vector(scale), points, com, inertia, moments, axes)
     if len(points):
         warnings = check_tensor(inertia, source="explicit_inertia.tensor with ballast")
-    return MassProperties(total, center_of_mass, inertia, warnings)
+    return MassProperties(total, com, inertia, warnings)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..base.compilation import njit
+from ..base.compilation import exported, local_integers, local_matrix, njit
 from ..base.errors import TensorError
 from ..base.vectors import Matrix3, Vector3
 
@@ -23,7 +23,7 @@ SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _EQUAL_COMPONENT = 1e-9  # components closer than this count as equal; the first one then decides the column's sign
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def _rotate(a: Matrix3, v: Matrix3, p: int, q: int) -> bool:
     """Jacobi rotation of a (3, 3) to a[p, q] = 0, and of v (3, 3), in place; False if it is below rounding already."""
     g = a[p, q]
@@ -52,7 +52,7 @@ def _rotate(a: Matrix3, v: Matrix3, p: int, q: int) -> bool:
     return True
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def _sign_columns(axes: Matrix3) -> None:
     """Fix the signs of axes (3, 3), columns, in place: largest component of the first two positive, right-handed."""
     for column in range(2):
@@ -73,9 +73,9 @@ def _sign_columns(axes: Matrix3) -> None:
             axes[row, 2] = -axes[row, 2]
 
 
-@njit()
-def principal_axes_kernel(inertia: Matrix3) -> tuple[Vector3, Matrix3]:
-    """Principal moments (3,) ascending and axes (3, 3), columns, of a symmetric ``inertia`` (3, 3).
+@exported("f8[:,:]", "f8[:]", "f8[:,:]")
+def principal_axes_kernel(inertia: Matrix3, moments: Vector3, axes: Matrix3) -> None:
+    """Fill principal ``moments`` (3,) ascending and ``axes`` (3, 3), columns, of a symmetric ``inertia`` (3, 3).
 
     Cyclic Jacobi rotations until every off-diagonal element is below the rounding of its two diagonal elements: for a
     well-scaled positive definite tensor each moment then has high relative accuracy (Demmel and Veselić, SIAM J. Matrix
@@ -84,8 +84,11 @@ def principal_axes_kernel(inertia: Matrix3) -> tuple[Vector3, Matrix3]:
     matters (simulation/flight.py). The axes form a proper rotation: the largest component of the first and second
     column is positive, the third makes them right-handed.
     """
-    a = inertia.copy()
-    v = np.eye(3)
+    a, v, order = local_matrix(3, 3), local_matrix(3, 3), local_integers(3)
+    for i in range(3):
+        order[i] = i
+        for j in range(3):
+            a[i, j], v[i, j] = inertia[i, j], 1.0 if i == j else 0.0
     for _ in range(30):
         turned = False
         for p in range(2):
@@ -93,24 +96,22 @@ def principal_axes_kernel(inertia: Matrix3) -> tuple[Vector3, Matrix3]:
                 turned = _rotate(a, v, p, q) or turned
         if not turned:
             break
-    order = np.array([0, 1, 2])
     for p in range(2):  # three numbers: a selection sort
         for q in range(p + 1, 3):
             if a[order[q], order[q]] < a[order[p], order[p]]:
                 order[p], order[q] = order[q], order[p]
-    moments = np.empty(3)
-    axes = np.empty((3, 3))
     for column in range(3):
         moments[column] = a[order[column], order[column]]
         for k in range(3):
             axes[k, column] = v[k, order[column]]
     _sign_columns(axes)
-    return moments, axes
 
 
 def principal_axes(inertia: Matrix3) -> tuple[Vector3, Matrix3]:
     """Principal moments (3,) ascending [kg m²] and axes (3, 3), columns, of ``inertia`` (3, 3); see the kernel."""
-    return principal_axes_kernel(np.ascontiguousarray(inertia, dtype=np.float64))
+    moments, axes = np.empty(3), np.empty((3, 3))
+    principal_axes_kernel(np.ascontiguousarray(inertia, dtype=np.float64), moments, axes)
+    return moments, axes
 
 
 def tensor_from_six(six: Sequence[float]) -> Matrix3:
@@ -125,30 +126,58 @@ def six_from_tensor(inertia: Matrix3) -> tuple[float, float, float, float, float
     return xx, xy, xz, yy, yz, zz
 
 
+POSSIBLE, NOT_FINITE, NOT_SYMMETRIC, NOT_POSITIVE, UNEQUAL, NEARLY = range(6)
+"""Whether a rigid body can have a tensor, or the first rule that it breaks; NEARLY: A + B ≥ C by rounding."""
+
+
+@exported("f8[:,:]", "f8[:]", returns="i8")
+def judged_tensor(inertia: Matrix3, moments: Vector3) -> int:
+    """Which rule of ``check_tensor`` an ``inertia`` (3, 3) breaks: POSSIBLE, NOT_FINITE and so on. ``moments`` (3,) are
+    filled with its principal ones, if it is finite and symmetric.
+    """
+    largest = difference = 0.0
+    for i in range(3):
+        for j in range(3):
+            if not math.isfinite(inertia[i, j]):
+                return NOT_FINITE
+            largest = max(largest, abs(inertia[i, j]))
+            difference = max(difference, abs(inertia[i, j] - inertia[j, i]))
+    if largest == 0.0 or difference > 1e-12 * largest:
+        return NOT_SYMMETRIC
+    principal_axes_kernel(inertia, moments, local_matrix(3, 3))
+    a, b, c = moments[0], moments[1], moments[2]
+    if not a > 0.0 or c > MAX_MOMENT_RATIO * a:
+        return NOT_POSITIVE
+    gap = (c - a - b) / c
+    if gap > TRIANGLE_SLACK_GIVEN:
+        return UNEQUAL
+    return NEARLY if gap > TRIANGLE_SLACK_COMPUTED else POSSIBLE
+
+
 def check_tensor(inertia: Matrix3, *, source: str = "inertia tensor") -> tuple[str, ...]:
     """Warnings about ``inertia`` (3, 3) [kg m², about the COM]; empty if there are none.
 
     Raises TensorError, its field ``source``, when no rigid body has such a tensor: not finite, not symmetric, a moment
     that isn't positive, C/A beyond 1e12, or A + B < C (1 − 1e-5) for principal moments A ≤ B ≤ C.
     """
-    inertia = np.asarray(inertia, dtype=np.float64)
+    inertia, moments = np.ascontiguousarray(inertia, dtype=np.float64), np.zeros(3)
     if inertia.shape != (3, 3):
         raise TensorError(source, inertia.shape, "a 3 x 3 matrix")
-    if not np.all(np.isfinite(inertia)):
+    rule = judged_tensor(inertia, moments)
+    if rule == NOT_FINITE:
         raise TensorError(source, six_from_tensor(inertia), "finite numbers")
-    largest = float(np.max(np.abs(inertia)))
-    if largest == 0.0 or np.max(np.abs(inertia - inertia.T)) > 1e-12 * largest:
+    if rule == NOT_SYMMETRIC:
         raise TensorError(source, inertia.tolist(), "a symmetric matrix other than zero")
-    a, b, c = (float(moment) for moment in principal_axes(inertia)[0])
-    if not a > 0.0 or c > MAX_MOMENT_RATIO * a:
+    a, b, c = moments.tolist()
+    if rule == NOT_POSITIVE:
         why = "all positive, the largest at most 1e12 times the smallest (a body on one line has no such tensor)"
         raise TensorError(source, (a, b, c), f"principal moments {why}")
-    gap = (c - a - b) / c
-    if gap > TRIANGLE_SLACK_GIVEN:
+    if rule == UNEQUAL:
         accepted = "principal moments A <= B <= C with A + B >= C (1 - 1e-5), as every body has"
         remedy = f"with these A and B, C is at most {a + b:.9g} kg m²: look for swapped entries and another unit"
         raise TensorError(source, (a, b, c), f"{accepted}; {remedy}")
-    if gap > TRIANGLE_SLACK_COMPUTED:
+    if rule == NEARLY:
+        gap = (c - a - b) / c
         return (f"{source}: A + B falls short of C by {gap:.1e} C (principal moments {a:.9g}, {b:.9g}, {c:.9g})",)
     return ()
 

@@ -13,11 +13,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.compilation import njit
+from ..base.compilation import exported, njit
 from ..base.rotation import norm, quaternion_of_axes
 from ..base.vectors import Attitude, Matrix3, Numbers, Vector3
-from ..mass.closed_form import Principal
-from ..mass.tensor import principal_axes_kernel
+from ..mass.tensor import principal_axes
 
 # Layout of a body's row.
 MASS = 0
@@ -68,12 +67,13 @@ def normal(body: BodyRow, x: float, y: float, z: float) -> tuple[float, float, f
     return x / size, y / size, z / size
 
 
-@njit(error_model="numpy", allocates=False)
-def fill_body(mass: float, com: Vector3, inertia: Matrix3, principal: Principal, scale: Vector3, body: BodyRow) -> None:
-    """Fill the row of a body (BODY,), with length ℓ = 1, from mass, com (3,), inertia (3, 3), its principal moments and
-    axes, and scale (3,).
+@exported("f8", "f8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", "f8[:]", "f8[:]")
+def fill_body(
+    mass: float, com: Vector3, inertia: Matrix3, moments: Vector3, axes: Matrix3, scale: Vector3, body: BodyRow
+) -> None:
+    """Fill the row of a body (BODY,), with length ℓ = 1, from mass, com (3,), inertia (3, 3), its principal moments
+    (3,) and axes (3, 3), and scale (3,).
     """
-    moments, axes = principal
     quaternion_of_axes(axes, body[QUATERNION : QUATERNION + 4])
     body[MASS], body[LENGTH] = mass, 1.0
     for k in range(3):
@@ -151,5 +151,5 @@ def make_body(
     """A body of given mass properties, its tensor diagonalized once."""
     row = np.empty(BODY)
     com, tensor, sides = (np.ascontiguousarray(numbers, dtype=float) for numbers in (center_of_mass, inertia, scale))
-    fill_body(float(mass), com, tensor, principal_axes_kernel(tensor), sides, row)
+    fill_body(float(mass), com, tensor, *principal_axes(tensor), sides, row)
     return Body(row)
