@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.vectors import FloatArray, IntArray, Points, Records
+from ..mass.tensor import six_from_tensor
 from . import measurements as ms
 from . import rotations as rot
 from . import trajectories as tr
@@ -110,7 +111,12 @@ def flown_rows(starts: FloatArray, values: Sequence[Values]) -> tuple[Records, F
         row["explicit_inertia_mass"], row["explicit_inertia_center_of_mass"] = v.mass, v.center_of_mass
         row["explicit_inertia_tensor"], row["gravity"] = six_from_tensor(v.inertia), v.gravity
         row["linear_damping"], row["angular_damping"] = v.damping
-    com, q, w, moved = rows["explicit_inertia_center_of_mass"], starts[:, 3:7], starts[:, 10:STATE], starts[:, :STATE].copy()
+    com, q, w, moved = (
+        rows["explicit_inertia_center_of_mass"],
+        starts[:, 3:7],
+        starts[:, 10:STATE],
+        starts[:, :STATE].copy(),
+    )
     moved[:, :3] += rot.turned(q, com)
     moved[:, 7:10] += rot.turned(q, rot.cross(w, com))
     return rows, moved

@@ -183,3 +183,38 @@ def _pseudo_normal(vertices: Points, triangles: Triangles, point: Vector, tolera
                 ny += angle * y / area
                 nz += angle * z / area
     return nx, ny, nz
+
+
+@njit(error_model="numpy", allocates=False)
+def nearest_point(vertices: Points, triangles: Triangles, x: float, y: float, z: float) -> Vector:
+    return _nearest(vertices, triangles, (x, y, z))
+
+
+@njit(error_model="numpy", allocates=False)
+def ray_hit(
+    vertices: Points, triangles: Triangles, ox: float, oy: float, oz: float, x: float, y: float, z: float
+) -> tuple[bool, float, float, float]:
+    longest = max(abs(x), abs(y), abs(z))
+    x, y, z = x / longest, y / longest, z / longest
+    t = _first_hit(vertices, triangles, (ox, oy, oz), (x, y, z))
+    return t < math.inf, ox + t * x, oy + t * y, oz + t * z
+
+
+@njit(error_model="numpy", allocates=False)
+def inward_normal(
+    vertices: Points, triangles: Triangles, x: float, y: float, z: float
+) -> tuple[bool, float, float, float]:
+    low = [0.0] if False else (math.inf, math.inf, math.inf)
+    lx, ly, lz = low
+    hx, hy, hz = -math.inf, -math.inf, -math.inf
+    for i in range(triangles.shape[0]):
+        for k in range(3):
+            v = triangles[i, k]
+            lx, ly, lz = min(lx, vertices[v, 0]), min(ly, vertices[v, 1]), min(lz, vertices[v, 2])
+            hx, hy, hz = max(hx, vertices[v, 0]), max(hy, vertices[v, 1]), max(hz, vertices[v, 2])
+    tolerance = 1e-9 * norm(hx - lx, hy - ly, hz - lz)
+    nx, ny, nz = _pseudo_normal(vertices, triangles, (x, y, z), tolerance)
+    size = norm(nx, ny, nz)
+    if size > 1e-12:
+        return True, -nx / size, -ny / size, -nz / size
+    return False, 0.0, 0.0, 0.0

@@ -11,13 +11,25 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.compilation import copy_numbers, exported, local_numbers, njit
+from ..base.rotation import matrix_elements
 from ..base.vectors import FloatArray, Points, Records, Triangles
 from ..motion.body import BODY, COM, MASS, BodyRow
-from ..motion.loads import AT_COM, LOAD, LOAD_AXES, NO_MESH, NORMAL_AXES, ON_RAY, PLACE, POINT, RESOLVED, WORLD_AXES
-from ..motion.loads import magnitudes, needs_of_load, resolve_load, NEED_STRING
+from ..motion.loads import (
+    AT_COM,
+    LOAD,
+    LOAD_AXES,
+    NEED_STRING,
+    NO_MESH,
+    ON_RAY,
+    PLACE,
+    POINT,
+    RESOLVED,
+    magnitudes,
+    needs_of_load,
+    resolve_load,
+)
 from ..motion.problem import begin_body
 from ..motion.state import fill_initial_row, shift_com
-from ..base.rotation import matrix_elements
 from . import flight as fl
 from . import refusals as rf
 from .commands import CLEAR, MOVE_STRING, RELEASE_STRING, SET_STATE, TIE_STRING
@@ -34,9 +46,7 @@ one now. END_DUE: end what is due. END_ALL: end all active loads.
 
 
 @exported(FLIGHT, [LOAD_ROW], [EVENT], "f8[:]", "i8", "i8", returns="i8")
-def operate(
-    flight: np.record, loads: Records, events: Records, room: FloatArray, what: int, until_ns: int
-) -> int:
+def operate(flight: np.record, loads: Records, events: Records, room: FloatArray, what: int, until_ns: int) -> int:
     """Perform an operation on the flight; returns its result."""
     if what == FLY:
         return fl.fly(flight, loads, events, room, until_ns)
@@ -225,4 +235,3 @@ def change(
     fl.take_body(flight, loads)
     change_string(old, new, flight, before)
     return True
-

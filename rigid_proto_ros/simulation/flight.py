@@ -232,7 +232,9 @@ def commit_until(flight: np.record, room: FloatArray, until_ns: int) -> bool:
         return True
     # Slices are plain arrays, as a kernel that is called by its address expects.
     y, following = flight.variables[:], flight.following[:]
-    advanced, taken, good = commit(flight.method, y, flight.problem, flight.control, following, room, flight.step_ns, span_ns)
+    advanced, taken, good = commit(
+        flight.method, y, flight.problem, flight.control, following, room, flight.step_ns, span_ns
+    )
     flight.committed_ns += advanced
     flight.taken += taken
     return good

@@ -117,9 +117,7 @@ class FlightArrays:
     def change(self, old: Setup, new: Setup) -> None:
         """Go on as the flight of another setup; raises CommandRefused."""
         same_mesh = old.mesh_sha256 == new.mesh_sha256
-        if not change(
-            old.scene, new.scene, new.mesh, same_mesh, self.flight, self._loads, self._room, self._refusal
-        ):
+        if not change(old.scene, new.scene, new.mesh, same_mesh, self.flight, self._loads, self._room, self._refusal):
             raise refused_command(self._refusal)
 
     def check_change(self, old: Setup, new: Setup) -> None:

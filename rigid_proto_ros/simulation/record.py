@@ -12,17 +12,17 @@ import math
 
 import numpy as np
 
-from ..base.arithmetic import exact_quotient, logarithm
+from ..base.arithmetic import exact_quotient
 from ..base.compilation import copy_numbers, exported, local_matrix, local_numbers, njit, record_type
 from ..base.vectors import Matrix3, Vector3
-from ..mass import INERTIA_MODELS, MODEL_COMS
+from ..mass import MODEL_COMS
 from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
 from ..mass.moments import MOMENTS
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import NEARLY, POSSIBLE, judged_tensor
 from ..motion.body import LENGTH, BodyRow, fill_body
 from ..motion.integrators import INTEGRATORS
-from ..motion.integrators.series_steps import MAX_DEGREE
+from ..motion.integrators.series_steps import degree_for
 from ..motion.loads import NEED_ANGULAR_DAMPING, NEED_NO_GYROSCOPIC_TERM, NEED_STRING, NEEDS
 from ..motion.problem import begin_body
 from ..motion.state import fill_initial_row
@@ -79,12 +79,12 @@ MESH = record_type(
     [
         ("has_surface", np.bool_),  # False: there is no mesh
         ("extent", np.float64, 3),  # sides of the bounding box [mesh units]
-        ("known", np.bool_, EXPLICIT),  # by the number of the model, whether its moments are there
         ("solid", MOMENTS),
         ("shell", MOMENTS),
         ("points", MOMENTS),
         ("bounding_box", MOMENTS),
         ("stretch", np.float64, 3),  # |scale|/|scale_x| for which those of the shell hold
+        ("known", np.uint8, EXPLICIT),  # by the number of the model, whether its moments are there
     ]
 )
 
@@ -104,14 +104,6 @@ def nearest_integer(x: float) -> int:
 def timeout_ns(seconds: float) -> int:
     """A timeout [ns]: 0, which means never, for 0 s alone."""
     return max(1, nearest_integer(seconds * 1e9)) if seconds != 0.0 else 0
-
-
-@njit(error_model="numpy", allocates=False)
-def degree_for(accuracy: float) -> int:
-    """Degree of series with the least work per simulated time at this accuracy, as measured; the minimum is flat (12 at
-    1e-3, 19 at 1e-9).
-    """
-    return min(max(nearest_integer(8.5 - 1.15 * logarithm(accuracy) / logarithm(10.0)), 6), MAX_DEGREE)
 
 
 # The body
@@ -140,13 +132,13 @@ def _moments_of(mesh: np.record, model: int) -> np.record:
 def _are_known(scene: np.record, mesh: np.record, refusal: np.record) -> bool:
     """Whether the moments are there that the scene needs: of its model, and of the solid for a density or its COM."""
     s, model = scene.scale, scene.inertia_model
-    fits = mesh.known[model]
+    fits = mesh.known[model] != 0
     if model == SHELL:
         for k in range(3):
             fits = fits and abs(s[k]) / abs(s[0]) == mesh.stretch[k]
     if not fits:
         return refuse(refusal, rf.NO_MOMENTS, model, 0.0, 0.0, 0.0)
-    if not mesh.known[SOLID] and (scene.mass == 0.0 or scene.inertia_model_com == OF_SOLID):
+    if mesh.known[SOLID] == 0 and (scene.mass == 0.0 or scene.inertia_model_com == OF_SOLID):
         return refuse(refusal, rf.NO_MOMENTS, SOLID, 0.0, 0.0, 0.0)
     return True
 
@@ -177,9 +169,9 @@ def _spread(
     for k in range(3):
         left[k] = math.copysign(abs(s[0]), s[k]) if model == SHELL else s[k]
     unit = _moments_of(mesh, model)
-    placed = mesh.solid if scene.inertia_model_com == OF_SOLID else unit
-    ballast = scene.ballast[: scene.ballasts]
-    return spread_mass(mass, unit, placed, s, left, ballast, com, inertia, moments, axes)
+    at_solid = scene.inertia_model_com == OF_SOLID
+    placed, ballast = mesh.solid if at_solid else unit, scene.ballast[: scene.ballasts]
+    return spread_mass(mass, unit, placed, at_solid, s, left, ballast, com, inertia, moments, axes)
 
 
 @exported(SCENE, MESH, "f8[:]", REFUSAL, returns="b1")
@@ -271,7 +263,11 @@ def begin(scene: np.record, mesh: np.record, flight: np.record, refusal: np.reco
 def begin_with_body(scene: np.record, flight: np.record, refusal: np.record) -> bool:
     """The same for a flight that has its body already."""
     body = flight.body
-    attitude, velocity, spin = scene.initial_orientation_xyzw, scene.initial_linear_velocity, scene.initial_angular_velocity
+    attitude, velocity, spin = (
+        scene.initial_orientation_xyzw,
+        scene.initial_linear_velocity,
+        scene.initial_angular_velocity,
+    )
     if not fill_initial_row(scene.initial_position, attitude, velocity, spin, flight.row):
         return refuse(refusal, rf.ORIENTATION, 0, 0.0, 0.0, 0.0)
     copy_numbers(flight.row, flight.start)

@@ -186,7 +186,10 @@ def check_command(command: Command, setup: Setup) -> bytes:
 
 
 def _load_row(command: WrenchCommand, setup: Setup) -> bytes:
-    refusal, row = new_record(REFUSAL), bytearray(load_bytes(command.frame, command.force, command.torque, setup.contacts))
+    refusal, row = (
+        new_record(REFUSAL),
+        bytearray(load_bytes(command.frame, command.force, command.torque, setup.contacts)),
+    )
     load = np.frombuffer(row)
     if not check_load(setup.flight, setup.vertices, setup.triangles, command.flight_kind, load, refusal):
         raise refused_load(refusal, command, setup)

@@ -298,7 +298,9 @@ class Simulation:
             elif not isinstance(command, WrenchCommand):
                 continue
             elif what == fl.APPLIED:
-                observer.on(Applied(now_ns, command, load_of_bytes(pending.row), self.setup.body, arrays.attitude_at(number)))
+                observer.on(
+                    Applied(now_ns, command, load_of_bytes(pending.row), self.setup.body, arrays.attitude_at(number))
+                )
             else:
                 kind = "impulse" if command.flight_kind == IMPULSE else command.kind
                 self._notify_load(load_id, kind, load_of_bytes(pending.row))

@@ -40,8 +40,9 @@ from ...base.arithmetic import inverse_tangent_of, pair_add, pair_multiply, sine
 from ...base.compilation import njit
 from ...base.rotation import multiply, norm, normalize, rotate
 from ...base.vectors import Quaternion, Vector
+from ..loads import ANGULAR_DAMPING
 from ..problem import MAX_SPEED, Variables, damping_functions, is_good, parts_of, undamped_torque
-from .integrator import ANGULAR_DAMPING, LOADS, ONE_STEP, Integrator, Method
+from .integrator import LOADS, ONE_STEP, Integrator, Method
 
 ON_SEPARATRIX = 1e-290
 """m₁ of an initial state on the separatrix to all digits: it stays near the middle axis for 670/ω_p, then leaves it. An

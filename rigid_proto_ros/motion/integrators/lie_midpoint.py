@@ -25,8 +25,9 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import multiply, normalize, rotate
 from ...base.vectors import Quaternion, Vector
+from ..loads import ANGULAR_DAMPING
 from ..problem import Variables, is_good, parts_of, torque
-from .integrator import ANGULAR_DAMPING, LOADS, Integrator
+from .integrator import LOADS, Integrator
 
 _MAX_ITERATIONS = 60
 """Newton's method needs 3 to 6; many more only if the step is too long to converge."""

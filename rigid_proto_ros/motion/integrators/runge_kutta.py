@@ -21,6 +21,7 @@ from ...base.compilation import copy_numbers, njit
 from ...base.rotation import exponential, multiply, normalize
 from ...base.simd import Packed, filled, four, joined, load, number, store
 from ...base.vectors import FloatArray
+from ..loads import NO_GYROSCOPIC_TERM
 from ..problem import (
     DISPLACEMENT,
     HAND_WORK,
@@ -34,7 +35,7 @@ from ..problem import (
     stretch,
     tension_margin,
 )
-from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
+from .integrator import EVALUATED, Integrator, Kernel
 from .string_law import is_one_sided, shortening_heat
 
 Step = Callable[[Variables, np.record, float, bool, FloatArray, FloatArray, Variables], None]

@@ -36,9 +36,10 @@ from ...base.simd import (
     triple,
 )
 from ...base.vectors import FloatArray
+from ..loads import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE
 from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, is_good
 from ..string import NO_DIRECTION
-from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
+from .integrator import Integrator
 
 
 @njit(error_model="numpy", allocates=False)

@@ -19,7 +19,6 @@ committed, so that the times of sampling never change the steps.
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
@@ -190,12 +189,16 @@ def fast_exp2(x: float) -> float:
     return power * (1.0 + f - f * (1.0 - f) * (0.3069 + 0.0794 * f))
 
 
-@functools.cache
+_TO_NEAREST = 6755399441055744.0  # 1.5·2⁵²
+
+
+@njit(error_model="numpy", allocates=False)
 def degree_for(accuracy: float) -> int:
     """Degree with the least work per simulated time at this accuracy, as measured; the minimum is flat (12 at 1e-3, 19
     at 1e-9).
     """
-    return min(max(round(8.5 - 1.15 * logarithm(accuracy) / logarithm(10.0)), 6), MAX_DEGREE)
+    degree = 8.5 - 1.15 * logarithm(accuracy) / logarithm(10.0)
+    return min(max(int((degree + _TO_NEAREST) - _TO_NEAREST), 6), MAX_DEGREE)
 
 
 @njit(error_model="numpy", allocates=False)
@@ -286,6 +289,13 @@ def _count(control: np.record) -> None:
     control.series = False
 
 
+@njit(error_model="numpy", allocates=False)
+def spin_workspace(degree: int) -> tuple[int, int]:
+    """Workspace for the series of the spin alone, cleared when the method changes; a fifth of the other's size."""
+    return degree + 1, SPIN_COLUMNS
+
+
+@njit(error_model="numpy", allocates=False)
 def series_workspace(degree: int) -> tuple[int, int]:
     """Workspace for the coefficients of the step's first series and of its last one, and for the initial variables of
     the last one. They are kept until the step is committed, because samples within the step evaluate them.
