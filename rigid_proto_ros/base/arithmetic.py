@@ -14,14 +14,13 @@ import math
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 
-from .compilation import INTERPRETED, Emitted, intrinsic, njit
+from .compilation import COMPILED, Emitted, intrinsic, njit
 from .simd import fused_multiply_add
 
-# isort: split
-# After compilation.py, which keeps numba from importing what isn't needed.
-from numba import types
+if COMPILED:
+    from llvmlite import ir
+    from numba import types
 
 # Pairs of doubles
 #
@@ -114,7 +113,7 @@ def double_of(_typing_context: Any, _bits: Any) -> Emitted:
     )
 
 
-if INTERPRETED:
+if not COMPILED:
 
     def bits_of(x: float) -> int:
         """The 64 bits of a double as an integer."""
