@@ -20,7 +20,7 @@ from .gram_schmidt import EULER, MIDPOINT
 from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Kernel, Method
 from .lie_midpoint import lie_midpoint_steps
 from .runge_kutta import DOP853, RK4, semi_implicit_euler_steps
-from .series import taylor_steps
+from .series import MOTION_COLUMNS, taylor_steps
 from .series_steps import MAX_DEGREE, series_steps, series_workspace, spin_workspace
 
 euler_steps = EULER.kernel
@@ -127,8 +127,8 @@ def workspace_of(method: int, degree: int) -> tuple[int, int]:
     return spin_workspace(degree) if _SPIN_ALONE[method] else series_workspace(degree)
 
 
-ROOM = max(rows * columns for rows, columns in (spin_workspace(MAX_DEGREE), series_workspace(MAX_DEGREE)))
-"""Doubles in the largest workspace."""
+ROOM = (2 * (MAX_DEGREE + 2) + 1) * MOTION_COLUMNS
+"""Doubles in the largest workspace, that of ``series_workspace`` at MAX_DEGREE."""
 
 
 def method_of(number: int) -> Method:
