@@ -18,8 +18,8 @@ from ..base.vectors import BoolArray, FloatArray, IntArray, Records
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import BODY, fill_body
 from ..motion.integrators.auto import AUTO
-from ..motion.integrators.integrator import METHOD, method_table, provide_kernel, workspace_size
 from ..motion.integrators.series_steps import degree_for
+from ..motion.integrators.stepping import METHOD, method_table, workspace_size
 from ..motion.problem import ENVIRONMENT_FIELDS, PROBLEM, VARIABLES, begin_body
 from ..simulation import flight as fl
 from ..simulation.commands import NO_SLOT
@@ -43,8 +43,6 @@ STATE = 13
 SPECIFIC_FORCE = 13  # (3,) at the COM: acceleration without gravity [m/s², body axes]
 ANGULAR_ACCELERATION = 16  # (3,) [rad/s², body axes]
 SAMPLE = 19
-
-DONE = -1
 
 
 @dataclass(frozen=True)
@@ -71,12 +69,10 @@ def _fly_all(
     tables: tuple[Records, Records, Records, Records, FloatArray],
     samples: FloatArray,
     good: IntArray,
-) -> int:
+) -> None:
     """Each of flown (n,), FLOWN, through times_ns (m,) ascending from 0: samples (n, m, SAMPLE); good (n,) whether it
     came through. tables: methods, one flight, loads with room for all commands, events and workspace, as
     simulation/flight.py takes them.
-
-    Returns DONE, or the number of the method that must be compiled first.
     """
     methods, flights, rows, events, room = tables
     count, flight = commands.shape[0], flights[0]
@@ -106,10 +102,7 @@ def _fly_all(
         fl.begin_segment(flight, rows, methods, room)
         good[i] = 1
         for k in range(times_ns.shape[0]):
-            came = fl.fly(flight, rows, events, methods, room, times_ns[k])
-            if came == fl.NO_KERNEL:
-                return int(flight.method)
-            if came != fl.REACHED:
+            if fl.fly(flight, rows, events, methods, room, times_ns[k]) != fl.REACHED:
                 good[i] = 0
                 break
             sample = samples[i, k]
@@ -119,16 +112,15 @@ def _fly_all(
             felt = rotate_inverse(q[0], q[1], q[2], q[3], rates[0] - g[0], rates[1] - g[1], rates[2] - g[2])
             for j in range(3):
                 sample[SPECIFIC_FORCE + j], sample[ANGULAR_ACCELERATION + j] = felt[j], rates[3 + j]
-    return DONE
 
 
 @cache
-def _compiled() -> tuple[Callable[..., int], Records, int]:
+def _compiled() -> tuple[Callable[..., None], Records, int]:
     """``_fly_all`` compiled, or loaded from the cache, the table of the methods, and the degree of their series."""
     flat, table, cube = types.float64[:, ::1], types.int64[:, ::1], types.float64[:, :, ::1]
     bodies, *records = (from_dtype(kind)[::1] for kind in (FLOWN, METHOD, fl.FLIGHT, fl.LOAD_ROW, fl.EVENT))
     tables = types.Tuple((*records, types.float64[::1]))
-    signature = int64(bodies, types.int64[::1], table, flat, int64, tables, cube, types.int64[::1])
+    signature = types.void(bodies, types.int64[::1], table, flat, int64, tables, cube, types.int64[::1])
     degree = degree_for(ACCURACY)
     methods = method_table(AUTO, degree)
     return entry_of(njit(nogil=True, error_model="numpy")(_fly_all), signature), methods, degree
@@ -144,8 +136,5 @@ def fly_rows(flown: Records, times_ns: IntArray, wrenches: Wrenches) -> tuple[Fl
     count, room = len(wrenches.commands), np.zeros(max(1, workspace_size(methods)))
     rows, events = np.zeros(count + 1, fl.LOAD_ROW), np.zeros(4 * count + 8, fl.EVENT)
     tables = methods, np.zeros(1, fl.FLIGHT), rows, events, room
-    while True:
-        wanted = kernel(flown, times_ns, wrenches.commands, wrenches.loads, degree, tables, samples, good)
-        if wanted == DONE:
-            return samples, good == 1
-        provide_kernel(AUTO, methods, wanted)
+    kernel(flown, times_ns, wrenches.commands, wrenches.loads, degree, tables, samples, good)
+    return samples, good == 1

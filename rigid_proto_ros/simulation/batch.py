@@ -24,7 +24,6 @@ from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, BodyRow, arm, fill_body
 from ..motion.integrators.auto import FASTEST
-from ..motion.integrators.integrator import provide_kernel
 from ..motion.loads import is_within_magnitude
 from ..motion.problem import ENVIRONMENT_FIELDS, KNOT, ORIGIN, PUSHES, REST, TARGET, C, K, begin_body
 from ..motion.state import fill_initial_row
@@ -103,8 +102,6 @@ class Batch:
     def arrays(self) -> _Side:
         """Arguments of the compiled call."""
         start = self.setup.flight_start
-        for number in range(len(start.methods)):
-            provide_kernel(self.setup.integrator, start.methods, number)
         return self.rows, self.ballast, start.flight, start.methods, np.ascontiguousarray(self.commands)
 
 

@@ -19,8 +19,9 @@ from ..base.rotation import norm
 from ..base.vectors import FloatArray, Records, StateRow
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
-from ..motion.integrators.integrator import ADAPTIVE, CONTROL, FIXED_STEPS, NOTHING, commit, reach
+from ..motion.integrators.integrator import ADAPTIVE, FIXED_STEPS
 from ..motion.integrators.series_steps import FLOOR, begin_control
+from ..motion.integrators.stepping import CONTROL, commit, reach
 from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
 from ..motion.problem import (
     HAND_WORK,
@@ -67,7 +68,6 @@ FLIGHT = record_type(
         ("poke_ns", np.int64),
         ("chooses", np.bool_),  # whether the method is selected for each segment, as by auto
         ("method", np.int64),
-        ("waits", np.bool_),  # whether a call was interrupted because a kernel isn't compiled yet
         ("segments", np.int64),  # number of segments begun
         # Work of the string's hand and heat in its damper [J]: from the segment's start to now_ns, and before it.
         ("work", np.float64),
@@ -142,15 +142,15 @@ tensor given in its principal axes, otherwise up to 1.0 times I₃/I₁.
 NEVER = 1 << 62
 """Later than any simulated time [ns]."""
 
-REACHED, FAILED, NO_KERNEL = range(3)
-"""Result of a call. NO_KERNEL: the segment's method must be compiled first."""
+REACHED, FAILED = range(2)
+"""Result of a call."""
 
 
 @njit(error_model="numpy", allocates=False)
 def begin_flight(flight: np.record) -> None:
     """Reset time, counters and work of a flight to time 0, before its first segment."""
     flight.now_ns, flight.start_ns, flight.committed_ns = 0, 0, 0
-    flight.method, flight.segments, flight.waits, flight.tied = 0, 0, False, False
+    flight.method, flight.segments, flight.tied = 0, 0, False
     flight.steps_before, flight.evaluations_before = 0, 0
     flight.work_before, flight.lost_before = 0.0, 0.0
     for k in range(FLOOR_KINDS):
@@ -162,7 +162,7 @@ def begin_flight(flight: np.record) -> None:
 def begin_segment(flight: np.record, loads: Records, methods: Records, room: FloatArray) -> None:
     """Begin a segment at ``start``: sum the active loads anew, in the order in which they began, and select the method.
 
-    loads: the table. methods: see motion/integrators/integrator.py. room: memory for the workspace of adaptive methods.
+    loads: the table. methods: see motion/integrators/stepping.py. room: memory for the workspace of adaptive methods.
     """
     for k in range(LOADS_SIZE):
         flight.sums[k] = 0.0
@@ -205,14 +205,14 @@ def begin_variables(flight: np.record, methods: Records, room: FloatArray) -> No
     flight.segments += 1
 
 
-@njit(error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, inline="always")
 def commit_until(flight: np.record, methods: Records, room: FloatArray, until_ns: int) -> bool:
     """Commit every full step of the segment that ends at or before ``until_ns``; returns whether all were good."""
     span_ns = until_ns - flight.committed_ns
     # If the pending step ends later, there is nothing to commit.
     if span_ns == 0 or span_ns < flight.control.accepted_ns:
         return True
-    # Slices are plain arrays, as a kernel that is called by its address expects.
+    # Slices are plain arrays: integrators are compiled for one type of array only.
     y, following = flight.variables[:], flight.following[:]
     method = methods[flight.method]
     advanced, taken, good = commit(method, y, flight.problem, flight.control, following, room, flight.step_ns, span_ns)
@@ -221,7 +221,7 @@ def commit_until(flight: np.record, methods: Records, room: FloatArray, until_ns
     return good
 
 
-@njit(error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, inline="always")
 def sample(flight: np.record, methods: Records, room: FloatArray, at_ns: int, row: StateRow) -> bool:
     """Write the state at ``at_ns``, less than one step after the last committed step, into row and commit nothing.
     Returns whether the state is good.
@@ -243,13 +243,9 @@ def sample(flight: np.record, methods: Records, room: FloatArray, at_ns: int, ro
     return True
 
 
-@njit(error_model="numpy", allocates=False, forceinline=True)
+@njit(error_model="numpy", allocates=False, inline="always")
 def advance_segment(flight: np.record, methods: Records, room: FloatArray, until_ns: int) -> int:
     """Advance within the segment to ``until_ns``: full steps, then one shorter step on a copy, which ends there."""
-    method = methods[flight.method]
-    flight.waits = method.way != NOTHING and method.address == 0
-    if flight.waits:
-        return NO_KERNEL
     if not (commit_until(flight, methods, room, until_ns) and sample(flight, methods, room, until_ns, flight.row)):
         stop_in_last_good_state(flight)
         return FAILED
@@ -474,7 +470,7 @@ def next_event_ns(flight: np.record, loads: Records) -> int:
     return event_ns
 
 
-@njit(error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False, inline="always")
 def fly(
     flight: np.record,
     loads: Records,
@@ -485,10 +481,9 @@ def fly(
 ) -> int:
     """Advance the flight to ``until_ns``; ``row`` is then the state before events at that same time are applied.
 
-    Returns REACHED, FAILED (``row`` is the last good state) or NO_KERNEL: provide the method's kernel and call again.
+    Returns REACHED or FAILED (``row`` is the last good state).
     """
-    if not flight.waits:
-        flight.events, flight.timeouts = 0, 0
+    flight.events, flight.timeouts = 0, 0
     while True:
         # 1. Until the next event: full steps, then one shorter step that ends exactly there.
         event_ns = min(next_event_ns(flight, loads), until_ns)

@@ -14,7 +14,7 @@ from numba import float64, from_dtype, int64, types
 from ..base.compilation import entry_of, njit, place_of
 from ..base.simd import aligned
 from ..base.vectors import Attitude, FloatArray, Records
-from ..motion.integrators.integrator import METHOD, provide_kernel
+from ..motion.integrators.stepping import METHOD
 from ..motion.loads import Load, load_of_bytes
 from ..motion.state import State
 from ..motion.string import StringState
@@ -233,11 +233,7 @@ class FlightArrays:
 
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; returns False when the motion failed."""
-        while (came := self.call(FLY, until_ns)) != _REACHED:
-            if came == fl.FAILED:
-                return False
-            provide_kernel(self.integrator, self.methods, int(self.flight.method))
-        return True
+        return self.call(FLY, until_ns) == _REACHED
 
     def last_events(self) -> list[tuple[int, ...]]:
         """Events of the last call: time_ns, what, load_id and row of each."""

@@ -24,11 +24,10 @@ from ..motion.integrators.integrator import (
     NO_GYROSCOPIC_TERM,
     STRING,
     Integrator,
-    method_table,
     needs_of_load,
-    workspace_size,
 )
 from ..motion.integrators.series_steps import degree_for
+from ..motion.integrators.stepping import method_table, workspace_size
 from ..motion.loads import Load, light_row, resolve_load
 from ..motion.problem import ENVIRONMENT_NEEDS, Environment, begin_body
 from ..motion.state import State
