@@ -28,7 +28,18 @@ from .errors import InputError
 ABI = 1
 """Version of what stands above."""
 
-MODULES = ("mass.closed_form", "mass.tensor", "motion.body", "motion.state", "simulation.flight", "simulation.record", "simulation.effects", "simulation.quantities", "simulation.batch", "identify.trajectories")
+MODULES = (
+    "mass.closed_form",
+    "mass.tensor",
+    "motion.body",
+    "motion.state",
+    "simulation.flight",
+    "simulation.record",
+    "simulation.effects",
+    "simulation.quantities",
+    "simulation.batch",
+    "identify.trajectories",
+)
 """Those that declare exported kernels."""
 
 KERNELS: dict[str, Kernel] = {}

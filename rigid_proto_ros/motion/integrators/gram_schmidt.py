@@ -116,6 +116,9 @@ def _steps(tableau: FloatArray) -> Kernel:
     return steps
 
 
+euler_steps = _steps(ONE_STAGE)
+midpoint_steps = _steps(np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 1.0]]))
+
 EULER = Integrator(
     name="euler",
     order=1,
@@ -124,7 +127,7 @@ EULER = Integrator(
     limits="Explicit: gains energy at every step, useless beyond |ω|h of about 0.1.",
     stability_limit=0.1,
     supports=EVALUATED | {NO_GYROSCOPIC_TERM},
-    kernel=_steps(ONE_STAGE),
+    kernel=euler_steps,
 )
 
 MIDPOINT = Integrator(
@@ -135,5 +138,5 @@ MIDPOINT = Integrator(
     limits="Explicit: energy drifts with h³ per step; diverges beyond |ω|h of about 1.",
     stability_limit=0.3,
     supports=EVALUATED | {NO_GYROSCOPIC_TERM},
-    kernel=_steps(np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 1.0]])),
+    kernel=midpoint_steps,
 )

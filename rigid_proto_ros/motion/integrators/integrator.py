@@ -35,7 +35,7 @@ finite or exceeds MAX_SPEED is undone.
 
 @dataclass(frozen=True)
 class Method:
-    """A way to step, and its kernel.
+    """A way to step, and its kernel, which integrators/stepping.py calls.
 
     kernel: a Kernel, or for ADAPTIVE (y, p, control, following, workspace, span_ns, sampling), which commits steps, or
     samples; control: CONTROL. choice: description and reason, a format string with {step_s}, {degree} and

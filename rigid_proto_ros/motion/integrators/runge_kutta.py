@@ -175,6 +175,18 @@ def explicit(tableau: FloatArray) -> Kernel:
     return steps
 
 
+rk4_steps = explicit(
+    np.array(
+        [
+            [0.0, 0.0, 0.0, 0.0],
+            [0.5, 0.0, 0.0, 0.0],
+            [0.0, 0.5, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
+        ]
+    )
+)
+
 RK4 = Integrator(
     name="rk4",
     order=4,
@@ -183,17 +195,7 @@ RK4 = Integrator(
     limits="Explicit: diverges beyond |ω|h of about 2.8; energy drifts with h⁵ per step.",
     stability_limit=1.0,
     supports=EVALUATED | {NO_GYROSCOPIC_TERM},
-    kernel=explicit(
-        np.array(
-            [
-                [0.0, 0.0, 0.0, 0.0],
-                [0.5, 0.0, 0.0, 0.0],
-                [0.0, 0.5, 0.0, 0.0],
-                [0.0, 0.0, 1.0, 0.0],
-                [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
-            ]
-        )
-    ),
+    kernel=rk4_steps,
 )
 
 
@@ -262,6 +264,8 @@ DOP853_TABLEAU[12, [0, 5, 6, 7, 8, 9, 10, 11]] = [
     0.04471061572777259,
 ]
 
+dop853_steps = explicit(DOP853_TABLEAU)
+
 DOP853 = Integrator(
     name="dop853",
     order=8,
@@ -270,7 +274,7 @@ DOP853 = Integrator(
     limits="Explicit: accurate up to |ω|h of about 1, diverges beyond about 4.",
     stability_limit=2.0,
     supports=EVALUATED,
-    kernel=explicit(DOP853_TABLEAU),
+    kernel=dop853_steps,
 )
 
 

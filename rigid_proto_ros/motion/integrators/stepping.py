@@ -16,17 +16,53 @@ from ..problem import Variables
 from . import INTEGRATORS
 from .auto import steady_steps
 from .free_body import free_body_steps, free_body_strang_steps
-from .gram_schmidt import EULER, MIDPOINT
+from .gram_schmidt import euler_steps, midpoint_steps
 from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Kernel, Method
 from .lie_midpoint import lie_midpoint_steps
-from .runge_kutta import DOP853, RK4, semi_implicit_euler_steps
+from .runge_kutta import dop853_steps, rk4_steps, semi_implicit_euler_steps
 from .series import MOTION_COLUMNS, taylor_steps
 from .series_steps import MAX_DEGREE, series_steps, series_workspace, spin_workspace
 
-euler_steps = EULER.kernel
-midpoint_steps = MIDPOINT.kernel
-rk4_steps = RK4.kernel
-dop853_steps = DOP853.kernel
+KERNELS: tuple[Kernel, ...] = (
+    steady_steps,
+    free_body_steps,
+    free_body_strang_steps,
+    euler_steps,
+    midpoint_steps,
+    semi_implicit_euler_steps,
+    rk4_steps,
+    lie_midpoint_steps,
+    dop853_steps,
+    taylor_steps,
+)
+"""The kernels of fixed steps of all integrators, by number; the only adaptive one is ``series_steps``."""
+
+
+@njit(error_model="numpy", allocates=False)
+def fixed_steps(number: int, y: Variables, p: np.record, h: float, n: int) -> int:
+    """Up to n steps of h seconds in place by the kernel with this number; returns how many were good. WebAssembly has
+    no addresses of functions, and records hold none.
+    """
+    if number == 0:
+        return steady_steps(y, p, h, n)
+    if number == 1:
+        return free_body_steps(y, p, h, n)
+    if number == 2:
+        return free_body_strang_steps(y, p, h, n)
+    if number == 3:
+        return euler_steps(y, p, h, n)
+    if number == 4:
+        return midpoint_steps(y, p, h, n)
+    if number == 5:
+        return semi_implicit_euler_steps(y, p, h, n)
+    if number == 6:
+        return rk4_steps(y, p, h, n)
+    if number == 7:
+        return lie_midpoint_steps(y, p, h, n)
+    if number == 8:
+        return dop853_steps(y, p, h, n)
+    return taylor_steps(y, p, h, n)
+
 
 CONTROL = record_type(
     [
@@ -51,40 +87,6 @@ CONTROL = record_type(
     ]
 )
 """State of an adaptive kernel between calls."""
-
-# Kernels by number
-
-KERNELS: tuple[Kernel, ...] = (
-    *(steady_steps, free_body_steps, free_body_strang_steps, euler_steps, midpoint_steps, semi_implicit_euler_steps),
-    *(rk4_steps, lie_midpoint_steps, dop853_steps, taylor_steps),
-)
-
-
-@njit(error_model="numpy", allocates=False)
-def fixed_steps(code: int, y: Variables, p: np.record, h: float, n: int) -> int:
-    """Up to n steps of h seconds in place by the kernel with this number; returns the number of good ones."""
-    if code == 0:
-        return steady_steps(y, p, h, n)
-    if code == 1:
-        return free_body_steps(y, p, h, n)
-    if code == 2:
-        return free_body_strang_steps(y, p, h, n)
-    if code == 3:
-        return euler_steps(y, p, h, n)
-    if code == 4:
-        return midpoint_steps(y, p, h, n)
-    if code == 5:
-        return semi_implicit_euler_steps(y, p, h, n)
-    if code == 6:
-        return rk4_steps(y, p, h, n)
-    if code == 7:
-        return lie_midpoint_steps(y, p, h, n)
-    if code == 8:
-        return dop853_steps(y, p, h, n)
-    if code == 9:
-        return taylor_steps(y, p, h, n)
-    return 0
-
 
 # Methods by number: those of all integrators, one after the other
 
@@ -136,6 +138,12 @@ def method_of(number: int) -> Method:
     return _METHODS[number]
 
 
+# Arguments of kernels: for literal ones they would be compiled a second time.
+_COMMITTING: Any = np.bool_(False)
+_SAMPLING: Any = np.bool_(True)
+_ONCE: Any = np.int64(1)
+
+
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def commit(
     method: int,
@@ -159,7 +167,7 @@ def commit(
     if way_of(method) == ADAPTIVE:
         rows, columns = workspace_of(method, control.degree)
         workspace = matrix_of(room, rows, columns)
-        advanced = series_steps(y, p, control, following, workspace, span_ns, np.bool_(0))
+        advanced = series_steps(y, p, control, following, workspace, span_ns, _COMMITTING)
         return advanced, 0, not control.failed
     return 0, 0, True
 
@@ -180,5 +188,5 @@ def reach(
     if way_of(method) == ADAPTIVE:
         rows, columns = workspace_of(method, control.degree)
         workspace = matrix_of(room, rows, columns)
-        return bool(series_steps(y, p, control, following, workspace, rest_ns, np.bool_(1)) == rest_ns)
-    return bool(fixed_steps(_KERNEL[method], y, p, rest_ns * 1e-9, np.int64(1)) == 1)
+        return bool(series_steps(y, p, control, following, workspace, rest_ns, _SAMPLING) == rest_ns)
+    return bool(fixed_steps(_KERNEL[method], y, p, rest_ns * 1e-9, _ONCE) == 1)
