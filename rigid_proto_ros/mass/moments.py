@@ -19,17 +19,15 @@ Sums are in the order 1, x, y, z, xx, xy, xz, yy, yz, zz, each a pair of doubles
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arithmetic import pair_add, pair_divide, pair_multiply, two_sum
-from ..base.compilation import new_record, njit, record_type
+from ..base.arithmetic import fast_two_sum, pair_add, pair_divide, pair_multiply, two_product, two_sum
+from ..base.compilation import exported, local_matrix, local_numbers, matrix_of, new_record, njit, record_type
 from ..base.errors import MeshError
-from ..base.simd import Packed, filled, load, number, store
-from ..base.vectors import FloatArray, IntArray, Points, Triangles, Vector3
+from ..base.simd import Packed, filled, fused_multiply_add, load, number, store
+from ..base.vectors import BoolArray, FloatArray, IntArray, Points, Triangles, Vector3
 
 SMALL_MESH = 16
 """Up to this many triangles the compensated sums cost less than the call, so they are always used."""
@@ -39,9 +37,12 @@ centroid and tensor was at most 1.1e-14 for 3,000 random convex hulls, many of t
 """
 _BLOCK = 256
 """Triangles whose plain sum is added to the total without error; their corners, 18 KB, stay in the L1 cache."""
+ROOM = 9 * _BLOCK
+"""Doubles of workspace for a solid's moments."""
 _LANES = 8
 """Triangles processed together in vector registers; an order chosen by the compiler would depend on the processor."""
 _UNIT_ROUNDOFF = 2.0**-53
+_UNSCALED = np.ones(3)
 
 _Pair = tuple[Packed, Packed]  # the nearest doubles, and their rounding errors
 _Point = tuple[float, float, float]
@@ -85,14 +86,31 @@ class Moments:
             found[name] = getattr(self, name)
         return found
 
-    def outward(self) -> Moments:
-        """The moments of the same solid wound outward."""
-        return self if self.measure >= 0.0 else replace(self, measure=-self.measure, second=-self.second)
+
+MODELS = ("solid", "shell", "points", "bounding_box")
+"""Those of INERTIA_MODELS that are moments of a mesh, by their numbers in kernels."""
+SOLID, SHELL, POINTS, BOX = range(4)
+STRETCHED = ("shell",)
+"""Models whose measure stretches depending on direction, so that a non-uniform scale needs a new pass."""
+
+AS_NEEDED, PLAIN, IN_PAIRS = range(3)
+"""How the solid's sums are computed."""
+
+FOUND, NO_FACES, NO_VERTEX, NOT_FINITE, ONE_POINT, NO_VOLUME, NO_AREA = range(7)
+"""Whether a mesh has the moments, and why not."""
+_REASONS = {
+    NO_FACES: "there are no faces; a surface has at least one triangle",
+    NO_VERTEX: "a face uses a vertex outside 0 to {}",
+    NOT_FINITE: "a vertex coordinate is not finite",
+    ONE_POINT: "all vertices lie in one point",
+    NO_VOLUME: "the surface encloses no volume",
+    NO_AREA: "the surface has no area",
+}
 
 
-@njit(nogil=True)
-def _bounds(points: Points) -> tuple[_Point, _Point]:
-    """Lower and upper corner; raises MeshError for coordinates that aren't finite."""
+@njit(error_model="numpy", allocates=False)
+def _bounds(points: Points, lower: Vector3, upper: Vector3) -> bool:
+    """Fill the lower and upper corner (3,); False for coordinates that aren't finite."""
     x0 = y0 = z0 = np.inf
     x1 = y1 = z1 = -np.inf
     zero = 0.0  # or NaN
@@ -101,98 +119,121 @@ def _bounds(points: Points) -> tuple[_Point, _Point]:
         x0, y0, z0 = x if x < x0 else x0, y if y < y0 else y0, z if z < z0 else z0
         x1, y1, z1 = x if x > x1 else x1, y if y > y1 else y1, z if z > z1 else z1
         zero += (x - x) + (y - y) + (z - z)
-    if zero != 0.0:
-        raise MeshError("mesh", "a vertex coordinate is not finite")
-    return (x0, y0, z0), (x1, y1, z1)
+    lower[0], lower[1], lower[2] = x0, y0, z0
+    upper[0], upper[1], upper[2] = x1, y1, z1
+    return zero == 0.0
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _leads_outside(triangles: Triangles, count: int) -> bool:
     """Whether a triangle uses a vertex number outside 0 to ``count`` − 1."""
-    vertex: Any
     signs, last = 0, count - 1
-    for vertex in triangles.ravel():  # contiguous, so that this makes no copy
-        signs |= vertex | (last - vertex)
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            signs |= triangles[t, k] | (last - triangles[t, k])
     return signs < 0
 
 
-def _checked(vertices: Points, triangles: Triangles) -> tuple[Points, Triangles]:
-    """Vertices (n, 3) float64 and triangles (m, 3) int64, contiguous; raises MeshError for an empty mesh and for a
-    vertex number out of range.
+@exported("i8[:,:]", "b1[:]", returns="i8", nogil=True)
+def mark_referenced(triangles: Triangles, used: BoolArray) -> int:
+    """Mark in ``used`` (n,) the vertices that at least one of triangles (m, 3) uses; their number, or −1 where a
+    triangle uses one outside 0 to n − 1.
     """
-    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
-    triangles = np.ascontiguousarray(triangles, dtype=np.int64)
+    count, vertex_count = 0, used.shape[0]
+    for i in range(vertex_count):
+        used[i] = False
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            i = triangles[t, k]
+            if i < 0 or i >= vertex_count:
+                return -1
+            used[i] = True
+    for i in range(vertex_count):
+        count += used[i]
+    return count
+
+
+@exported("f8[:,:]", "i8[:,:]", "b1[:]", "f8[:]", "f8[:]", returns="i8", nogil=True)
+def bounding_box(vertices: Points, triangles: Triangles, used: BoolArray, lower: Vector3, upper: Vector3) -> int:
+    """Fill the lower and upper corner (3,) of the vertices (n, 3) that triangles (m, 3) use; FOUND, or why there are
+    none. ``used`` (n,) is filled as by ``mark_referenced``.
+    """
     if triangles.shape[0] == 0 or vertices.shape[0] == 0:
-        raise MeshError("mesh", "there are no faces; a surface has at least one triangle")
-    if _leads_outside(triangles, vertices.shape[0]):
-        raise MeshError("mesh", f"a face uses a vertex outside 0 to {vertices.shape[0] - 1}")
-    return vertices, triangles
+        return NO_FACES
+    if mark_referenced(triangles, used) < 0:
+        return NO_VERTEX
+    for k in range(3):
+        lower[k], upper[k] = np.inf, -np.inf
+    zero = 0.0  # or NaN
+    for i in range(vertices.shape[0]):
+        if used[i]:
+            for k in range(3):
+                x = vertices[i, k]
+                lower[k], upper[k] = x if x < lower[k] else lower[k], x if x > upper[k] else upper[k]
+                zero += x - x
+    return FOUND if zero == 0.0 else NOT_FINITE
 
 
-@njit(nogil=True)
-def _exact_reference(vertices: Points) -> tuple[Vector3, float, float]:
-    """A point near the bounding box's centre from which the differences of all vertices are exact in double precision.
+@njit(error_model="numpy", allocates=False)
+def _exact_reference(lower: Vector3, upper: Vector3, reference: Vector3) -> tuple[float, float]:
+    """Fill ``reference`` (3,): a point near the centre of a box from which the differences of all points in it are
+    exact in double precision.
 
     Per axis: the centre c if the box's half extent is below |c|/2, since v − c is then exact (Sterbenz), otherwise 0.
-    Returns the reference (3,), the power of two that scales the largest |v − reference| to about 1, and that largest.
-    Raises MeshError for coordinates that aren't finite, and for vertices all in one point.
+    Returns the power of two that scales the largest |v − reference| to about 1, and that largest; for a box that is one
+    point they are 0.
     """
-    lower, upper = _bounds(vertices)
-    reference, size = np.zeros(3), 0.0
+    size = 0.0
+    is_point = True
     for k in range(3):
         low, high = lower[k], upper[k]
         middle = 0.5 * low + 0.5 * high
-        if 0.5 * high - 0.5 * low <= 0.49 * abs(middle):
-            reference[k] = middle
+        reference[k] = middle if 0.5 * high - 0.5 * low <= 0.49 * abs(middle) else 0.0
         size = max(size, abs(low - reference[k]), abs(high - reference[k]))
-    if lower == upper:
-        raise MeshError("mesh", "all vertices lie in one point")
-    return reference, math.ldexp(1.0, -math.frexp(size)[1]), size
+        is_point = is_point and low == high
+    if is_point:
+        return 0.0, 0.0
+    return math.ldexp(1.0, -math.frexp(size)[1]), size
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _central(
     sums: FloatArray,
     reference: Vector3,
     factor: float,
     divisors: tuple[float, float, float],
     dimension: int,
-    numbers: FloatArray,
-) -> None:
-    """Compute the numbers (16,) of Moments, in its order, from the raw sums (10, 2) of (v − reference)·factor;
-    dimension: that of the measure; divisors: of the measure, the first and the second moments.
+    found: np.record,
+) -> bool:
+    """Fill ``found``, MOMENTS, from the raw sums (10, 2) of (v − reference)·factor; dimension: that of the measure;
+    divisors: of the measure, the first and the second moments.
 
-    The subtraction that cancels is done in pairs. If the measure is zero, the numbers stay unchanged.
+    The subtraction that cancels is done in pairs. False if the measure is zero.
     """
-    first, center = np.zeros((3, 2)), np.zeros((3, 2))
     measure, measure_low = pair_divide(sums[0, 0], sums[0, 1], divisors[0], 0.0)
     if measure == 0.0:
-        return
+        return False
+    first, center = local_matrix(3, 2), local_matrix(3, 2)
     unit = 1.0
     for _ in range(dimension):
         unit /= factor
-    numbers[0] = measure * unit
+    found.measure = measure * unit
     for k in range(3):
-        first[k] = pair_divide(sums[1 + k, 0], sums[1 + k, 1], divisors[1], 0.0)
-        center[k] = pair_divide(first[k, 0], first[k, 1], measure, measure_low)
-        numbers[1 + k], numbers[4 + k], numbers[7 + k] = reference[k], center[k, 0] / factor, center[k, 1] / factor
+        first[k, 0], first[k, 1] = pair_divide(sums[1 + k, 0], sums[1 + k, 1], divisors[1], 0.0)
+        center[k, 0], center[k, 1] = pair_divide(first[k, 0], first[k, 1], measure, measure_low)
+        found.reference[k] = reference[k]
+        found.center[k], found.center_low[k] = center[k, 0] / factor, center[k, 1] / factor
     slot = 0
     for i in range(3):
         for j in range(i, 3):
             raw, raw_low = pair_divide(sums[4 + slot, 0], sums[4 + slot, 1], divisors[2], 0.0)
             moved, moved_low = pair_multiply(first[i, 0], first[i, 1], center[j, 0], center[j, 1])
-            numbers[10 + slot] = pair_add(raw, raw_low, -moved, -moved_low)[0] / factor / factor * unit
+            found.second[slot] = pair_add(raw, raw_low, -moved, -moved_low)[0] / factor / factor * unit
             slot += 1
+    return bool(found.measure != 0.0)
 
 
-def _moments(numbers: FloatArray, no_measure: str) -> Moments:
-    """Of the numbers by ``_central``; raises MeshError, which says ``no_measure``, if the measure is 0."""
-    if numbers[0] == 0.0:
-        raise MeshError("mesh", no_measure)
-    return Moments(float(numbers[0]), numbers[1:4], numbers[4:7], numbers[7:10], numbers[10:])
-
-
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _gather(vertices: Points, triangles: Triangles, start: int, corners: FloatArray) -> int:
     """Copy the corners a, b, c of the triangles from ``start`` on into the columns of ``corners`` (9, n).
 
@@ -205,11 +246,13 @@ def _gather(vertices: Points, triangles: Triangles, start: int, corners: FloatAr
             for k in range(3):
                 corners[3 * corner + k, t] = vertices[i, k]
     whole = -(-count // _LANES) * _LANES
-    corners[:, count:whole] = 0.0
+    for row in range(9):
+        for t in range(count, whole):
+            corners[row, t] = 0.0
     return whole
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _corner(corners: FloatArray, corner: int, t: int, reference: Vector3, factor: float) -> tuple[Packed, ...]:
     """x, y and z of one corner of _LANES triangles, relative to the reference in units of 1/factor."""
     zero, first = filled(0.0, _LANES), 3 * corner * corners.shape[1] + t
@@ -219,24 +262,30 @@ def _corner(corners: FloatArray, corner: int, t: int, reference: Vector3, factor
     return (x - reference[0]) * factor, (y - reference[1]) * factor, (z - reference[2]) * factor
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _across(lanes: Packed) -> float:
     """The sum of eight numbers, by halves (pairwise)."""
     even = (number(lanes, 0) + number(lanes, 4)) + (number(lanes, 2) + number(lanes, 6))
     return even + ((number(lanes, 1) + number(lanes, 5)) + (number(lanes, 3) + number(lanes, 7)))
 
 
-@njit(nogil=True)
-def _blocked_sums(
-    vertices: Points, triangles: Triangles, reference: Vector3, factor: float
-) -> tuple[FloatArray, float]:
-    """The solid's ten sums (10, 2) in plain doubles, block by block; the sums of blocks are added without error.
+@njit(error_model="numpy", allocates=False)
+def _add_across(sums: FloatArray, slot: int, lanes: Packed) -> None:
+    """Add the sum of eight numbers to one sum of ``sums`` (10, 2), without error."""
+    sums[slot, 0], error = two_sum(sums[slot, 0], _across(lanes))
+    sums[slot, 1] += error
 
-    Also Σ(|b − a|² + |c − a|²), which measures the rounding error of d.
+
+@njit(error_model="numpy", allocates=False)
+def _blocked_sums(
+    vertices: Points, triangles: Triangles, reference: Vector3, factor: float, corners: FloatArray, sums: FloatArray
+) -> float:
+    """Add the solid's ten sums to ``sums`` (10, 2), zeros, in plain doubles, block by block; the sums of blocks are
+    added without error. corners (9, _BLOCK): workspace.
+
+    Returns Σ(|b − a|² + |c − a|²), which measures the rounding error of d.
     """
-    sums = np.zeros((10, 2))
     edges = 0.0
-    corners = np.empty((9, _BLOCK))
     zero = filled(0.0, _LANES)
     for start in range(0, triangles.shape[0], _BLOCK):
         v0, vx, vy, vz, size = zero, zero, zero, zero, zero
@@ -260,45 +309,51 @@ def _blocked_sums(
             yz = yz + d * (sy * sz + ay * az + by * bz + cy * cz)
             zz = zz + d * (sz * sz + az * az + bz * bz + cz * cz)
             size = size + (ux * ux + uy * uy + uz * uz + wx * wx + wy * wy + wz * wz)
-        block = (v0, vx, vy, vz, xx, xy, xz, yy, yz, zz)
-        for k in range(10):
-            sums[k, 0], error = two_sum(sums[k, 0], _across(block[k]))
-            sums[k, 1] += error
+        _add_across(sums, 0, v0)
+        _add_across(sums, 1, vx)
+        _add_across(sums, 2, vy)
+        _add_across(sums, 3, vz)
+        _add_across(sums, 4, xx)
+        _add_across(sums, 5, xy)
+        _add_across(sums, 6, xz)
+        _add_across(sums, 7, yy)
+        _add_across(sums, 8, yz)
+        _add_across(sums, 9, zz)
         edges += _across(size)
-    return sums, edges
+    return edges
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _plus(p: _Pair, q: _Pair) -> _Pair:
     return pair_add(p[0], p[1], q[0], q[1])
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _times(p: _Pair, q: _Pair) -> _Pair:
     return pair_multiply(p[0], p[1], q[0], q[1])
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _minor(p: _Pair, q: _Pair, r: _Pair, s: _Pair) -> _Pair:
     """p q − r s."""
     moved, moved_low = _times(r, s)
     return _plus(_times(p, q), (-moved, -moved_low))
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _sum(a: tuple[Packed, ...], b: tuple[Packed, ...], sign: float) -> tuple[_Pair, ...]:
     """a + sign·b, exactly."""
     return two_sum(a[0], sign * b[0]), two_sum(a[1], sign * b[1]), two_sum(a[2], sign * b[2])
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _scalar_product(a: tuple[_Pair, ...], b: tuple[_Pair, ...]) -> _Pair:
     return _plus(_plus(_times(a[0], b[0]), _times(a[1], b[1])), _times(a[2], b[2]))
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _add(sums: FloatArray, slot: int, p: _Pair) -> None:
-    """Add p to one sum of ``sums`` (10, 2, _LANES)."""
+    """Add p to one sum of ``sums`` (20 · _LANES,): for each slot high parts, then low ones."""
     high = 2 * slot * _LANES
     total = load(sums, high, p[0]), load(sums, high + _LANES, p[0])
     total = _plus(total, p)
@@ -306,12 +361,15 @@ def _add(sums: FloatArray, slot: int, p: _Pair) -> None:
     store(sums, high + _LANES, total[1])
 
 
-@njit(nogil=True)
-def _compensated_sums(vertices: Points, triangles: Triangles, reference: Vector3, factor: float) -> FloatArray:
-    """The solid's ten sums (10, 2) in pairs (about 104 bits), for bodies so thin that products of doubles round too
-    much; relative to the reference every corner is exact."""
-    of_lanes = np.zeros((10, 2, _LANES))
-    corners = np.empty((9, _BLOCK))
+@njit(error_model="numpy", allocates=False)
+def _compensated_sums(
+    vertices: Points, triangles: Triangles, reference: Vector3, factor: float, corners: FloatArray, sums: FloatArray
+) -> None:
+    """Fill the solid's ten ``sums`` (10, 2) in pairs (about 104 bits), for bodies so thin that products of doubles
+    round too much; relative to the reference every corner is exact. corners (9, _BLOCK): workspace."""
+    of_lanes = local_numbers(160)
+    for k in range(160):
+        of_lanes[k] = 0.0
     zero = filled(0.0, _LANES)
     for start in range(0, triangles.shape[0], _BLOCK):
         for t in range(0, _gather(vertices, triangles, start, corners), _LANES):
@@ -335,27 +393,239 @@ def _compensated_sums(vertices: Points, triangles: Triangles, reference: Vector3
             _add(of_lanes, 7, _times(d, _scalar_product(y, y)))
             _add(of_lanes, 8, _times(d, _scalar_product(y, z)))
             _add(of_lanes, 9, _times(d, _scalar_product(z, z)))
-    sums = np.zeros((10, 2))
     for k in range(10):
+        sums[k, 0] = sums[k, 1] = 0.0
         for lane in range(_LANES):
-            sums[k] = pair_add(sums[k, 0], sums[k, 1], of_lanes[k, 0, lane], of_lanes[k, 1, lane])
-    return sums
+            at = 2 * k * _LANES + lane
+            sums[k, 0], sums[k, 1] = pair_add(sums[k, 0], sums[k, 1], of_lanes[at], of_lanes[at + _LANES])
 
 
-@njit(nogil=True)
-def _solid(vertices: Points, triangles: Triangles, chooses: bool, in_pairs: bool, numbers: FloatArray) -> None:
-    """Compute the solid's ``numbers`` as in ``_central``, its sums in pairs of doubles or not, or as needed."""
-    reference, factor, size = _exact_reference(vertices)
-    sums = np.zeros((10, 2))
-    if chooses:
+@exported("f8[:,:]", "i8[:,:]", "i8", "f8[:]", MOMENTS, returns="i8", nogil=True)
+def signed_solid_moments(vertices: Points, triangles: Triangles, how: int, room: FloatArray, found: np.record) -> int:
+    """Fill ``found`` with the moments of the solid as it is wound, see ``solid_moments``; FOUND, or why there are none.
+
+    how: AS_NEEDED, PLAIN or IN_PAIRS. room: memory for ROOM doubles.
+    """
+    if triangles.shape[0] == 0 or vertices.shape[0] == 0:
+        return NO_FACES
+    if _leads_outside(triangles, vertices.shape[0]):
+        return NO_VERTEX
+    lower, upper, reference, sums = local_numbers(3), local_numbers(3), local_numbers(3), local_matrix(10, 2)
+    if not _bounds(vertices, lower, upper):
+        return NOT_FINITE
+    factor, size = _exact_reference(lower, upper, reference)
+    if size == 0.0:
+        return ONE_POINT
+    corners, in_pairs = matrix_of(room, 9, _BLOCK), how == IN_PAIRS
+    if how == AS_NEEDED:
         in_pairs = triangles.shape[0] <= SMALL_MESH
     if not in_pairs:
-        sums, edges = _blocked_sums(vertices, triangles, reference, factor)
+        for k in range(10):
+            sums[k, 0] = sums[k, 1] = 0.0
+        edges = _blocked_sums(vertices, triangles, reference, factor, corners, sums)
         rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
-        in_pairs = chooses and not rounding <= ROUNDING_LIMIT * abs(sums[0, 0])
+        in_pairs = how == AS_NEEDED and not rounding <= ROUNDING_LIMIT * abs(sums[0, 0])
     if in_pairs:
-        sums = _compensated_sums(vertices, triangles, reference, factor)
-    _central(sums, reference, factor, (6.0, 24.0, 120.0), 3, numbers)
+        _compensated_sums(vertices, triangles, reference, factor, corners, sums)
+    return FOUND if _central(sums, reference, factor, (6.0, 24.0, 120.0), 3, found) else NO_VOLUME
+
+
+@njit(error_model="numpy", allocates=False)
+def _point(points: Points, i: int) -> _Point:
+    return points[i, 0], points[i, 1], points[i, 2]
+
+
+@njit(error_model="numpy", allocates=False)
+def _normal(points: Points, triangle: IntArray) -> _Point:
+    """The triangle's normal; its length is twice the area."""
+    a, b, c = _point(points, triangle[0]), _point(points, triangle[1]), _point(points, triangle[2])
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    wx, wy, wz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    return uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+
+
+@njit(error_model="numpy", allocates=False)
+def _add_number(sums: FloatArray, slot: int, x: float) -> None:
+    """Add x to one sum of ``sums`` (10, 2)."""
+    sums[slot, 0], sums[slot, 1] = pair_add(sums[slot, 0], sums[slot, 1], x, 0.0)
+
+
+@njit(error_model="numpy", allocates=False)
+def _shell_sums(points: Points, triangles: Triangles, starts: IntArray, sums: FloatArray) -> None:
+    """Add the ten sums to ``sums`` (10, 2), zeros. Polygon k consists of the triangles starts[k] to starts[k + 1] − 1,
+    a fan; without ``starts`` each triangle is one.
+    """
+    is_fan = starts.shape[0] > 0
+    for polygon in range(starts.shape[0] - 1 if is_fan else triangles.shape[0]):
+        begin, end = (starts[polygon], starts[polygon + 1]) if is_fan else (polygon, polygon + 1)
+        mx = my = mz = 0.0  # twice the Newell normal: the fan triangles' normals add up to it
+        for t in range(begin, end):
+            nx, ny, nz = _normal(points, triangles[t])
+            mx, my, mz = mx + nx, my + ny, mz + nz
+        for t in range(begin, end):
+            nx, ny, nz = _normal(points, triangles[t])
+            area = 0.5 * math.sqrt(nx * nx + ny * ny + nz * nz)
+            if mx * nx + my * ny + mz * nz < 0.0:
+                area = -area
+            a, b, c = _point(points, triangles[t, 0]), _point(points, triangles[t, 1]), _point(points, triangles[t, 2])
+            x, y, z = a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]
+            _add_number(sums, 0, area)
+            _add_number(sums, 1, area * x)
+            _add_number(sums, 2, area * y)
+            _add_number(sums, 3, area * z)
+            _add_number(sums, 4, area * (x * x + a[0] * a[0] + b[0] * b[0] + c[0] * c[0]))
+            _add_number(sums, 5, area * (x * y + a[0] * a[1] + b[0] * b[1] + c[0] * c[1]))
+            _add_number(sums, 6, area * (x * z + a[0] * a[2] + b[0] * b[2] + c[0] * c[2]))
+            _add_number(sums, 7, area * (y * y + a[1] * a[1] + b[1] * b[1] + c[1] * c[1]))
+            _add_number(sums, 8, area * (y * z + a[1] * a[2] + b[1] * b[2] + c[1] * c[2]))
+            _add_number(sums, 9, area * (z * z + a[2] * a[2] + b[2] * b[2] + c[2] * c[2]))
+
+
+@njit(error_model="numpy", allocates=False)
+def _put_back(found: np.record, stretch: Vector3, base: Vector3) -> None:
+    """Add the stretched ``base`` (3,), about which ``found`` is, to its reference: the nearest doubles, and what they
+    lack to ``center_low``.
+
+    The rest of a fused multiply-add is a sum of two doubles (Boldo and Muller, "Exact and approximated error of the
+    FMA", IEEE Trans. Comput. 60, 2011), while a product is exact in two.
+    """
+    for k in range(3):
+        r = found.reference[k]
+        near = fused_multiply_add(base[k], stretch[k], r)
+        product, product_low = two_product(base[k], stretch[k])
+        s, s_low = two_sum(r, product_low)
+        t, t_low = two_sum(product, s)
+        rest, _ = fast_two_sum((t - near) + t_low, s_low)
+        found.reference[k] = near
+        found.center_low[k] += rest
+
+
+@njit(error_model="numpy", allocates=False)
+def _shell(
+    vertices: Points, triangles: Triangles, starts: IntArray, scale: Vector3, points: Points, found: np.record
+) -> int:
+    """The shell's part of ``moments_of``; points (n, 3): workspace."""
+    stretch, base, reference = local_numbers(3), local_numbers(3), local_numbers(3)
+    lower, upper, sums = local_numbers(3), local_numbers(3), local_matrix(10, 2)
+    is_stretched = False
+    for k in range(3):
+        stretch[k] = abs(scale[k]) / abs(scale[0])
+        is_stretched = is_stretched or stretch[k] != 1.0
+    if _leads_outside(triangles, vertices.shape[0]):
+        return NO_VERTEX
+    for k in range(3):
+        base[k] = vertices[triangles[0, 0], k]
+    for i in range(vertices.shape[0]):
+        for k in range(3):
+            # About a vertex: far from the origin the products would round.
+            points[i, k] = (vertices[i, k] - base[k]) * stretch[k] if is_stretched else vertices[i, k]
+    if not _bounds(points, lower, upper):
+        return NOT_FINITE
+    factor, size = _exact_reference(lower, upper, reference)
+    if size == 0.0:
+        return ONE_POINT
+    for i in range(vertices.shape[0]):
+        for k in range(3):
+            points[i, k] = (points[i, k] - reference[k]) * factor
+    for k in range(10):
+        sums[k, 0] = sums[k, 1] = 0.0
+    _shell_sums(points, triangles, starts, sums)
+    if not _central(sums, reference, factor, (1.0, 3.0, 12.0), 2, found):
+        return NO_AREA
+    if is_stretched:
+        _put_back(found, stretch, base)
+    return FOUND
+
+
+@njit(error_model="numpy", allocates=False)
+def _points(vertices: Points, used: BoolArray, lower: Vector3, upper: Vector3, found: np.record) -> int:
+    """The points' part of ``moments_of``, for vertices within a box."""
+    reference, sums = local_numbers(3), local_matrix(10, 2)
+    factor, size = _exact_reference(lower, upper, reference)
+    if size == 0.0:
+        return ONE_POINT
+    count = 0
+    for k in range(10):
+        sums[k, 0] = sums[k, 1] = 0.0
+    for i in range(vertices.shape[0]):
+        if used[i]:
+            x = (vertices[i, 0] - reference[0]) * factor
+            y = (vertices[i, 1] - reference[1]) * factor
+            z = (vertices[i, 2] - reference[2]) * factor
+            count += 1
+            _add_number(sums, 1, x)
+            _add_number(sums, 2, y)
+            _add_number(sums, 3, z)
+            _add_number(sums, 4, x * x)
+            _add_number(sums, 5, x * y)
+            _add_number(sums, 6, x * z)
+            _add_number(sums, 7, y * y)
+            _add_number(sums, 8, y * z)
+            _add_number(sums, 9, z * z)
+    sums[0, 0] = count
+    _central(sums, reference, factor, (1.0, 1.0, 1.0), 0, found)
+    return FOUND
+
+
+@njit(error_model="numpy", allocates=False)
+def _box(lower: Vector3, upper: Vector3, found: np.record) -> None:
+    """The moments of a box as a solid cuboid."""
+    x, y, z = upper[0] - lower[0], upper[1] - lower[1], upper[2] - lower[2]
+    volume = x * y * z
+    # A flat box has no volume, but a mass distribution: its measure is then 1.
+    measure = volume if volume > 0.0 else 1.0
+    found.measure = measure
+    for k in range(3):
+        found.reference[k], found.center[k], found.center_low[k] = 0.5 * lower[k] + 0.5 * upper[k], 0.0, 0.0
+    for k in range(6):
+        found.second[k] = 0.0
+    found.second[0] = measure * (x * x) / 12.0
+    found.second[3] = measure * (y * y) / 12.0
+    found.second[5] = measure * (z * z) / 12.0
+
+
+@exported("i8", "f8[:,:]", "i8[:,:]", "i8[:]", "f8[:]", "b1[:]", "f8[:]", MOMENTS, returns="i8", nogil=True)
+def moments_of(
+    model: int,
+    vertices: Points,
+    triangles: Triangles,
+    starts: IntArray,
+    scale: Vector3,
+    used: BoolArray,
+    room: FloatArray,
+    found: np.record,
+) -> int:
+    """Fill ``found`` with the moments of a model, see ``mesh_moments``; FOUND, or why there are none.
+
+    starts: empty where each triangle is a polygon. used (n,): workspace of POINTS and BOX; room: memory for ROOM
+    doubles of SOLID, for 3 n of SHELL.
+    """
+    if model == SOLID:
+        code = signed_solid_moments(vertices, triangles, AS_NEEDED, room, found)
+        if code == FOUND and not found.measure >= 0.0:
+            found.measure = -found.measure
+            for k in range(6):
+                found.second[k] = -found.second[k]
+        return code
+    if triangles.shape[0] == 0 or vertices.shape[0] == 0:
+        return NO_FACES
+    if model == SHELL:
+        return _shell(vertices, triangles, starts, scale, matrix_of(room, vertices.shape[0], 3), found)
+    lower, upper = local_numbers(3), local_numbers(3)
+    code = bounding_box(vertices, triangles, used, lower, upper)
+    if code != FOUND:
+        return code
+    if model == POINTS:
+        return _points(vertices, used, lower, upper, found)
+    _box(lower, upper, found)
+    return FOUND
+
+
+def _moments(code: int, found: np.record, vertices: Points) -> Moments:
+    """What a kernel has found; raises MeshError where there is nothing."""
+    if code != FOUND:
+        raise MeshError("mesh", _REASONS[code].format(len(vertices) - 1))
+    return Moments(float(found.measure), found.reference, found.center, found.center_low, found.second)
 
 
 def solid_moments(vertices: Points, triangles: Triangles, *, compensated: bool | None = None) -> Moments:
@@ -366,121 +636,49 @@ def solid_moments(vertices: Points, triangles: Triangles, *, compensated: bool |
     used; always or never if ``compensated`` says so. Raises MeshError for an empty or non-finite mesh, a vertex number
     out of range, or zero volume.
     """
-    vertices, triangles = _checked(vertices, triangles)
-    numbers = np.zeros(16)
-    _solid(vertices, triangles, compensated is None, bool(compensated), numbers)
-    return _moments(numbers, "the surface encloses no volume")
+    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int64)
+    found, how = new_record(MOMENTS), AS_NEEDED if compensated is None else IN_PAIRS if compensated else PLAIN
+    return _moments(signed_solid_moments(vertices, triangles, how, np.empty(ROOM), found), found, vertices)
 
 
-@njit(nogil=True)
-def _point(points: Points, i: int) -> _Point:
-    return points[i, 0], points[i, 1], points[i, 2]
+def mesh_moments(
+    model: str,
+    vertices: Points,
+    triangles: Triangles,
+    polygon_starts: IntArray | None = None,
+    scale: FloatArray = _UNSCALED,
+) -> Moments:
+    """Moments of one of MODELS for ``triangles`` (m, 3) over ``vertices`` (n, 3).
 
+    solid: as ``solid_moments``, of the same solid wound outward.
 
-@njit(nogil=True)
-def _normal(points: Points, triangle: IntArray) -> _Point:
-    """The triangle's normal; its length is twice the area."""
-    a, b, c = _point(points, triangle[0]), _point(points, triangle[1]), _point(points, triangle[2])
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    wx, wy, wz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    return uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+    shell: the surface, of uniform thickness; its measure is its area. polygon_starts (p + 1,) says which fan triangles
+    form a polygon; None if each triangle is one. A fan triangle of a concave polygon that lies outside it counts
+    negative: its sign is that of its normal relative to the polygon's Newell normal. scale (3,): the moments are those
+    of the surface stretched by |scale|/|scale_x|.
 
+    points: equal point masses at the vertices that triangles use, the measure being their number (the 2019 paper's
+    eq. 7). bounding_box: that of these vertices as a solid cuboid (its eq. 8, centred on the box).
 
-@njit(nogil=True)
-def _shell_sums(points: Points, triangles: Triangles, starts: IntArray) -> FloatArray:
-    """The ten sums (10, 2) over polygons; polygon k consists of the triangles starts[k] to starts[k + 1] − 1, a fan."""
-    sums = np.zeros((10, 2))
-    for polygon in range(starts.shape[0] - 1):
-        mx = my = mz = 0.0  # twice the Newell normal: the fan triangles' normals add up to it
-        for t in range(starts[polygon], starts[polygon + 1]):
-            nx, ny, nz = _normal(points, triangles[t])
-            mx, my, mz = mx + nx, my + ny, mz + nz
-        for t in range(starts[polygon], starts[polygon + 1]):
-            nx, ny, nz = _normal(points, triangles[t])
-            area = 0.5 * math.sqrt(nx * nx + ny * ny + nz * nz)
-            if mx * nx + my * ny + mz * nz < 0.0:
-                area = -area
-            a, b, c = _point(points, triangles[t, 0]), _point(points, triangles[t, 1]), _point(points, triangles[t, 2])
-            s = (a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2])
-            sums[0] = pair_add(sums[0, 0], sums[0, 1], area, 0.0)
-            slot = 4
-            for i in range(3):
-                sums[1 + i] = pair_add(sums[1 + i, 0], sums[1 + i, 1], area * s[i], 0.0)
-                for j in range(i, 3):
-                    bracket = s[i] * s[j] + a[i] * a[j] + b[i] * b[j] + c[i] * c[j]
-                    sums[slot] = pair_add(sums[slot, 0], sums[slot, 1], area * bracket, 0.0)
-                    slot += 1
-    return sums
-
-
-def shell_moments(vertices: Points, triangles: Triangles, polygon_starts: IntArray | None = None) -> Moments:
-    """Moments of the surface as a thin shell of uniform thickness; the measure is its area.
-
-    vertices (n, 3), triangles (m, 3); polygon_starts (p + 1,) says which fan triangles form a polygon; None if each
-    triangle is one. A fan triangle of a concave polygon that lies outside it counts negative: its sign is that of its
-    normal relative to the polygon's Newell normal. Raises MeshError for an empty mesh, non-finite vertices, or zero
-    area.
+    Raises MeshError for an empty mesh, a vertex number out of range, coordinates that aren't finite, and where there is
+    no volume or area.
     """
-    vertices, triangles = _checked(vertices, triangles)
-    reference, factor, _ = _exact_reference(vertices)
-    starts = np.arange(len(triangles) + 1) if polygon_starts is None else np.asarray(polygon_starts, np.int64)
-    sums, numbers = _shell_sums((vertices - reference) * factor, triangles, starts), np.zeros(16)
-    _central(sums, reference, factor, (1.0, 3.0, 12.0), 2, numbers)
-    return _moments(numbers, "the surface has no area")
+    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int64)
+    starts = np.empty(0, np.int64) if polygon_starts is None else np.ascontiguousarray(polygon_starts, np.int64)
+    number, found = MODELS.index(model), new_record(MOMENTS)
+    used = np.empty(len(vertices) if number in (POINTS, BOX) else 0, np.bool_)
+    room = np.empty(max(ROOM, 3 * len(vertices)) if number in (SOLID, SHELL) else 0)
+    return _moments(moments_of(number, vertices, triangles, starts, scale, used, room, found), found, vertices)
 
 
 def referenced_vertices(vertices: Points, triangles: Triangles) -> Points:
-    """The vertices (k, 3) that at least one triangle uses, in the file's order."""
-    used = np.zeros(vertices.shape[0], dtype=bool)
-    used[triangles.ravel()] = True
-    return vertices if used.all() else vertices[used]
-
-
-@njit(nogil=True)
-def _point_sums(points: Points) -> FloatArray:
-    sums = np.zeros((10, 2))
-    sums[0, 0] = points.shape[0]
-    for t in range(points.shape[0]):
-        x = _point(points, t)
-        slot = 4
-        for i in range(3):
-            sums[1 + i] = pair_add(sums[1 + i, 0], sums[1 + i, 1], x[i], 0.0)
-            for j in range(i, 3):
-                sums[slot] = pair_add(sums[slot, 0], sums[slot, 1], x[i] * x[j], 0.0)
-                slot += 1
-    return sums
-
-
-def point_moments(vertices: Points, triangles: Triangles) -> Moments:
-    """Equal point masses at the referenced vertices, the measure being their number (the 2019 paper's eq. 7)."""
-    vertices, triangles = _checked(vertices, triangles)
-    points = referenced_vertices(vertices, triangles)
-    reference, factor, _ = _exact_reference(points)
-    sums, numbers = _point_sums((points - reference) * factor), np.zeros(16)
-    _central(sums, reference, factor, (1.0, 1.0, 1.0), 0, numbers)
-    return _moments(numbers, "there are no points")
-
-
-def box_moments(vertices: Points, triangles: Triangles) -> Moments:
-    """The bounding box of the referenced vertices as a solid cuboid (the 2019 paper's eq. 8, centred on the box)."""
-    vertices, triangles = _checked(vertices, triangles)
-    lower, upper = _bounds(referenced_vertices(vertices, triangles))
-    low, high = np.array(lower), np.array(upper)
-    side = high - low
-    volume = float(side[0] * side[1] * side[2])
-    second = np.zeros(6)
-    # A flat box has no volume, but a mass distribution: its measure is then 1.
-    measure = volume if volume > 0.0 else 1.0
-    second[[0, 3, 5]] = measure * (side * side) / 12.0
-    return Moments(measure, 0.5 * low + 0.5 * high, np.zeros(3), np.zeros(3), second)
-
-
-MODELS: dict[str, Callable[[Points, Triangles, IntArray | None], Moments]] = {
-    "solid": lambda vertices, triangles, _: solid_moments(vertices, triangles).outward(),
-    "shell": shell_moments,
-    "points": lambda vertices, triangles, _: point_moments(vertices, triangles),
-    "bounding_box": lambda vertices, triangles, _: box_moments(vertices, triangles),
-}
-"""The moments of each of INERTIA_MODELS that a mesh has, as functions of vertices, triangles and polygon_starts."""
-STRETCHED = ("shell",)
-"""Models whose measure stretches depending on direction, so that a non-uniform scale needs a new pass."""
+    """The vertices (k, 3) that at least one triangle uses, in the file's order; raises MeshError for a vertex number
+    out of range.
+    """
+    used = np.empty(len(vertices), np.bool_)
+    count = mark_referenced(np.ascontiguousarray(triangles, dtype=np.int64), used)
+    if count < 0:
+        raise MeshError("mesh", _REASONS[NO_VERTEX].format(len(vertices) - 1))
+    return vertices if count == len(vertices) else vertices[used]

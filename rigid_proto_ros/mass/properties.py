@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from fractions import Fraction
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from ..base.errors import InputError, MeshError, TensorError
 from ..base.vectors import FloatArray, IntArray, Matrix3, Points, Triangles, Vector3
 from . import MODEL_COMS
 from .closed_form import given_mass, is_plainly_good, spread_mass
-from .moments import MODELS, STRETCHED, Moments
+from .moments import MODELS, STRETCHED, Moments, mesh_moments
 from .tensor import check_tensor, tensor_from_six
 
 SCALE_LIMITS = (1e-9, 1e9)
@@ -65,7 +64,7 @@ def _checked_ballast(ballast: Sequence[Sequence[float]]) -> FloatArray:
 class MeshMoments:
     """A mesh's moments at unit density; each model's are computed on first use and kept.
 
-    vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as in ``shell_moments``. ``no_solid``: why
+    vertices (n, 3) and triangles (m, 3) in mesh coordinates; polygon_starts as in ``mesh_moments``. ``no_solid``: why
     the surface bounds no solid and what helps, "" if it bounds one; with it the solid model, and a density, are
     refused. ``stand_in`` returns vertices (k, 3) and triangles (l, 3) of another solid that is used instead, for a
     surface that bounds none or whose parts overlap. For a surface wound inward throughout the results are those of the
@@ -101,17 +100,7 @@ class MeshMoments:
         key = (model, *stretch.tolist())
         if key not in self._moments:
             vertices, triangles = self.solid_surface() if model == "solid" else (self.vertices, self.triangles)
-            if np.all(stretch == 1.0):
-                found = MODELS[model](vertices, triangles, self.polygon_starts)
-            else:  # about a vertex: far from the origin the products would round
-                base = vertices[triangles[0, 0]]
-                found = MODELS[model]((vertices - base) * stretch, triangles, self.polygon_starts)
-                parts = zip(found.reference, base, stretch, strict=True)
-                exact = [Fraction(r) + Fraction(b) * Fraction(s) for r, b, s in parts]
-                reference = np.array([float(place) for place in exact])
-                low = [float(place - Fraction(near)) for place, near in zip(exact, reference, strict=True)]
-                found = replace(found, reference=reference, center_low=found.center_low + low)
-            self._moments[key] = found
+            self._moments[key] = mesh_moments(model, vertices, triangles, self.polygon_starts, stretch)
         return self._moments[key]
 
     def body_mass(self, *, scale: ArrayLike = (1.0, 1.0, 1.0), mass: float = 0.0, density: float = 1000.0) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.compilation import njit
+from ..base.compilation import exported
 from ..base.rotation import length, times
 from ..base.vectors import BoolArray, IntArray, Points, Triangles
 from ..mesh.intersection import component_nesting
@@ -71,15 +71,18 @@ def _drop_copies(surface: RepairedSurface) -> list[str]:
     return [f"removed {counted(int(np.count_nonzero(surplus)), 'duplicate face')}"]
 
 
-_SWEEP = np.array([0.8163, 0.3719, 0.4421])  # oblique, so that few points project to the same place
+_SWEEP = (0.8163, 0.3719, 0.4421)  # oblique, so that few points project to the same place
 
 
-@njit(nogil=True)
-def _near_pairs(points: Points, order: IntArray, tolerance: float, target: IntArray) -> None:
-    """Set target (k,) of points (k, 3) to the first point within ``tolerance``, in their order along _SWEEP."""
+@exported("f8[:,:]", "i8[:]", "f8", "i8[:]", nogil=True)
+def near_pairs(points: Points, order: IntArray, tolerance: float, target: IntArray) -> None:
+    """Set target (k,), each its own number, of points (k, 3) to the first point within ``tolerance``, in their order
+    along _SWEEP.
+    """
     rounding = 0.0
-    for k in range(3):
-        rounding = max(rounding, 1e-14 * np.max(np.abs(points[:, k])))
+    for i in range(points.shape[0]):
+        for k in range(3):
+            rounding = max(rounding, 1e-14 * abs(points[i, k]))
     for i in range(order.shape[0]):
         a = order[i]
         if target[a] != a:
@@ -103,7 +106,7 @@ def _weld_rims(surface: RepairedSurface) -> list[str]:
     used = surface.vertices[surface.triangles.ravel()]
     tolerance = WELD * length(used.max(axis=0) - used.min(axis=0))
     target = np.arange(len(rim))
-    _near_pairs(points, np.argsort(times(points, _SWEEP), kind="stable"), tolerance, target)
+    near_pairs(points, np.argsort(times(points, _SWEEP), kind="stable"), tolerance, target)
     moved = int(np.count_nonzero(target != np.arange(len(rim))))
     if not moved:
         return []
@@ -129,7 +132,9 @@ def _turns(edges: IntArray, count: int) -> tuple[BoolArray, IntArray, bool]:
     agrees = edges[:, 2] == 1
     first = np.concatenate([one, one + count])
     second = np.concatenate([np.where(agrees, other, other + count), np.where(agrees, other + count, other)])
-    sets = joined_sets(first, second, 2 * count).reshape(2, count)
+    smallest = np.empty(2 * count, np.int64)
+    joined_sets(first, second, smallest)
+    sets = smallest.reshape(2, count)
     patch = sets.min(axis=0)
     return sets[0] != patch, patch, bool(np.all(sets[0] != sets[1]))
 

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.compilation import exported, local_matrix, njit
 from ..base.errors import MeshError, is_missing
-from ..base.vectors import Points, Triangles
+from ..base.rotation import matrix_elements, normalize
+from ..base.vectors import FloatArray, Points, Triangles
 
 _LIBRARIES = ("images", "effects", "materials", "cameras", "lights", "animations", "animation_clips", "controllers")
 _UNUSED = (*(f"library_{kind}" for kind in _LIBRARIES), "bind_material", "instance_camera", "instance_light", "extra")
@@ -21,6 +23,74 @@ _UNUSED = (*(f"library_{kind}" for kind in _LIBRARIES), "bind_material", "instan
 _ARCHIVES = ("zip", "bz2", "tar.bz2", "tar.gz", "zae")
 MAX_TRIANGLES = 20_000_000
 """A mesh with more triangles is refused: to read and judge this many takes about 10 GB (480 bytes for each)."""
+
+
+@exported("f8[:]", "f8[:,:]")
+def node_matrix(numbers: FloatArray, matrix: FloatArray) -> None:
+    """Fill the matrix (4, 4) of a scene's node: of 16 numbers, its columns one after the other, or of 10: translation,
+    rotation as a quaternion xyzw of any length, and scale, which acts first.
+    """
+    if numbers.shape[0] == 16:
+        for k in range(16):
+            matrix[k % 4, k // 4] = numbers[k]
+        return
+    x, y, z, w = normalize(numbers[3], numbers[4], numbers[5], numbers[6])
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = matrix_elements(x, y, z, w)
+    a, b, c = numbers[7], numbers[8], numbers[9]
+    matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3] = xx * a, xy * b, xz * c, numbers[0]
+    matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[1, 3] = yx * a, yy * b, yz * c, numbers[1]
+    matrix[2, 0], matrix[2, 1], matrix[2, 2], matrix[2, 3] = zx * a, zy * b, zz * c, numbers[2]
+    matrix[3, 0] = matrix[3, 1] = matrix[3, 2] = 0.0
+    matrix[3, 3] = 1.0
+
+
+@exported("f8[:,:]", "f8[:,:]", "f8[:,:]")
+def multiply_matrices(a: FloatArray, b: FloatArray, product: FloatArray) -> None:
+    """Fill ``product`` (4, 4), another matrix, with a b, summed in the columns' order."""
+    for i in range(4):
+        for j in range(4):
+            product[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j] + a[i, 3] * b[3, j]
+
+
+@njit(error_model="numpy", allocates=False)
+def _mirrors(matrix: FloatArray) -> bool:
+    """Whether the determinant of the upper left (3, 3) is negative: by elimination, rows with the largest pivots first,
+    so that nothing overflows.
+    """
+    rows, negative = local_matrix(3, 3), False
+    for i in range(3):
+        for j in range(3):
+            rows[i, j] = matrix[i, j]
+    for k in range(3):
+        best = k
+        for i in range(k + 1, 3):
+            if abs(rows[i, k]) > abs(rows[best, k]):
+                best = i
+        if not rows[best, k] != 0.0:
+            return False
+        if best != k:
+            negative = not negative
+            for j in range(3):
+                rows[k, j], rows[best, j] = rows[best, j], rows[k, j]
+        if rows[k, k] < 0.0:
+            negative = not negative
+        for i in range(k + 1, 3):
+            factor = rows[i, k] / rows[k, k]
+            for j in range(k + 1, 3):
+                rows[i, j] -= factor * rows[k, j]
+    return negative
+
+
+@exported("f8[:,:]", "f8[:,:]", "f8[:,:]", returns="b1", nogil=True)
+def place_vertices(vertices: Points, matrix: FloatArray, placed: Points) -> bool:
+    """Fill ``placed`` (n, 3) with vertices (n, 3) transformed by matrix (4, 4), summed in a fixed order; whether that
+    mirrors them.
+    """
+    for i in range(vertices.shape[0]):
+        x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        for k in range(3):
+            placed[i, k] = x * matrix[k, 0] + y * matrix[k, 1] + z * matrix[k, 2] + matrix[k, 3]
+    return _mirrors(matrix)
 
 
 class Assembly:
@@ -44,14 +114,12 @@ class Assembly:
         self._held += len(triangles)
         if max(self._held, (self._count + len(vertices)) // 3) > MAX_TRIANGLES:
             raise MeshError(self.name, f"it has more than {MAX_TRIANGLES} triangles", "a smaller mesh")
-        linear, shift = matrix[:3, :3], matrix[:3, 3]
         with np.errstate(all="ignore"):  # the verdict refuses numbers that aren't finite
-            x, y, z = np.asarray(vertices, dtype=np.float64).T[:, :, None]
-            # Summed in a fixed order: that of BLAS depends on the processor.
-            self._vertices.append(x * linear[:, 0] + y * linear[:, 1] + z * linear[:, 2] + shift)
-            mirrored = np.linalg.det(linear) < 0.0
-        if mirrored:
+            points, matrix = (np.ascontiguousarray(of, dtype=np.float64) for of in (vertices, matrix))
+        placed = np.empty((len(points), 3))
+        if place_vertices(points, matrix, placed):
             triangles = triangles[:, [0, 2, 1]]
+        self._vertices.append(placed)
         self._triangles.append(triangles + self._count)
         self._count += len(vertices)
 

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import MeshError
-from ..base.rotation import matrix_from_quaternion, normalize
 from ..base.vectors import FloatArray, Triangles
-from .assembly import Assembly
+from .assembly import Assembly, multiply_matrices, node_matrix
 
 TRIANGLES = 4
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -97,12 +96,14 @@ class _Document:
 
 def _node_matrix(node: dict[str, Any]) -> FloatArray:
     """The matrix (4, 4) of a node: scale, then rotation, then translation; or the given matrix."""
+    numbers, matrix = np.empty(16 if "matrix" in node else 10), np.empty((4, 4))
     if "matrix" in node:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    matrix = np.eye(4)
-    quaternion = normalize(*np.asarray(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64).tolist())
-    matrix[:3, :3] = matrix_from_quaternion(quaternion) * np.asarray(node.get("scale", (1, 1, 1)), dtype=np.float64)
-    matrix[:3, 3] = node.get("translation", (0, 0, 0))
+        numbers[:] = np.reshape(node["matrix"], 16)
+    else:
+        numbers[:3] = np.reshape(node.get("translation", (0, 0, 0)), 3)
+        numbers[3:7] = np.reshape(node.get("rotation", (0, 0, 0, 1)), 4)
+        numbers[7:] = np.reshape(node.get("scale", (1, 1, 1)), 3)
+    node_matrix(numbers, matrix)
     return matrix
 
 
@@ -131,7 +132,8 @@ def _add_node(document: _Document, number: int, above: FloatArray, seen: set[int
         raise MeshError(document.name, f"node {number} occurs twice in the scene; its nodes must be a tree")
     seen.add(number)
     node = document.item("nodes", number)
-    matrix = above @ _node_matrix(node)
+    matrix = np.empty((4, 4))
+    multiply_matrices(above, _node_matrix(node), matrix)
     if "mesh" in node:
         mesh = document.item("meshes", node["mesh"])
         if "skin" in node:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.compilation import njit
+from ..base.compilation import exported, local_integers, njit
 from ..base.vectors import BoolArray, FloatArray, IntArray, Points, Triangles
 from .topology import Components, Topology
 
@@ -52,36 +52,36 @@ _Vector = tuple[float, float, float]
 _Triangle = tuple[_Vector, _Vector, _Vector]
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _corner(vertices: Points, i: int) -> _Vector:
     return vertices[i, 0], vertices[i, 1], vertices[i, 2]
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def corners_of(vertices: Points, corners: Triangles, i: int) -> _Triangle:
     """The three corners of triangle i."""
     return _corner(vertices, corners[i, 0]), _corner(vertices, corners[i, 1]), _corner(vertices, corners[i, 2])
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def minus(a: _Vector, b: _Vector) -> _Vector:
     """a − b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def cross(a: _Vector, b: _Vector) -> _Vector:
     """a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def dot(a: _Vector, b: _Vector) -> float:
     """a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _largest(a: _Vector) -> float:
     return max(abs(a[0]), abs(a[1]), abs(a[2]))
 
@@ -110,7 +110,7 @@ def hierarchy(vertices: Points, corners: Triangles) -> Hierarchy:
     return order, own, boxes
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _boxes_meet(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
     """Whether box i and box j of ``others`` have a point in common."""
     x = (boxes[i, 0] <= others[j, 3]) & (others[j, 0] <= boxes[i, 3])
@@ -118,7 +118,7 @@ def _boxes_meet(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
     return bool(x & y & (boxes[i, 2] <= others[j, 5]) & (others[j, 2] <= boxes[i, 5]))
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _heights(triangle: _Triangle, other: _Triangle) -> tuple[_Vector, _Vector]:
     """Normal of a triangle, with a length of twice its area, and its scalar products with the corners of the other one
     relative to its first corner; 0 for corners in its plane to rounding.
@@ -131,22 +131,32 @@ def _heights(triangle: _Triangle, other: _Triangle) -> tuple[_Vector, _Vector]:
     return normal, (d if abs(d) > margin else 0.0, e if abs(e) > margin else 0.0, f if abs(f) > margin else 0.0)
 
 
-@njit(nogil=True)
-def _piece(triangle: _Triangle, heights: _Vector, axis: int, origin: float) -> tuple[float, float]:
-    """Interval along ``axis``, from ``origin``, in which a triangle meets the plane above which its corners have
-    ``heights``."""
-    low, high = math.inf, -math.inf
-    for k in range(3):
-        end = (k + 1) % 3
-        d, e = heights[k], heights[end]
-        if d == 0.0 or d * e < 0.0:
-            x, y = triangle[k][axis] - origin, triangle[end][axis] - origin
-            place = x + (y - x) * (d / (d - e)) if d != 0.0 else x
-            low, high = min(low, place), max(high, place)
+@njit(error_model="numpy", allocates=False)
+def _along(axis: int, a: _Vector) -> float:
+    """Component ``axis`` of a."""
+    return a[0] if axis == 0 else (a[1] if axis == 1 else a[2])
+
+
+@njit(error_model="numpy", allocates=False)
+def _with_end(low: float, high: float, d: float, e: float, x: float, y: float) -> tuple[float, float]:
+    """The interval, made to hold where an edge from x at the height d to y at the height e meets the height 0."""
+    if d == 0.0 or d * e < 0.0:
+        place = x + (y - x) * (d / (d - e)) if d != 0.0 else x
+        return min(low, place), max(high, place)
     return low, high
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
+def _piece(triangle: _Triangle, heights: _Vector, axis: int, origin: float) -> tuple[float, float]:
+    """Interval along ``axis``, from ``origin``, in which a triangle meets the plane above which its corners have
+    ``heights``."""
+    x, y, z = _along(axis, triangle[0]) - origin, _along(axis, triangle[1]) - origin, _along(axis, triangle[2]) - origin
+    low, high = _with_end(math.inf, -math.inf, heights[0], heights[1], x, y)
+    low, high = _with_end(low, high, heights[1], heights[2], y, z)
+    return _with_end(low, high, heights[2], heights[0], z, x)
+
+
+@njit(error_model="numpy", allocates=False)
 def triangles_cross(vertices: Points, corners: Triangles, i: int, j: int) -> bool:
     """Whether triangles i and j of ``corners`` (m, 3) over vertices (n, 3) properly intersect."""
     one, other = corners_of(vertices, corners, i), corners_of(vertices, corners, j)
@@ -158,13 +168,13 @@ def triangles_cross(vertices: Points, corners: Triangles, i: int, j: int) -> boo
         return False
     dx, dy, dz = cross(normal, across)
     axis = 0 if abs(dx) >= max(abs(dy), abs(dz)) else (1 if abs(dy) >= abs(dz) else 2)
-    origin = one[0][axis]
+    origin = _along(axis, one[0])
     low, high = _piece(one, heights, axis, origin)
     lower, higher = _piece(other, above, axis, origin)
     return min(high, higher) - max(low, lower) > TOUCHING * (max(high, higher) - min(low, lower))
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _share_a_corner(corners: Triangles, i: int, j: int) -> bool:
     for k in range(3):
         if corners[i, k] == corners[j, 0] or corners[i, k] == corners[j, 1] or corners[i, k] == corners[j, 2]:
@@ -172,19 +182,28 @@ def _share_a_corner(corners: Triangles, i: int, j: int) -> bool:
     return False
 
 
-@njit(nogil=True)
+@exported(*("f8[:,:]", "i8[:,:]", "i8[:]", "i8[:]", "f8[:,:]", "f8[:,:]", "i8", "b1[:,:]"), returns="i8 b1", nogil=True)
 def crossings(
-    vertices: Points, corners: Triangles, component: IntArray, count: int, tree: Hierarchy, limit: int
-) -> tuple[int, BoolArray, bool]:
-    """Number of intersecting pairs of triangles of one component without a common corner; which components intersect,
-    (count, count); whether ``limit`` visits sufficed. corners (m, 3): over welded vertices; component (m,).
+    vertices: Points,
+    corners: Triangles,
+    component: IntArray,
+    order: IntArray,
+    own: FloatArray,
+    boxes: FloatArray,
+    limit: int,
+    crossing: BoolArray,
+) -> tuple[int, bool]:
+    """Number of intersecting pairs of triangles of one component without a common corner, and whether ``limit`` visits
+    sufficed; fills ``crossing`` (k, k) with which components intersect. corners (m, 3): over welded vertices; component
+    (m,); order, own and boxes: the Hierarchy.
     """
-    order, own, boxes = tree
-    inner = len(boxes) // 2
-    crossing = np.zeros((count, count), np.bool_)
+    inner = boxes.shape[0] // 2
+    for c in range(crossing.shape[0]):
+        for d in range(crossing.shape[0]):
+            crossing[c, d] = False
     within, visits = 0, 0
-    stack = np.zeros(64, np.int64)
-    for i in range(len(order)):
+    stack = local_integers(64)
+    for i in range(order.shape[0]):
         s = order[i]
         stack[0] = 0
         top = 1
@@ -198,7 +217,7 @@ def crossings(
                 stack[top], stack[top + 1] = 2 * node + 1, 2 * node + 2
                 top += 2
                 continue
-            for j in range(max(i + 1, (node - inner) * LEAF), min((node - inner + 1) * LEAF, len(order))):
+            for j in range(max(i + 1, (node - inner) * LEAF), min((node - inner + 1) * LEAF, order.shape[0])):
                 t = order[j]
                 c, d = component[s], component[t]
                 if crossing[c, d] or not _boxes_meet(own, i, own, j) or (c == d and _share_a_corner(corners, s, t)):
@@ -208,11 +227,11 @@ def crossings(
                     within += c == d
                     crossing[c, d] = crossing[d, c] = c != d
         if visits > limit:
-            return within, crossing, False
-    return within, crossing, True
+            return within, False
+    return within, True
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
 def _hit(triangle: _Triangle, origin: _Vector, direction: _Vector, reach: float) -> tuple[int, bool]:
     """(sign, sure): +1 where the ray leaves through the triangle, −1 where it enters, 0 for a miss; sure: neither near
     an edge nor within ``reach`` of the origin.
@@ -236,12 +255,20 @@ def _hit(triangle: _Triangle, origin: _Vector, direction: _Vector, reach: float)
     return (1 if u + v + w > 0.0 else -1), True
 
 
-@njit(nogil=True)
+@njit(error_model="numpy", allocates=False)
+def _slab(near: float, far: float, low: float, high: float, origin: float, direction: float) -> tuple[float, float]:
+    """The part of a ray, from ``near`` to ``far``, that lies between low and high along one axis."""
+    a, b = (low - origin) / direction, (high - origin) / direction
+    return max(near, min(a, b)), min(far, max(a, b))
+
+
+@njit(error_model="numpy", allocates=False)
 def _shoot(
     vertices: Points,
     corners: Triangles,
     component: IntArray,
-    tree: Hierarchy,
+    order: IntArray,
+    boxes: FloatArray,
     own: int,
     origin: _Vector,
     direction: _Vector,
@@ -252,28 +279,28 @@ def _shoot(
     """Sum the signed hits of all components but ``own`` in winding (k,); sure (k,): whether they are certain. Returns
     the number of boxes visited.
     """
-    winding[:] = 0
-    sure[:] = True
-    order, _, boxes = tree
-    inner = len(boxes) // 2
-    stack = np.zeros(64, np.int64)
+    for c in range(winding.shape[0]):
+        winding[c], sure[c] = 0, True
+    inner = boxes.shape[0] // 2
+    stack = local_integers(64)
+    stack[0] = 0
     top, visits = 1, 0
     while top > 0:
         top -= 1
         node = stack[top]
         visits += 1
-        near, far = 0.0, math.inf
-        for k in range(3):  # widened, so that no uncertain hit is missed
-            a = (boxes[node, k] - reach - origin[k]) / direction[k]
-            b = (boxes[node, 3 + k] + reach - origin[k]) / direction[k]
-            near, far = max(near, min(a, b)), min(far, max(a, b))
+        # Widened, so that no uncertain hit is missed.
+        box = boxes[node]
+        near, far = _slab(0.0, math.inf, box[0] - reach, box[3] + reach, origin[0], direction[0])
+        near, far = _slab(near, far, box[1] - reach, box[4] + reach, origin[1], direction[1])
+        near, far = _slab(near, far, box[2] - reach, box[5] + reach, origin[2], direction[2])
         if near > far:
             continue
         if node < inner:
             stack[top], stack[top + 1] = 2 * node + 1, 2 * node + 2
             top += 2
             continue
-        for i in range((node - inner) * LEAF, min((node - inner + 1) * LEAF, len(order))):
+        for i in range((node - inner) * LEAF, min((node - inner + 1) * LEAF, order.shape[0])):
             other = component[order[i]]
             if other != own:
                 sign, certain = _hit(corners_of(vertices, corners, order[i]), origin, direction, reach)
@@ -282,42 +309,60 @@ def _shoot(
     return visits
 
 
-@njit(nogil=True)
-def _sides(
+@exported(
+    *("f8[:,:]", "i8[:,:]", "i8[:]", "i8[:]", "f8[:,:]", "i8[:]", "b1[:,:]", "f8", "b1[:,:]", "b1[:,:]", "i8[:]"),
+    *("b1[:,:]",),
+    returns="b1",
+    nogil=True,
+)
+def sides_of_components(
     vertices: Points,
     corners: Triangles,
     component: IntArray,
-    tree: Hierarchy,
+    order: IntArray,
+    boxes: FloatArray,
     samples: IntArray,
     near: BoolArray,
     reach: float,
-) -> tuple[BoolArray, BoolArray, bool]:
-    """Which components have samples outside and inside which others, (k, k) each, and whether the work limit sufficed.
+    outside: BoolArray,
+    inside: BoolArray,
+    winding: IntArray,
+    flags: BoolArray,
+) -> bool:
+    """Fill which components have samples outside and inside which others, (k, k) each; whether the work limit sufficed.
 
-    samples (s,): triangles in which a ray begins; near (k, k): pairs whose boxes overlap.
+    samples (s,): triangles in which a ray begins; near (k, k): pairs whose boxes overlap. order and boxes: of the
+    Hierarchy. winding (k,) and flags (2, k): workspace.
     """
-    outside, inside = np.zeros_like(near), np.zeros_like(near)
-    winding, sure = np.zeros(len(near), np.int64), np.ones(len(near), np.bool_)
-    visits = 0
-    for sample in samples:
-        own = component[sample]
-        a, b, c = corners_of(vertices, corners, sample)
+    count, visits = near.shape[0], 0
+    sure, asked = flags[0], flags[1]
+    for c in range(count):
+        for d in range(count):
+            outside[c, d] = inside[c, d] = False
+    for s in range(samples.shape[0]):
+        own = component[samples[s]]
+        a, b, c = corners_of(vertices, corners, samples[s])
         origin = (
             dot(_SAMPLE, (a[0], b[0], c[0])),
             dot(_SAMPLE, (a[1], b[1], c[1])),
             dot(_SAMPLE, (a[2], b[2], c[2])),
         )
-        asked = near[own].copy()
+        for d in range(count):
+            asked[d] = near[own, d]
         for direction in _DIRECTIONS:
-            visits += _shoot(vertices, corners, component, tree, own, origin, direction, reach, winding, sure)
-            inside[own] |= asked & sure & (winding != 0)
-            outside[own] |= asked & sure & (winding == 0)
-            asked &= ~sure
-            if not asked.any():
+            visits += _shoot(vertices, corners, component, order, boxes, own, origin, direction, reach, winding, sure)
+            is_unsure = False
+            for d in range(count):
+                if asked[d] and sure[d]:
+                    inside[own, d] |= winding[d] != 0
+                    outside[own, d] |= winding[d] == 0
+                    asked[d] = False
+                is_unsure = is_unsure or asked[d]
+            if not is_unsure:
                 break
         if visits > WORK_LIMIT:
-            return outside, inside, False
-    return outside, inside, True
+            return False
+    return True
 
 
 @dataclass(frozen=True)
@@ -344,20 +389,23 @@ class Nesting:
 def component_nesting(vertices: Points, topology: Topology, sums: Components) -> Nesting:
     """Nesting, intersections and self-intersections of closed components."""
     component, count = topology.component, topology.components
-    tree = hierarchy(vertices, topology.corners)
-    within, found, complete = crossings(vertices, topology.corners, component, count, tree, WORK_LIMIT)
+    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+    order, own, boxes = hierarchy(vertices, topology.corners)
+    found = np.empty((count, count), dtype=bool)
+    within, complete = crossings(vertices, topology.corners, component, order, own, boxes, WORK_LIMIT, found)
     near = np.all((sums.lower[:, None] <= sums.upper[None]) & (sums.lower[None] <= sums.upper[:, None]), axis=2)
     np.fill_diagonal(near, False)
     inside = np.zeros((count, count), dtype=bool)
     if near.any():
         of_each = np.split(np.argsort(component, kind="stable"), np.cumsum(np.bincount(component))[:-1])
-        samples = [
-            own[:: -(-len(own) // SAMPLES)] for own, asked in zip(of_each, near.any(axis=1), strict=True) if asked
-        ]
-        reach = NEAR * float(np.linalg.norm(sums.upper.max(axis=0) - sums.lower.min(axis=0)))
-        outside, inner, decided = _sides(
-            vertices, topology.corners, component, tree, np.concatenate(samples), near, reach
+        samples = np.concatenate(
+            [mine[:: -(-len(mine) // SAMPLES)] for mine, asked in zip(of_each, near.any(axis=1), strict=True) if asked]
         )
+        reach = NEAR * float(np.linalg.norm(sums.upper.max(axis=0) - sums.lower.min(axis=0)))
+        outside, inner = np.empty_like(near), np.empty_like(near)
+        room = np.empty(count, np.int64), np.empty((2, count), dtype=bool)
+        tree = order, boxes, samples
+        decided = sides_of_components(vertices, topology.corners, component, *tree, near, reach, outside, inner, *room)
         on_both_sides = outside & inner
         found = found | on_both_sides | on_both_sides.T
         inside = inner & ~outside & ~found

@@ -13,7 +13,7 @@ import numpy as np
 from ..base.errors import MeshError
 from ..base.vectors import IntArray, Points
 from .ascii_floats import as_numbers, error_at
-from .topology import first_equal_rows
+from .topology import equal_rows
 
 _HEAD = 100
 """Words, with any number of blanks in between, within which an ASCII file must begin its first facet."""
@@ -30,7 +30,7 @@ _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 
 def _merge(points: Points) -> tuple[Points, IntArray, IntArray]:
     """Vertices (n, 3), corners (3m,) and their starts (m + 1,) of corner points (3m, 3)."""
-    first = first_equal_rows(np.ascontiguousarray(points).view(np.int64))
+    first = equal_rows(np.ascontiguousarray(points).view(np.int64))
     new = first == np.arange(len(first))
     return points[new], (np.cumsum(new) - 1)[first], np.arange(0, len(first) + 1, 3)
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.compilation import njit
+from ..base.compilation import local_numbers, njit
 from ..base.errors import CommandRefused
 from ..base.rotation import matrix_elements
 from ..base.vectors import FloatArray, Points, StateRow, Triangles, Vector, Vector3, vector
@@ -132,9 +132,12 @@ def needs_of_load(load: FloatArray) -> int:
 
 
 @njit(error_model="numpy", allocates=False)
-def resolve_load(load: FloatArray, body: BodyRow, row: StateRow, vertices: Points, triangles: Triangles) -> int:
+def resolve_load(
+    load: FloatArray, body: BodyRow, row: StateRow, vertices: Points, triangles: Triangles, extent: Vector3
+) -> int:
     """Resolve a load (LOAD,) on a body in a state (13,): a vertex or a ray to the point that it leads to on the
-    surface, and the normal there if it pushes along it. Returns RESOLVED, or why there is no such point.
+    surface, of this extent (3,), and the normal there if it pushes along it. Returns RESOLVED, or why there is no such
+    point.
     """
     has_mesh = triangles.shape[0] > 0
     if load[PLACE] == AT_VERTEX:
@@ -155,8 +158,7 @@ def resolve_load(load: FloatArray, body: BodyRow, row: StateRow, vertices: Point
         return RESOLVED
     if not has_mesh:
         return NO_MESH_NORMAL
-    found, x, y, z = inward_normal(vertices, triangles, load[POINT], load[POINT + 1], load[POINT + 2])
-    load[NORMAL], load[NORMAL + 1], load[NORMAL + 2] = x, y, z
+    found = inward_normal(vertices, triangles, load[POINT : POINT + 3], extent, load[NORMAL : NORMAL + 3])
     return RESOLVED if found else NO_NORMAL
 
 
@@ -167,13 +169,15 @@ def _hit(load: FloatArray, body: BodyRow, row: StateRow, vertices: Points, trian
     x, y, z = load[NORMAL], load[NORMAL + 1], load[NORMAL + 2]
     longest = max(abs(x), abs(y), abs(z))
     x, y, z = to_body_axes(row, x / longest, y / longest, z / longest)
-    x, y, z = x / body[s], y / body[s + 1], z / body[s + 2]
     ox, oy, oz = to_body_axes(row, load[POINT] - row[0], load[POINT + 1] - row[1], load[POINT + 2] - row[2])
-    ox, oy, oz = (ox + body[c]) / body[s], (oy + body[c + 1]) / body[s + 1], (oz + body[c + 2]) / body[s + 2]
-    found, x, y, z = ray_hit(vertices, triangles, ox, oy, oz, x, y, z)
-    load[PLACE], load[POINT], load[POINT + 1], load[POINT + 2] = AT_POINT, x, y, z
-    load[NORMAL] = load[NORMAL + 1] = load[NORMAL + 2] = 0.0
-    return bool(found)
+    origin, direction = local_numbers(3), local_numbers(3)
+    direction[0], direction[1], direction[2] = x / body[s], y / body[s + 1], z / body[s + 2]
+    origin[0], origin[1] = (ox + body[c]) / body[s], (oy + body[c + 1]) / body[s + 1]
+    origin[2] = (oz + body[c + 2]) / body[s + 2]
+    if not ray_hit(vertices, triangles, origin, direction, load[POINT : POINT + 3]):
+        return False
+    load[PLACE], load[NORMAL], load[NORMAL + 1], load[NORMAL + 2] = AT_POINT, 0.0, 0.0, 0.0
+    return True
 
 
 @njit(error_model="numpy", allocates=False)

@@ -14,10 +14,10 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arithmetic import inverse_tangent_of
-from ..base.compilation import njit
-from ..base.rotation import length, norm
-from ..base.vectors import Numbers, Points, Triangles, Vector, Vector3, vector
-from ..mass.moments import referenced_vertices
+from ..base.compilation import exported, local_numbers, njit
+from ..base.rotation import norm
+from ..base.vectors import Numbers, Points, Triangles, Vector, Vector3
+from ..mass.moments import bounding_box
 from ..mesh.intersection import corners_of, cross, dot, minus
 
 
@@ -29,21 +29,28 @@ class Surface:
     triangles: Triangles
 
     @cached_property
+    def _arrays(self) -> tuple[Points, Triangles]:
+        vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
+        return vertices, np.ascontiguousarray(self.triangles, dtype=np.int64)
+
+    @cached_property
     def extent(self) -> Vector3:
         """Sides of the bounding box (3,)."""
-        sides: Vector3 = np.ptp(referenced_vertices(self.vertices, self.triangles), axis=0)
-        return sides
+        lower, upper = np.zeros(3), np.zeros(3)
+        bounding_box(*self._arrays, np.empty(len(self.vertices), np.bool_), lower, upper)
+        return upper - lower
 
     def ray_hit(self, origin: Numbers, direction: Numbers) -> Vector3 | None:
         """First point (3,) where the ray meets the surface from either side; None for a miss."""
-        origin, direction = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
-        direction = direction / np.abs(direction).max()
-        distance = _first_hit(self.vertices, self.triangles, origin, direction)
-        return origin + distance * direction if distance < math.inf else None
+        point = np.empty(3)
+        hits = ray_hit(*self._arrays, _three(origin), _three(direction), point)
+        return point if hits else None
 
     def nearest_point(self, point: Numbers) -> Vector3:
         """The point (3,) of the surface nearest to ``point`` (3,)."""
-        return np.array(_nearest(self.vertices, self.triangles, vector(point)))
+        nearest = np.empty(3)
+        nearest_point(*self._arrays, _three(point), nearest)
+        return nearest
 
     def inward_normal(self, point: Numbers) -> Vector3:
         """Unit inward normal (3,) of the surface where it is nearest to ``point`` (3,).
@@ -51,13 +58,16 @@ class Surface:
         On an edge or at a vertex it is the angle-weighted mean of the normals of adjacent faces (Baerentzen & Aanaes
         2005), which doesn't depend on how the faces are triangulated. Zero where they cancel.
         """
-        tolerance = 1e-9 * length(self.extent)
-        outward = np.array(_pseudo_normal(self.vertices, self.triangles, vector(point), tolerance))
-        size = length(outward)
-        return -outward / size if size > 1e-12 else np.zeros(3)
+        normal = np.empty(3)
+        inward_normal(*self._arrays, _three(point), self.extent, normal)
+        return normal
 
 
-@njit()
+def _three(numbers: Numbers) -> Vector3:
+    return np.ascontiguousarray(numbers, dtype=np.float64)
+
+
+@njit(error_model="numpy", allocates=False)
 def _first_hit(vertices: Points, triangles: Triangles, origin: Vector3, direction: Vector3) -> float:
     """Distance along ``direction`` of the first hit, infinite for none: Woop, Benthin and Wald (2013), watertight at
     edges.
@@ -97,12 +107,29 @@ def _first_hit(vertices: Points, triangles: Triangles, origin: Vector3, directio
     return best
 
 
-@njit()
+@exported("f8[:,:]", "i8[:,:]", "f8[:]", "f8[:]", "f8[:]", returns="b1", nogil=True)
+def ray_hit(vertices: Points, triangles: Triangles, origin: Vector3, direction: Vector3, point: Vector3) -> bool:
+    """Whether a ray meets triangles (m, 3) over vertices (n, 3) from either side; fills ``point`` (3,), the first one
+    where it does. direction (3,): of any length.
+    """
+    unit = local_numbers(3)
+    largest = max(abs(direction[0]), abs(direction[1]), abs(direction[2]))
+    for k in range(3):
+        unit[k] = direction[k] / largest
+    distance = _first_hit(vertices, triangles, origin, unit)
+    if not distance < math.inf:
+        return False
+    for k in range(3):
+        point[k] = origin[k] + distance * unit[k]
+    return True
+
+
+@njit(error_model="numpy", allocates=False)
 def _angle(a: Vector, b: Vector) -> float:
     return inverse_tangent_of(norm(*cross(a, b)), dot(a, b))
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def _nearest_on_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> tuple[Vector, float, float, float]:
     """Nearest point of a triangle to p, squared distance, and its coordinates u, v along the edges ab and ac. After
     Ericson, Real-Time Collision Detection (2005), section 5.1.5.
@@ -140,7 +167,7 @@ def _nearest_on_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> tuple[Ve
     return nearest, dot(gap, gap), u, v
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def _angle_at(u: float, v: float, a: Vector, b: Vector, c: Vector) -> float:
     """The angle of a triangle at a point of it: the corner's angle, π on an edge, 2π inside."""
     tolerance = 1e-9
@@ -155,7 +182,7 @@ def _angle_at(u: float, v: float, a: Vector, b: Vector, c: Vector) -> float:
     return 2.0 * math.pi
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def _nearest(vertices: Points, triangles: Triangles, point: Vector) -> Vector:
     best = math.inf
     found = (0.0, 0.0, 0.0)
@@ -167,9 +194,19 @@ def _nearest(vertices: Points, triangles: Triangles, point: Vector) -> Vector:
     return found
 
 
-@njit()
-def _pseudo_normal(vertices: Points, triangles: Triangles, point: Vector, tolerance: float) -> Vector:
-    foot = _nearest(vertices, triangles, point)
+@exported("f8[:,:]", "i8[:,:]", "f8[:]", "f8[:]", nogil=True)
+def nearest_point(vertices: Points, triangles: Triangles, point: Vector3, nearest: Vector3) -> None:
+    """Fill ``nearest`` (3,): the point of triangles (m, 3) over vertices (n, 3) that is nearest to ``point`` (3,)."""
+    nearest[0], nearest[1], nearest[2] = _nearest(vertices, triangles, (point[0], point[1], point[2]))
+
+
+@exported("f8[:,:]", "i8[:,:]", "f8[:]", "f8[:]", "f8[:]", returns="b1", nogil=True)
+def inward_normal(vertices: Points, triangles: Triangles, point: Vector3, extent: Vector3, normal: Vector3) -> bool:
+    """Fill the unit ``normal`` (3,), see ``Surface``; False, and zeros, where there is none. extent (3,): of the
+    surface.
+    """
+    tolerance = 1e-9 * norm(extent[0], extent[1], extent[2])
+    foot = _nearest(vertices, triangles, (point[0], point[1], point[2]))
     nx, ny, nz = 0.0, 0.0, 0.0
     for i in range(triangles.shape[0]):
         a, b, c = corners_of(vertices, triangles, i)
@@ -182,39 +219,9 @@ def _pseudo_normal(vertices: Points, triangles: Triangles, point: Vector, tolera
                 nx += angle * x / area
                 ny += angle * y / area
                 nz += angle * z / area
-    return nx, ny, nz
-
-
-@njit(error_model="numpy", allocates=False)
-def nearest_point(vertices: Points, triangles: Triangles, x: float, y: float, z: float) -> Vector:
-    return _nearest(vertices, triangles, (x, y, z))
-
-
-@njit(error_model="numpy", allocates=False)
-def ray_hit(
-    vertices: Points, triangles: Triangles, ox: float, oy: float, oz: float, x: float, y: float, z: float
-) -> tuple[bool, float, float, float]:
-    longest = max(abs(x), abs(y), abs(z))
-    x, y, z = x / longest, y / longest, z / longest
-    t = _first_hit(vertices, triangles, (ox, oy, oz), (x, y, z))
-    return t < math.inf, ox + t * x, oy + t * y, oz + t * z
-
-
-@njit(error_model="numpy", allocates=False)
-def inward_normal(
-    vertices: Points, triangles: Triangles, x: float, y: float, z: float
-) -> tuple[bool, float, float, float]:
-    low = [0.0] if False else (math.inf, math.inf, math.inf)
-    lx, ly, lz = low
-    hx, hy, hz = -math.inf, -math.inf, -math.inf
-    for i in range(triangles.shape[0]):
-        for k in range(3):
-            v = triangles[i, k]
-            lx, ly, lz = min(lx, vertices[v, 0]), min(ly, vertices[v, 1]), min(lz, vertices[v, 2])
-            hx, hy, hz = max(hx, vertices[v, 0]), max(hy, vertices[v, 1]), max(hz, vertices[v, 2])
-    tolerance = 1e-9 * norm(hx - lx, hy - ly, hz - lz)
-    nx, ny, nz = _pseudo_normal(vertices, triangles, (x, y, z), tolerance)
     size = norm(nx, ny, nz)
-    if size > 1e-12:
-        return True, -nx / size, -ny / size, -nz / size
-    return False, 0.0, 0.0, 0.0
+    if not size > 1e-12:
+        normal[0] = normal[1] = normal[2] = 0.0
+        return False
+    normal[0], normal[1], normal[2] = -nx / size, -ny / size, -nz / size
+    return True

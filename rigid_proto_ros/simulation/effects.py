@@ -86,9 +86,15 @@ def _is_taken(flight: np.record, kind: int, load: FloatArray, refusal: np.record
     return True
 
 
-@exported(FLIGHT, "f8[:,:]", "i8[:,:]", "i8", "f8[:]", REFUSAL, returns="b1")
+@exported(FLIGHT, MESH, "f8[:,:]", "i8[:,:]", "i8", "f8[:]", REFUSAL, returns="b1")
 def check_load(
-    flight: np.record, vertices: Points, triangles: Triangles, kind: int, load: FloatArray, refusal: np.record
+    flight: np.record,
+    mesh: np.record,
+    vertices: Points,
+    triangles: Triangles,
+    kind: int,
+    load: FloatArray,
+    refusal: np.record,
 ) -> bool:
     """Whether a flight can take the load (LOAD,) of a command of this kind, before it acts; resolves the load, except
     for a ray, whose point is known only then.
@@ -100,7 +106,7 @@ def check_load(
         copy_numbers(load, at_com)
         at_com[PLACE] = AT_COM
         return _is_taken(flight, kind, at_com, refusal)
-    found = resolve_load(load, flight.body, flight.row, vertices, triangles)
+    found = resolve_load(load, flight.body, flight.row, vertices, triangles, mesh.extent)
     if found != RESOLVED:
         return refuse(refusal, rf.UNRESOLVED, found, 0.0, 0.0, 0.0)
     return _is_taken(flight, kind, load, refusal)
@@ -129,9 +135,10 @@ def _set_state(row: FloatArray, given: FloatArray) -> None:
             copy_numbers(old[10:13], row[10:13])
 
 
-@exported(SCENE, "f8[:,:]", "i8[:,:]", FLIGHT, [LOAD_ROW], [EVENT], REFUSAL, returns="b1")
+@exported(SCENE, MESH, "f8[:,:]", "i8[:,:]", FLIGHT, [LOAD_ROW], [EVENT], REFUSAL, returns="b1")
 def command(
     scene: np.record,
+    mesh: np.record,
     vertices: Points,
     triangles: Triangles,
     flight: np.record,
@@ -147,7 +154,7 @@ def command(
     refusal.code = rf.ACCEPTED
     if kind <= CLEAR:
         if kind < CLEAR:
-            found = resolve_load(load, flight.body, flight.row, vertices, triangles)
+            found = resolve_load(load, flight.body, flight.row, vertices, triangles, mesh.extent)
             if found != RESOLVED:
                 return refuse(refusal, rf.UNRESOLVED, found, 0.0, 0.0, 0.0)
             if not _is_taken(flight, kind, load, refusal):

@@ -148,11 +148,11 @@ class FlightArrays:
 
     def apply(self, pending: Pending, setup: Setup) -> None:
         """Apply a command of any kind but thrusters and changes of parameters now; raises CommandRefused."""
-        sent, vertices, triangles = pending.command, setup.vertices, setup.triangles
+        sent, surface = pending.command, (setup.mesh, setup.vertices, setup.triangles)
         if isinstance(sent, WrenchCommand) and not (pending.row and pending.surface is setup.surface):
             pending.row = load_bytes(sent.frame, sent.force, sent.torque, setup.contacts)
         self.put([row_of(pending)])
-        if not command(setup.scene, vertices, triangles, self.flight, self._loads, self._events, self._refusal):
+        if not command(setup.scene, *surface, self.flight, self._loads, self._events, self._refusal):
             raise refused_load(self._refusal, sent, setup)
         if pending.row:
             pending.row = self._loads[self.first_due].load.tobytes()  # resolved
@@ -160,7 +160,7 @@ class FlightArrays:
     def refusal_of(self, pending: Pending, setup: Setup) -> CommandRefused:
         """Why body or integrator couldn't take the resolved load of a command."""
         kind, load = row_of(pending).kind, np.frombuffer(bytearray(pending.row))
-        check_load(self.flight, setup.vertices, setup.triangles, kind, load, self._refusal)
+        check_load(self.flight, setup.mesh, setup.vertices, setup.triangles, kind, load, self._refusal)
         return refused_command(self._refusal)
 
     def call(self, what: int, until_ns: int = 0) -> int:

@@ -191,7 +191,7 @@ def _load_row(command: WrenchCommand, setup: Setup) -> bytes:
         bytearray(load_bytes(command.frame, command.force, command.torque, setup.contacts)),
     )
     load = np.frombuffer(row)
-    if not check_load(setup.flight, setup.vertices, setup.triangles, command.flight_kind, load, refusal):
+    if not check_load(setup.flight, setup.mesh, setup.vertices, setup.triangles, command.flight_kind, load, refusal):
         raise refused_load(refusal, command, setup)
     return bytes(row)
 
@@ -216,7 +216,7 @@ def check_thrust(forces: tuple[float, ...], setup: Setup) -> None:
     for thruster, force in zip(thrusters.values(), forces, strict=True):
         # As of an impulse, whose magnitude alone is checked: a thruster that is off now may be on later.
         load = thruster.load(thruster.within(force)).row
-        if not check_load(setup.flight, setup.vertices, setup.triangles, IMPULSE, load, refusal):
+        if not check_load(setup.flight, setup.mesh, setup.vertices, setup.triangles, IMPULSE, load, refusal):
             raise refused_command(refusal)
         needs |= needs_of_load(thruster.load(1.0).row)
     check_supported(setup.integrator, needs_in(needs))

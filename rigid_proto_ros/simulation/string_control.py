@@ -231,7 +231,9 @@ def move_knot(
     attach, before = local_numbers(3), local_numbers(STRING)
     mesh_point_of(axes, point, flight, attach)
     if triangles.shape[0] > 0:
-        attach[0], attach[1], attach[2] = nearest_point(vertices, triangles, attach[0], attach[1], attach[2])
+        foot = local_numbers(3)
+        nearest_point(vertices, triangles, attach, foot)
+        copy_numbers(foot, attach)
     if flight.tied:
         if not follows_rates(scene, flight.body, True, attach, refusal):
             return False

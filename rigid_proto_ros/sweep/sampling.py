@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arithmetic import exponential_of, logarithm, sine_cosine
-from ..base.compilation import njit
+from ..base.compilation import exported
 from ..base.errors import InputError
 from ..base.vectors import FloatArray, IntArray
 from .fields import mapping, number, whole
@@ -93,7 +93,7 @@ class Draw:
     def shaped(self, uniforms: FloatArray) -> FloatArray:
         """Values (n,) or (n, k) from uniform numbers (n, ``uniforms``); those themselves for a vertex."""
         out = np.empty((len(uniforms), {_ROTATION: 4, _DIRECTION: 3}.get(self.shape, 1)))
-        _shape(self.shape, self.a, self.b, np.ascontiguousarray(uniforms), out)
+        shape_draws(self.shape, self.a, self.b, np.ascontiguousarray(uniforms), out)
         return out[:, 0] if out.shape[1] == 1 else out
 
 
@@ -181,8 +181,8 @@ def row_uniforms(seed: int, rows: IntArray, dimensions: int) -> FloatArray:
     return out
 
 
-@njit(error_model="numpy")
-def _shape(kind: int, a: float, b: float, u: FloatArray, out: FloatArray) -> None:
+@exported("i8", "f8", "f8", "f8[:,:]", "f8[:,:]", nogil=True)
+def shape_draws(kind: int, a: float, b: float, u: FloatArray, out: FloatArray) -> None:
     """Fill out (n, k) from uniforms u (n, j), as ``Draw`` has them.
 
     A rotation is uniform over the group (Shoemake, Graphics Gems III, 1992), a direction over the sphere; a normal

@@ -9,7 +9,7 @@ import pytest
 from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj
 
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.mass.moments import MODELS
+from rigid_proto_ros.mass import properties
 
 
 def inspect(capsys, *arguments: str) -> tuple[int, str, str]:
@@ -77,14 +77,14 @@ def test_verification_states_errors_against_exact_arithmetic(capsys):
 
 
 def test_a_verification_that_fails_exits_1(capsys, monkeypatch):
-    true_solid = MODELS["solid"]
+    true = properties.mesh_moments
 
     def slightly_off(*surface):
-        moments = true_solid(*surface)
+        moments = true(*surface)
         return replace(moments, measure=(1 + 1e-12) * moments.measure)
 
     monkeypatch.setenv("RIGID_PROTO_CACHE", "off")
-    monkeypatch.setitem(MODELS, "solid", slightly_off)
+    monkeypatch.setattr(properties, "mesh_moments", slightly_off)
     status, out, err = inspect(capsys, "book", "--verify", "--json")
     assert status == 1
     assert json.loads(out)["verification"]["volume_error"] == pytest.approx(1e-12, rel=1e-2)

@@ -6,7 +6,7 @@ import pytest
 from mass_solids import box, circle, moved, prism
 
 from rigid_proto_ros.base.errors import InputError, MeshError, TensorError
-from rigid_proto_ros.mass.moments import MODELS, point_moments
+from rigid_proto_ros.mass.moments import MODELS, mesh_moments
 from rigid_proto_ros.mass.properties import MeshMoments, explicit_mass_properties
 
 COMPUTED = ("solid", "shell", "points", "bounding_box")
@@ -35,7 +35,7 @@ def test_points_are_equal_masses_at_referenced_vertices_alone(lopsided):
     expected = each * (np.sum(offset**2) * np.eye(3) - offset.T @ offset)
     assert properties.center_of_mass == pytest.approx(center, rel=1e-13)
     assert properties.inertia == pytest.approx(expected, rel=1e-12, abs=1e-13)
-    assert point_moments(stray, triangles).measure == len(vertices)
+    assert mesh_moments("points", stray, triangles).measure == len(vertices)
 
 
 def test_shell_of_a_box_is_the_sum_of_its_six_plates():

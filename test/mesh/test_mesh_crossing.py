@@ -32,7 +32,10 @@ def exactly_cross(first: np.ndarray, second: np.ndarray) -> bool:
 
 
 def found(points: np.ndarray, corners: np.ndarray, component: np.ndarray, limit: int = WORK_LIMIT) -> tuple:
-    return crossings(points, corners, component, int(component.max()) + 1, hierarchy(points, corners), limit)
+    count = int(component.max()) + 1
+    crossing = np.empty((count, count), dtype=bool)
+    within, complete = crossings(points, corners, component, *hierarchy(points, corners), limit, crossing)
+    return within, crossing, complete
 
 
 def within_one(points: np.ndarray, corners: np.ndarray) -> int:
