@@ -29,25 +29,25 @@ ABI = 1
 """Version of what stands above."""
 
 MODULES = (
-<<<<<<< HEAD
-    "mass.closed_form",
-    "mass.tensor",
-    "motion.body",
-    "motion.state",
-    "simulation.flight",
-    "simulation.record",
-    "simulation.effects",
-    "simulation.quantities",
-    "simulation.batch",
-    "identify.trajectories",
-=======
     "base.rotation",
-    "mass.tensor",
+    "mesh.assembly",
+    "mesh.intersection",
+    "mesh.topology",
     "mass.closed_form",
+    "mass.moments",
+    "mass.repair",
+    "mass.tensor",
     "motion.body",
     "motion.state",
+    "motion.surface",
+    "simulation.batch",
+    "simulation.effects",
+    "simulation.flight",
+    "simulation.quantities",
+    "simulation.record",
+    "sweep.sampling",
+    "identify.trajectories",
     "kernels.fused",
->>>>>>> build
 )
 """Those that declare exported kernels."""
 
