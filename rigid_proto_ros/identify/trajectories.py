@@ -132,7 +132,20 @@ def fly_rows(
     samples = np.empty((len(scenes), len(times_ns), SAMPLE))
     good, count = np.zeros(len(scenes), np.int64), len(wrenches.commands)
     rows, events = np.zeros(count + 1, LOAD_ROW), np.zeros(4 * count + 8, EVENT)
-    scratch = aligned(ROOM), np.zeros(1, PROBLEM), np.zeros(VARIABLES), new_record(REFUSAL)
-    commands = wrenches.commands, wrenches.loads
-    fly_samples(scenes, starts, times_ns, *commands, np.zeros(2, FLIGHT), rows, events, *scratch, samples, good)
+    fly_samples(
+        scenes,
+        starts,
+        times_ns,
+        wrenches.commands,
+        wrenches.loads,
+        np.zeros(2, FLIGHT),
+        rows,
+        events,
+        aligned(ROOM),
+        np.zeros(1, PROBLEM),
+        np.zeros(VARIABLES),
+        new_record(REFUSAL),
+        samples,
+        good,
+    )
     return samples, good == 1

@@ -101,7 +101,10 @@ def _check_raises(text: str) -> None:
     raising = set(re.findall(rf'call void @"?{re.escape(RAISES)}(\w+)', text))
     if raising:
         pickled = re.findall(r'@\.const\.pickledata\S* = .*? c"(.*)"', text)
-        found = [re.sub(rb"\\([0-9A-F]{2})", lambda digits: bytes.fromhex(digits[1].decode()), one.encode()) for one in pickled]
+        found = [
+            re.sub(rb"\\([0-9A-F]{2})", lambda digits: bytes.fromhex(digits[1].decode()), one.encode())
+            for one in pickled
+        ]
         reasons = {f"{kind.__name__}{values} in {place}" for kind, values, place in map(pickle.loads, found)}
         raise InputError(", ".join(sorted(raising)), "; ".join(sorted(reasons)), "kernels that raise nothing")
 

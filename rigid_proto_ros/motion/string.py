@@ -172,8 +172,9 @@ class StringState:
 
     def potential_energy(self, body: Body, state: State) -> float:
         """½ k x² [J]; 0 while a pull-only string is slack."""
-        ends = self.arm(body).tolist(), state.row.tolist(), self.free_end(state.time_ns).tolist()
-        span = span_of(*ends[0], ends[1], *ends[2])
+        x, y, z = self.arm(body).tolist()
+        ex, ey, ez = self.free_end(state.time_ns).tolist()
+        span = span_of(x, y, z, state.row, ex, ey, ez)
         return energy_of(span, self.stiffness, self.rest_length, self.bilateral)
 
 
@@ -189,6 +190,8 @@ def string_of(flight: np.record, never_ns: int) -> StringState:
         int(flight.string_last_ns),
         None if release_ns == never_ns else release_ns,
         float(flight.string_mass),
-        *numbers[K : REST + 1],
+        numbers[K],
+        numbers[C],
+        numbers[REST],
         numbers[PUSHES] != 0.0,
     )

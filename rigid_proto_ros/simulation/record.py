@@ -121,11 +121,14 @@ def explicit_tensor(scene: np.record, inertia: Matrix3) -> None:
 
 @njit(error_model="numpy", allocates=False)
 def _moments_of(mesh: np.record, model: int) -> np.record:
+    moments: np.record = mesh.bounding_box
     if model == SOLID:
-        return mesh.solid
-    if model == SHELL:
-        return mesh.shell
-    return mesh.points if model == POINTS else mesh.bounding_box
+        moments = mesh.solid
+    elif model == SHELL:
+        moments = mesh.shell
+    elif model == POINTS:
+        moments = mesh.points
+    return moments
 
 
 @njit(error_model="numpy", allocates=False)

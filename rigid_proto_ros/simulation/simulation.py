@@ -471,7 +471,7 @@ class Simulation:
     @property
     def floors(self) -> list[float]:
         """Error floors by kind (flight.FLOOR_KINDS); 0 where rounding isn't the limit."""
-        return self._arrays.floors().tolist()
+        return [float(floor) for floor in self._arrays.floors()]
 
     @property
     def too_coarse(self) -> str:

@@ -8,6 +8,8 @@ from there on a copy. So neither depends on the times of sampling.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...base.compilation import matrix_of, njit, record_type
