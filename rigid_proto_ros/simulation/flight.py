@@ -9,11 +9,11 @@ same functions.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
 
+from ..base.arithmetic import exponent_of, scaled
 from ..base.compilation import copy_numbers, copy_record, njit, record_type
 from ..base.rotation import norm
 from ..base.vectors import FloatArray, Records, StateRow
@@ -198,7 +198,8 @@ def begin_variables(flight: np.record, methods: Records, room: FloatArray) -> No
     method = methods[flight.method]
     if flight.method != before and method.way == ADAPTIVE:
         # Kernels rely on zeros in elements that they never write; another method may have written there.
-        room[: method.rows * method.columns] = 0.0
+        for k in range(method.rows * method.columns):
+            room[k] = 0.0
     begin_control(flight.control, flight.accuracy, flight.degree)
     flight.work, flight.lost = 0.0, 0.0
     flight.committed_ns, flight.taken = flight.start_ns, 0
@@ -323,7 +324,7 @@ def note_floors(flight: np.record, methods: Records, floors: FloatArray) -> None
         if rate > accuracy:
             floors[TENSOR_FLOOR] = max(floors[TENSOR_FLOOR], rate)
     farthest = max(abs(row[0]), abs(row[1]), abs(row[2]))
-    place = math.ldexp(1.0, math.frexp(farthest)[1] - 54) / body[of_body.LENGTH]
+    place = scaled(1.0, exponent_of(farthest) - 54) / body[of_body.LENGTH]
     if place > max(accuracy * (flight.now_ns - flight.start_ns) * 1e-9, FLOOR):
         floors[PLACE_FLOOR] = max(floors[PLACE_FLOOR], place)
 
