@@ -195,11 +195,19 @@ HAND_WORK = 13
 HEAT = 14
 VARIABLES = 15
 
+
+@njit(error_model="numpy", allocates=False, forceinline=True)
+def copy_variables(of: Variables, to: Variables) -> None:
+    """Copy the variables of one array to another."""
+    for k in range(VARIABLES):
+        to[k] = of[k]
+
+
 MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def is_good(y: Variables) -> bool:
     """Whether variables y are finite and no runaway."""
     size = 0.0

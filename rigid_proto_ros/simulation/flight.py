@@ -9,11 +9,11 @@ same functions.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
 
+from ..base.arithmetic import exponent_of, scaled
 from ..base.compilation import copy_numbers, copy_record, exported, njit, record_type
 from ..base.rotation import norm
 from ..base.vectors import FloatArray, Records, StateRow
@@ -342,7 +342,7 @@ def note_floors(flight: np.record, floors: FloatArray) -> None:
         if rate > accuracy:
             floors[TENSOR_FLOOR] = max(floors[TENSOR_FLOOR], rate)
     farthest = max(abs(row[0]), abs(row[1]), abs(row[2]))
-    place = math.ldexp(1.0, math.frexp(farthest)[1] - 54) / body[of_body.LENGTH]
+    place = scaled(1.0, exponent_of(farthest) - 54) / body[of_body.LENGTH]
     if place > max(accuracy * (flight.now_ns - flight.start_ns) * 1e-9, FLOOR):
         floors[PLACE_FLOOR] = max(floors[PLACE_FLOOR], place)
 

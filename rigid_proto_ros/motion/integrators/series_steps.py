@@ -32,6 +32,7 @@ from ..problem import ATTITUDE, HEAT, VARIABLES, Variables, damping_functions, i
 from ..string import most_yielding
 from .series import (
     A_KNOT,
+    MAX_DEGREE,
     MOTION_COLUMNS,
     SPIN_COLUMNS,
     VARIABLES_AT,
@@ -65,7 +66,6 @@ PART_ON_A_STRING = 0.1
 poles.
 """
 
-MAX_DEGREE = 26
 _HIGHER = 3
 """Added to the degree of a series of the spin for the whole motion, where the cost of a step besides its series is
 higher.
@@ -170,7 +170,7 @@ _LOG2_MOST = -0.15200309344504997
 # log₂ and 2ˣ to two digits from the exponent of a double: ten times faster than libm, with the same bits everywhere.
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def fast_log2(x: float) -> float:
     """log₂ x for x > 0 with an error below 0.006; −1023 for subnormal x."""
     bits = bits_of(x)
@@ -180,12 +180,15 @@ def fast_log2(x: float) -> float:
     return float((bits >> MANTISSA_BITS) - BIAS) + f + f * (1.0 - f) * (0.4427 - 0.164 * f)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def fast_exp2(x: float) -> float:
     """2ˣ with a relative error below 0.001, for x clamped to ±1000."""
-    whole = math.floor(min(max(x, -1000.0), 1000.0))
-    f = min(max(x, -1000.0), 1000.0) - whole
-    power: float = double_of((int(whole) + BIAS) << MANTISSA_BITS)
+    x = min(max(x, -1000.0), 1000.0)
+    whole = int(x)
+    if whole > x:
+        whole -= 1
+    f = x - whole
+    power: float = double_of((whole + BIAS) << MANTISSA_BITS)
     return power * (1.0 + f - f * (1.0 - f) * (0.3069 + 0.0794 * f))
 
 
@@ -358,7 +361,7 @@ def _lay_out(y: Variables, p: np.record, control: np.record, weights: Weights, c
         switch, after, h = next_law(series, p, degree, h, law, accuracy)
         if switch == NONE:
             break
-        before_ns = int(math.floor((gone + switch) * 1e9))
+        before_ns = int((gone + switch) * 1e9)
         if parts > 1 and before_ns * 1e-9 > gone:
             # One change of law per step: each multiplies the error of the step before it.
             return before_ns
@@ -370,7 +373,7 @@ def _lay_out(y: Variables, p: np.record, control: np.record, weights: Weights, c
         knot = knot_at(start, p)
         gone, law = gone + switch, after
         control.last_start, control.last_law = gone, law
-    length_ns = int(math.floor((gone + h) * 1e9))
+    length_ns = int((gone + h) * 1e9)
     # The last series must cover a part of the step.
     return length_ns if length_ns * 1e-9 > gone else length_ns + 1
 
