@@ -6,11 +6,8 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
-import re
 
 PACKAGE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
-
-_RELATIVE_IMPORT = re.compile(r"^[ \t]*from[ \t]+(\.+)([\w.]*)[ \t]+import[ \t]+(?:\(([^)]*)\)|([^\n]*))", re.MULTILINE)
 
 
 @functools.cache
@@ -29,21 +26,36 @@ def source_stamp(*files: str) -> bytes:
 @functools.cache
 def _source(file: str) -> tuple[bytes, list[str]]:
     """Hash of a file, and the files that it imports."""
-    with open(file, encoding="utf-8") as stream:
-        text = stream.read()
-    candidates = set()
-    for dots, name, in_brackets, plain in _RELATIVE_IMPORT.findall(text):
+    with open(file, "rb") as stream:
+        content = stream.read()
+    imported = []
+    # By hand: regular expressions took five times as long, at every start.
+    parts = content.decode().split("from .")
+    for before, after in zip(parts, parts[1:], strict=False):
+        if before.rpartition("\n")[2].strip():
+            continue  # within a line
+        origin, _, names = after.partition(" import ")
+        names = names[1 : names.index(")")] if names.startswith("(") else names.partition("\n")[0]
+        module = origin.lstrip(".")
         folder = file
-        for _ in dots:
+        for _ in range(1 + len(origin) - len(module)):
             folder = os.path.dirname(folder)
-        module = os.path.join(folder, *filter(None, name.split(".")))
+        *outer, last = module.split(".")
+        folder = os.path.join(folder, *outer)
+        within = os.path.join(folder, last) if last else folder
         # An imported name is defined in a module, or is a module of a package.
-        candidates |= {f"{module}.py", os.path.join(module, "__init__.py")}
-        candidates |= {os.path.join(module, f"{name}.py") for name in re.findall(r"\w+", in_brackets or plain)}
-    return hashlib.sha256(text.encode()).digest(), [file for file in candidates if _exists(file)]
+        candidates = [(folder, f"{last}.py"), (within, "__init__.py")]
+        candidates += [(within, f"{name.split()[0]}.py") for name in names.split(",") if name.strip()]
+        imported += [os.path.join(place, name) for place, name in candidates if name in _names(place)]
+    return hashlib.sha256(content).digest(), imported
 
 
-_exists = functools.cache(os.path.isfile)
+@functools.cache
+def _names(folder: str) -> set[str]:
+    try:
+        return set(os.listdir(folder))
+    except OSError:
+        return set()
 
 
 def user_cache() -> str:

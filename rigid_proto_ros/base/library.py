@@ -56,9 +56,15 @@ KERNELS: dict[str, Kernel] = {}
 
 _CODES = {"f8": "d", "i8": "q", "b1": "?7x"}
 """Numbers in a block, as struct has them."""
-_CONTENT = object.__basicsize__
-"""Where an array, or a record of one, has the address of its content: right behind the head of every object."""
-_address_at = ctypes.c_size_t.from_address
+_WORD = ctypes.sizeof(ctypes.c_size_t)
+_MEMORY = (ctypes.c_size_t * (1 << 44)).from_address(0)
+"""All memory as words. NumPy's own ways to an address take ten times as long."""
+_OF_ARRAY = object.__basicsize__ // _WORD
+"""Where an array object has the address of its content: behind the head of every object, in words."""
+_OF_RECORD = _OF_ARRAY + 1
+"""Where a record has it: behind the head of objects of several sizes."""
+_IN_ORDER = 0x0001 | 0x0100
+"""NumPy's flags of an array that is contiguous and aligned."""
 
 
 class Kernel:
@@ -72,32 +78,37 @@ class Kernel:
         self.function, self.name, self.nogil = function, function.__name__, nogil
         self.arguments, self.returns = arguments, returns.split()
         assert KERNELS.setdefault(self.name, self) is self, f"two kernels are named {self.name}"
-        self._called: Any = None
         self.compiled: Any = None  # numba's dispatcher, where it compiles
+        self._called: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the library's function."""
-        function = self._called or self._prepared()
-        values: list[Any] = []
         try:
-            for take, argument in zip(self._takers, arguments, strict=True):
-                values += take(argument)
-            block = self._block()
-            self._pack(block, 0, *values)
-        except (ValueError, struct.error) as error:
+            return (self._called or self._prepared())(*arguments)
+        except struct.error as error:
             raise TypeError(f"{self.name}: {error}") from None
-        function(block)
-        return self._result(block)
 
     def bound(self, *first: Any) -> Callable[..., Any]:
         """See ``compilation.bound``."""
-        function = self._called or self._prepared()
-        block, at = self._block(), 8 * len(self.returns)
-        values = [value for take, argument in zip(self._takers, first, strict=False) for value in take(argument)]
-        given = struct.Struct("=" + "".join(self._codes[: len(first)]))
-        given.pack_into(block, at, *values)
-        rest, at = struct.Struct("=" + "".join(self._codes[len(first) :])), at + given.size
-        pack, result = rest.pack_into, self._result
+        if self._called is None:
+            self._prepared()
+        function, block, at = self._function, self._block(), 8 * len(self.returns)
+        given = struct.Struct("=" + "".join(map(_codes, self.arguments[: len(first)])))
+        given.pack_into(block, at, *self._values(first))
+        kinds, at = self.arguments[len(first) :], at + given.size
+        if len(kinds) == len(self.returns) == 1 and "b1" not in (*kinds, *self.returns):
+            # Half as long as by the general way.
+            as_bytes: Any = memoryview(block).cast("B")
+            taken, given_back = as_bytes.cast(_CODES[kinds[0]]), as_bytes.cast(_CODES[self.returns[0]])
+            slot = at // 8
+
+            def call_with_one(number: Any, _kept: Any = first) -> Any:
+                taken[slot] = number
+                function(block)
+                return given_back[0]
+
+            return call_with_one
+        pack, result = struct.Struct("=" + "".join(map(_codes, kinds))).pack_into, self._result
 
         def call(*numbers: Any, _kept: Any = first) -> Any:
             pack(block, at, *numbers)
@@ -107,60 +118,91 @@ class Kernel:
         return call
 
     def _prepared(self) -> Any:
-        """The library's function; what packs and unpacks its blocks is made with it."""
-        self._takers, self._codes = zip(*map(_taker_and_codes, self.arguments), strict=True)
+        """Make what packs a block, calls the library's function and unpacks the block, as code for this signature."""
         out = "".join(_CODES[kind] for kind in self.returns)
-        packed = struct.Struct(f"={8 * len(self.returns)}x{''.join(self._codes)}")
-        self._block, self._pack = ctypes.c_int64 * (packed.size // 8), packed.pack_into
+        packed = struct.Struct(f"={8 * len(self.returns)}x{''.join(map(_codes, self.arguments))}")
         unpack = struct.Struct(f"={out}").unpack_from
         self._result = (lambda block: unpack(block)[0]) if len(self.returns) == 1 else unpack if out else _nothing
-        self._called = loaded(self.nogil)[self.name]
-        self._called.restype = None
+        self._block = ctypes.c_int64 * (packed.size // 8)
+        self._function = loaded(self.nogil)[self.name]
+        self._function.restype = None
+        known: dict[str, Any] = {f"kind{k}": place(argument)[0] for k, argument in enumerate(self.arguments)}
+        known.update(array=np.ndarray, record=np.record, memory=_MEMORY, looked_at=self._values)
+        known.update(new_block=self._block, function=self._function, pack=packed.pack_into, unpack=unpack)
+        exec(_source(self), known)
+        self._called = known["call"]
         return self._called
+
+    def _values(self, arguments: tuple[Any, ...]) -> list[Any]:
+        """The arguments as a block has them. Raises TypeError."""
+        values: list[Any] = []
+        for argument, declared in zip(arguments, self.arguments, strict=False):
+            kind, dimensions = place(declared)
+            values += [argument] if kind is None else _address_and_extents(argument, kind, dimensions, self.name)
+        return values
+
+
+def _source(kernel: Kernel) -> str:
+    """Code of a function ``call``: a loop over the arguments would take twice as long."""
+    names = [f"a{k}" for k in range(len(kernel.arguments))]
+    checks, values = [], []
+    for k, (name, declared) in enumerate(zip(names, kernel.arguments, strict=True)):
+        kind, dimensions = place(declared)
+        if kind is None:
+            values.append(name)
+        elif dimensions == 0:
+            checks.append(f"{name}.__class__ is record and {name}.dtype is kind{k}")
+            values.append(f"memory[id({name}) // {_WORD} + {_OF_RECORD}]")
+        else:
+            in_order = f"{name}.flags.num & {_IN_ORDER} == {_IN_ORDER}"
+            checks.append(f"{name}.__class__ is array and {name}.dtype is kind{k} and {name}.ndim == {dimensions}")
+            checks.append(in_order)
+            values.append(f"memory[id({name}) // {_WORD} + {_OF_ARRAY}], *{name}.shape")
+    result = {0: "None", 1: "unpack(block)[0]"}.get(len(kernel.returns), "unpack(block)")
+    return f"""
+def call({", ".join(names)}):
+    block = new_block()
+    if {" and ".join(checks) or "True"}:
+        pack(block, 0, {", ".join(values)})
+    else:
+        pack(block, 0, *looked_at(({"".join(name + ", " for name in names)})))
+    function(block)
+    return {result}
+"""
 
 
 def _nothing(_block: Any) -> None:
     return None
 
 
-def _taker_and_codes(place: Any) -> tuple[Callable[[Any], tuple[Any, ...]], str]:
-    """What turns an argument into values of a block, and how struct packs these."""
-    if isinstance(place, str) and place in _CODES:
-        return (lambda number: (number,)), _CODES[place]
-    if isinstance(place, np.dtype):
-        return functools.partial(_address_of_record, place), "q"
-    kind, dimensions = array_of(place)
-    return functools.partial(_address_and_shape, kind, dimensions), "q" * (1 + dimensions)
+def place(declared: Any) -> tuple[np.dtype[Any] | None, int]:
+    """Type and number of dimensions of an argument: 0 for a record, None and 0 for a number."""
+    if isinstance(declared, np.dtype):
+        return declared, 0
+    if isinstance(declared, list):
+        return declared[0], 1
+    kind, _, extents = declared.partition("[")
+    return (np.dtype(kind), extents.count(":")) if extents else (None, 0)
 
 
-def array_of(place: Any) -> tuple[np.dtype[Any], int]:
-    """Type of an array's elements and number of its dimensions, of a place in a signature."""
-    if isinstance(place, list):
-        return place[0], 1
-    kind, _, extents = place.partition("[")
-    return np.dtype(kind), extents.count(":")
+def _codes(declared: Any) -> str:
+    """How struct packs an argument."""
+    kind, dimensions = place(declared)
+    return _CODES[declared] if kind is None else "q" * (1 + dimensions)
 
 
-def _address_of_record(kind: np.dtype[Any], record: Any) -> tuple[int]:
-    if not isinstance(record, np.void | np.ndarray) or record.dtype != kind or record.size != 1:
-        raise TypeError(f"got {_described(record)}; accepted: a record of {kind.names}")
-    return (_address_at(id(record) + _CONTENT).value,)
-
-
-def _address_and_shape(kind: np.dtype[Any], dimensions: int, array: Any) -> tuple[int, ...]:
-    if isinstance(array, np.ndarray) and (array.dtype is kind or array.dtype == kind) and array.ndim == dimensions:
-        flags = array.flags
-        if flags.c_contiguous and flags.aligned:
-            return (_address_at(id(array) + _CONTENT).value, *array.shape)
-    shown = kind if kind.names is None else f"records of {kind.names}"
-    raise TypeError(f"got {_described(array)}; accepted: a contiguous array of {shown} with {dimensions} dimensions")
-
-
-def _described(given: Any) -> str:
-    if not isinstance(given, np.void | np.ndarray):
-        return repr(given)
-    kind = given.dtype.names or given.dtype
-    return f"{type(given).__name__} of {kind}, shape {given.shape}, strides {given.strides}"
+def _address_and_extents(argument: Any, kind: np.dtype[Any], dimensions: int, name: str) -> tuple[int, ...]:
+    """Also of what isn't plainly right: a record alone in an array, a type that is only equal, ... Raises TypeError."""
+    if isinstance(argument, np.ndarray | np.void) and argument.dtype == kind:
+        of = _OF_ARRAY if isinstance(argument, np.ndarray) else _OF_RECORD
+        right = argument.ndim == dimensions or (dimensions == 0 and argument.size == 1)
+        if right and argument.flags.num & _IN_ORDER == _IN_ORDER:
+            return (_MEMORY[id(argument) // _WORD + of], *argument.shape[:dimensions])
+    wanted = f"an array of {kind.names or kind}, contiguous, with {dimensions} dimensions"
+    got = repr(argument)
+    if isinstance(argument, np.ndarray | np.void):
+        got = f"{argument.dtype.names or argument.dtype}, shape {argument.shape}, strides {argument.strides}"
+    raise TypeError(f"{name}: got {got}; accepted: {wanted if dimensions else f'a record of {kind.names}'}")
 
 
 # The library
@@ -230,9 +272,19 @@ def loaded(nogil: bool) -> Any:
             if not os.path.isfile(path):
                 _build()
             check_own(folder)
+        _check_addresses()
         return (ctypes.CDLL if nogil else ctypes.PyDLL)(path)
     except OSError as error:
         raise InputError("kernels", str(error)) from None
+
+
+def _check_addresses() -> None:
+    """Make sure that objects are laid out as ``Kernel`` reads them. Raises InputError."""
+    array = np.zeros(2, np.dtype((np.record, [("x", np.int64)])))
+    first = array.__array_interface__["data"][0]
+    read = (_MEMORY[id(array) // _WORD + _OF_ARRAY], _MEMORY[id(record := array[1]) // _WORD + _OF_RECORD])
+    if read != (first, first + 8) or record.dtype is not array.dtype:
+        raise InputError("kernels", f"numpy {np.__version__} on {sys.implementation.name}", "one that is known here")
 
 
 def _build() -> None:

@@ -19,7 +19,7 @@ from numba.core.errors import NumbaError
 from numba.np.arrayobj import populate_array
 
 from ..base.errors import InputError
-from ..base.library import KERNELS, MODULES, Kernel, array_of
+from ..base.library import KERNELS, MODULES, Kernel, place
 
 NUMBERS = {"f8": float64, "i8": int64, "b1": boolean}
 RAISES = "raises."
@@ -66,14 +66,12 @@ def whole_module(told: Callable[[int, int], None]) -> Any:
     return whole
 
 
-def numba_type(place: Any) -> Any:
-    """Type of an argument, of a place in a signature."""
-    if isinstance(place, str) and place in NUMBERS:
-        return NUMBERS[place]
-    if not isinstance(place, str | list):
-        return from_dtype(place)
-    kind, dimensions = array_of(place)
-    return types.Array(from_dtype(kind), dimensions, "C")
+def numba_type(declared: Any) -> Any:
+    """Type of an argument."""
+    kind, dimensions = place(declared)
+    if kind is None:
+        return NUMBERS[declared]
+    return types.Array(from_dtype(kind), dimensions, "C") if dimensions else from_dtype(kind)
 
 
 def compiled(kernel: Kernel) -> Any:
@@ -114,11 +112,11 @@ def block_function(kernel: Kernel, result: Any) -> ir.Module:
     builder = ir.IRBuilder(function.append_basic_block())
     block, slots = function.args[0], iter(range(len(kernel.returns), 1000))
 
-    def place(number: int) -> Any:
+    def slot(number: int) -> Any:
         return builder.gep(block, [ir.Constant(ir.IntType(32), number)], inbounds=True)
 
     def taken(kind: Any) -> Any:
-        bits = builder.load(place(next(slots)))
+        bits = builder.load(slot(next(slots)))
         if kind == float64:
             return builder.bitcast(bits, _DOUBLE)
         return builder.trunc(bits, ir.IntType(1)) if kind == boolean else bits
@@ -148,6 +146,6 @@ def block_function(kernel: Kernel, result: Any) -> ir.Module:
     numbers = cgutils.unpack_tuple(builder, value) if several else [value] * len(kernel.returns)
     for number, (kind, given) in enumerate(zip(kernel.returns, numbers, strict=True)):
         bits = builder.bitcast(given, _SLOT) if kind == "f8" else builder.zext(given, _SLOT) if kind == "b1" else given
-        builder.store(bits, place(number))
+        builder.store(bits, slot(number))
     builder.ret_void()
     return module
