@@ -251,7 +251,8 @@ def place_of(kind: np.dtype[Any], name: str) -> int:
     return int(fields[name][1])
 
 
-def _assign_fields(of: np.record, to: np.record) -> None:
+def copy_fields(of: np.record, to: np.record) -> None:
+    """Copy a record to another one of the same type, outside of compiled functions."""
     for name in of.dtype.names or ():
         to[name] = of[name]
 
@@ -265,7 +266,7 @@ def _record_copier(_typing_context: Any, of: Any, to: Any) -> Emitted:
     return types.none(of, to), code
 
 
-copy_record = intrinsic(_record_copier) if COMPILED else _assign_fields
+copy_record = intrinsic(_record_copier) if COMPILED else copy_fields
 """copy_record(of, to): copy a record to another one of the same type. An assignment would be compiled to a load and a
 store per byte.
 """

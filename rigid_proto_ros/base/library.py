@@ -30,10 +30,23 @@ ABI = 1
 
 MODULES = (
     "base.rotation",
-    "mass.tensor",
+    "mesh.assembly",
+    "mesh.intersection",
+    "mesh.topology",
     "mass.closed_form",
+    "mass.moments",
+    "mass.repair",
+    "mass.tensor",
     "motion.body",
     "motion.state",
+    "motion.surface",
+    "simulation.batch",
+    "simulation.effects",
+    "simulation.flight",
+    "simulation.quantities",
+    "simulation.record",
+    "sweep.sampling",
+    "identify.trajectories",
     "kernels.fused",
 )
 """Those that declare exported kernels."""

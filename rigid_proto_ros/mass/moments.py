@@ -401,9 +401,7 @@ def _compensated_sums(
 
 
 @exported("f8[:,:]", "i8[:,:]", "i8", "f8[:]", MOMENTS, returns="i8", nogil=True)
-def signed_solid_moments(
-    vertices: Points, triangles: Triangles, how: int, room: FloatArray, found: np.record
-) -> int:
+def signed_solid_moments(vertices: Points, triangles: Triangles, how: int, room: FloatArray, found: np.record) -> int:
     """Fill ``found`` with the moments of the solid as it is wound, see ``solid_moments``; FOUND, or why there are none.
 
     how: AS_NEEDED, PLAIN or IN_PAIRS. room: memory for ROOM doubles.

@@ -141,13 +141,10 @@ class MeshMoments:
         own = self.body_mass(scale=s, mass=mass, density=density)
         # A shell's moments include the stretch: the uniform part and the mirroring are left.
         left = np.copysign(abs(s[0]), s) if model in STRETCHED else s
-        unit = moments.record
-        if com == "solid":
-            solid = self.moments("solid")
-            for name in ("reference", "center", "center_low"):
-                unit[name] = (s / left) * getattr(solid, name)
+        unit, at_solid = moments.record, com == "solid"
+        placed = self.moments("solid").record if at_solid else unit
         center, inertia, principal, axes = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
-        total = spread_mass(own, unit, s, left, points, center, inertia, principal, axes)
+        total = spread_mass(own, unit, placed, at_solid, s, left, points, center, inertia, principal, axes)
         warnings = ()
         if not is_plainly_good(principal):
             try:

@@ -107,6 +107,13 @@ def fill_initial_row(
     return x != 0.0 or y != 0.0 or z != 0.0 or w != 0.0
 
 
+@njit(error_model="numpy", allocates=False)
+def to_body_axes(row: StateRow, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Rᵀ v of v = (x, y, z) in world axes."""
+    R = matrix_elements(row[3], row[4], row[5], row[6])
+    return R[0] * x + R[3] * y + R[6] * z, R[1] * x + R[4] * y + R[7] * z, R[2] * x + R[5] * y + R[8] * z
+
+
 @exported("f8[:]", "f8", "f8", "f8")
 def shift_com(row: StateRow, x: float, y: float, z: float) -> None:
     """Change the reference point of a state row (13,) to the one at d = (x, y, z) [m, body axes] from the COM on the
