@@ -66,7 +66,7 @@ def _mirrors(matrix: FloatArray) -> bool:
         for i in range(k + 1, 3):
             if abs(rows[i, k]) > abs(rows[best, k]):
                 best = i
-        if not rows[best, k] != 0.0:
+        if rows[best, k] == 0.0:
             return False
         if best != k:
             negative = not negative

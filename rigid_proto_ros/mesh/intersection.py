@@ -182,9 +182,7 @@ def _share_a_corner(corners: Triangles, i: int, j: int) -> bool:
     return False
 
 
-@exported(
-    *("f8[:,:]", "i8[:,:]", "i8[:]", "i8[:]", "f8[:,:]", "f8[:,:]", "i8", "b1[:,:]"), returns="i8 b1", nogil=True
-)
+@exported(*("f8[:,:]", "i8[:,:]", "i8[:]", "i8[:]", "f8[:,:]", "f8[:,:]", "i8", "b1[:,:]"), returns="i8 b1", nogil=True)
 def crossings(
     vertices: Points,
     corners: Triangles,
@@ -407,9 +405,7 @@ def component_nesting(vertices: Points, topology: Topology, sums: Components) ->
         outside, inner = np.empty_like(near), np.empty_like(near)
         room = np.empty(count, np.int64), np.empty((2, count), dtype=bool)
         tree = order, boxes, samples
-        decided = sides_of_components(
-            vertices, topology.corners, component, *tree, near, reach, outside, inner, *room
-        )
+        decided = sides_of_components(vertices, topology.corners, component, *tree, near, reach, outside, inner, *room)
         on_both_sides = outside & inner
         found = found | on_both_sides | on_both_sides.T
         inside = inner & ~outside & ~found

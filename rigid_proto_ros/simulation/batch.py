@@ -19,8 +19,8 @@ from ..base.arithmetic import exact_quotient
 from ..base.compilation import copy_numbers, copy_record, local_matrix, local_numbers, njit, record_type
 from ..base.simd import aligned
 from ..base.vectors import FloatArray, IntArray, Matrix3, Records, Vector, Vector3
-from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
 from ..mass import moments as of_mesh
+from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import principal_axes_kernel
 from ..motion.body import AXES, COM, INERTIA, LENGTH, MASS, MOMENTS, BodyRow, arm, fill_body
