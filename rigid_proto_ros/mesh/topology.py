@@ -353,6 +353,14 @@ def mesh_topology(vertices: Points, triangles: Triangles) -> Topology:
     return Topology(corners, edges, component, components, duplicates)
 
 
+def turned_triangles(triangles: Triangles) -> Triangles:
+    """The triangles (m, 3), wound the other way."""
+    triangles = np.ascontiguousarray(triangles, dtype=np.int64)
+    turned = np.empty_like(triangles)
+    turn_triangles(triangles, turned)
+    return turned
+
+
 def doubled_faces(topology: Topology) -> int:
     """Number of faces that occur with one winding more often than with the other by two or more: a volume beside each
     counts more than once.
