@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Compile kernels into the cache: ``compile_kernels.py integrators | flight | first | scenes``.
 
-The first two share few kernels and take about as long, so that they run side by side. ``first``, after them, is the few
-that are still missing for the flight of `make run`. ``scenes`` is what any other bundled scene, lesson or example
-script needs.
+The first two share few kernels, so that they run side by side. ``first``, after them, is the few that are still missing
+for the flight of `make run`. ``scenes`` is what any other bundled scene, lesson or example script needs.
 """
 
 import re
@@ -19,12 +18,8 @@ sys.path.insert(0, str(ROOT))
 from rigid_proto_ros.base.bundled import example_path, scene_names, scene_path
 from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.live.live_simulation import warm_up
-from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.motion.integrators import auto
-from rigid_proto_ros.motion.integrators.integrator import method_table, provide_kernel
 from rigid_proto_ros.scene.scenario import read_scene
-from rigid_proto_ros.simulation.commands import WrenchCommand
-from rigid_proto_ros.simulation.simulation import Simulation
+from rigid_proto_ros.simulation.flight_arrays import _entry
 
 
 def scenes_and_scripts() -> list[tuple[str, Path | None]]:
@@ -43,19 +38,13 @@ def fly(*words: str) -> int:
 
 
 def compile_integrators() -> None:
-    """Those that auto chooses from."""
-    table = method_table(auto.AUTO, 0)
-    for kind in (auto.STEADY, auto.FREE, auto.TURNING_LOADS, auto.ANY_LOADS):
-        provide_kernel(auto.AUTO, table, kind)
+    """The flight of one body, by all integrators."""
+    _entry()
 
 
 def compile_flight() -> None:
-    """What every flight needs: a body rests, and no integrator is called."""
-    trial = Simulation(read_scene("t_handle", {"initial.angular_velocity": [0.0, 0.0, 0.0]}).setup)
-    # Checked when it is taken; it doesn't come to act.
-    frame = "world@origin"
-    trial.submit(WrenchCommand(False, parse_frame(frame), (1e-9, 0.0, 0.0), (0.0, 0.0, 0.0), frame), 2_000_000)
-    trial.advance(1_000_000)
+    """What every flight needs besides: its body."""
+    read_scene("t_handle")
 
 
 def fly_first() -> int:

@@ -29,6 +29,8 @@ from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, Integrator
 from .runge_kutta import explicit
 
 
+heun_steps = explicit(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.5]]))
+
 HEUN = Integrator(
     name="heun",
     order=2,
@@ -37,7 +39,7 @@ HEUN = Integrator(
     limits="Explicit.",
     stability_limit=1.0,
     supports=LOADS | {ANGULAR_DAMPING, NO_GYROSCOPIC_TERM},
-    kernel=explicit(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.5]])),
+    kernel=heun_steps,
 )
 '''
 
@@ -91,6 +93,10 @@ def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
     names = (folder.parent / "__init__.py").read_text("utf-8")
     names = names.replace('    "rk4": "runge_kutta",\n', '    "rk4": "runge_kutta",\n    "heun": "heun",\n')
     (folder.parent / "__init__.py").write_text(names, "utf-8")
+    stepping = (folder / "stepping.py").read_text("utf-8")
+    stepping = stepping.replace("from .integrator import", "from .heun import heun_steps\nfrom .integrator import")
+    stepping = stepping.replace("    rk4_steps,\n", "    rk4_steps,\n    heun_steps,\n")
+    (folder / "stepping.py").write_text(stepping, "utf-8")
     done = subprocess.run(
         [sys.executable, "-c", FLY], cwd=tmp_path, env=_only(tmp_path), capture_output=True, text=True, check=False
     )

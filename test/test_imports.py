@@ -19,7 +19,7 @@ MODULES = {
 }
 ORDER = (
     *("base", "mesh", "mass", "motion", "simulation", "scene", "session"),
-    *("picture", "rerun_view", "export", "live", "workbench", "ros", "sweep", "identify", "robots", "cli"),
+    *("picture", "rerun_view", "export", "live", "workbench", "ros", "sweep", "identify", "robots", "cli", "kernels"),
 )
 """Folders in the order of imports: each knows only those before it."""
 STRANGERS = {
@@ -35,8 +35,8 @@ ROS = ("rclpy", "rcl_interfaces", "builtin_interfaces")
 # Which folders or modules may import a package that is neither ours nor Python's.
 ALLOWED = {
     "numpy": ORDER,
-    "numba": ("base", "mesh", "mass", "motion", "simulation", "sweep", "identify.trajectories"),
-    "llvmlite": ("base.simd", "base.arithmetic", "base.provenance"),  # comes with numba
+    "numba": ("base", "mesh", "mass", "motion", "simulation", "sweep", "identify.trajectories", "kernels"),
+    "llvmlite": ("base.compilation", "base.simd", "base.arithmetic", "base.provenance", "kernels"),  # comes with numba
     "yaml": ("scene", "session", "sweep", "ros", "cli"),
     "trimesh": ("mesh.assembly", "robots.link_shapes"),
     "collada": ("mesh.assembly",),

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Arithmetic that gives the same bits on every machine: pairs of doubles, and elementary functions. A C library's
-functions differ by version, vendor and processor.
+functions differ by version, vendor and processor. Called from Python without the compiler they are plain functions with
+the same bits.
 
 The functions are made of what IEEE 754 fixes, +, −, ·, / and √, in the order written, and err by less than 1 ulp
 (measured against mpmath: see test/base/test_elementary.py). Where a sum decides about the last digit it is taken in
@@ -14,14 +15,13 @@ import math
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 
-from .compilation import INTERPRETED, Emitted, intrinsic, njit
+from .compilation import COMPILED, Emitted, intrinsic, njit
 from .simd import fused_multiply_add
 
-# isort: split
-# After compilation.py, which keeps numba from importing what isn't needed.
-from numba import types
+if COMPILED:
+    from llvmlite import ir
+    from numba import types
 
 # Pairs of doubles
 #
@@ -30,7 +30,7 @@ from numba import types
 # arithmetic after Hida, Li and Bailey (QD, 2001).
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def two_sum(a: float, b: float) -> tuple[float, float]:
     """a + b = high + low, exactly."""
     high = a + b
@@ -38,21 +38,21 @@ def two_sum(a: float, b: float) -> tuple[float, float]:
     return high, (a - (high - t)) + (b - t)
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def fast_two_sum(a: float, b: float) -> tuple[float, float]:
     """a + b = high + low, exactly, for |a| ≥ |b| or a = 0."""
     high = a + b
     return high, b - (high - a)
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def two_product(a: float, b: float) -> tuple[float, float]:
     """a b = high + low, exactly, while |a b| > 1e-290 or zero."""
     high = a * b
     return high, fused_multiply_add(a, b, -high)
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def pair_add(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
     """Sum of two pairs, relative error ≤ 3·2⁻¹⁰⁶ even under cancellation (the accurate variant)."""
     s, e = two_sum(a, b)
@@ -61,14 +61,14 @@ def pair_add(a: float, a_low: float, b: float, b_low: float) -> tuple[float, flo
     return fast_two_sum(s, e + f)
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def pair_multiply(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
     """Product of two pairs, relative error ≤ 7·2⁻¹⁰⁶."""
     p, e = two_product(a, b)
     return fast_two_sum(p, e + (a * b_low + a_low * b))
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def pair_divide(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
     """Quotient of two pairs, relative error ≤ 10·2⁻¹⁰⁶; b ≠ 0."""
     q = a / b
@@ -77,22 +77,7 @@ def pair_divide(a: float, a_low: float, b: float, b_low: float) -> tuple[float, 
     return fast_two_sum(q, (r + r_low) / b)
 
 
-@njit(error_model="numpy")
-def exact_quotient(product: float, factor: float) -> float:
-    """x with x · factor == product in double precision where there is one, else the nearest."""
-    x = product / factor
-    if x * factor == product:
-        return x
-    up: float = np.nextafter(x, np.inf)
-    down: float = np.nextafter(x, -np.inf)
-    if up * factor == product:
-        return up
-    if down * factor == product:
-        return down
-    return x
-
-
-# Elementary functions
+# Bits of a double
 
 BIAS, MANTISSA_BITS = 1023, 52
 MANTISSA = (1 << MANTISSA_BITS) - 1
@@ -114,7 +99,7 @@ def double_of(_typing_context: Any, _bits: Any) -> Emitted:
     )
 
 
-if INTERPRETED:
+if not COMPILED:
 
     def bits_of(x: float) -> int:
         """The 64 bits of a double as an integer."""
@@ -124,6 +109,100 @@ if INTERPRETED:
         """The double with these 64 bits."""
         return float(np.int64(bits).view(np.float64))
 
+
+# What a C library has functions for: exponents, neighbours, whole numbers and remainders. Exact, so that there is one
+# result, and made of operations that are instructions on every processor; rounding to a whole number isn't.
+
+_SPECIAL_EXPONENT = 2 * BIAS + 1
+"""Exponent's bits of infinity and of what is no number."""
+
+
+@njit(error_model="numpy", allocates=False)
+def exponent_of(x: float) -> int:
+    """n with ½ ≤ |x| 2⁻ⁿ < 1, as C's frexp gives it: 0 for zero, infinity and what is no number."""
+    biased = (bits_of(x) >> MANTISSA_BITS) & _SPECIAL_EXPONENT
+    lifted = 0
+    if biased == 0 and x != 0.0:
+        biased, lifted = (bits_of(x * 2.0**64) >> MANTISSA_BITS) & _SPECIAL_EXPONENT, 64
+    return int(biased - (BIAS - 1) - lifted) if 0 < biased < _SPECIAL_EXPONENT else 0
+
+
+@njit(error_model="numpy", allocates=False)
+def scaled(x: float, n: int) -> float:
+    """x 2ⁿ, rounded once, as C's ldexp gives it, for every n.
+
+    Powers of two in range are one multiplication. A smaller one is split so that the last factor is below 2⁻⁵³: what
+    comes before it is exact, or so small that its own rounding can't be seen. Source: scalbn of musl.
+    """
+    if n > BIAS:
+        x, n = x * 2.0**1023, n - 1023
+        if n > BIAS:
+            x, n = x * 2.0**1023, min(n - 1023, 1023)
+    elif n < 1 - BIAS:
+        x, n = x * 2.0**-969, n + 969
+        if n < 1 - BIAS:
+            x, n = x * 2.0**-969, max(n + 969, -1022)
+    power: float = double_of((n + BIAS) << MANTISSA_BITS)
+    return x * power
+
+
+@njit(error_model="numpy", allocates=False)
+def next_up(x: float) -> float:
+    """The next larger double; x itself for infinity and what is no number."""
+    if not x < math.inf:
+        return x
+    if x == 0.0:
+        return 5e-324
+    bits = bits_of(x)
+    above: float = double_of(bits + 1 if x > 0.0 else bits - 1)
+    return above
+
+
+@njit(error_model="numpy", allocates=False)
+def nearest_whole(x: float) -> float:
+    """The whole number nearest to x, an even one between two; −2⁶³ where it is beyond the integers of 64 bits."""
+    size = abs(x)
+    if size < 2.0**52:
+        return math.copysign((size + 2.0**52) - 2.0**52, x) + 0.0  # no −0
+    return x if size < 2.0**63 else -(2.0**63)
+
+
+@njit(error_model="numpy", allocates=False)
+def remainder_of(x: float, divisor: float) -> float:
+    """x modulo the divisor with the divisor's sign, as Python's %: long division, exact but for the addition that turns
+    the sign. Not a number where Python raises an error.
+    """
+    size, whole = abs(x), abs(divisor)
+    if not (size < math.inf and whole > 0.0):
+        return math.nan
+    rest = size
+    if size >= whole:
+        e, f = exponent_of(size), exponent_of(whole)
+        a, b = int(scaled(size, 53 - e)), int(scaled(whole, 53 - f))
+        for _ in range(e - f):
+            a = 2 * (a - b if a >= b else a)
+        rest = scaled(float(a - b if a >= b else a), f - 53)
+    if rest == 0.0:
+        return math.copysign(0.0, divisor)
+    rest = math.copysign(rest, x)
+    return rest if (rest < 0.0) == (divisor < 0.0) else rest + divisor
+
+
+@njit(error_model="numpy", allocates=False)
+def exact_quotient(product: float, factor: float) -> float:
+    """x with x · factor == product in double precision where there is one, else the nearest; factor ≠ 0."""
+    x = product / factor
+    if x * factor == product:
+        return x
+    up, down = next_up(x), -next_up(-x)
+    if up * factor == product:
+        return up
+    if down * factor == product:
+        return down
+    return x
+
+
+# Elementary functions
 
 _TO_NEAREST = 6755399441055744.0
 """1.5·2⁵²: added and taken off again, it leaves the nearest whole number of one up to 2⁵¹."""
@@ -198,13 +277,13 @@ _ANGLES_LOW = np.array(
 ).reshape(4, 9)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _reduced_in_pairs(x: float) -> tuple[int, float, float]:
     """As ``_reduced``, for |x| < 2⁵¹ with three doubles of π/2. Beyond, neighbours are further apart than an angle is
     of use: then x is taken modulo the double that is nearest to 2π.
     """
     if abs(x) >= 2.0**51:
-        x = x % (2.0 * math.pi)
+        x = remainder_of(x, 2.0 * math.pi)
     whole = (x * (2.0 / math.pi) + _TO_NEAREST) - _TO_NEAREST
     for _ in range(2):
         product, product_low = two_product(whole, _PAIR_HALF_PI[0])
@@ -219,7 +298,7 @@ def _reduced_in_pairs(x: float) -> tuple[int, float, float]:
     return int(whole), r, low
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _reduced(x: float) -> tuple[int, float, float]:
     """n, modulo 4 where it is large, and a pair r with x = n π/2 + r, |r| ≤ π/4.
 
@@ -237,7 +316,7 @@ def _reduced(x: float) -> tuple[int, float, float]:
     return _reduced_in_pairs(x)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _sine(r: float, low: float) -> float:
     z = r * r
     c = _SIN
@@ -246,7 +325,7 @@ def _sine(r: float, low: float) -> float:
     return r + (z * r * (c[0] + z * tail) + low * (1.0 - 0.5 * z))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _cosine(r: float, low: float) -> float:
     z = r * r
     c = _COS
@@ -257,7 +336,7 @@ def _cosine(r: float, low: float) -> float:
     return top + (((1.0 - top) - half) + (zz * tail - r * low))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def sine_cosine(x: float) -> tuple[float, float]:
     """sin x and cos x."""
     if abs(x) < _AS_ITSELF:
@@ -271,7 +350,7 @@ def sine_cosine(x: float) -> tuple[float, float]:
     return s, c
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _exponential_parts(x: float) -> tuple[int, float, float, float]:
     """n, r and a pair (t, t_low) with eˣ = 2ⁿ (1 + r + t), |r| ≤ ½ log 2; |x| < 1000."""
     whole = (x * (1.0 / 0.6931471805599453) + _TO_NEAREST) - _TO_NEAREST
@@ -286,19 +365,7 @@ def _exponential_parts(x: float) -> tuple[int, float, float, float]:
     return int(whole), r, t, t_low + 0.5 * square_low
 
 
-@njit(error_model="numpy")
-def _scaled(x: float, n: int) -> float:
-    """x 2ⁿ, |n| ≤ 1500, rounded once."""
-    if -1000 < n < 1000:
-        power: float = double_of((n + BIAS) << MANTISSA_BITS)
-        return x * power
-    half = n // 2
-    first: float = double_of((half + BIAS) << MANTISSA_BITS)
-    second: float = double_of((n - half + BIAS) << MANTISSA_BITS)
-    return x * first * second
-
-
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def exponential_of(x: float) -> float:
     """eˣ."""
     if not -746.0 < x < 710.0:
@@ -306,10 +373,10 @@ def exponential_of(x: float) -> float:
     n, r, t, t_low = _exponential_parts(x)
     s, e = fast_two_sum(1.0, r)
     s, f = fast_two_sum(s, t)
-    return _scaled(s + (e + f + t_low), n)
+    return scaled(s + (e + f + t_low), n)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def expm1(x: float) -> float:
     """eˣ − 1, without cancellation for small x."""
     if not -40.0 < x < 709.0:
@@ -322,11 +389,11 @@ def expm1(x: float) -> float:
         return high + (low + t_low)
     s, e = fast_two_sum(1.0, r)
     s, f = fast_two_sum(s, t)
-    high, low = two_sum(_scaled(s, n), -1.0)
-    return high + (low + _scaled(e + f + t_low, n))
+    high, low = two_sum(scaled(s, n), -1.0)
+    return high + (low + scaled(e + f + t_low, n))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _logarithm(x: float) -> tuple[float, float]:
     """log x as an unevaluated sum of two, for normal x > 0."""
     bits = bits_of(x)
@@ -348,7 +415,7 @@ def _logarithm(x: float) -> tuple[float, float]:
     return high, (low + lost) + rest
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def logarithm(x: float) -> float:
     """log x; −∞ for 0, NaN for less."""
     if not 0.0 < x < math.inf:
@@ -363,7 +430,7 @@ def logarithm(x: float) -> float:
     return high + low
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _angle(less: float, more: float, octant: int) -> float:
     """φ = arctan less/more in octant 0, π/2 − φ in 1, π/2 + φ in 2, π − φ in 3, for 0 ≤ less ≤ more, neither tiny nor
     huge.
@@ -389,12 +456,11 @@ def _angle(less: float, more: float, octant: int) -> float:
     tail = z * s * tail + rest
     if octant == 1 or octant == 3:
         z, tail = -z, -tail
-    high, low = fast_two_sum(_ANGLES[octant, k], z)
-    correction: float = _ANGLES_LOW[octant, k] + tail
-    return high + (low + correction)
+    high, low = fast_two_sum(float(_ANGLES[octant, k]), z)
+    return high + (low + (float(_ANGLES_LOW[octant, k]) + tail))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def inverse_tangent_of(y: float, x: float) -> float:
     """The angle of (x, y) from the x axis, −π to π, and so arctan y for x = 1; signs of zeros count as in C's atan2."""
     if not (abs(x) < math.inf and abs(y) < math.inf):
@@ -413,8 +479,8 @@ def inverse_tangent_of(y: float, x: float) -> float:
     if across == 0.0:
         return math.copysign(math.pi if back else 0.0, y)
     if more > 1e100 or more < 1e-100:
-        _, exponent = math.frexp(more)
-        across, along = math.ldexp(across, -exponent), math.ldexp(along, -exponent)
+        exponent = exponent_of(more)
+        across, along = scaled(across, -exponent), scaled(along, -exponent)
     if across < 1e-20 * along:
         # What the quotient's rounding and the next term add is below an ulp.
         return y / x if not back else math.copysign(math.pi, y)

@@ -25,7 +25,7 @@ def dot(a: Numbers, b: Numbers) -> float:
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def norm(x: float, y: float, z: float) -> float:
     """|v| of v = (x, y, z), if squares neither overflow nor underflow."""
     return math.sqrt(x * x + y * y + z * z)
@@ -47,7 +47,7 @@ def transposed_times(matrix: Matrix3, v: Numbers) -> Vector3:
     return product
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def multiply(
     ax: float, ay: float, az: float, aw: float, bx: float, by: float, bz: float, bw: float
 ) -> tuple[float, float, float, float]:
@@ -60,7 +60,7 @@ def multiply(
     )
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def rotate(qx: float, qy: float, qz: float, qw: float, vx: float, vy: float, vz: float) -> tuple[float, float, float]:
     """Rotate v from body to world axes: v + 2w(u × v) + 2u × (u × v), u the vector part."""
     tx = 2.0 * (qy * vz - qz * vy)
@@ -73,7 +73,7 @@ def rotate(qx: float, qy: float, qz: float, qw: float, vx: float, vy: float, vz:
     )
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def rotate_inverse(
     qx: float, qy: float, qz: float, qw: float, vx: float, vy: float, vz: float
 ) -> tuple[float, float, float]:
@@ -81,14 +81,14 @@ def rotate_inverse(
     return rotate(-qx, -qy, -qz, qw, vx, vy, vz)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def normalize(qx: float, qy: float, qz: float, qw: float) -> tuple[float, float, float, float]:
     """Scale to unit length."""
     scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
     return qx * scale, qy * scale, qz * scale, qw * scale
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def to_unit(qx: float, qy: float, qz: float, qw: float) -> tuple[float, float, float, float]:
     """A given quaternion scaled to unit length; zeros if its length is zero or not finite.
 
@@ -102,7 +102,7 @@ def to_unit(qx: float, qy: float, qz: float, qw: float) -> tuple[float, float, f
     return normalize(qx / largest, qy / largest, qz / largest, qw / largest)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def exponential(x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Unit quaternion xyzw of the rotation by |v| [rad] about v = (x, y, z); accurate for small angles, too."""
     angle = norm(x, y, z)
@@ -112,7 +112,7 @@ def exponential(x: float, y: float, z: float) -> tuple[float, float, float, floa
     return x * factor, y * factor, z * factor, cosine
 
 
-@njit()
+@njit(error_model="numpy", allocates=False)
 def matrix_elements(x: float, y: float, z: float, w: float) -> tuple[float, ...]:
     """The rotation matrix, body to world, of a unit quaternion: nine numbers row by row."""
     return (

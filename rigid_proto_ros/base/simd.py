@@ -14,14 +14,17 @@ from fractions import Fraction
 from typing import Any, TypeVar
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import models, overload, register_model
 
-from .compilation import INTERPRETED, Emitted, intrinsic, njit
+from .compilation import COMPILED, Emitted, intrinsic, njit
 from .vectors import FloatArray
 
-_DOUBLE, _NUMBER, _BITS = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
+if COMPILED:
+    from llvmlite import ir
+    from numba import types
+    from numba.extending import models, overload, register_model
+
+    _DOUBLE, _NUMBER, _BITS = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
+
 LINE = 8
 """Doubles in a cache line."""
 Packed = Any
@@ -29,19 +32,20 @@ Packed = Any
 _Plain = TypeVar("_Plain")
 
 
-class Doubles(types.Type):
-    """A vector of ``count`` doubles."""
+if COMPILED:
 
-    def __init__(self, count: int) -> None:
-        self.count = count
-        super().__init__(name=f"Doubles({count})")
+    class Doubles(types.Type):
+        """A vector of ``count`` doubles."""
 
+        def __init__(self, count: int) -> None:
+            self.count = count
+            super().__init__(name=f"Doubles({count})")
 
-@register_model(Doubles)
-class _DoublesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        initialize: Any = super().__init__
-        initialize(manager, kind, ir.VectorType(_DOUBLE, kind.count))
+    @register_model(Doubles)
+    class _DoublesModel(models.PrimitiveModel):
+        def __init__(self, manager: Any, kind: Any) -> None:
+            initialize: Any = super().__init__
+            initialize(manager, kind, ir.VectorType(_DOUBLE, kind.count))
 
 
 def aligned(count: int, before: int = 0) -> FloatArray:
@@ -54,8 +58,8 @@ def aligned(count: int, before: int = 0) -> FloatArray:
 
 
 def _operation_on_vectors(plain: Callable[..., _Plain], **options: bool) -> Callable[[Any], Callable[..., _Plain]]:
-    """Decorator of an intrinsic; if kernels are interpreted, vectors are arrays and ``plain`` is used instead."""
-    if INTERPRETED:
+    """Decorator of an intrinsic; where numba doesn't compile, vectors are arrays and ``plain`` is used."""
+    if not COMPILED:
         return lambda _: plain
     of_types: Callable[[Any], Callable[..., _Plain]] = intrinsic(**options) if options else intrinsic
     return of_types
@@ -241,18 +245,18 @@ def _operation(name: str) -> Callable[..., Any]:
     return typed
 
 
-overload(operator.add)(_operation("fadd"))
-overload(operator.sub)(_operation("fsub"))
-overload(operator.mul)(_operation("fmul"))
-overload(operator.truediv)(_operation("fdiv"))
+if COMPILED:
+    overload(operator.add)(_operation("fadd"))
+    overload(operator.sub)(_operation("fsub"))
+    overload(operator.mul)(_operation("fmul"))
+    overload(operator.truediv)(_operation("fdiv"))
 
+    @overload(operator.neg)
+    def _negated(vector: Any) -> Any:
+        def implementation(vector: Any) -> Any:
+            return -1.0 * vector
 
-@overload(operator.neg)
-def _negated(vector: Any) -> Any:
-    def implementation(vector: Any) -> Any:
-        return -1.0 * vector
-
-    return implementation if isinstance(vector, Doubles) else None
+        return implementation if isinstance(vector, Doubles) else None
 
 
 def _fused_exactly(a: Any, b: Any, c: Any) -> Any:

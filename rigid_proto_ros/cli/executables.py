@@ -16,7 +16,7 @@ import sys
 
 from ..base import interrupts
 
-NUMERICS = {"numba": "numba", "numpy": "numpy", "yaml": "PyYAML"}
+NUMERICS = {"numpy": "numpy", "yaml": "PyYAML"}
 """Packages without which nothing runs, by the names that they are imported by."""
 
 

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     last_ns = max((command.stamp_ns for command in script), default=0)
     scenario = read_scene(args.name, None, lambda text: print(f"rigid_proto lesson: {text}", file=sys.stderr))
     setup = scenario.setup
-    falls = setup.gravity.any() and not setup.string.attached
+    falls = setup.gravity.any() and not setup.scene.string_attached
     duration_ns = max(nanoseconds(fall_s(setup) if falls else shown.duration_s), last_ns + nanoseconds(1.0))
     if args.duration is not None:
         duration_ns = nanoseconds(args.duration)

@@ -73,11 +73,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
-    """Run the command, with a message if kernels have to be compiled first."""
-    from ..base.compilation import notify_when_compiling
-
-    text = f"rigid_proto {args.command}: compiling kernels, at the first start only; a minute or two if all are missing"
-    with notify_when_compiling(lambda: print(text, file=sys.stderr, flush=True)):
-        status = int(args.run(args))
+    """Run the command."""
+    status = int(args.run(args))
     print(end="", flush=True)  # inside _run, so that an output that can't be written is reported like any file
     return status

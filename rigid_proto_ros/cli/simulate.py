@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
         record.end_ns = flight.simulation.time_ns
         write_exports(args, record, source_of_scene(scenario, script), _warn if args.json else print)
     if floor := flight.simulation.accuracy_floor:
-        _warn(f"accuracy {flight.simulation.setup.accuracy:g} is not held throughout: {floor}")
+        _warn(f"accuracy {flight.simulation.setup.scene.accuracy:g} is not held throughout: {floor}")
     if flight.simulation.failure:
         _warn(f"stopped in the last good state: {flight.simulation.failure}")
         return 1

@@ -48,15 +48,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _whole(study: Study, args: argparse.Namespace) -> int:
-    from ..base.compilation import notify_when_compiling
     from ..sweep.table import SweepInterrupted, run_study
 
     file = Path(args.output or Path(study.name).stem + ".parquet")
     if file.suffix != ".parquet":
         raise InputError("--output", str(file), "a file that ends in .parquet")
     try:
-        with notify_when_compiling(lambda: _print("kernels are being compiled, which takes a while the first time")):
-            metadata = run_study(study, file)
+        metadata = run_study(study, file)
     except SweepInterrupted as stopped:
         if stopped.rows_done:
             _print(f"{stopped.rows_done} of {study.rows} rows are in {file}")

@@ -198,7 +198,7 @@ def _impulses_of(history: ms.LoadHistory, begin_ns: int, seconds: FloatArray, at
         np.where(in_body, rot.turned(turns, vectors), vectors)
         for vectors in (rows[:, ld.FORCE : ld.FORCE + 3], rows[:, ld.TORQUE : ld.TORQUE + 3])
     )
-    has_point = rows[:, ld.HAS_POINT] != 0.0
+    has_point = rows[:, ld.PLACE] != ld.AT_COM
     arm = np.where(has_point[:, None], rot.turned(turns, rows[:, ld.POINT : ld.POINT + 3]), 0.0)
     return Impulses(middles, length * force, length * (torque + rot.cross(arm, force)), ~has_point, turns)
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from ..base.errors import CommandRefused, InputError
 from ..base.vectors import FloatArray, vector
-from ..motion.loads import Load, resolve_load
+from ..motion.loads import Load, load_of_bytes
 from ..scene.command_codec import frame_names, of_event
 from ..scene.scenario import Scenario
 from ..session.recorded_session import RecordedSession, decode_event, session_scenario
 from ..simulation.commands import NO_SLOT, ClearWrench, WrenchCommand
-from ..simulation.setup import Setup
+from ..simulation.setup import Setup, check_command
 from .measurements import ATTITUDE, POSITION, LoadHistory, MeasuredFlight, Series, load_history
 
 
@@ -26,11 +26,11 @@ def session_flight(
     """
     scenario = session_scenario(session)
     setup = scenario.setup
-    if setup.string.attached:
+    if setup.scene.string_attached:
         raise InputError(
             "session", f"{name} has a string tied to the body from its start; only wrenches and pokes are supported"
         )
-    if not setup.gyroscopic:
+    if not setup.scene.gyroscopic:
         raise InputError(
             "session", f"{name} was simulated with gyroscopic: false, which isn't the motion of a rigid body"
         )
@@ -42,7 +42,7 @@ def session_flight(
     if not series:
         raise InputError("--from", first_s, f"a time within {name}, which ends at {1e-9 * session.end_ns:g} s")
     x, y, z = (float(value) for value in setup.gravity)
-    damping = float(setup.linear_damping), float(setup.angular_damping)
+    damping = float(setup.scene.linear_damping), float(setup.scene.angular_damping)
     return MeasuredFlight(name, tuple(series), loads, (x, y, z), *damping, gravity_from="from the scene"), scenario
 
 
@@ -96,7 +96,8 @@ def _load_history(
         for one in acting:
             if one.slot == command.slot != NO_SLOT:
                 one.end_ns = min(one.end_ns, time_ns)
-        usual = setup.wrench_timeout_ns or end_ns if command.held else setup.poke_duration_ns
+        flight = setup.flight
+        usual = int(flight.timeout_ns or end_ns if command.held else flight.poke_ns)
         lasts = command.duration_ns if command.duration_ns >= 0 else usual
         acting.append(_Acting(time_ns, min(time_ns + lasts, end_ns), load, command.slot))
     pushes = [(one.begin_ns, one.end_ns, one.load) for one in acting if one.end_ns > one.begin_ns]
@@ -109,9 +110,7 @@ def _tracked(command: WrenchCommand, setup: Setup, name: str, time_ns: int) -> F
         where = f"at {1e-9 * time_ns:g} s {name} has a poke along a ray"
         raise InputError("session", f"{where}: the point it hit isn't in the log; end before it with --to")
     try:
-        load = resolve_load(
-            command.frame, command.force, command.torque, setup.body, setup.surface, dict(setup.contacts), None
-        )
+        load = load_of_bytes(check_command(command, setup))
     except CommandRefused as refusal:
         raise InputError("session", f"{name} has a command that the simulation refuses: {refusal}") from None
     point = None if load.mesh_point is None else vector(load.arm(setup.body))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.vectors import FloatArray, IntArray, Points, Records
+from ..mass.tensor import six_from_tensor
 from . import measurements as ms
 from . import rotations as rot
 from . import trajectories as tr
@@ -101,18 +102,24 @@ def moved_starts(starts: FloatArray, changes: FloatArray) -> FloatArray:
     return moved
 
 
-def flown_rows(starts: FloatArray, values: Sequence[Values]) -> Records:
-    """Bodies for ``trajectories.fly_rows`` (n,): starts (n, 13) of the tracked frame as those of the centre of mass."""
-    rows = np.zeros(len(values), tr.FLOWN)
+def flown_rows(starts: FloatArray, values: Sequence[Values]) -> tuple[Records, FloatArray]:
+    """Scenes for ``trajectories.fly_rows`` (n,), and starts (n, 13) of the tracked frame as those of the centre of
+    mass.
+    """
+    rows = tr.blank_scenes(len(values))
     for row, v in zip(rows, values, strict=True):
-        row["mass"], row["center_of_mass"] = v.mass, v.center_of_mass
-        row["inertia"], row["gravity"] = v.inertia, v.gravity
+        row["explicit_inertia_mass"], row["explicit_inertia_center_of_mass"] = v.mass, v.center_of_mass
+        row["explicit_inertia_tensor"], row["gravity"] = six_from_tensor(v.inertia), v.gravity
         row["linear_damping"], row["angular_damping"] = v.damping
-    com, q, w, moved = rows["center_of_mass"], starts[:, 3:7], starts[:, 10:STATE], rows["start"]
-    moved[:] = starts[:, :STATE]
+    com, q, w, moved = (
+        rows["explicit_inertia_center_of_mass"],
+        starts[:, 3:7],
+        starts[:, 10:STATE],
+        starts[:, :STATE].copy(),
+    )
     moved[:, :3] += rot.turned(q, com)
     moved[:, 7:10] += rot.turned(q, rot.cross(w, com))
-    return rows
+    return rows, moved
 
 
 COM, PLACE, GYRO_BIAS, ACCEL_BIAS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
@@ -154,7 +161,7 @@ def segment_residuals(segment: Segment, start: FloatArray, values: Values) -> li
     """Measured minus shown of each series (m, 3), in its own unit; None where the flight failed."""
     times, where = _times(segment, values)
     rows = flown_rows(start[None], [segment.flight.own(values)])
-    samples, good = tr.fly_rows(rows, times, segment.wrenches(start, values))
+    samples, good = tr.fly_rows(*rows, times, segment.wrenches(start, values))
     if not good.all():
         return None
     sensor = sensor_numbers(values)
@@ -203,7 +210,7 @@ class Variations:
         self._changes = np.zeros((len(self._flown), START))
         self._changes[1 : 1 + START] = np.diag(start_steps)
 
-    def rows(self, flight: ms.MeasuredFlight, start: FloatArray) -> Records:
+    def rows(self, flight: ms.MeasuredFlight, start: FloatArray) -> tuple[Records, FloatArray]:
         """Variations of a flight from about ``start`` as ``trajectories.fly_rows`` takes them (f,)."""
         starts = moved_starts(np.repeat(start[None, :STATE], len(self._flown), axis=0), self._changes)
         return flown_rows(starts, [flight.own(values) for values in self._flown])
@@ -220,7 +227,7 @@ def linearized(
     values, unknowns = variations.values, variations.unknowns
     extra = len(segment.change_sds_s)
     times, where = _times(segment, values)
-    samples, good = tr.fly_rows(variations.rows(segment.flight, start), times, segment.wrenches(start, values))
+    samples, good = tr.fly_rows(*variations.rows(segment.flight, start), times, segment.wrenches(start, values))
     if not good.all():
         return None
     columns = np.zeros((START + extra + len(unknowns) + 1, 3 * segment.samples))

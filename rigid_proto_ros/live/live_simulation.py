@@ -14,22 +14,17 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
-from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from ..base.errors import CommandRefused, InputError
-from ..motion.frames import parse_frame
-from ..motion.state import State, shift_com
+from ..motion.state import State
 from ..scene.command_codec import frame_names
 from ..scene.parameters import with_mass_of_density
 from ..scene.scenario import Scenario
 from ..scene.scenario_run import notify_start
-from ..simulation.commands import Change, Command, MoveString, WrenchCommand
+from ..simulation.commands import Change, Command
 from ..simulation.observer import Observer, Observers, SceneChanged
-from ..simulation.setup import Setup
-from ..simulation.simulation import Simulation
 from .pacing import Stamps, ask_for_short_slices
 from .simulation_loop import Endpoints, SimulationLoop
 
@@ -98,9 +93,7 @@ class LiveSimulation:
         self.call(announce)
 
     def start(self, on_crash: Callable[[], None] = lambda: None) -> None:
-        """Simulated time begins. on_crash() is called should the thread end by a fault of the program. What isn't
-        compiled by then (``warm_up``) is compiled in flight, which holds the motion up.
-        """
+        """Simulated time begins. on_crash() is called should the thread end by a fault of the program."""
         # What start-up has made stays: the garbage collector going through it again would hold up the motion for 0.1 s.
         gc.freeze()
         with self._handing_over:
@@ -230,7 +223,6 @@ class LiveSimulation:
             self.loop.reset()
 
         self._check_contacts(scenario)
-        self._warm_up_change(scenario)
         self.call(begin)
         self.endpoints.parameters_changed()
 
@@ -250,7 +242,7 @@ class LiveSimulation:
         mass to 0.
         """
         self.give_up_failed_recording()
-        # Loading a mesh and compiling take time that the physics thread hasn't got: this fills the caches before it.
+        # Loading a mesh takes time that the physics thread hasn't got: this fills the cache before it.
         loop = self.loop
         changes = with_mass_of_density(changes)
         present = loop.scenario
@@ -259,7 +251,6 @@ class LiveSimulation:
         except CommandRefused as refusal:
             self.call(partial(loop.simulation.refuse, refusal))
             raise
-        self._warm_up_change(planned)
         if changes.get("record", "") == present.parameters.record:
             changes = {name: value for name, value in changes.items() if name != "record"}
         if not changes:
@@ -295,12 +286,6 @@ class LiveSimulation:
         if finished is not None:
             finished.close()
         self.endpoints.parameters_changed()
-
-    def _warm_up_change(self, planned: Scenario) -> None:
-        """Compile the kernels of another integrator."""
-        if planned.setup.integrator is not self.scenario.setup.integrator:
-            with suppress(CommandRefused):  # what acts when the change is made decides, and that is counted
-                warm_up(planned.setup)
 
     # Observers
 
@@ -377,28 +362,3 @@ class LiveSimulation:
 
         self.call(give_up)
         failed.close()
-
-
-def warm_up(setup: Setup) -> State:
-    """Fly this setup for a moment under a command of each kind that its integrator supports, so that no command waits
-    for kernels that have to be compiled or loaded; returns the last state.
-    """
-    spinning = setup.initial.copy()
-    spinning[10:13] += (0.1, 0.2, 0.3)
-    force = (1e-9 * setup.body.mass, 0.0, 0.0)
-    commands: list[Command] = [MoveString(tuple(setup.initial[:3].tolist()))]
-    for frame in ("world@origin;duration=0.01", "body@origin;duration=0.01", "world@origin;impulse"):
-        commands.append(WrenchCommand(False, parse_frame(frame), force, (0.0, 0.0, 0.0), frame))
-    for command in commands:
-        trial = Simulation(replace(setup, initial=spinning))
-        try:
-            trial.submit(command)
-        except CommandRefused:
-            continue  # an integrator that doesn't support it will refuse it in flight too
-        for until_ns in (1_000_000, 2_000_001):
-            trial.advance(until_ns)
-    # Used by changes in flight that move the COM, by ~/imu and by /diagnostics.
-    shift_com(trial.state.row, 0.0, 0.0, 0.0)
-    trial.specific_force((0.0, 0.0, 0.0))
-    _ = trial.kinetic_energy, trial.angular_momentum
-    return trial.state

@@ -75,7 +75,7 @@ class WorkBudget:
             if self._events != simulation.events.count:
                 # Whatever happened may have changed what a second costs.
                 self._events = simulation.events.count
-                self._slice_ns = min(FIRST_STEPS * simulation.setup.step_ns, FIRST_NS)
+                self._slice_ns = min(FIRST_STEPS * int(simulation.flight.step_ns), FIRST_NS)
             rest_ns = until_ns - simulation.time_ns
             began_ns = time.monotonic_ns()
             if began_ns >= self._end_ns:

@@ -67,10 +67,14 @@ def _loaded(
     return total
 
 
-@exported("f8", MOMENTS, "f8[:]", "f8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", returns="f8")
+@exported(
+    "f8", MOMENTS, MOMENTS, "b1", "f8[:]", "f8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", returns="f8"
+)
 def spread_mass(
     mass: float,
     unit: np.record,
+    placed: np.record,
+    at_solid: bool,
     scale: Vector3,
     left: Vector3,
     points: FloatArray,
@@ -82,21 +86,26 @@ def spread_mass(
     """Total mass [kg] of a mass [kg] distributed over a mesh, and ballast; fills COM (3,), inertia (3, 3), its
     principal moments (3,) and axes (3, 3).
 
-    unit: MOMENTS at unit density. scale (3,) of the mesh; left (3,): the part of it that the moments don't include yet.
-    points (k, 4): ballast, masses [kg] and mesh coordinates.
+    unit: MOMENTS at unit density; placed: MOMENTS whose centre is taken: ``unit`` itself or, ``at_solid``, those of the
+    solid at no scale. scale (3,) of the mesh; left (3,): the part of it that ``unit`` doesn't include yet. points (k,
+    4): ballast, masses [kg] and mesh coordinates.
     """
     place, base, reference, second = local_numbers(3), local_numbers(3), local_numbers(3), local_matrix(3, 3)
+    low = local_numbers(3)
     slot, per_measure = 0, mass / unit.measure
     for i in range(3):
-        reference[i] = unit.reference[i] * (left[i] / scale[i])
-        base[i] = left[i] * unit.reference[i] + 0.0  # no -0
-        place[i] = left[i] * unit.center[i]
+        stretch = scale[i] / left[i] if at_solid else 1.0
+        at = stretch * placed.reference[i]
+        reference[i] = at * (left[i] / scale[i])
+        base[i] = left[i] * at + 0.0  # no -0
+        place[i] = left[i] * (stretch * placed.center[i])
+        low[i] = stretch * placed.center_low[i]
         for j in range(i, 3):
             second[i, j] = second[j, i] = unit.second[slot] * (left[i] * left[j]) * per_measure
             slot += 1
     total = _loaded(mass, place, second, scale, reference, points, com, inertia)
     for i in range(3):
-        with_rest = base[i] + (place[i] + left[i] * unit.center_low[i])
+        with_rest = base[i] + (place[i] + left[i] * low[i])
         com[i] = base[i] + com[i] if points.shape[0] else with_rest
     principal_axes_kernel(inertia, moments, axes)
     return total

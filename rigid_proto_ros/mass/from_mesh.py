@@ -19,7 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.compilation import INTERPRETED, source_stamp, user_cache
+from ..base.cache import source_stamp, user_cache
+from ..base.compilation import INTERPRETED
 from ..base.errors import InputError
 from ..base.files import whole_file
 from ..base.vectors import Points, Triangles

@@ -24,7 +24,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arithmetic import fast_two_sum, pair_add, pair_divide, pair_multiply, two_product, two_sum
+from ..base.arithmetic import (
+    exponent_of,
+    fast_two_sum,
+    pair_add,
+    pair_divide,
+    pair_multiply,
+    scaled,
+    two_product,
+    two_sum,
+)
 from ..base.compilation import exported, local_matrix, local_numbers, matrix_of, njit, record_type
 from ..base.errors import MeshError
 from ..base.simd import Packed, filled, fused_multiply_add, load, number, store
@@ -202,7 +211,7 @@ def _exact_reference(lower: Vector3, upper: Vector3, reference: Vector3) -> tupl
         is_point = is_point and low == high
     if is_point:
         return 0.0, 0.0
-    return math.ldexp(1.0, -math.frexp(size)[1]), size
+    return scaled(1.0, -exponent_of(size)), size
 
 
 @njit(error_model="numpy", allocates=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -141,19 +141,17 @@ class MeshMoments:
         own = self.body_mass(scale=s, mass=mass, density=density)
         # A shell's moments include the stretch: the uniform part and the mirroring are left.
         left = np.copysign(abs(s[0]), s) if model in STRETCHED else s
-        if com == "solid":
-            solid, rest = self.moments("solid"), s / left
-            reference, center, low = (rest * of for of in (solid.reference, solid.center, solid.center_low))
-            moments = replace(moments, reference=reference, center=center, center_low=low)
-        center_of_mass, inertia, principal, axes = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
-        total = spread_mass(own, moments.record, s, left, points, center_of_mass, inertia, principal, axes)
+        unit, at_solid = moments.record, com == "solid"
+        placed = self.moments("solid").record if at_solid else unit
+        center, inertia, principal, axes = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+        total = spread_mass(own, unit, placed, at_solid, s, left, points, center, inertia, principal, axes)
         warnings = ()
         if not is_plainly_good(principal):
             try:
                 warnings = check_tensor(inertia, source=f"{model} model of {self.name}")
             except TensorError as error:
                 raise TensorError(f"inertia_model {model}", f"{self.name}: {error.received}", error.accepted) from None
-        return MassProperties(total, center_of_mass, inertia, warnings)
+        return MassProperties(total, center, inertia, warnings)
 
 
 def explicit_mass_properties(

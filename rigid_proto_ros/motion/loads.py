@@ -17,15 +17,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.compilation import njit
+from ..base.compilation import local_numbers, njit
 from ..base.errors import CommandRefused
-from ..base.rotation import matrix_elements, transposed_times
-from ..base.vectors import FloatArray, Numbers, StateRow, Vector, Vector3, vector
+from ..base.rotation import matrix_elements
+from ..base.vectors import FloatArray, Points, StateRow, Triangles, Vector, Vector3, vector
 from . import body as of_body
 from .body import MAX_ACCELERATION, Body, BodyRow
 from .frames import Frame, contact_point, point_text
-from .state import State
-from .surface import Surface
+from .state import to_body_axes
+from .surface import inward_normal, ray_hit
 
 # Layout of the sums of loads, a row of LOADS_SIZE doubles.
 FORCE_WORLD = 0  # (3,) [N]
@@ -38,12 +38,31 @@ LOADS_SIZE = 21
 # Layout of one load, a row of LOAD doubles.
 LOAD_AXES = 0
 WORLD_AXES, BODY_AXES, NORMAL_AXES = 0.0, 1.0, 2.0
-HAS_POINT = 1
+PLACE = 1
+AT_COM, AT_POINT, AT_VERTEX, ON_RAY = 0.0, 1.0, 2.0, 3.0
+"""Where a load acts. A vertex, whose number is in POINT, and a ray, whose origin and direction in world axes are in
+POINT and NORMAL, become the point that they lead to when the load is resolved.
+"""
 POINT = 2  # (3,) [mesh coordinates]
 FORCE = 5  # (3,) [N, or N s]
 TORQUE = 8  # (3,) [N m, or N m s]
 NORMAL = 11  # (3,) inward normal of the unscaled mesh
 LOAD = 14
+
+BODY_TORQUE = "a torque"
+WORLD_TORQUE = "a torque fixed in the world or a world force off the centre of mass"
+BODY_FORCE = "a force that turns with the body"
+ANGULAR_DAMPING = "angular damping"
+STRING = "a string"
+NO_GYROSCOPIC_TERM = "gyroscopic: false"
+NEEDS = (BODY_TORQUE, WORLD_TORQUE, BODY_FORCE, ANGULAR_DAMPING, STRING, NO_GYROSCOPIC_TERM)
+"""What a scene may need of its integrator; compiled functions have bits for it, in this order."""
+NEED_BODY_TORQUE, NEED_WORLD_TORQUE, NEED_BODY_FORCE, NEED_ANGULAR_DAMPING, NEED_STRING, NEED_NO_GYROSCOPIC_TERM = (
+    1 << k for k in range(6)
+)
+
+RESOLVED, NO_MESH, NO_VERTEX, NO_MESH_NORMAL, NO_NORMAL, MISSED = range(6)
+"""Whether a load's point was found, or why not."""
 
 _AXES = ("world", "body", "normal")
 _AXES_NUMBERS = {"world": WORLD_AXES, "body": BODY_AXES, "normal": NORMAL_AXES}
@@ -54,7 +73,7 @@ _ORIGIN = (0.0, 0.0, 0.0)
 @njit(error_model="numpy", allocates=False)
 def arm_of(load: FloatArray, body: BodyRow) -> Vector:
     """Vector from the COM to the point of application [m, body axes]: three numbers."""
-    if load[HAS_POINT] == 0.0:
+    if load[PLACE] == AT_COM:
         return 0.0, 0.0, 0.0
     return of_body.arm(body, load[POINT], load[POINT + 1], load[POINT + 2])
 
@@ -82,7 +101,7 @@ def magnitudes(load: FloatArray, body: BodyRow) -> tuple[float, float]:
     """
     force = _bound(load[FORCE], load[FORCE + 1], load[FORCE + 2])
     torque = _bound(load[TORQUE], load[TORQUE + 1], load[TORQUE + 2])
-    if load[HAS_POINT] != 0.0:
+    if load[PLACE] != AT_COM:
         x, y, z = arm_of(load, body)
         torque += _bound(x, y, z) * force
     return force / body[of_body.MASS], torque / body[of_body.MOMENTS]
@@ -102,6 +121,66 @@ def is_zero(load: FloatArray) -> bool:
 
 
 @njit(error_model="numpy", allocates=False)
+def needs_of_load(load: FloatArray) -> int:
+    """What a load needs of the integrator, as bits of NEEDS."""
+    pushes = load[FORCE] != 0.0 or load[FORCE + 1] != 0.0 or load[FORCE + 2] != 0.0
+    turns = load[TORQUE] != 0.0 or load[TORQUE + 1] != 0.0 or load[TORQUE + 2] != 0.0
+    turns = turns or (load[PLACE] != AT_COM and pushes)
+    if load[LOAD_AXES] == WORLD_AXES:
+        return NEED_WORLD_TORQUE if turns else 0
+    return (NEED_BODY_TORQUE if turns else 0) | (NEED_BODY_FORCE if pushes else 0)
+
+
+@njit(error_model="numpy", allocates=False)
+def resolve_load(
+    load: FloatArray, body: BodyRow, row: StateRow, vertices: Points, triangles: Triangles, extent: Vector3
+) -> int:
+    """Resolve a load (LOAD,) on a body in a state (13,): a vertex or a ray to the point that it leads to on the
+    surface, of this extent (3,), and the normal there if it pushes along it. Returns RESOLVED, or why there is no such
+    point.
+    """
+    has_mesh = triangles.shape[0] > 0
+    if load[PLACE] == AT_VERTEX:
+        number = int(load[POINT])
+        if not has_mesh:
+            return NO_MESH
+        if number >= vertices.shape[0]:
+            return NO_VERTEX
+        for k in range(3):
+            load[POINT + k] = vertices[number, k]
+        load[PLACE] = AT_POINT
+    elif load[PLACE] == ON_RAY:
+        if not has_mesh:
+            return NO_MESH
+        if not _hit(load, body, row, vertices, triangles):
+            return MISSED
+    if load[LOAD_AXES] != NORMAL_AXES:
+        return RESOLVED
+    if not has_mesh:
+        return NO_MESH_NORMAL
+    found = inward_normal(vertices, triangles, load[POINT : POINT + 3], extent, load[NORMAL : NORMAL + 3])
+    return RESOLVED if found else NO_NORMAL
+
+
+@njit(error_model="numpy", allocates=False)
+def _hit(load: FloatArray, body: BodyRow, row: StateRow, vertices: Points, triangles: Triangles) -> bool:
+    """Replace a ray by the first point where it meets the surface; False for a miss."""
+    c, s = of_body.COM, of_body.BODY_SCALE
+    x, y, z = load[NORMAL], load[NORMAL + 1], load[NORMAL + 2]
+    longest = max(abs(x), abs(y), abs(z))
+    x, y, z = to_body_axes(row, x / longest, y / longest, z / longest)
+    ox, oy, oz = to_body_axes(row, load[POINT] - row[0], load[POINT + 1] - row[1], load[POINT + 2] - row[2])
+    origin, direction = local_numbers(3), local_numbers(3)
+    direction[0], direction[1], direction[2] = x / body[s], y / body[s + 1], z / body[s + 2]
+    origin[0], origin[1] = (ox + body[c]) / body[s], (oy + body[c + 1]) / body[s + 1]
+    origin[2] = (oz + body[c + 2]) / body[s + 2]
+    if not ray_hit(vertices, triangles, origin, direction, load[POINT : POINT + 3]):
+        return False
+    load[PLACE], load[NORMAL], load[NORMAL + 1], load[NORMAL + 2] = AT_POINT, 0.0, 0.0, 0.0
+    return True
+
+
+@njit(error_model="numpy", allocates=False)
 def accumulate_load(load: FloatArray, body: BodyRow, share: FloatArray) -> None:
     """Write the load's contribution to the sums into share (LOADS_SIZE,): forces and torques by axes, and the moment r
     Fᵀ of a world force.
@@ -113,12 +192,12 @@ def accumulate_load(load: FloatArray, body: BodyRow, share: FloatArray) -> None:
         for j in range(3):
             f = load[FORCE + j]
             share[FORCE_WORLD + j] = f
-            if load[HAS_POINT] != 0.0:
+            if load[PLACE] != AT_COM:
                 share[MOMENT + j], share[MOMENT + 3 + j], share[MOMENT + 6 + j] = rx * f, ry * f, rz * f
         share[TORQUE_WORLD], share[TORQUE_WORLD + 1], share[TORQUE_WORLD + 2] = tx, ty, tz
         return
     fx, fy, fz = own_force(load, body)
-    if load[HAS_POINT] != 0.0:
+    if load[PLACE] != AT_COM:
         tx, ty, tz = tx + (ry * fz - rz * fy), ty + (rz * fx - rx * fz), tz + (rx * fy - ry * fx)
     share[FORCE_BODY], share[FORCE_BODY + 1], share[FORCE_BODY + 2] = fx, fy, fz
     share[TORQUE_BODY], share[TORQUE_BODY + 1], share[TORQUE_BODY + 2] = tx, ty, tz
@@ -136,7 +215,7 @@ def apply_impulse(load: FloatArray, body: BodyRow, row: StateRow) -> None:
     else:
         fx, fy, fz = own_force(load, body)
         jx, jy, jz = a * fx + b * fy + c * fz, d * fx + e * fy + f * fz, g * fx + h * fy + i * fz
-    if load[HAS_POINT] != 0.0:
+    if load[PLACE] != AT_COM:
         rx, ry, rz = arm_of(load, body)
         hx, hy, hz = hx + (ry * fz - rz * fy), hy + (rz * fx - rx * fz), hz + (rx * fy - ry * fx)
     if jx != 0.0 or jy != 0.0 or jz != 0.0:
@@ -172,9 +251,8 @@ class Load(NamedTuple):
     def packed(self) -> bytes:
         """The load's row (LOAD,) as bytes."""
         axes, point, force, torque, normal = self
-        return _ROW.pack(
-            _AXES_NUMBERS[axes], point is not None, *(point or _ORIGIN), *force, *torque, *(normal or _ORIGIN)
-        )
+        place = AT_COM if point is None else AT_POINT
+        return _ROW.pack(_AXES_NUMBERS[axes], place, *(point or _ORIGIN), *force, *torque, *(normal or _ORIGIN))
 
     @property
     def row(self) -> FloatArray:
@@ -196,107 +274,49 @@ class Load(NamedTuple):
         """The force (3,), in body axes, of a load whose axes rotate with the body."""
         return np.array(own_force(self.row, body.row))
 
-    def check_magnitude(self, body: Body) -> None:
-        """Raises CommandRefused (``magnitude``) when the accelerations would pass MAX_ACCELERATION."""
-        row = self.row
-        if not is_within_magnitude(row, body.row):
-            linear, angular = magnitudes(row, body.row)
-            raise CommandRefused(
-                "magnitude",
-                "wrench",
-                f"{linear:.3g} m/s² and {angular:.3g} rad/s²",
-                f"at most {MAX_ACCELERATION:g} of each for a body of {body.mass:g} kg",
-            )
-
 
 def load_of_bytes(row: bytes) -> Load:
-    """The load whose row has these bytes."""
-    axes, has_point, *numbers = _ROW.unpack(row)
+    """The load whose row, resolved, has these bytes."""
+    axes, place, *numbers = _ROW.unpack(row)
     point, force, torque, normal = (vector(numbers[k : k + 3]) for k in range(0, 12, 3))
     named = _AXES[int(axes)]
-    return Load(named, point if has_point else None, force, torque, normal if named == "normal" else None)
+    return Load(named, None if place == AT_COM else point, force, torque, normal if named == "normal" else None)
 
 
-def light_row(frame: Frame, force: Numbers, torque: Numbers, body: Body, contacts: Mapping[str, Vector]) -> bytes:
-    """Fast path for most loads: the row of a load in world or body axes, at the COM, a contact or a given point, that
-    is far below the magnitude limit. Empty for any other load, which ``resolve_load`` resolves or refuses.
+def load_bytes(frame: Frame, force: Vector, torque: Vector, contacts: Mapping[str, Vector]) -> bytes:
+    """The row of a wrench in a frame, as bytes; a vertex, a ray and a normal are still to be resolved. Raises
+    CommandRefused (``frame``, ``nonfinite``).
     """
-    word, axes = frame.point[0], frame.axes
-    if word == "com":
-        point = _ORIGIN
-    elif word == "point":
-        point = frame.point[1]
-    elif word == "contact" and frame.point[1] in contacts:
-        point = contacts[frame.point[1]]
-    else:
-        return b""
     fx, fy, fz = force
     tx, ty, tz = torque
-    x, y, z = point
-    amount = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz)
-    # False for numbers that aren't finite.
-    if axes != "normal" and amount * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light:
-        return _ROW.pack(_AXES_NUMBERS[axes], word != "com", x, y, z, fx, fy, fz, tx, ty, tz, *_ORIGIN)
-    return b""
-
-
-def resolve_load(
-    frame: Frame,
-    force: Numbers,
-    torque: Numbers,
-    body: Body | None,
-    surface: Surface | None,
-    contacts: Mapping[str, Vector],
-    state: State | None,
-) -> Load:
-    """Resolve a frame's point on the body in its state; raises CommandRefused (``frame``, ``ray_miss``, ``nonfinite``).
-
-    Without a body and a state a ray stays unresolved: it is checked again when it takes effect.
-    """
-    force, torque = vector(force), vector(torque)
     # The sum of finite numbers may overflow: if it isn't finite, each number is checked.
-    if not math.isfinite(sum(force) + sum(torque)) and not all(map(math.isfinite, (*force, *torque))):
+    if not math.isfinite(fx + fy + fz + tx + ty + tz) and not all(map(math.isfinite, (*force, *torque))):
         raise CommandRefused("nonfinite", "wrench", [*force, *torque], "finite numbers")
-    if frame.axes != "normal":
-        return Load(frame.axes, _mesh_point(frame, body, surface, contacts, state), force, torque)
-    if any(force[1:]) or any(torque):
+    word, axes = frame.point[0], frame.axes
+    if axes == "normal" and (fy or fz or tx or ty or tz):
         raise CommandRefused("frame", "wrench", [*force, *torque], "force.x alone in normal axes")
-    mesh_point = _mesh_point(frame, body, surface, contacts, state)
-    mesh_normal = None
-    if mesh_point is not None:
-        if surface is None:
-            raise CommandRefused("frame", "frame_id", frame.text, "normal axes only on a body with a mesh")
-        normal = surface.inward_normal(mesh_point)
-        if not normal.any():
-            raise CommandRefused("frame", "frame_id", frame.text, "a point where the surface has a normal")
-        mesh_normal = vector(normal)
-    return Load(frame.axes, mesh_point, force, torque, mesh_normal)
-
-
-def _mesh_point(
-    frame: Frame, body: Body | None, surface: Surface | None, contacts: Mapping[str, Vector], state: State | None
-) -> Vector | None:
-    word, *values = frame.point
+    place, x, y, z, normal = AT_POINT, 0.0, 0.0, 0.0, _ORIGIN
     if word == "com":
-        return None
-    if word == "origin":
-        return (0.0, 0.0, 0.0)
-    if word == "contact":
-        return contact_point(values[0], contacts)
-    if word == "point":
-        return vector(values[0])
-    if surface is None:
-        raise CommandRefused("frame", "frame_id", frame.text, "this point only on a body with a mesh")
-    if word == "vertex":
-        if values[0] >= len(surface.vertices):
-            raise CommandRefused("frame", "frame_id", frame.text, f"vertex/0 to vertex/{len(surface.vertices) - 1}")
-        return vector(surface.vertices[values[0]])
-    if state is None or body is None:
-        return None
-    R = state.rotation
-    origin = body.mesh_point(transposed_times(R, np.asarray(values[0]) - state.position))
-    direction = transposed_times(R, np.asarray(values[1]) / np.abs(values[1]).max()) / body.scale
-    hit = surface.ray_hit(origin, direction)
-    if hit is None:
-        raise CommandRefused("ray_miss", "frame_id", frame.text, "a ray that meets the body")
-    return vector(hit)
+        place = AT_COM
+    elif word == "point":
+        x, y, z = frame.point[1]
+    elif word == "contact":
+        x, y, z = contact_point(frame.point[1], contacts)
+    elif word == "vertex":
+        place, x = AT_VERTEX, frame.point[1]
+    elif word == "ray":
+        place, (x, y, z), normal = ON_RAY, frame.point[1], frame.point[2]
+    return _ROW.pack(_AXES_NUMBERS[axes], place, x, y, z, fx, fy, fz, tx, ty, tz, *normal)
+
+
+def unresolved(code: int, frame: Frame, vertices: int) -> CommandRefused:
+    """The error that says why the point of a frame wasn't found (``resolve_load``) on a mesh of so many vertices."""
+    if code == MISSED:
+        return CommandRefused("ray_miss", "frame_id", frame.text, "a ray that meets the body")
+    accepted = {
+        NO_MESH: "this point only on a body with a mesh",
+        NO_VERTEX: f"vertex/0 to vertex/{vertices - 1}",
+        NO_MESH_NORMAL: "normal axes only on a body with a mesh",
+        NO_NORMAL: "a point where the surface has a normal",
+    }
+    return CommandRefused("frame", "frame_id", frame.text, accepted[code])

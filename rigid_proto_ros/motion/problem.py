@@ -24,51 +24,18 @@ displacement and velocity, and what the hand has worked and the string's damper 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arithmetic import expm1
-from ..base.compilation import new_record, njit, record_type
+from ..base.compilation import njit, record_type
 from ..base.rotation import multiply, norm, rotate, rotate_inverse
-from ..base.vectors import FloatArray, Quaternion, StateRow, Vector, Vector3
+from ..base.vectors import FloatArray, Quaternion, StateRow, Vector
 from . import body as of_body
 from . import loads as of_loads
 from .body import BodyRow
-from .string import NO_DIRECTION, free_end_at
-
-ENVIRONMENT_FIELDS: list[tuple[Any, ...]] = [
-    ("gravity", np.float64, 3),  # [m/s², world]
-    ("linear_damping", np.float64),  # [N s/m]
-    ("angular_damping", np.float64),  # [N m s]
-]
-"""What acts beside loads and a string, by the names of the parameters that set it."""
-ENVIRONMENT_NEEDS = {"angular_damping": "angular damping"}
-"""What of it, where it isn't zero, asks for an integrator that supports it; the others are closed form for all."""
-ENVIRONMENT = record_type(ENVIRONMENT_FIELDS)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Environment:
-    """The same in Python: gravity (3,) [m/s², world], linear_damping [N s/m], angular_damping [N m s]; and gyroscopic,
-    whether the term ω × Iω is kept.
-    """
-
-    gravity: Vector3
-    linear_damping: float
-    angular_damping: float
-    gyroscopic: bool = True
-
-    @property
-    def environment(self) -> np.record:
-        """As compiled functions read it (ENVIRONMENT)."""
-        record = new_record(ENVIRONMENT)
-        for name, *_ in ENVIRONMENT_FIELDS:
-            record[name] = getattr(self, name)
-        return record
-
+from .string import KNOT, NO_DIRECTION, ORIGIN, PUSHES, REST, TARGET, C, K, free_end_at
 
 PROBLEM = record_type(
     [
@@ -107,18 +74,11 @@ PROBLEM = record_type(
 Variables = NDArray[np.float64]
 """(VARIABLES,): variables y of a segment."""
 
-# Where the numbers of a tied string stand in its row.
-KNOT = 0  # (3,) [mesh coordinates]
-ORIGIN = 3  # (3,) of the free end's way [m, world]
-TARGET = 6  # (3,) [m, world]
-K, C, REST, PUSHES = 9, 10, 11, 12
-STRING = 13
-
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def begin_body(p: np.record, body: BodyRow, environment: np.record, gyroscopic: float) -> None:
     """Fill p, a record of zeros, with what is the same in every segment of a body (BODY,): all but loads, string and
-    start. environment: a record with the fields of ENVIRONMENT, and others.
+    start. environment: a record with gravity (3,) [m/s², world], linear_damping [N s/m] and angular_damping [N m s].
     """
     for k in range(3):
         p.moments[k] = body[of_body.MOMENTS + k]
@@ -235,11 +195,19 @@ HAND_WORK = 13
 HEAT = 14
 VARIABLES = 15
 
+
+@njit(error_model="numpy", allocates=False, forceinline=True)
+def copy_variables(of: Variables, to: Variables) -> None:
+    """Copy the variables of one array to another."""
+    for k in range(VARIABLES):
+        to[k] = of[k]
+
+
 MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def is_good(y: Variables) -> bool:
     """Whether variables y are finite and no runaway."""
     size = 0.0

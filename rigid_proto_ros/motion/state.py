@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.compilation import njit
+from ..base.compilation import exported, njit
 from ..base.rotation import matrix_elements, matrix_from_quaternion, rotate, times, to_unit
 from ..base.vectors import Attitude, FloatArray, Matrix3, Numbers, StateRow, Vector3
 
@@ -108,6 +108,13 @@ def fill_initial_row(
 
 
 @njit(error_model="numpy", allocates=False)
+def to_body_axes(row: StateRow, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Rᵀ v of v = (x, y, z) in world axes."""
+    R = matrix_elements(row[3], row[4], row[5], row[6])
+    return R[0] * x + R[3] * y + R[6] * z, R[1] * x + R[4] * y + R[7] * z, R[2] * x + R[5] * y + R[8] * z
+
+
+@exported("f8[:]", "f8", "f8", "f8")
 def shift_com(row: StateRow, x: float, y: float, z: float) -> None:
     """Change the reference point of a state row (13,) to the one at d = (x, y, z) [m, body axes] from the COM on the
     same moving body: the position changes by R d, the velocity by ω × R d.
@@ -120,7 +127,7 @@ def shift_com(row: StateRow, x: float, y: float, z: float) -> None:
     row[7], row[8], row[9] = row[7] + (b * z - c * y), row[8] + (c * x - a * z), row[9] + (a * y - b * x)
 
 
-@njit(error_model="numpy", allocates=False)
+@exported("f8[:]", "f8", "f8[:]", returns="f8")
 def kinetic_energy(row: FloatArray, mass: float, inertia: FloatArray) -> float:
     """½ m|v|² + ½ ωᵀIω [J] of a state row (≥ 13,); inertia (9,) row by row."""
     x, y, z = row[10], row[11], row[12]
@@ -132,7 +139,7 @@ def kinetic_energy(row: FloatArray, mass: float, inertia: FloatArray) -> float:
     return float(0.5 * mass * (row[7] * row[7] + row[8] * row[8] + row[9] * row[9]) + 0.5 * turning)
 
 
-@njit(error_model="numpy", allocates=False)
+@exported("f8[:]", "f8[:]", returns="f8 f8 f8")
 def angular_momentum(row: FloatArray, inertia: FloatArray) -> tuple[float, float, float]:
     """L = R I ω about the COM, world axes [N m s], of a state row (≥ 13,); inertia (9,) row by row."""
     x, y, z = row[10], row[11], row[12]

@@ -14,15 +14,22 @@ or the string changes, and constant in between: c = 2ζ√(k m_eff), and k = m_e
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.compilation import njit
 from ..base.rotation import matrix_elements, norm
-from ..base.vectors import FloatArray, Numbers, StateRow, Vector, Vector3, vector
+from ..base.vectors import FloatArray, StateRow, Vector, Vector3, vector
 from .body import MASS, Body, BodyRow, angular_acceleration
 from .state import State
+
+# Where the numbers of a tied string stand in its row.
+KNOT = 0  # (3,) [mesh coordinates]
+ORIGIN = 3  # (3,) of the free end's way [m, world]
+TARGET = 6  # (3,) [m, world]
+K, C, REST, PUSHES = 9, 10, 11, 12
+STRING = 13
 
 RAMP_NS = 100_000_000
 """Longest time [ns] in which the free end moves to a new target: a hand in steady motion sends targets at 10 Hz or
@@ -130,50 +137,29 @@ def energy_of(span: Vector, stiffness: float, rest_length: float, bilateral: boo
 
 
 @dataclass(frozen=True)
-class StringSettings:
-    """Parameters of the string.
-
-    attached: tied from the start, at ``attach`` (mesh coordinates) to ``target`` [m, world], without timeout. stiffness
-    [N/m]; frequency [rad/s], overrides it if > 0; rest_length [m]; timeout_ns after the last target, 0 never.
-    """
-
-    attached: bool = False
-    attach: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    stiffness: float = 50.0
-    frequency: float = 0.0
-    damping_ratio: float = 0.1
-    rest_length: float = 0.0
-    bilateral: bool = False
-    timeout_ns: int = 1_000_000_000
-
-
-@dataclass(frozen=True)
 class StringState:
     """A tied string. attach: the knot in mesh coordinates. The free end moves at constant velocity from ``origin`` at
     begin_ns to ``target`` at end_ns [m, world] and stays there. last_target_ns: time of the last target; release_ns:
-    time of release, or None. effective_mass [kg], stiffness [N/m], damping [N s/m], frequency ω_s = √(k/m_eff) [rad/s].
+    time of release, or None. effective_mass [kg], stiffness [N/m], damping [N s/m].
     """
 
-    attach: tuple[float, float, float]
+    attach: Vector
     origin: Vector3
     target: Vector3
     begin_ns: int
     end_ns: int
     last_target_ns: int
     release_ns: int | None
-    effective_mass: float = 0.0
-    stiffness: float = 0.0
-    damping: float = 0.0
-    frequency: float = 0.0
-    rest_length: float = 0.0
-    bilateral: bool = False
+    effective_mass: float
+    stiffness: float
+    damping: float
+    rest_length: float
+    bilateral: bool
 
     @property
-    def row(self) -> FloatArray:
-        """The string as compiled functions read it (STRING,), see motion/problem.py."""
-        numbers = (self.stiffness, self.damping, self.rest_length, float(self.bilateral))
-        return np.array([*self.attach, *self.origin, *self.target, *numbers])
+    def frequency(self) -> float:
+        """ω_s = √(k/m_eff) [rad/s]."""
+        return math.sqrt(self.stiffness / self.effective_mass)
 
     def arm(self, body: Body) -> Vector3:
         """Vector from the COM to the knot (3,) [m, body axes]."""
@@ -181,65 +167,31 @@ class StringState:
 
     def free_end(self, time_ns: int) -> Vector3:
         """Position of the free end (3,) [m, world]."""
-        return np.array(free_end_at(time_ns, self.origin, self.target, self.begin_ns, self.end_ns)[0])
-
-    def _span(self, body: Body, state: State) -> Vector:
-        rx, ry, rz = self.arm(body)
-        ex, ey, ez = self.free_end(state.time_ns)
-        return span_of(rx, ry, rz, state.row, ex, ey, ez)
+        origin, target = self.origin.tolist(), self.target.tolist()
+        return np.array(free_end_at(time_ns, origin, target, self.begin_ns, self.end_ns)[0])
 
     def potential_energy(self, body: Body, state: State) -> float:
         """½ k x² [J]; 0 while a pull-only string is slack."""
-        return energy_of(self._span(body, state), self.stiffness, self.rest_length, self.bilateral)
-
-    def moved(self, target: Numbers, time_ns: int, timeout_ns: int) -> StringState:
-        """Move the free end to a new target, in the time since the last target but at most RAMP_NS."""
-        ramp_ns = min(time_ns - self.last_target_ns, RAMP_NS)
-        return replace(
-            self,
-            origin=self.free_end(time_ns),
-            target=np.asarray(target, dtype=float),
-            begin_ns=time_ns,
-            end_ns=time_ns + ramp_ns,
-            last_target_ns=time_ns,
-            release_ns=time_ns + timeout_ns if timeout_ns else None,
-        )
-
-    def with_spring(self, settings: StringSettings, body: Body, state: State, mass: float = 0.0) -> StringState:
-        """A copy with stiffness and damping computed from the settings and ``mass`` [kg] or, if that is 0, from the
-        current effective mass of the body.
-        """
-        if not mass:
-            rx, ry, rz = self.arm(body)
-            mass = effective_mass(body.row, rx, ry, rz, state.row, self._span(body, state), settings.rest_length)
-        stiffness, damping = spring_of(
-            mass, float(settings.stiffness), float(settings.frequency), float(settings.damping_ratio)
-        )
-        return replace(
-            self,
-            effective_mass=mass,
-            stiffness=stiffness,
-            damping=damping,
-            frequency=math.sqrt(stiffness / mass),
-            rest_length=settings.rest_length,
-            bilateral=settings.bilateral,
-        )
+        x, y, z = self.arm(body).tolist()
+        ex, ey, ez = self.free_end(state.time_ns).tolist()
+        span = span_of(x, y, z, state.row, ex, ey, ez)
+        return energy_of(span, self.stiffness, self.rest_length, self.bilateral)
 
 
-def tie(
-    settings: StringSettings,
-    attach: Numbers,
-    target: Numbers,
-    body: Body,
-    state: State,
-    timeout_ns: int,
-    mass: float = 0.0,
-) -> StringState:
-    """Tie the string at ``attach`` (mesh coordinates) with its free end at ``target`` [m, world] at once.
-
-    timeout_ns: 0 for no release. mass: see ``with_spring``.
-    """
-    now_ns, point = state.time_ns, np.asarray(target, dtype=float)
-    release_ns = now_ns + timeout_ns if timeout_ns else None
-    tied = StringState(vector(attach), point, point, now_ns, now_ns, now_ns, release_ns)
-    return tied.with_spring(settings, body, state, mass)
+def string_of(flight: np.record, never_ns: int) -> StringState:
+    """The tied string of a flight (simulation/flight.py), in which it isn't released at never_ns."""
+    numbers, release_ns = flight.string.tolist(), int(flight.string_release_ns)
+    return StringState(
+        vector(numbers[KNOT : KNOT + 3]),
+        np.array(numbers[ORIGIN : ORIGIN + 3]),
+        np.array(numbers[TARGET : TARGET + 3]),
+        int(flight.string_begin_ns),
+        int(flight.string_end_ns),
+        int(flight.string_last_ns),
+        None if release_ns == never_ns else release_ns,
+        float(flight.string_mass),
+        numbers[K],
+        numbers[C],
+        numbers[REST],
+        numbers[PUSHES] != 0.0,
+    )

@@ -182,7 +182,7 @@ class RerunObserver(WritingObserver):
             ghost=picture.ghost is not None,
             falls=bool(np.any(setup.gravity)) and not tied,
             tied=tied,
-            dropped_term=not setup.gyroscopic,
+            dropped_term=not setup.scene.gyroscopic,
         )
         stream.send_layout(blueprint(subject, finished))
 
@@ -239,7 +239,7 @@ class RerunObserver(WritingObserver):
         """Move the frames of a body whose COM moves within its mesh: the mesh stays where it is, as it does in flight,
         also until the next state.
         """
-        if kind not in self._rows or before is None or after is None or before.geometry != after.geometry:
+        if kind not in self._rows or before is None or after is None or not after.stays_in_place_of(before):
             return
         row, moved = self._rows[kind], after.body.center_of_mass - before.body.center_of_mass
         if moved.any():

@@ -79,27 +79,24 @@ class NodeProcess(threading.Thread):
             self._request_end()
 
     def _begin(self, given: Mapping[str, object], until_s: float | None) -> None:
-        """Make the node, which may compile for minutes, and let it run. Raises InputError."""
+        """Make the node and let it run. Raises InputError."""
         from rclpy.exceptions import ParameterException
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.qos_overriding_options import InvalidQosOverridesError
 
-        from ..base.compilation import notify_when_compiling
-        from ..live.live_simulation import warm_up
         from ..simulation.commands import nanoseconds
         from .arguments import begin_ros
         from .node import RigidBodyNode
 
         begin_ros(self._argv)
-        with notify_when_compiling(lambda: _tell("compiling kernels, at the first start only; a minute or two ...")):
-            try:
-                node = self._node = RigidBodyNode(given, self._make_viewer)
-            except (ParameterException, InvalidQosOverridesError, RuntimeError) as error:
-                # rclpy's own parameters: its text says which, and what is accepted.
-                if isinstance(error, RuntimeError) and "QoS override" not in str(error):
-                    raise
-                raise InputError("ROS arguments", " ".join(str(error).split())) from None
-            node.states.pack_all(warm_up(node.live.scenario.setup))
+        try:
+            node = self._node = RigidBodyNode(given, self._make_viewer)
+        except (ParameterException, InvalidQosOverridesError, RuntimeError) as error:
+            # rclpy's own parameters: its text says which, and what is accepted.
+            if isinstance(error, RuntimeError) and "QoS override" not in str(error):
+                raise
+            raise InputError("ROS arguments", " ".join(str(error).split())) from None
+        node.states.pack_all(node.live.loop.simulation.state)
         self._close_page = open_page(node)
         node.live.announce()
         if until_s is not None:

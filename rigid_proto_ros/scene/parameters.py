@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.errors import CommandRefused, InputError, did_you_mean
 from ..mass import INERTIA_MODELS, MODEL_COMS
-from ..motion import INTEGRATOR_FILES
+from ..motion import INTEGRATOR_NAMES
 from ..motion.frames import check_contact_name
 
 LIVE, AT_RESET, READ_ONLY = "live", "at the next reset", "read-only"
@@ -269,7 +269,7 @@ class GhostParameters:
     integrator: str = declare(
         "",
         "Integrator of a ghost that is shown, from time 0 or the next reset on, and gets the same commands.",
-        choices=("", *INTEGRATOR_FILES),
+        choices=("", *INTEGRATOR_NAMES),
     )
 
 
@@ -333,7 +333,7 @@ class Parameters:
     integrator: str = declare(
         "auto",
         "Integrator of the motion; auto selects the cheapest one that meets accuracy.",
-        choices=tuple(INTEGRATOR_FILES),
+        choices=INTEGRATOR_NAMES,
     )
     step: float = declare(
         0.001, "Step of fixed-step integrators, rounded to the nearest nanosecond.", "s", lower=1e-9, upper=1e5

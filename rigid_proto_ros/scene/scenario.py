@@ -11,40 +11,55 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from ..base.arithmetic import exact_quotient
+from ..base.compilation import copy_fields, new_record
 from ..base.errors import CommandRefused, InputError, MeshError
 from ..base.vectors import Vector3
+from ..mass import INERTIA_MODELS, MODEL_COMS
 from ..mass.from_mesh import mesh_body
-from ..mass.properties import MassProperties, MeshMoments, explicit_mass_properties, scale_vector
+from ..mass.moments import STRETCHED
+from ..mass.properties import MeshMoments
 from ..mesh.locate import resolve_mesh
 from ..mesh.reading import Mesh
-from ..motion.body import make_body
-from ..motion.integrators import integrator_named
-from ..motion.problem import ENVIRONMENT_FIELDS
-from ..motion.state import fill_initial_row
-from ..motion.string import StringSettings
+from ..motion.integrators import INTEGRATORS
 from ..motion.surface import Surface
 from ..simulation.commands import nanoseconds
-from ..simulation.setup import Setup, check_start
+from ..simulation.record import MAX_BALLASTS, MESH, SCENE
+from ..simulation.setup import Setup, make_setup
 from ..simulation.thrusters import make_thruster
-from .parameters import READ_ONLY, Parameters, Value, convert_all, parameter_named, with_mass_of_density
+from .parameters import PARAMETERS, READ_ONLY, Parameters, Value, convert_all, parameter_named, with_mass_of_density
 from .scene_file import read_scene_text, scene_file, scene_values
 from .yaml_text import yaml_value
 
 _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class BodyMesh:
-    """A mesh with what is computed from it once: its moments, and its surface wound outward."""
+    """A mesh with what is computed from it once: its moments, its surface wound outward, and its numbers (MESH), of
+    which there are those that a scene has needed so far.
+    """
 
     mesh: Mesh
     moments: MeshMoments
     surface: Surface
+    numbers: np.record
+
+    def provide(self, model: str, scale: Vector3) -> np.record:
+        """The numbers with the moments of a model at this scale (3,); raises MeshError."""
+        moments, numbers = self.moments.moments(model, scale), new_record(MESH)
+        copy_fields(self.numbers, numbers)  # setups keep the present ones
+        copy_fields(moments.record, numbers[model])
+        numbers["known"][INERTIA_MODELS.index(model)] = True
+        if model in STRETCHED:
+            numbers["stretch"] = np.abs(scale) / abs(scale[0])
+        self.numbers = numbers
+        return numbers
 
 
 @dataclass(frozen=True)
@@ -144,7 +159,9 @@ def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh
     body = mesh_body(mesh or parameters.mesh, repair=parameters.mesh_repair, fallback=parameters.mesh_fallback)
     if not body.verdict.usable:
         raise MeshError(f"mesh {parameters.mesh}", body.verdict.reason)
-    return BodyMesh(body.mesh, body.moments, Surface(body.vertices, body.triangles))
+    surface, numbers = Surface(body.vertices, body.triangles), new_record(MESH)
+    numbers["has_surface"], numbers["extent"] = True, surface.extent
+    return BodyMesh(body.mesh, body.moments, surface, numbers)
 
 
 def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
@@ -154,9 +171,8 @@ def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
 
 def build_scenario(parameters: Parameters, body_mesh: BodyMesh | None) -> Scenario:
     """The scenario of parameters whose mesh is loaded already; raises InputError."""
-    setup, warnings = _setup(parameters, body_mesh)
-    check_start(setup)
-    return Scenario(parameters, body_mesh, setup, warnings, _ghost_setup(parameters, body_mesh))
+    setup = _setup(parameters, body_mesh)
+    return Scenario(parameters, body_mesh, setup, setup.warnings, _ghost_setup(parameters, body_mesh))
 
 
 def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | None:
@@ -168,91 +184,69 @@ def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | 
         inertia_model=ghost.inertia_model or parameters.inertia_model,
         integrator=ghost.integrator or parameters.integrator,
     )
-    setup, _ = _setup(own, body_mesh)
-    if ghost.integrator:
-        try:
-            check_start(setup)
-        except CommandRefused as refusal:
-            raise InputError("ghost.integrator", refusal.received, refusal.accepted) from None
-    return setup
+    try:
+        return _setup(own, body_mesh)
+    except CommandRefused as refusal:
+        raise InputError("ghost.integrator", refusal.received, refusal.accepted) from None
 
 
-def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> tuple[Setup, tuple[str, ...]]:
-    scale = scale_vector(list(parameters.scale))
-    properties = _mass_properties(parameters, body_mesh, scale)
-    # Within an ulp of where it is, at a product of mesh coordinate and scale: so it survives being sent back by
-    # message.
-    center_of_mass = [exact_quotient(c, s) * s for c, s in zip(properties.center_of_mass, scale, strict=True)]
-    body = make_body(properties.mass, center_of_mass, properties.inertia, scale)
-    initial, string = parameters.initial, parameters.string
-    row = np.empty(13)
-    position, orientation = np.array(initial.position), np.array(initial.orientation_xyzw)
-    if not fill_initial_row(
-        position, orientation, np.array(initial.linear_velocity), np.array(initial.angular_velocity), row
-    ):
-        accepted = "four finite numbers x, y, z, w, not all zero"
-        raise InputError("initial.orientation_xyzw", list(initial.orientation_xyzw), accepted)
-    if parameters.imu_contact and parameters.imu_contact not in parameters.contacts:
-        known = ", ".join(sorted(parameters.contacts)) or "the body has none"
-        raise InputError("imu_contact", parameters.imu_contact, f"'' for the COM, or a contact ({known})")
-    numbers = {name: getattr(parameters, name) for name, *_ in ENVIRONMENT_FIELDS}
-    environment: dict[str, Any] = {name: np.asarray(n) if isinstance(n, tuple) else n for name, n in numbers.items()}
-    setup = Setup(
-        body=body,
-        inertia_model=parameters.inertia_model,
+def scene_record(parameters: Parameters) -> np.record:
+    """The numbers of parameters (simulation/record.py, SCENE); raises InputError for more ballast than it holds."""
+    scene = new_record(SCENE)
+    for name, value_of in _SCENE_VALUES:
+        scene[name] = value_of(parameters)
+    for name, choices, value_of in _SCENE_CHOICES:
+        scene[name] = choices.index(value_of(parameters))
+    points = [mass for mass in parameters.point_masses if mass[0] > 0.0]
+    if len(points) > MAX_BALLASTS:
+        raise InputError("ballast", f"{len(points)} point masses", f"at most {MAX_BALLASTS} with a mass")
+    scene["ballasts"] = len(points)
+    for place, point in zip(scene.ballast, points, strict=False):
+        place[:] = point
+    return scene
+
+
+_SCENE_CHOICES = [
+    (name, choices, attrgetter(name))
+    for name, choices in {
+        "inertia_model": INERTIA_MODELS,
+        "inertia_model_com": MODEL_COMS,
+        "integrator": tuple(INTEGRATORS),
+    }.items()
+]
+_SCENE_VALUES = [
+    (name, attrgetter(parameter))
+    for parameter in PARAMETERS
+    if (name := parameter.replace(".", "_")) in (SCENE.names or ()) and name not in [c[0] for c in _SCENE_CHOICES]
+]
+"""Fields of a scene's record, and the parameters that they are: those of the same name, with dots as underscores."""
+
+
+def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup:
+    for point in parameters.point_masses:
+        if not point[0] >= 0.0:
+            raise InputError("ballast", point, "mass >= 0 [kg] and x, y, z, all finite")
+    scene = scene_record(parameters)
+    mesh = new_record(MESH) if body_mesh is None else body_mesh.numbers
+    setup = make_setup(
+        scene,
+        mesh,
         surface=body_mesh.surface if body_mesh else None,
-        geometry=(body_mesh.mesh.sha256 if body_mesh else "", *scale.tolist()),
+        mesh_sha256=body_mesh.mesh.sha256 if body_mesh else "",
         contacts=dict(parameters.contacts),
-        gyroscopic=parameters.gyroscopic,
-        **environment,
-        integrator=integrator_named(parameters.integrator),
-        step_ns=nanoseconds(parameters.step),
-        wrench_timeout_ns=_timeout_ns(parameters.wrench_timeout),
-        poke_duration_ns=nanoseconds(parameters.poke_duration),
-        string=StringSettings(
-            attached=string.attached,
-            attach=string.attach,
-            target=string.target,
-            stiffness=string.stiffness,
-            frequency=string.frequency,
-            damping_ratio=string.damping_ratio,
-            rest_length=string.rest_length,
-            bilateral=string.bilateral,
-            timeout_ns=_timeout_ns(string.timeout),
-        ),
-        accuracy=parameters.accuracy,
-        initial=row,
-        initial_string_mass=initial.string_mass,
         thrusters={
             name: make_thruster(
                 name, numbers, parameters.thruster.bidirectional, nanoseconds(parameters.thruster.minimum_on_time)
             )
             for name, numbers in sorted(parameters.thrusters.items())
         },
+        provide=None if body_mesh is None else body_mesh.provide,
+        mesh_name=body_mesh.mesh.name if body_mesh else "",
     )
-    return setup, tuple(properties.warnings)
-
-
-def _timeout_ns(seconds: float) -> int:
-    """0, which means never, for 0 s alone."""
-    return max(1, nanoseconds(seconds)) if seconds else 0
-
-
-def _mass_properties(parameters: Parameters, body_mesh: BodyMesh | None, scale: Vector3) -> MassProperties:
-    ballast = parameters.point_masses
-    if parameters.inertia_model == "explicit":
-        given = parameters.explicit_inertia
-        return explicit_mass_properties(given.mass, given.center_of_mass, given.tensor, ballast=ballast, scale=scale)
-    if body_mesh is None:
-        raise InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
-    return body_mesh.moments.mass_properties(
-        parameters.inertia_model,
-        scale=scale,
-        mass=parameters.mass,
-        density=parameters.density,
-        ballast=ballast,
-        com=parameters.inertia_model_com,
-    )
+    if parameters.imu_contact and parameters.imu_contact not in parameters.contacts:
+        known = ", ".join(sorted(parameters.contacts)) or "the body has none"
+        raise InputError("imu_contact", parameters.imu_contact, f"'' for the COM, or a contact ({known})")
+    return setup
 
 
 def with_inertia(scenario: Scenario, content: Mapping[str, Any]) -> Scenario:

@@ -25,11 +25,11 @@ from ..scene.command_codec import MARKS, of_event
 from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, make_scenario, scene_text
 from ..scene.script import entry_of, script_text
-from ..simulation.commands import HELD_WRENCH, UNNAMED_SLOT, TieString, WrenchCommand, slot_name
+from ..simulation.commands import HELD_WRENCH, TIE_AXES, UNNAMED_SLOT, TieString, WrenchCommand, slot_name
 from ..simulation.flight import NEVER
 from ..simulation.observer import Applied, Event, Logged, Observer
 from ..simulation.simulation import Simulation
-from ..simulation.string_control import mesh_point
+from ..simulation.string_control import mesh_point_of
 from .messages import PROJECTIONS
 from .recorded_session import RecordedSession, Resimulation, decode_event, resimulation
 
@@ -116,7 +116,8 @@ class _Writer(Observer):
         elif isinstance(command, TieString):
             # In mesh coordinates, not yet taken onto the surface: that happens again.
             simulation = self.again.simulation
-            point = mesh_point(command, simulation.setup.body, simulation.state)
+            point = np.zeros(3)
+            mesh_point_of(TIE_AXES.index(command.axes), np.array(command.point), simulation.flight, point)
             command = replace(command, axes="mesh", point=vector(point))
         self.entries.append({"t": time_ns / 1e9, **entry_of(command)})
 
@@ -222,7 +223,7 @@ def _string_entries(simulation: Simulation) -> Iterator[Entry]:
 
 
 def _load_entries(simulation: Simulation) -> Iterator[Entry]:
-    timeout_ns, now_ns = simulation.setup.wrench_timeout_ns, simulation.time_ns
+    timeout_ns, now_ns = int(simulation.flight.timeout_ns), simulation.time_ns
     for acting in simulation.acting:
         endless = acting.kind == HELD_WRENCH and not timeout_ns
         if acting.thruster >= 0 or not (endless or acting.end_ns > now_ns):
@@ -253,7 +254,7 @@ def _thruster_entries(simulation: Simulation) -> Iterator[Entry]:
         return
     ends = [push.off_ns for push in pushes]
     if control.times_out:
-        timeout_ns, thrusters = control.last_ns + simulation.setup.wrench_timeout_ns, control.thrusters.values()
+        timeout_ns, thrusters = control.last_ns + int(simulation.flight.timeout_ns), control.thrusters.values()
         least_ns = [push.on_ns + thruster.minimum_on_ns for push, thruster in zip(pushes, thrusters, strict=True)]
         ends = [min(end_ns, max(timeout_ns, on_ns)) for end_ns, on_ns in zip(ends, least_ns, strict=True)]
     for time_ns in (now_ns, *sorted({end_ns for end_ns in ends if end_ns != NEVER})):

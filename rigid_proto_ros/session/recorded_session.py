@@ -230,7 +230,7 @@ class Resimulation(ScenarioRun):
             if command is None:
                 if acted_ns == time_ns:
                     # Nothing but the end of the motion, in its next step, keeps time where a command has acted.
-                    self.simulation.advance(time_ns + self.simulation.setup.step_ns)
+                    self.simulation.advance(time_ns + int(self.simulation.flight.step_ns))
                 self.simulation.log(kind, content)
                 continue
             acted_ns = time_ns

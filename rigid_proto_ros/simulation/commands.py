@@ -8,24 +8,35 @@ which a program that only sends commands doesn't need.
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..base.errors import CommandRefused, InputError
 from ..base.vectors import Vector
 from ..motion.frames import Frame
 
 if TYPE_CHECKING:
+    from ..motion.surface import Surface
     from .setup import Setup
 
 NO_SLOT, UNNAMED_SLOT = 0, 1
-HELD_WRENCH, PULSE, IMPULSE, CLEAR = range(4)
+HELD_WRENCH, PULSE, IMPULSE, CLEAR, TIE_STRING, MOVE_STRING, RELEASE_STRING, SET_STATE = range(8)
 """Kinds of commands in the tables of a flight."""
+
+TIE_AXES = ("mesh", "body", "world")
+"""Coordinates in which a point to tie the string at is given, in the order of their numbers."""
+
+_ROW = struct.Struct("=14d")
 
 FARTHEST = 1e100
 """Largest coordinate of a point [m], or number of a state; its square still fits a double."""
+
+
+def _point_row(axes: int, point: Sequence[float]) -> bytes:
+    return _ROW.pack(axes, 0.0, *point, *(0.0,) * 9)
 
 
 def nanoseconds(seconds: float) -> int:
@@ -54,6 +65,26 @@ class Stamped:
 
     stamp_ns: int = 0
     entry: int = field(default=0, compare=False)
+
+    @property
+    def duration_ns(self) -> int:
+        """Duration that the command states [ns], or −1."""
+        return -1
+
+    @property
+    def flight_kind(self) -> int:
+        """Kind in the flight's tables."""
+        return CLEAR
+
+    @property
+    def slot(self) -> int:
+        """Number of the slot whose load it replaces."""
+        return NO_SLOT
+
+    @property
+    def numbers(self) -> bytes:
+        """The command's numbers as the flight's tables have them (LOAD,); a wrench's are resolved on a body first."""
+        return b""
 
 
 @dataclass(slots=True)
@@ -160,6 +191,18 @@ class SetState(Stamped):
             raise CommandRefused("state", "state, orientation_xyzw", [0.0] * 4, "four numbers, not all zero")
 
     @property
+    def flight_kind(self) -> int:
+        """See Stamped."""
+        return SET_STATE
+
+    @property
+    def numbers(self) -> bytes:
+        """See Stamped: bits of the values that there are, then all of them."""
+        bits = sum(1 << k for k, name in enumerate(STATE_VALUES) if name in self.values)
+        given = [self.values.get(name, (0.0,) * count) for name, count in STATE_VALUES.items()]
+        return _ROW.pack(bits, *(number for numbers in given for number in numbers))
+
+    @property
     def content(self) -> dict[str, Any]:
         """The command as an event line keeps it."""
         return {name: list(numbers) for name, numbers in self.values.items()}
@@ -213,7 +256,7 @@ class TieString(Stamped):
     rank = Rank.STRING_ATTACH
 
     def __post_init__(self) -> None:
-        if self.axes not in ("mesh", "body", "world"):
+        if self.axes not in TIE_AXES:
             raise CommandRefused("frame", "frame_id", self.frame_id or self.axes, "axes mesh, body or world")
         _check_numbers("string attach", self.point)
 
@@ -221,6 +264,16 @@ class TieString(Stamped):
     def content(self) -> dict[str, Any]:
         """The command as an event line keeps it."""
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "axes": self.axes, "point": list(self.point)}
+
+    @property
+    def flight_kind(self) -> int:
+        """See Stamped."""
+        return TIE_STRING
+
+    @property
+    def numbers(self) -> bytes:
+        """See Stamped: the axes and the point."""
+        return _point_row(TIE_AXES.index(self.axes), self.point)
 
 
 @dataclass(slots=True)
@@ -240,6 +293,16 @@ class MoveString(Stamped):
         """The command as an event line keeps it."""
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "point": list(self.point)}
 
+    @property
+    def flight_kind(self) -> int:
+        """See Stamped."""
+        return MOVE_STRING
+
+    @property
+    def numbers(self) -> bytes:
+        """See Stamped: the point."""
+        return _point_row(0, self.point)
+
 
 @dataclass(slots=True)
 class ReleaseString(Stamped):
@@ -247,6 +310,11 @@ class ReleaseString(Stamped):
 
     kind = "string_release"
     rank = Rank.CHANGE
+
+    @property
+    def flight_kind(self) -> int:
+        """See Stamped."""
+        return RELEASE_STRING
 
     @property
     def content(self) -> dict[str, Any]:
@@ -294,27 +362,36 @@ Listed = tuple[int, int]
 Command = WrenchCommand | ThrusterCommand | SetState | ClearWrench | Change | TieString | MoveString | ReleaseString
 
 
+class Row(NamedTuple):
+    """A command as the flight's tables have it, a row of LOAD_ROW (simulation/flight.py)."""
+
+    time_ns: int
+    duration_ns: int
+    kind: int
+    slot: int
+    load: bytes
+
+
 @dataclass(slots=True)
 class Pending:
     """A command waiting for its time. order: sort key among commands with equal times (``order_of``). listed: its place
-    in a list, if it is an entry of one. kind, duration_ns, slot and row: as in the flight's tables; row is empty until
-    the load is resolved, for the setup resolved_for.
+    in a list, if it is an entry of one. row: of a wrench or poke, its load (LOAD,), resolved on this surface but for a
+    ray.
     """
 
     time_ns: int
     command: Command
     order: tuple[int, int, int, int] = (0, 0, 0, 0)
     listed: Listed | None = None
-    resolved_for: Setup | None = None
-    kind: int = CLEAR
-    duration_ns: int = -1
-    slot: int = NO_SLOT
     row: bytes = b""
+    surface: Surface | None = None
 
-    def set_load(self, command: WrenchCommand, row: bytes, setup: Setup) -> None:
-        """Store the load of the command, a wrench or poke, which was resolved for this setup."""
-        self.resolved_for, self.row = setup, row
-        self.kind, self.duration_ns, self.slot = command.flight_kind, command.duration_ns, command.slot
+
+def row_of(pending: Pending) -> Row:
+    """A command as the flight's tables have it."""
+    command = pending.command
+    numbers = pending.row or command.numbers
+    return Row(pending.time_ns, command.duration_ns, command.flight_kind, command.slot, numbers)
 
 
 Waiting = tuple[int, tuple[int, int, int, int], Pending]

@@ -9,25 +9,42 @@ same functions.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import numpy as np
 
-from ..base.compilation import copy_numbers, copy_record, njit, record_type
+from ..base.arithmetic import exponent_of, scaled
+from ..base.compilation import copy_numbers, copy_record, exported, njit, record_type
 from ..base.rotation import norm
 from ..base.vectors import FloatArray, Records, StateRow
 from ..motion import body as of_body
 from ..motion.integrators.auto import kind_of_segment
-from ..motion.integrators.integrator import ADAPTIVE, CONTROL, FIXED_STEPS, NOTHING, commit, reach
+from ..motion.integrators.integrator import ADAPTIVE, FIXED_STEPS
 from ..motion.integrators.series_steps import FLOOR, begin_control
-from ..motion.loads import LOAD, LOADS_SIZE, accumulate_load, apply_impulse, is_zero
+from ..motion.integrators.stepping import (
+    CONTROL,
+    commit,
+    evaluations_of,
+    method_for,
+    reach,
+    sleeps,
+    way_of,
+    workspace_of,
+)
+from ..motion.loads import (
+    LOAD,
+    LOADS_SIZE,
+    accumulate_load,
+    apply_impulse,
+    is_within_magnitude,
+    is_zero,
+    needs_of_load,
+)
 from ..motion.problem import (
     HAND_WORK,
     HEAT,
     MAX_SPEED,
     PROBLEM,
-    STRING,
     VARIABLES,
     Variables,
     accelerations,
@@ -38,6 +55,7 @@ from ..motion.problem import (
     to_good_row,
     to_variables,
 )
+from ..motion.string import STRING
 from .commands import CLEAR, HELD_WRENCH, IMPULSE, NO_SLOT, PULSE
 
 FLIGHT = record_type(
@@ -54,10 +72,17 @@ FLIGHT = record_type(
         ("common", PROBLEM),  # the part of the problem that all segments of this body share
         ("problem", PROBLEM),  # of the segment
         ("body", np.float64, of_body.BODY),
-        ("string", np.float64, STRING),  # valid while ``tied``
+        # The string: a row as in motion/problem.py, valid while ``tied``; when its free end leaves its origin and is at
+        # its target; when the last target came, and when it will be released (NEVER: not by itself); the effective mass
+        # [kg] from which its stiffness and damping were computed; where the next target ties it [mesh coordinates].
+        ("string", np.float64, STRING),
+        ("string_mass", np.float64),
         ("tied", np.bool_),
         ("string_begin_ns", np.int64),
         ("string_end_ns", np.int64),
+        ("string_last_ns", np.int64),
+        ("string_release_ns", np.int64),
+        ("string_attach", np.float64, 3),
         ("sums", np.float64, LOADS_SIZE),  # sums of the active loads
         # Settings. A timeout of 0 means no timeout.
         ("accuracy", np.float64),
@@ -65,9 +90,11 @@ FLIGHT = record_type(
         ("step_ns", np.int64),
         ("timeout_ns", np.int64),
         ("poke_ns", np.int64),
+        ("string_timeout_ns", np.int64),
+        ("integrator", np.int64),  # its number
+        ("supports", np.int64),  # what it supports, as bits (motion/loads.py, NEEDS)
         ("chooses", np.bool_),  # whether the method is selected for each segment, as by auto
         ("method", np.int64),
-        ("waits", np.bool_),  # whether a call was interrupted because a kernel isn't compiled yet
         ("segments", np.int64),  # number of segments begun
         # Work of the string's hand and heat in its damper [J]: from the segment's start to now_ns, and before it.
         ("work", np.float64),
@@ -85,7 +112,8 @@ FLIGHT = record_type(
         ("due_end", np.int64),
         ("load_ids", np.int64),  # number of load ids assigned
         ("events", np.int64),  # number of events written in this call
-        ("timeouts", np.int64),  # number of held wrenches that timed out in this call
+        # Number of held wrenches and strings that timed out, and of commands that were refused, in this call.
+        ("noteworthy", np.int64),
     ]
 )
 
@@ -114,9 +142,10 @@ EVENT = record_type(
 )
 """An event of a load or command."""
 
-APPLIED, BEGAN, ENDED, DONE, TIMED_OUT = range(5)
+APPLIED, BEGAN, ENDED, DONE, TIMED_OUT, RELEASED, TOO_LARGE, UNSUPPORTED = range(8)
 """Kinds of events. APPLIED: a command is applied, before the loads that it ends and begins. DONE: after these.
-TIMED_OUT: a held wrench ended by its timeout.
+TIMED_OUT: a held wrench ended by its timeout; RELEASED: the string was released by its own. TOO_LARGE, UNSUPPORTED: a
+command was refused, since the body or the integrator can't take its load.
 """
 
 STEP_FLOOR, PULL_FLOOR, SPIN_FLOOR, TENSOR_FLOOR, PLACE_FLOOR, FLOOR_KINDS = range(6)
@@ -142,27 +171,15 @@ tensor given in its principal axes, otherwise up to 1.0 times I₃/I₁.
 NEVER = 1 << 62
 """Later than any simulated time [ns]."""
 
-REACHED, FAILED, NO_KERNEL = range(3)
-"""Result of a call. NO_KERNEL: the segment's method must be compiled first."""
+REACHED, FAILED = range(2)
+"""Result of a call."""
 
 
 @njit(error_model="numpy", allocates=False)
-def begin_flight(flight: np.record) -> None:
-    """Reset time, counters and work of a flight to time 0, before its first segment."""
-    flight.now_ns, flight.start_ns, flight.committed_ns = 0, 0, 0
-    flight.method, flight.segments, flight.waits, flight.tied = 0, 0, False, False
-    flight.steps_before, flight.evaluations_before = 0, 0
-    flight.work_before, flight.lost_before = 0.0, 0.0
-    for k in range(FLOOR_KINDS):
-        flight.floors[k] = 0.0
-    flight.acting, flight.due, flight.due_end, flight.load_ids, flight.events, flight.timeouts = 0, 0, 0, 0, 0, 0
-
-
-@njit(error_model="numpy", allocates=False)
-def begin_segment(flight: np.record, loads: Records, methods: Records, room: FloatArray) -> None:
+def begin_segment(flight: np.record, loads: Records, room: FloatArray) -> None:
     """Begin a segment at ``start``: sum the active loads anew, in the order in which they began, and select the method.
 
-    loads: the table. methods: see motion/integrators/integrator.py. room: memory for the workspace of adaptive methods.
+    loads: the table. room: memory for the workspace of adaptive methods (ROOM in motion/integrators/stepping.py).
     """
     for k in range(LOADS_SIZE):
         flight.sums[k] = 0.0
@@ -173,7 +190,7 @@ def begin_segment(flight: np.record, loads: Records, methods: Records, room: Flo
     problem = flight.problem
     copy_record(flight.common, flight.problem)
     complete_problem(flight, flight.start, flight.start_ns, problem)
-    begin_variables(flight, methods, room)
+    begin_variables(flight, room)
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
@@ -187,18 +204,19 @@ def complete_problem(flight: np.record, row: StateRow, time_ns: int, p: np.recor
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def begin_variables(flight: np.record, methods: Records, room: FloatArray) -> None:
+def begin_variables(flight: np.record, room: FloatArray) -> None:
     """Set the initial variables and select the method of a segment whose problem is complete."""
     p, y = flight.problem, flight.variables
     for k in range(VARIABLES):
         y[k] = 0.0
     to_variables(flight.start, p, y)
     before = flight.method
-    flight.method = kind_of_segment(p, y) if flight.chooses else 0
-    method = methods[flight.method]
-    if flight.method != before and method.way == ADAPTIVE:
+    flight.method = method_for(flight.integrator, kind_of_segment(p, y) if flight.chooses else 0)
+    if flight.method != before and way_of(flight.method) == ADAPTIVE:
         # Kernels rely on zeros in elements that they never write; another method may have written there.
-        room[: method.rows * method.columns] = 0.0
+        rows, columns = workspace_of(flight.method, flight.degree)
+        for k in range(rows * columns):
+            room[k] = 0.0
     begin_control(flight.control, flight.accuracy, flight.degree)
     flight.work, flight.lost = 0.0, 0.0
     flight.committed_ns, flight.taken = flight.start_ns, 0
@@ -206,7 +224,7 @@ def begin_variables(flight: np.record, methods: Records, room: FloatArray) -> No
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def commit_until(flight: np.record, methods: Records, room: FloatArray, until_ns: int) -> bool:
+def commit_until(flight: np.record, room: FloatArray, until_ns: int) -> bool:
     """Commit every full step of the segment that ends at or before ``until_ns``; returns whether all were good."""
     span_ns = until_ns - flight.committed_ns
     # If the pending step ends later, there is nothing to commit.
@@ -214,15 +232,16 @@ def commit_until(flight: np.record, methods: Records, room: FloatArray, until_ns
         return True
     # Slices are plain arrays, as a kernel that is called by its address expects.
     y, following = flight.variables[:], flight.following[:]
-    method = methods[flight.method]
-    advanced, taken, good = commit(method, y, flight.problem, flight.control, following, room, flight.step_ns, span_ns)
+    advanced, taken, good = commit(
+        flight.method, y, flight.problem, flight.control, following, room, flight.step_ns, span_ns
+    )
     flight.committed_ns += advanced
     flight.taken += taken
     return good
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def sample(flight: np.record, methods: Records, room: FloatArray, at_ns: int, row: StateRow) -> bool:
+def sample(flight: np.record, room: FloatArray, at_ns: int, row: StateRow) -> bool:
     """Write the state at ``at_ns``, less than one step after the last committed step, into row and commit nothing.
     Returns whether the state is good.
     """
@@ -235,7 +254,7 @@ def sample(flight: np.record, methods: Records, room: FloatArray, at_ns: int, ro
         trial, following = flight.trial[:], flight.following[:]
         copy_numbers(y, trial)
         y = trial
-        if not reach(methods[flight.method], y, p, flight.control, following, room, rest_ns):
+        if not reach(flight.method, y, p, flight.control, following, room, rest_ns):
             return False
     if not to_good_row(y, p, (at_ns - flight.start_ns) * 1e-9, row, MAX_SPEED):
         return False
@@ -244,20 +263,16 @@ def sample(flight: np.record, methods: Records, room: FloatArray, at_ns: int, ro
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def advance_segment(flight: np.record, methods: Records, room: FloatArray, until_ns: int) -> int:
+def advance_segment(flight: np.record, room: FloatArray, until_ns: int) -> int:
     """Advance within the segment to ``until_ns``: full steps, then one shorter step on a copy, which ends there."""
-    method = methods[flight.method]
-    flight.waits = method.way != NOTHING and method.address == 0
-    if flight.waits:
-        return NO_KERNEL
-    if not (commit_until(flight, methods, room, until_ns) and sample(flight, methods, room, until_ns, flight.row)):
+    if not (commit_until(flight, room, until_ns) and sample(flight, room, until_ns, flight.row)):
         stop_in_last_good_state(flight)
         return FAILED
     flight.now_ns = until_ns
     return REACHED
 
 
-@njit(error_model="numpy", allocates=False)
+@exported(FLIGHT, [PROBLEM], "f8[:]", returns="f8 f8 f8 f8 f8 f8")
 def accelerations_now(flight: np.record, problem: Records, y: Variables) -> tuple[float, ...]:
     """Accelerations at now_ns by the equations of motion: of the COM [m/s², world], angular [rad/s², body axes]; six
     numbers. problem (1,) and y (VARIABLES,) are scratch memory.
@@ -298,28 +313,28 @@ def steps_of_segment(flight: np.record) -> int:
 
 
 @njit(error_model="numpy", allocates=False)
-def evaluations_of_segment(flight: np.record, methods: Records) -> int:
+def evaluations_of_segment(flight: np.record) -> int:
     """Evaluations of the equations of motion in the segment's committed steps."""
     # The shorter step that ends a segment uses the series of the pending step.
     counted = flight.control.evaluations + flight.control.pending
-    return int(flight.taken * methods[flight.method].evaluations + counted)
+    return int(flight.taken * evaluations_of(flight.method) + counted)
 
 
-@njit(error_model="numpy", allocates=False)
-def note_floors(flight: np.record, methods: Records, floors: FloatArray) -> None:
+@exported(FLIGHT, "f8[:]")
+def note_floors(flight: np.record, floors: FloatArray) -> None:
     """Update ``floors`` (FLOOR_KINDS,) with limits of double precision in the segment up to now_ns, which no method can
     improve. Rounding ω to ε causes an attitude error of ε|ω|t. A position is rounded to half a unit in its last place.
     The tensor of a slender body, unless given in its principal axes, holds its smallest moment and the difference of
     the others only to ε I₃. Fixed steps have no accuracy that could be missed.
     """
     accuracy, control, body, row = flight.accuracy, flight.control, flight.body, flight.row
-    method = methods[flight.method]
-    if method.way == FIXED_STEPS or flight.now_ns == flight.start_ns:
+    way = way_of(flight.method)
+    if way == FIXED_STEPS or flight.now_ns == flight.start_ns:
         return
     floors[STEP_FLOOR] = max(floors[STEP_FLOOR], control.floor_rate)
     floors[PULL_FLOOR] = max(floors[PULL_FLOOR], control.pull_floor_rate)
     rate = ROUNDINGS * 2.0**-52 * norm(row[10], row[11], row[12])
-    if method.way != ADAPTIVE and not method.sleeps and rate > accuracy:
+    if way != ADAPTIVE and not sleeps(flight.method) and rate > accuracy:
         floors[SPIN_FLOOR] = max(floors[SPIN_FLOOR], rate)
     I, M = of_body.INERTIA, of_body.MOMENTS
     if body[I + 1] != 0.0 or body[I + 2] != 0.0 or body[I + 5] != 0.0:
@@ -327,7 +342,7 @@ def note_floors(flight: np.record, methods: Records, floors: FloatArray) -> None
         if rate > accuracy:
             floors[TENSOR_FLOOR] = max(floors[TENSOR_FLOOR], rate)
     farthest = max(abs(row[0]), abs(row[1]), abs(row[2]))
-    place = math.ldexp(1.0, math.frexp(farthest)[1] - 54) / body[of_body.LENGTH]
+    place = scaled(1.0, exponent_of(farthest) - 54) / body[of_body.LENGTH]
     if place > max(accuracy * (flight.now_ns - flight.start_ns) * 1e-9, FLOOR):
         floors[PLACE_FLOOR] = max(floors[PLACE_FLOOR], place)
 
@@ -338,24 +353,24 @@ def floor_text(floors: Iterable[float]) -> str:
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def finish_segment(flight: np.record, loads: Records, methods: Records, room: FloatArray) -> None:
+def finish_segment(flight: np.record, loads: Records, room: FloatArray) -> None:
     """Add the segment's counts to the totals and begin another segment at the state at now_ns."""
-    note_floors(flight, methods, flight.floors)
+    note_floors(flight, flight.floors)
     flight.steps_before += steps_of_segment(flight)
-    flight.evaluations_before += evaluations_of_segment(flight, methods)
+    flight.evaluations_before += evaluations_of_segment(flight)
     flight.work_before += flight.work
     flight.lost_before += flight.lost
     copy_numbers(flight.row, flight.start)
     flight.start_ns = flight.now_ns
-    begin_segment(flight, loads, methods, room)
+    begin_segment(flight, loads, room)
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
-def cut_segment(flight: np.record, loads: Records, methods: Records, room: FloatArray) -> None:
+def cut_segment(flight: np.record, loads: Records, room: FloatArray) -> None:
     """End the segment at now_ns, counting the shorter step that was taken to that time, and begin another."""
-    if flight.now_ns > flight.committed_ns and not methods[flight.method].sleeps:
+    if flight.now_ns > flight.committed_ns and not sleeps(flight.method):
         flight.taken += 1
-    finish_segment(flight, loads, methods, room)
+    finish_segment(flight, loads, room)
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
@@ -367,7 +382,9 @@ def _write(flight: np.record, events: Records, what: int, load_id: int, row: int
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def end_due(flight: np.record, loads: Records, events: Records) -> bool:
-    """End the loads whose end is at or before now_ns; returns whether any ended."""
+    """End the loads whose end is at or before now_ns, and release a string that has timed out; returns whether anything
+    ended, or the string's free end arrives at its target now.
+    """
     kept = 0
     for row in range(flight.acting):
         if loads[row].end_ns > flight.now_ns:
@@ -377,12 +394,19 @@ def end_due(flight: np.record, loads: Records, events: Records) -> bool:
             continue
         if loads[row].kind == HELD_WRENCH:
             _write(flight, events, TIMED_OUT, loads[row].id, loads[row].slot)
-            flight.timeouts += 1
+            flight.noteworthy += 1
         else:
             _write(flight, events, ENDED, loads[row].id, row)
     ended = kept != flight.acting
     flight.acting = kept
-    return bool(ended)
+    if not flight.tied:
+        return bool(ended)
+    if flight.string_release_ns <= flight.now_ns:
+        flight.tied = False
+        _write(flight, events, RELEASED, 0, 0)
+        flight.noteworthy += 1
+        return True
+    return bool(ended or flight.string_end_ns == flight.now_ns)
 
 
 @njit(error_model="numpy", allocates=False)
@@ -436,10 +460,29 @@ def _begin(flight: np.record, loads: Records, row: int, end_ns: int) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def apply(flight: np.record, loads: Records, events: Records, row: int) -> None:
-    """Apply the command in a row at now_ns. Active loads may be written to the rows before it."""
+def takes(flight: np.record, kind: int, load: FloatArray) -> int:
+    """Whether body and integrator can take a command's load: DONE, TOO_LARGE or UNSUPPORTED. An impulse acts at once:
+    the integrator never sees it.
+    """
+    if not is_within_magnitude(load, flight.body):
+        return TOO_LARGE
+    if kind != IMPULSE and needs_of_load(load) & ~flight.supports != 0:
+        return UNSUPPORTED
+    return DONE
+
+
+@njit(error_model="numpy", allocates=False)
+def apply(flight: np.record, loads: Records, events: Records, row: int) -> bool:
+    """Apply the command in a row at now_ns; returns whether it was accepted. Active loads may be written to the rows
+    before it.
+    """
     kind, load = loads[row].kind, loads[row].load
     if kind != CLEAR:
+        taken = takes(flight, kind, load)
+        if taken != DONE:
+            _write(flight, events, taken, 0, row)
+            flight.noteworthy += 1
+            return False
         flight.load_ids += 1
     load_id = flight.load_ids
     _write(flight, events, APPLIED, load_id, row)
@@ -461,16 +504,21 @@ def apply(flight: np.record, loads: Records, events: Records, row: int) -> None:
             _begin(flight, loads, row, end_of_held(flight, flight.now_ns))
             _write(flight, events, BEGAN, load_id, row)
     _write(flight, events, DONE, load_id, row)
+    return True
 
 
 @njit(error_model="numpy", allocates=False, forceinline=True)
 def next_event_ns(flight: np.record, loads: Records) -> int:
-    """Time of the next event: a load ends, a command is due, or the string's free end arrives at its target."""
+    """Time of the next event: a load ends, a command is due, the string's free end arrives at its target, or the string
+    is released.
+    """
     event_ns = loads[flight.due].at_ns if flight.due < flight.due_end else NEVER
     for row in range(flight.acting):
         event_ns = min(event_ns, loads[row].end_ns)
-    if flight.tied and flight.string_end_ns > flight.start_ns:
-        event_ns = min(event_ns, flight.string_end_ns)
+    if flight.tied:
+        event_ns = min(event_ns, flight.string_release_ns)
+        if flight.string_end_ns > flight.start_ns:
+            event_ns = min(event_ns, flight.string_end_ns)
     return event_ns
 
 
@@ -479,25 +527,24 @@ def fly(
     flight: np.record,
     loads: Records,
     events: Records,
-    methods: Records,
     room: FloatArray,
     until_ns: int,
 ) -> int:
     """Advance the flight to ``until_ns``; ``row`` is then the state before events at that same time are applied.
 
-    Returns REACHED, FAILED (``row`` is the last good state) or NO_KERNEL: provide the method's kernel and call again.
+    Returns REACHED or FAILED (``row`` is the last good state).
     """
-    if not flight.waits:
-        flight.events, flight.timeouts = 0, 0
+    flight.events, flight.noteworthy = 0, 0
     while True:
         # 1. Until the next event: full steps, then one shorter step that ends exactly there.
         event_ns = min(next_event_ns(flight, loads), until_ns)
-        came = advance_segment(flight, methods, room, event_ns)
+        came = advance_segment(flight, room, event_ns)
         if came != REACHED or event_ns == until_ns:
             return came
         # 2. Loads end, then commands are applied; a new segment begins with the new loads.
-        end_due(flight, loads, events)
+        changed = end_due(flight, loads, events)
         while flight.due < flight.due_end and loads[flight.due].at_ns == event_ns:
-            apply(flight, loads, events, flight.due)
+            changed = apply(flight, loads, events, flight.due) or changed
             flight.due += 1
-        cut_segment(flight, loads, methods, room)
+        if changed:
+            cut_segment(flight, loads, room)

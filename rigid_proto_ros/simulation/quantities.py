@@ -11,11 +11,18 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..base.arithmetic import inverse_tangent_of
-from ..base.compilation import copy_numbers, njit
+from ..base.compilation import copy_numbers, exported, njit
 from ..base.rotation import norm, rotate
-from ..base.vectors import Attitude, FloatArray, IntArray, StateRow, Vector3
+from ..base.vectors import Attitude, FloatArray, IntArray
+from ..motion.body import INERTIA as BODY_INERTIA
+from ..motion.body import MASS as BODY_MASS
 from ..motion.state import angular_momentum, kinetic_energy
+from .flight import FLIGHT
+from .record import SCENE
+from .string_control import string_energy
 
 QUANTITIES = {
     "position.x": "m",
@@ -78,7 +85,7 @@ def _potential(row: FloatArray) -> float:
     return float(row[STRING_ENERGY] - row[MASS] * fallen)
 
 
-@njit(error_model="numpy", allocates=False)
+@exported("f8[:]", "f8[:]", returns="f8")
 def attitude_angle(a: Attitude, b: Attitude) -> float:
     """Angle of the rotation from attitude a (4,) to b (4,), xyzw [rad, 0 to π]."""
     w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -88,19 +95,18 @@ def attitude_angle(a: Attitude, b: Attitude) -> float:
     return 2.0 * inverse_tangent_of(norm(x, y, z), abs(w))
 
 
-@njit(error_model="numpy", allocates=False, forceinline=True)
-def fill_state(
-    state: StateRow, string_energy: float, mass: float, inertia: FloatArray, gravity: Vector3, row: FloatArray
-) -> None:
-    """Fill a state row (STATE,) from the state (13,) and what is in force with it: tensor (9,), gravity (3,)."""
-    copy_numbers(state, row[:13])
-    row[STRING_ENERGY], row[MASS] = string_energy, mass
-    copy_numbers(inertia, row[INERTIA : INERTIA + 9])
-    copy_numbers(gravity, row[GRAVITY : GRAVITY + 3])
+@exported(SCENE, FLIGHT, "f8[:]")
+def state_of(scene: np.record, flight: np.record, row: FloatArray) -> None:
+    """Fill a state row (STATE,) with the present state of a flight and what is in force with it."""
+    body = flight.body
+    copy_numbers(flight.row, row[:13])
+    row[STRING_ENERGY], row[MASS] = string_energy(flight), body[BODY_MASS]
+    copy_numbers(body[BODY_INERTIA : BODY_INERTIA + 9], row[INERTIA : INERTIA + 9])
+    copy_numbers(scene.gravity, row[GRAVITY : GRAVITY + 3])
 
 
-@njit(error_model="numpy", allocates=False, forceinline=True)
-def begin(row: FloatArray, context: FloatArray) -> None:
+@exported("f8[:]", "f8[:]")
+def begin_context(row: FloatArray, context: FloatArray) -> None:
     """Fill the context (CONTEXT,) from the state row (STATE,) at time 0. Energy and angular momentum of a body that has
     none are NaN, and so is their drift.
     """
@@ -112,7 +118,7 @@ def begin(row: FloatArray, context: FloatArray) -> None:
     context[START_MOMENTUM + 1], context[START_MOMENTUM + 2] = ly, lz
 
 
-@njit(error_model="numpy", allocates=False)
+@exported("i8", "f8[:]", "f8[:]", returns="f8")
 def quantity(code: int, row: FloatArray, context: FloatArray) -> float:
     """The quantity NAMES[code] of a state row (STATE,)."""
     if code < 13:
@@ -142,7 +148,7 @@ def quantity(code: int, row: FloatArray, context: FloatArray) -> float:
     return inverse_tangent_of(across, lx * ax + ly * ay + lz * az)
 
 
-@njit(error_model="numpy", allocates=False)
+@exported("i8", "f8[:]", "f8[:]", returns="f8")
 def difference(code: int, a: FloatArray, b: FloatArray) -> float:
     """The difference number ``code`` of DIFFERENCES between two state rows."""
     if code == 0:
@@ -207,7 +213,7 @@ def _first(measure: FloatArray, states: FloatArray, context: FloatArray) -> int:
     return -1
 
 
-@njit(error_model="numpy", allocates=False)
+@exported("f8[:,:]", "f8[:,:]", "f8[:,:]", "i8[:]", "f8[:]", "f8[:]")
 def measure_flight(
     measures: FloatArray,
     states: FloatArray,

@@ -16,13 +16,12 @@ import numpy as np
 
 from ..base.errors import CommandRefused, InputError
 from ..base.rotation import cross, dot, length, times, transposed_times
-from ..base.vectors import Numbers, Vector, Vector3
-from ..motion.integrators import check_supported
-from ..motion.integrators.integrator import STRING
+from ..base.vectors import FloatArray, Numbers, Vector, Vector3, vector
 from ..motion.integrators.series_steps import degree_of_motion, fastest_swing
+from ..motion.integrators.stepping import method_of
 from ..motion.loads import TORQUE_WORLD, Load, load_of_bytes
-from ..motion.problem import MAX_SPEED, PROBLEM, VARIABLES
-from ..motion.state import State, angular_momentum, shift_com
+from ..motion.problem import MAX_SPEED
+from ..motion.state import State, angular_momentum
 from ..motion.string import StringState
 from . import flight as fl
 from .commands import (
@@ -33,18 +32,17 @@ from .commands import (
     ClearWrench,
     Command,
     Listed,
-    MoveString,
     Pending,
-    ReleaseString,
-    SetState,
+    Row,
     ThrusterCommand,
-    TieString,
     Waiting,
     WrenchCommand,
     order_of,
+    row_of,
     slot_name,
 )
-from .flight_arrays import APPLY, CUT, END_ALL, END_DUE, FINISH, TIMEOUTS, ActingLoad, FlightArrays
+from .effects import APPLY, CUT, END_ALL, END_DUE, FINISH
+from .flight_arrays import NOTEWORTHY, ActingLoad, FlightArrays
 from .observer import (
     AccuracyFloor,
     Applied,
@@ -60,16 +58,8 @@ from .observer import (
     StringChanged,
     shown_load,
 )
-from .setup import (
-    Setup,
-    check_command,
-    check_load_supported,
-    check_rates,
-    check_thrust,
-    load_row,
-    needs_of,
-)
-from .string_control import StringControl
+from .quantities import state_of
+from .setup import Setup, check_command, check_thrust
 from .thrusters import ThrusterControl
 
 _UNTIL_REPLACED_NS = fl.NEVER >> 1
@@ -100,8 +90,8 @@ class Simulation:
         self._arrivals = 0
         self.listed: Listed | None = None
         self.logs_timeouts = True
-        self._arrays = FlightArrays(setup)
-        self._told_string: StringState | None = None
+        self._arrays = FlightArrays()
+        self._told_string = b""
         self.watch(observer or Observer())
         self._start_over()
 
@@ -148,10 +138,9 @@ class Simulation:
 
     def _notify_string(self) -> None:
         """Notify the observer of the string if it has changed since the last notification."""
-        if self.string is self._told_string:
-            return
-        self._told_string = self.string
-        if StringChanged in self.observer.takes:
+        arrays = self._arrays
+        told, self._told_string = self._told_string, arrays.string_bytes if arrays.flight.tied else b""
+        if told != self._told_string and StringChanged in self.observer.takes:
             self.observer.on(self._string_as_tied())
 
     def log(self, kind: str, content: dict[str, Any]) -> None:
@@ -180,8 +169,8 @@ class Simulation:
         row, setup = (check_command(command, self.setup), self.setup) if checked is None else checked
         self._arrivals += 1
         pending = Pending(when_ns, command, order_of(command, listed, self._arrivals), listed)
-        if row and isinstance(command, WrenchCommand):
-            pending.set_load(command, row, setup)
+        if row:
+            pending.row, pending.surface = row, setup.surface
         self._push(pending)
         if self.follower is not None:
             self.follower(command, when_ns, listed)
@@ -197,14 +186,10 @@ class Simulation:
         self.observer.on(Refused(self.time_ns, error.reason, text))
 
     def check_change(self, new: Setup) -> None:
-        """Raises CommandRefused (``integrator``) when the new integrator can't handle current or future loads."""
-        # A string that is attached at time 0 will be tied at the next reset, even if it has been released since.
-        tied = new.string.attached or (self.string is not None and not self.setup.string.attached)
-        check_supported(new.integrator, needs_of(new, (acting.load for acting in self.acting), tied))
-        knot = new.string.attach if new.string.attach != self.setup.string.attach else self._string.attach
-        check_rates(new, knot if tied else None)
-        if new.string.attached:
-            check_rates(new, new.string.attach)  # where the next reset ties it
+        """Raises CommandRefused (``integrator``) when the new setup can't take over the present motion: its integrator
+        can't handle current or future loads or rates.
+        """
+        self._arrays.check_change(self.setup, new)
 
     def reset(self, setup: Setup | None = None) -> None:
         """Restart at time 0 in the initial state (of a new setup, if given), without active loads and scheduled
@@ -244,7 +229,7 @@ class Simulation:
             # 2. The flight advances from event to event, up to until_ns or to an event that needs Python code.
             if not arrays.fly(event_ns):
                 return self._stop_in_last_good_state(due)
-            if due or self._wants_loads or arrays.integers[TIMEOUTS]:
+            if due or self._wants_loads or arrays.integers[NOTEWORTHY]:
                 self._notify(due)
             self.time_ns = event_ns
             self.state = state = State(event_ns, arrays.row.copy())
@@ -255,21 +240,18 @@ class Simulation:
 
     def _hand_over(self, until_ns: int) -> tuple[int, Sequence[Pending]]:
         """Time until which the compiled flight can advance on its own, and the commands that it applies on the way."""
-        tied, pending = self._string.tied, self._pending
-        if tied is not None and tied.release_ns is not None:
-            until_ns = min(until_ns, tied.release_ns)
+        pending = self._pending
         if self.thrusters.due_ns < until_ns:
             until_ns = self.thrusters.due_ns
         if not pending or pending[0][0] >= until_ns:
             return until_ns, ()
-        setup = self.setup
         due: list[Pending] = []
         while pending:
             entry = pending[0]
             if entry[0] >= until_ns:
                 break
             first = entry[-1]
-            if first.resolved_for is not setup and not self._is_ready(first):
+            if not self._is_ready(first):
                 until_ns = first.time_ns
                 # All commands with the same time are applied together.
                 while due and due[-1].time_ns == until_ns:
@@ -277,29 +259,31 @@ class Simulation:
                 break
             heappop(pending)
             due.append(first)
-        self._arrays.put(due)
+        self._arrays.put(row_of(pending) for pending in due)
         return until_ns, due
 
     def _is_ready(self, pending: Pending) -> bool:
         """Whether the compiled flight can apply the command as it is."""
-        if not isinstance(pending.command, WrenchCommand):
-            # A clear also switches off thrusters that push, which the compiled flight doesn't know.
-            return isinstance(pending.command, ClearWrench) and not self.thrusters.pushing
-        try:
-            return self._still_holds(pending, pending.command)
-        except CommandRefused:
-            return False  # it is refused when it acts, not earlier
+        if isinstance(pending.command, WrenchCommand):
+            # A ray is resolved when it acts, and so is what was resolved on another mesh.
+            known = pending.row and pending.surface is self.setup.surface
+            return bool(known) and pending.command.frame.point[0] != "ray"
+        # A clear also switches off thrusters that push, which the compiled flight doesn't know.
+        return isinstance(pending.command, ClearWrench) and not self.thrusters.pushing
 
     def _notify(self, due: Sequence[Pending]) -> None:
         """Log the commands that were applied, and notify the observer of the loads that began and ended."""
         observer, arrays = self.observer, self._arrays
-        if not (self._wants_loads or observer.wants(Logged) or arrays.integers[TIMEOUTS]):
+        if not (self._wants_loads or observer.wants(Logged) or arrays.integers[NOTEWORTHY]):
             for pending in due:
                 self.events.note(pending.time_ns, pending.command)
             return
         first = arrays.first_due
         for number, (now_ns, what, load_id, row) in enumerate(arrays.last_events()):
             self.time_ns = now_ns
+            if what == fl.RELEASED:
+                self._notify_string()
+                continue
             if what in (fl.ENDED, fl.TIMED_OUT):
                 observer.on(LoadEnded(now_ns, load_id))
                 if what == fl.TIMED_OUT and self.logs_timeouts:
@@ -309,15 +293,17 @@ class Simulation:
             command = pending.command
             if what == fl.DONE:
                 self._log_command(command)
+            elif what in (fl.TOO_LARGE, fl.UNSUPPORTED):
+                self.refuse(arrays.refusal_of(pending, self.setup))
+            elif not isinstance(command, WrenchCommand):
                 continue
-            load = load_of_bytes(pending.row) if pending.row else None
-            if load is None or not isinstance(command, WrenchCommand):
-                continue
-            if what == fl.APPLIED:
-                observer.on(Applied(now_ns, command, load, self.setup.body, arrays.attitude_at(number)))
+            elif what == fl.APPLIED:
+                observer.on(
+                    Applied(now_ns, command, load_of_bytes(pending.row), self.setup.body, arrays.attitude_at(number))
+                )
             else:
-                kind = "impulse" if pending.kind == IMPULSE else command.kind
-                self._notify_load(load_id, kind, load)
+                kind = "impulse" if command.flight_kind == IMPULSE else command.kind
+                self._notify_load(load_id, kind, load_of_bytes(pending.row))
 
     def _log_command(self, command: Command) -> None:
         # A noted change would keep its whole setup in memory, mesh included.
@@ -333,9 +319,8 @@ class Simulation:
         arrays, now_ns = self._arrays, self.time_ns
         changed = bool(arrays.call(END_DUE))
         self._notify([])
-        changed |= self._string.end_due(now_ns)
         if self.thrusters.due_ns <= now_ns:
-            loads, timed_out = self.thrusters.end_due(now_ns, self.setup.wrench_timeout_ns)
+            loads, timed_out = self.thrusters.end_due(now_ns, self._timeout_ns)
             if timed_out and self.logs_timeouts:
                 self.log("timeout", {"thrusters": True})
             self._thrust(loads)
@@ -352,46 +337,39 @@ class Simulation:
                 self.refuse(CommandRefused("schedule", error.field, error.received, error.accepted))
         self.listed = None
         if changed:
-            arrays.tie(self._string.tied)
             arrays.call(CUT)
             self._notify_string()
 
     def _apply(self, pending: Pending) -> None:
-        command = pending.command
-        if isinstance(command, WrenchCommand | ClearWrench):
-            if isinstance(command, WrenchCommand) and not self._still_holds(pending, command):
-                pending.set_load(command, load_row(command, self.setup, self.state), self.setup)
-            self._arrays.put([pending])
-            self._arrays.call(APPLY)
-            self._notify([pending])
-            if isinstance(command, ClearWrench):
-                self.thrusters.clear()
-            self.state = self._arrays.state
-            return
+        command, arrays = pending.command, self._arrays
         if isinstance(command, ThrusterCommand):
             check_thrust(command.forces, self.setup)
-            self._thrust(self.thrusters.command(command.forces, self.time_ns, self.setup.wrench_timeout_ns))
+            self._thrust(self.thrusters.command(command.forces, self.time_ns, self._timeout_ns))
+            self._log_command(command)
         elif isinstance(command, Change):
             self._change(command.apply())
-        elif isinstance(command, SetState):
-            self._arrays.row[:] = self.state.moved(command.values).row
-            self.state = self._arrays.state
-        elif isinstance(command, TieString):
-            self._string.tie_at(command, self.setup, self.state)
-        elif isinstance(command, MoveString):
-            check_supported(self.setup.integrator, frozenset({STRING}))
-            self._string.move(command, self.setup, self.state)
-        elif isinstance(command, ReleaseString):
-            self._string.release()
-        self._log_command(command)
+            self._log_command(command)
+        else:
+            arrays.apply(pending, self.setup)
+            self.state = arrays.state
+            if isinstance(command, WrenchCommand | ClearWrench):
+                self._notify([pending])
+                if isinstance(command, ClearWrench):
+                    self.thrusters.clear()
+            else:
+                self._log_command(command)
+
+    @property
+    def _timeout_ns(self) -> int:
+        """Time [ns] after which held wrenches and thrusters end; 0 for never."""
+        return int(self.flight.timeout_ns)
 
     def _thrust(self, loads: list[tuple[int, Load]]) -> None:
         """Apply loads of thrusters, by number, until they are replaced."""
         arrays, rows = self._arrays, []
         for number, load in loads:
-            row = Pending(self.time_ns, ClearWrench(), duration_ns=_UNTIL_REPLACED_NS, row=load.packed)
-            row.kind, row.slot = HELD_WRENCH if load.is_zero else PULSE, -1 - number
-            rows.append(row)
+            kind = HELD_WRENCH if load.is_zero else PULSE
+            rows.append(Row(self.time_ns, _UNTIL_REPLACED_NS, kind, -1 - number, load.packed))
         arrays.put(rows)
         arrays.call(APPLY)
         if not self._wants_loads:
@@ -402,36 +380,14 @@ class Simulation:
             elif what == fl.BEGAN:
                 self._notify_load(load_id, "thruster", loads[row_number - arrays.first_due][1])
 
-    def _still_holds(self, pending: Pending, command: WrenchCommand) -> bool:
-        """Whether the load resolved at submission is still valid: not for a ray, and not if the mesh has changed since.
-
-        Raises CommandRefused when the current body or integrator can't take it.
-        """
-        setup, before = self.setup, pending.resolved_for
-        if before is setup:
-            return True
-        if before is None or before.surface is not setup.surface:
-            return False
-        load = load_of_bytes(pending.row)
-        if before.body is not setup.body:
-            load.check_magnitude(setup.body)
-        check_load_supported(command, load, setup)
-        pending.resolved_for = setup
-        return True
-
     def _change(self, new: Setup) -> None:
-        """Switch to another setup in flight. The same mesh at the same size stays in place: if the COM moves within it,
-        position and velocity become those of the new COM. Another mesh or size keeps the COM and its motion.
-        """
-        self.check_change(new)
-        old, self.setup = self.setup, new
-        moved = new.body.center_of_mass - old.body.center_of_mass
-        if new.geometry == old.geometry and moved.any():
-            shift_com(self._arrays.row, *moved.tolist())
-            self.state = self._arrays.state
-        self._arrays.take(new)
-        self._string.change(old, new, self.state)
-        self.thrusters.change(new.wrench_timeout_ns, self.time_ns)
+        """Switch to another setup in flight."""
+        old = self.setup
+        self._arrays.change(old, new)
+        self.setup, self.state = new, self._arrays.state
+        self.thrusters.change(self._timeout_ns, self.time_ns)
+        # The string's arm depends on the body, though it may be tied as before.
+        self._told_string = self._told_string and b"on another body"
         self._tell_of_mesh(old)
         self.announce()
 
@@ -439,7 +395,7 @@ class Simulation:
         surface = self.setup.surface
         if surface is not before.surface:
             vertices, triangles = (None, None) if surface is None else (surface.vertices, surface.triangles)
-            self.observer.on(MeshChanged(self.time_ns, vertices, triangles, str(self.setup.geometry[0])))
+            self.observer.on(MeshChanged(self.time_ns, vertices, triangles, self.setup.mesh_sha256))
 
     # Start and failure
 
@@ -449,10 +405,9 @@ class Simulation:
         self.failure = ""
         self.time_ns = 0
         self.state = State(0, self.setup.initial.copy())
-        self._string = StringControl(self.setup, self.state)
         self.thrusters = ThrusterControl(self.setup.thrusters)
-        self._arrays.start_over(self.setup, self._string.tied)
-        self._told_string = None
+        self._arrays.start_over(self.setup)
+        self._told_string = b""
         self._told_floor, self._next_floor_ns = "", 0
         self._notify_string()
 
@@ -491,7 +446,7 @@ class Simulation:
     @property
     def force_evaluations(self) -> int:
         """Evaluations of the equations of motion in the committed steps."""
-        in_segment = fl.evaluations_of_segment(self.flight, self._arrays.methods)
+        in_segment = fl.evaluations_of_segment(self.flight)
         return int(self.flight.evaluations_before + in_segment)
 
     @property
@@ -499,7 +454,7 @@ class Simulation:
         """The method that advances the body now, and the reason for it."""
         flight = self.flight
         degree = int(flight.degree)
-        return self._arrays.integrator.methods[int(flight.method)].choice.format(
+        return method_of(int(flight.method)).choice.format(
             step_s=int(flight.step_ns) * 1e-9,
             degree=degree,
             degree_of_motion=degree_of_motion(degree),
@@ -516,15 +471,13 @@ class Simulation:
     @property
     def floors(self) -> list[float]:
         """Error floors by kind (flight.FLOOR_KINDS); 0 where rounding isn't the limit."""
-        floors = self.flight.floors.copy()
-        fl.note_floors(self.flight, self._arrays.methods, floors)
-        return [float(floor) for floor in floors]
+        return [float(floor) for floor in self._arrays.floors()]
 
     @property
     def too_coarse(self) -> str:
         """Message if the fixed step is too long, with |ω|h or ω_s h above the integrator's limit; empty otherwise."""
         setup = self.setup
-        limit, h = setup.integrator.stability_limit, setup.step_ns * 1e-9
+        limit, h = setup.integrator.stability_limit, int(self.flight.step_ns) * 1e-9
         spin = length(self.state.angular_velocity_body) * h
         string = self.string
         swing = string.frequency * h if string else 0.0
@@ -537,12 +490,12 @@ class Simulation:
     @property
     def string(self) -> StringState | None:
         """State of the tied string, or None."""
-        return self._string.tied
+        return self._arrays.string
 
     @property
     def attach(self) -> Vector:
         """Where the next target ties the string, in mesh coordinates."""
-        return self._string.attach
+        return vector(self.flight.string_attach.tolist())
 
     @property
     def hand_work(self) -> float:
@@ -561,6 +514,10 @@ class Simulation:
         energy = -setup.body.mass * dot(setup.gravity, self.state.position)
         return energy + (string.potential_energy(setup.body, self.state) if string else 0.0)
 
+    def fill_state(self, row: FloatArray) -> None:
+        """Fill a state row (STATE,), see simulation/quantities.py, with the present state and what is in force."""
+        state_of(self.setup.scene, self.flight, row)
+
     @property
     def kinetic_energy(self) -> float:
         """½ m|v|² + ½ ωᵀIω [J]."""
@@ -577,7 +534,7 @@ class Simulation:
         # The entries after the forces are torques and moments of forces.
         if self.string is not None or self.flight.sums[TORQUE_WORLD:].any():
             return 0.0
-        if self.setup.angular_damping or not self.setup.gyroscopic:
+        if self.setup.scene.angular_damping or not self.setup.scene.gyroscopic:
             return 0.0
         start = np.array(angular_momentum(self.flight.start, self.setup.body.inertia.ravel()))
         moved, size = self.angular_momentum - start, length(start)
@@ -599,7 +556,7 @@ class Simulation:
     def at_rest(self) -> bool:
         """Whether nothing moves, no load acts and no command is pending."""
         still = not (self.state.row[7:].any() or self.setup.gravity.any())
-        return still and not self.flight.acting and self.string is None and not self._pending
+        return still and not (self.flight.acting or self.flight.tied or self._pending)
 
     def accelerations(self) -> tuple[Vector3, Vector3]:
         """Current acceleration of the COM (3,) [m/s²] and angular acceleration (3,) [rad/s²], both in world axes."""
@@ -618,5 +575,5 @@ class Simulation:
 
     def _accelerations(self) -> tuple[Vector3, Vector3]:
         """Current acceleration of the COM (3,) [m/s², world] and angular acceleration (3,) [rad/s², body axes]."""
-        six = np.array(fl.accelerations_now(self.flight, np.zeros(1, PROBLEM), np.zeros(VARIABLES)))
+        six = self._arrays.accelerations()
         return six[:3], six[3:]

@@ -17,22 +17,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import InputError, MeshError
+from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.vectors import BoolArray, FloatArray, IntArray, Records
-from ..mass.moments import STRETCHED
-from ..motion.integrators import check_supported
 from ..motion.loads import FORCE, TORQUE
-from ..motion.problem import ENVIRONMENT_NEEDS
-from ..scene.parameters import HUGE, Parameters, Value, parameter_named, with_mass_of_density
-from ..scene.scenario import BodyMesh, Scenario, build_scenario
+from ..scene.parameters import HUGE, Value, parameter_named, with_mass_of_density
+from ..scene.scenario import Scenario, build_scenario
 from ..scene.scenario_run import OfflineRun
 from ..scene.script import MAX_TIME_S, expand_script, script_text
 from ..scene.yaml_text import plain
 from ..simulation import batch
 from ..simulation import flight as fl
-from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand
-from ..simulation.quantities import CONTEXT, STATE, begin, fill_state, measure_flight
+from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand, row_of
+from ..simulation.quantities import CONTEXT, STATE, begin_context, measure_flight
+from ..simulation.record import SCENE
 from ..simulation.setup import Setup, check_command
 from ..simulation.simulation import Simulation
 from .sampling import Draw, as_text
@@ -54,28 +52,10 @@ def _field_of(parameter: str) -> str:
     return parameter.replace(".", "_")
 
 
-def batch_row(parameters: Parameters, body_mesh: BodyMesh | None) -> Records:
-    """The row (1,) batch.ROW of parameters; raises InputError."""
-    row = np.zeros(1, batch.ROW)
-    for name, value in parameters.named().items():
-        if _field_of(name) in batch.PARAMETERS:
-            row[_field_of(name)] = value
-    if body_mesh is not None:
-        row["has_surface"], row["extent"] = True, body_mesh.surface.extent
-    if parameters.inertia_model == "explicit" or body_mesh is None:
-        row["model"] = batch.EXPLICIT
-        return row
-    moments = body_mesh.moments.moments(parameters.inertia_model)
-    try:
-        row["solid_measure"] = body_mesh.moments.moments("solid").measure
-    except MeshError:
-        row["solid_measure"] = np.nan
-    row["model"] = batch.STRETCHED if parameters.inertia_model in STRETCHED else batch.ORDINARY
-    places = moments if parameters.inertia_model_com == "model" else body_mesh.moments.moments("solid")
-    row["moments"] = moments.record
-    for name in ("reference", "center", "center_low"):
-        row["moments"][name] = getattr(places, name)
-    return row
+def _is_number_of_scene(parameter: str) -> bool:
+    """Whether a parameter is one of the numbers in a scene's record."""
+    numbers = parameter_named(parameter).type in ("double", "doubles")
+    return numbers and _field_of(parameter) in (SCENE.names or ())
 
 
 class BatchMaker:
@@ -87,19 +67,12 @@ class BatchMaker:
         self._study, self._reference = study, with_mass_of_density(reference or {})
         for vary in study.vary:
             parameter = vary.target.parameter
-            if vary.is_random_vertex or (parameter and _field_of(parameter) not in batch.NUMBERS):
+            if vary.is_random_vertex or (parameter and not _is_number_of_scene(parameter)):
                 raise NotBatchable
         typical = study.applied([vary.form.probes[-1] for vary in study.vary])
         parameters = study.parameters.replaced({"mass": 0.0} if study.density_decides else {})
         parameters = parameters.replaced(self._reference)
-        body_mesh = body_mesh_of(parameters)
-        self._setup = setup = build_scenario(parameters, body_mesh).setup
-        varied = {v.target.parameter for v in study.vary}
-        check_supported(setup.integrator, frozenset(need for name, need in ENVIRONMENT_NEEDS.items() if name in varied))
-        if setup.string.attached and setup.initial_string_mass:
-            raise NotBatchable
-        self._row = batch_row(parameters, body_mesh)
-        self._ballast = np.array([m for m in parameters.point_masses if m[0] > 0.0], dtype=float).reshape(-1, 4)
+        self._setup = setup = build_scenario(parameters, body_mesh_of(parameters)).setup
         self._table, entries = _commands_of(typical.script, setup)
         self._written = [_place_of(v, typical.script, entries) if v.target.entry else None for v in study.vary]
         if any(self._written) and not setup.integrator.supports_loads:
@@ -108,7 +81,7 @@ class BatchMaker:
     def batch(self, columns: list[NDArray[Any]], count: int) -> tuple[batch.Batch, BoolArray]:
         """``count`` rows with these values of what varies, and which of them the batch may check (n,)."""
         good = np.ones(count, bool)
-        rows = np.repeat(self._row, count)
+        rows = np.repeat(np.array([self._setup.scene], SCENE), count)
         commands = np.repeat(self._table[None], count if any(self._written) else 1, axis=0)
         for vary, column, place in zip(self._study.vary, columns, self._written, strict=True):
             if place is not None:
@@ -124,7 +97,7 @@ class BatchMaker:
                     own[:] = column[:, None] if own.ndim > column.ndim else column
         # Stable: equal times act in the order of the script.
         order = np.argsort(commands["at_ns"], axis=1, kind="stable")
-        return batch.Batch(rows, self._ballast, self._setup, np.take_along_axis(commands, order, axis=1)), good
+        return batch.Batch(rows, self._setup.mesh, np.take_along_axis(commands, order, axis=1)), good
 
 
 def _commands_of(script: list[Any], setup: Setup) -> tuple[Records, list[int]]:
@@ -136,13 +109,11 @@ def _commands_of(script: list[Any], setup: Setup) -> tuple[Records, list[int]]:
             raise NotBatchable
         pending = Pending(command.stamp_ns, command)
         if isinstance(command, WrenchCommand):
-            load = check_command(command, setup)
-            if not load:
-                raise NotBatchable  # a ray
-            pending.set_load(command, load, setup)
-            row["load"] = np.frombuffer(load)
-        row["at_ns"], row["duration_ns"] = pending.time_ns, pending.duration_ns
-        row["kind"], row["slot"] = pending.kind, pending.slot
+            if command.frame.point[0] == "ray":
+                raise NotBatchable
+            pending.row = check_command(command, setup)
+            row["load"] = np.frombuffer(pending.row)
+        row["at_ns"], row["duration_ns"], row["kind"], row["slot"], _ = row_of(pending)
     return table, [command.entry for command in commands]
 
 
@@ -273,26 +244,19 @@ def _simulate(
 ) -> Simulation:
     """Fill ``states`` at the sample times, and the context; the simulation at their end."""
     simulation = OfflineRun(scenario, commands).simulation
-    _fill(simulation, states[0])
-    begin(states[0], context)
+    simulation.fill_state(states[0])
+    begin_context(states[0], context)
     for state, time_ns in zip(states, sample_ns.tolist(), strict=True):
         simulation.advance(time_ns)
         if simulation.failure:
             raise FailedFlight(simulation.failure)
-        _fill(simulation, state)
+        simulation.fill_state(state)
     if simulation.refused:
         # A row whose commands were refused in flight isn't the row that was asked for.
         refused = simulation.refused.items()
         texts = (f"commands refused: {count}, {reason}: {simulation.refusals[reason]}" for reason, count in refused)
         raise FailedFlight("; ".join(texts))
     return simulation
-
-
-def _fill(simulation: Simulation, row: FloatArray) -> None:
-    """Fill a state row (STATE,) with the present state, and with the body and gravity that are now in force."""
-    setup, string, state = simulation.setup, simulation.string, simulation.state
-    energy = string.potential_energy(setup.body, state) if string else 0.0
-    fill_state(state.row, energy, setup.body.mass, setup.body.inertia.ravel(), setup.gravity, row)
 
 
 def _table(

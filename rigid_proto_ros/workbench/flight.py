@@ -20,7 +20,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..base.compilation import notify_when_compiling
 from ..base.errors import InputError
 from ..base.vectors import FloatArray, IntArray, StateRow
 from ..live.live_simulation import LiveSimulation
@@ -48,8 +47,6 @@ LOOKS = frozenset(
 
 SOON_S = 0.3
 """[s] What takes no longer isn't said to be waited for."""
-
-COMPILING = "compiling, once only"
 
 SCENE, FUTURE = "another scene", "another future of this one"
 """What begins at a jump of time."""
@@ -198,8 +195,7 @@ class Flight:
         """On the worker thread: who has asked for something else meanwhile sees what is being waited for."""
         self.busy(doing)
         try:
-            with notify_when_compiling(lambda: self.busy(COMPILING)):
-                return function()
+            return function()
         finally:
             self.busy("")
 
@@ -235,18 +231,6 @@ class Flight:
     def step(self) -> None:
         """Go on by one publication period."""
         self.ask(self.live.step)
-
-    def prepare(self, warm_up: Callable[[], object], start: Callable[[], None]) -> None:
-        """Compile what the body needs, then let its time begin; from any thread."""
-
-        def work() -> None:
-            try:
-                self._work("", warm_up)
-                start()
-            except Exception as error:
-                self._say_failed(error)
-
-        self._worker.submit(work)
 
     # Scenes
 

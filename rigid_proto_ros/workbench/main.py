@@ -11,13 +11,11 @@ from collections.abc import Callable
 import viser
 
 from ..base.bundled import scene_names
-from ..base.compilation import notify_when_compiling
-from ..live.live_simulation import LiveSimulation, warm_up
+from ..live.live_simulation import LiveSimulation
 from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
 from ..scene.parameters import Parameters
 from ..scene.scenario import Scenario
-from .flight import COMPILING
 from .page import Page
 from .server import make_server, stop_server
 
@@ -88,20 +86,16 @@ def serve(
             if opens and has_display():
                 webbrowser.open(told[0])
 
-    waiting = server.gui.add_markdown(f"**{COMPILING} …**")
     try:
-        with notify_when_compiling(tell):
-            scenario = read()
-        live = LiveSimulation(scenario)
+        live = LiveSimulation(read())
     except BaseException:
         stop_server(server)
         raise
-    waiting.remove()
     workbench = Workbench(live, lesson=scene if scene in scene_names() else "", anew=True, server=server)
     try:
         tell()
         live.announce()
-        workbench.page.flight.prepare(lambda: warm_up(scenario.setup), live.start)
+        live.start()
         return wait()
     finally:
         workbench.close()

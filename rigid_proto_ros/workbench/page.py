@@ -485,7 +485,7 @@ class Page:
         size = shape.size if shape is not None else 1.0
         start = setup.initial[0:3]
         points = [start]
-        falls, held = bool(setup.gravity.any()), setup.string.attached
+        falls, held = bool(setup.gravity.any()), bool(setup.scene.string_attached)
         if falls or held:
             trial, foreseen_s = Simulation(setup), FORESEEN_S if held else fall_s(setup)
             for k in range(1, 41):
@@ -493,7 +493,7 @@ class Page:
         places = np.array(points)
         low, high = places.min(axis=0) - 0.5 * size, places.max(axis=0) + 0.5 * size
         if held:
-            low, high = np.minimum(low, setup.string.target), np.maximum(high, setup.string.target)
+            low, high = np.minimum(low, setup.scene.string_target), np.maximum(high, setup.scene.string_target)
         self.backend.origin = self._home = np.array(start)
         unit = self.backend.unit
         self.room.furnish(unit, (low - start) / unit, (high - start) / unit, falls and not held)

@@ -134,9 +134,11 @@ def motion_words(scenario: Scenario, loads: int, tied: bool, at_rest: bool, paus
         words = "free fall"
     else:
         words = "free rotation"
-        if setup.integrator.name in ("auto", "free_body") and not (setup.linear_damping or setup.angular_damping):
+        if setup.integrator.name in ("auto", "free_body") and not (
+            setup.scene.linear_damping or setup.scene.angular_damping
+        ):
             words += ", exact"
-    return words if setup.gyroscopic else f"{words}, without ω × Iω"
+    return words if setup.scene.gyroscopic else f"{words}, without ω × Iω"
 
 
 class ForcesTab:

@@ -13,12 +13,12 @@ import pytest
 from numba.core.caching import IndexDataCacheFile
 
 import rigid_proto_ros
-from rigid_proto_ros.base import compilation
+from rigid_proto_ros.base import cache, compilation, errors, jit, library
 
 PACKAGE = Path(rigid_proto_ros.__file__).parent
 INNER = "from .compilation import njit\n\n\n@njit()\ndef inner(x):\n    return x + {}\n"
 OUTER = "from .compilation import njit\nfrom .between import (\n    inner,\n)\n\n\n@njit()\ndef outer(x):\n    return inner(x)\n"
-BROKEN = "numba no longer keeps kernels by Dispatcher._cache: base/compilation.py needs another way"
+BROKEN = "numba no longer keeps kernels by Dispatcher._cache: base/jit.py needs another way"
 CALL = "from package.base.outer import outer; print(outer(1), sum(outer.stats.cache_hits.values()))"
 
 
@@ -35,7 +35,8 @@ def test_a_kernel_on_disk_is_that_of_its_file_and_of_all_behind_its_imports_also
     for checkout, added, locators in (("one", 1, ""), ("two", 1, other), ("two", 2, ""), ("one", 1, other)):
         base = tmp_path / checkout / "package" / "base"
         base.mkdir(parents=True, exist_ok=True)
-        shutil.copy(compilation.__file__, base)
+        for module in (cache, compilation, errors, jit, library):
+            shutil.copy(module.__file__, base)
         (base / "outer.py").write_text(OUTER)
         (base / "between.py").write_text("from .inner import inner\n")
         (base / "inner.py").write_text(INNER.format(added))
@@ -49,7 +50,7 @@ def adding(tmp_path, monkeypatch):
     """adding(k): a kernel x + k, kept below tmp_path."""
     file = tmp_path / "adding.py"
     file.write_text("def adding(njit, k):\n    @njit()\n    def plus(x):\n        return x + k\n\n    return plus\n")
-    monkeypatch.setattr(compilation, "PACKAGE", str(tmp_path))
+    monkeypatch.setattr(jit, "PACKAGE", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     code = {}
     exec(compile(file.read_text(), file, "exec"), code)
@@ -103,7 +104,7 @@ def test_without_a_folder_for_kernels_one_line_says_which_were_tried_and_what_to
 def test_without_a_home_folder_none_of_that_name_is_made_in_the_current_one(monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", "cache")  # to be ignored, as its specification says
     monkeypatch.setattr(os.path, "expanduser", lambda path: path)
-    assert compilation.user_cache() == ""
+    assert cache.user_cache() == ""
 
 
 def test_every_kernel_of_the_package_is_kept_that_way():

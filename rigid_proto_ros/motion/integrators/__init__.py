@@ -11,14 +11,29 @@ Python's division would raise an exception in the middle of it.
 
 from __future__ import annotations
 
-from importlib import import_module
-
 from ...base.errors import CommandRefused, InputError
-from .. import INTEGRATOR_FILES
+from .auto import AUTO
+from .free_body import FREE_BODY, FREE_BODY_STRANG
+from .gram_schmidt import EULER, MIDPOINT
 from .integrator import Integrator
+from .lie_midpoint import LIE_MIDPOINT
+from .runge_kutta import DOP853, RK4, SEMI_IMPLICIT_EULER
+from .series import TAYLOR
 
 INTEGRATORS: dict[str, Integrator] = {
-    name: getattr(import_module(f".{file}", __name__), name.upper()) for name, file in INTEGRATOR_FILES.items()
+    integrator.name: integrator
+    for integrator in (
+        AUTO,
+        EULER,
+        MIDPOINT,
+        SEMI_IMPLICIT_EULER,
+        RK4,
+        LIE_MIDPOINT,
+        DOP853,
+        TAYLOR,
+        FREE_BODY,
+        FREE_BODY_STRANG,
+    )
 }
 
 

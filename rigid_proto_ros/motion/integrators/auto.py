@@ -25,21 +25,11 @@ import numpy as np
 from ...base.compilation import njit
 from ...base.rotation import exponential, multiply, normalize, rotate
 from ...base.vectors import FloatArray
+from ..loads import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM, STRING
 from ..problem import Variables, damping_functions, is_good, stretch
 from .free_body import free_body_steps
-from .integrator import (
-    ADAPTIVE,
-    ANGULAR_DAMPING,
-    LOADS,
-    NO_GYROSCOPIC_TERM,
-    NOTHING,
-    ONE_STEP,
-    STRING,
-    Integrator,
-    Method,
-)
-from .series import SPIN_COLUMNS
-from .series_steps import series_steps, series_workspace
+from .integrator import ADAPTIVE, LOADS, NOTHING, ONE_STEP, Integrator, Method
+from .series_steps import series_steps
 
 FASTEST = 5e5
 """Highest frequency of a string [rad/s] and rate of damping [1/s] that one core can simulate in real time: 3.3e5 steps
@@ -102,13 +92,7 @@ _SERIES = Method(
     ADAPTIVE,
     series_steps,
     "auto: taylor of degree {degree_of_motion}, loads that depend on the attitude",
-    workspace=series_workspace,
 )
-
-
-def _spin_workspace(degree: int) -> tuple[int, int]:
-    """Workspace for the series of the spin alone, cleared when the method changes; a fifth of the other's size."""
-    return degree + 1, SPIN_COLUMNS
 
 
 _BY_KIND = {
@@ -117,7 +101,7 @@ _BY_KIND = {
     STEADY: Method(ONE_STEP, steady_steps, "auto: closed form, nothing changes the spin", 1),
     FREE: Method(ONE_STEP, free_body_steps, "auto: free_body, free rotation, exact", 1),
     TURNING_LOADS: replace(
-        _SERIES, choice="auto: taylor of degree {degree}, the loads turn with the body", workspace=_spin_workspace
+        _SERIES, choice="auto: taylor of degree {degree}, the loads turn with the body", spin_alone=True
     ),
     ANY_LOADS: _SERIES,
     SLACK_AT_REST: Method(

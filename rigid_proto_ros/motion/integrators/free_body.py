@@ -36,12 +36,32 @@ import math
 
 import numpy as np
 
-from ...base.arithmetic import inverse_tangent_of, pair_add, pair_multiply, sine_cosine, two_product, two_sum
-from ...base.compilation import njit
+from ...base.arithmetic import (
+    exponent_of,
+    inverse_tangent_of,
+    nearest_whole,
+    pair_add,
+    pair_multiply,
+    scaled,
+    sine_cosine,
+    two_product,
+    two_sum,
+)
+from ...base.compilation import local_numbers, njit
 from ...base.rotation import multiply, norm, normalize, rotate
 from ...base.vectors import Quaternion, Vector
-from ..problem import MAX_SPEED, Variables, damping_functions, is_good, parts_of, undamped_torque
-from .integrator import ANGULAR_DAMPING, LOADS, ONE_STEP, Integrator, Method
+from ..loads import ANGULAR_DAMPING
+from ..problem import (
+    MAX_SPEED,
+    VARIABLES,
+    Variables,
+    copy_variables,
+    damping_functions,
+    is_good,
+    parts_of,
+    undamped_torque,
+)
+from .integrator import LOADS, ONE_STEP, Integrator, Method
 
 ON_SEPARATRIX = 1e-290
 """m₁ of an initial state on the separatrix to all digits: it stays near the middle axis for 670/ω_p, then leaves it. An
@@ -63,10 +83,9 @@ def free_step(q: Quaternion, w: Vector, moments: Vector, h: float) -> tuple[Quat
     if largest == 0.0 or h == 0.0:
         return q, w
     # Scaling by powers of two avoids underflow and overflow, and is exact.
-    _, e = math.frexp(largest)
-    _, f = math.frexp(i3)
-    wx, wy, wz, h = math.ldexp(wx, -e), math.ldexp(wy, -e), math.ldexp(wz, -e), math.ldexp(h, e)
-    i1, i2, i3 = math.ldexp(i1, -f), math.ldexp(i2, -f), math.ldexp(i3, -f)
+    e, f = exponent_of(largest), exponent_of(i3)
+    wx, wy, wz, h = scaled(wx, -e), scaled(wy, -e), scaled(wz, -e), scaled(h, e)
+    i1, i2, i3 = scaled(i1, -f), scaled(i2, -f), scaled(i3, -f)
     if not math.isfinite(wx + wy + wz + h):
         # The surrounding scheme has diverged; the iterations below would never end.
         return (math.nan, math.nan, math.nan, math.nan), (wx, wy, wz)
@@ -93,7 +112,7 @@ def free_step(q: Quaternion, w: Vector, moments: Vector, h: float) -> tuple[Quat
         wx, wy, wz = wz, -wy, wx
         rx, ry, rz = rz, -ry, rx
     turned = normalize(*multiply(*q, rx, ry, rz, rw))
-    return turned, (math.ldexp(wx, e), math.ldexp(wy, e), math.ldexp(wz, e))
+    return turned, (scaled(wx, e), scaled(wy, e), scaled(wz, e))
 
 
 @njit(error_model="numpy", allocates=False)
@@ -115,8 +134,8 @@ def _circulate(moments: Vector, w: Vector, h: float) -> tuple[Quaternion, Vector
     m1 = max(gca * abs(_side_of_separatrix(A, B, C, w1, w3)) / (gcb * P), ON_SEPARATRIX)
     # Subtract whole half periods 2K, each of which changes the signs of sn and cn.
     u, K = rate * h, complete_quarter_period(m1)
-    whole = float(round(0.5 * u / K))
-    odd = whole % 2.0 != 0.0
+    whole = nearest_whole(0.5 * u / K)
+    odd = int(whole) & 1 != 0
     s, c, d = sn_cn_dn(u - 2.0 * K * whole, m, m1)
     if odd:
         s, c = -s, -c
@@ -226,7 +245,7 @@ _DUPLICATION = 3e-3
 """Relative spread of the arguments at which the error of Carlson's fifth-order series (sixth power) is about 1e-16."""
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def complete_quarter_period(m1: float) -> float:
     """K(m) by the arithmetic-geometric mean, m₁ > 0."""
     a, b = 1.0, math.sqrt(m1)
@@ -236,7 +255,7 @@ def complete_quarter_period(m1: float) -> float:
     return math.pi / (a + b)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def sn_cn_dn(u: float, m: float, m1: float) -> tuple[float, float, float]:
     """sn, cn, dn (u | m) for |u| ≤ K, m₁ > 0; cn and dn keep their relative accuracy where they are small."""
     if abs(u) < 1.0:
@@ -246,7 +265,7 @@ def sn_cn_dn(u: float, m: float, m1: float) -> tuple[float, float, float]:
     return _by_landen(u, m1)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _by_series(u: float, m: float) -> tuple[float, float, float]:
     """Maclaurin series, after halving u until it is small; then duplication (A&S 16.18)."""
     doublings = 0
@@ -282,7 +301,7 @@ def _by_series(u: float, m: float) -> tuple[float, float, float]:
     return s, c, d
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _by_landen(u: float, m1: float) -> tuple[float, float, float]:
     """Bulirsch's sncndn: descending Landen transformations of cot am, which keeps small cn and dn accurate."""
     squeeze = m1
@@ -313,7 +332,7 @@ def _by_landen(u: float, m1: float) -> tuple[float, float, float]:
     return sn, c * sn, d
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _set(values: tuple[float, ...], index: int, value: float) -> tuple[float, ...]:
     """A tuple of 14 with one entry replaced: tuples stay in registers, an array would be allocated at each call."""
     return (
@@ -334,7 +353,7 @@ def _set(values: tuple[float, ...], index: int, value: float) -> tuple[float, ..
     )
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _rc_of_one(e: float) -> float:
     """R_C(1, 1 + e), e ≥ 0."""
     if e < 1e-3:
@@ -344,7 +363,7 @@ def _rc_of_one(e: float) -> float:
     return inverse_tangent_of(root, 1.0) / root
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def carlson_rj(x: float, y: float, z: float, p: float) -> float:
     """R_J(x, y, z, p), 0 ≤ x, y, z ≤ p with at most one of them 0."""
     delta = (p - x) * (p - y) * (p - z)
@@ -411,11 +430,12 @@ def _kick(y: Variables, p: np.record, h: float, pushed: tuple[float, ...]) -> No
             y[10 + k] += h * damping_functions(linear * h)[0] * (pushed[3 + k] - linear * y[10 + k])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def free_body_strang_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     moments = p.moments[0], p.moments[1], p.moments[2]
-    new = y.copy()
+    new = local_numbers(VARIABLES)
+    copy_variables(y, new)
     pushed = _push(new, p)
     for done in range(n):
         _kick(new, p, 0.5 * h, pushed)
@@ -429,7 +449,7 @@ def free_body_strang_steps(y: Variables, p: np.record, h: float, n: int) -> int:
         _kick(new, p, 0.5 * h, pushed)
         if not is_good(new):
             return done
-        y[:] = new
+        copy_variables(new, y)
     return n
 
 

@@ -13,31 +13,32 @@ import math
 
 import numpy as np
 
-from ...base.compilation import copy_numbers, njit
+from ...base.compilation import njit
 from ...base.rotation import matrix_elements, norm
 from ...base.vectors import FloatArray, Quaternion, Vector
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, accelerations, parts_of
-from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
+from ..loads import NO_GYROSCOPIC_TERM
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, accelerations, copy_variables, parts_of
+from .integrator import EVALUATED, Integrator, Kernel
 from .runge_kutta import ONE_STAGE, repeated
 
 _Matrix = tuple[Vector, Vector, Vector]
 """A matrix as its three columns, the body's axes in world axes."""
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _axes(q: Quaternion) -> _Matrix:
     """Columns of the rotation matrix of a unit quaternion."""
     a, b, c, d, e, f, g, h, i = matrix_elements(*q)
     return (a, d, g), (b, e, h), (c, f, i)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _sum(a: Vector, h: float, x: float, b: Vector, y: float, c: Vector) -> Vector:
     """a + h (x b − y c)."""
     return a[0] + h * (x * b[0] - y * c[0]), a[1] + h * (x * b[1] - y * c[1]), a[2] + h * (x * b[2] - y * c[2])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _turned(start: _Matrix, at: _Matrix, w: Vector, h: float) -> _Matrix:
     """``start`` + h R [ω]× with R = ``at``: each axis moves with the velocity of its tip."""
     e, f, g = at
@@ -45,13 +46,13 @@ def _turned(start: _Matrix, at: _Matrix, w: Vector, h: float) -> _Matrix:
     return _sum(a, h, w[2], f, w[1], g), _sum(b, h, w[0], g, w[2], e), _sum(c, h, w[1], e, w[0], f)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _unit(v: Vector) -> Vector:
     scale = 1.0 / norm(*v)
     return v[0] * scale, v[1] * scale, v[2] * scale
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _orthonormal(matrix: _Matrix) -> _Matrix:
     """Gram-Schmidt: the first axis keeps its direction, the second its plane, the third is their vector product."""
     a, b, _ = matrix
@@ -61,7 +62,7 @@ def _orthonormal(matrix: _Matrix) -> _Matrix:
     return a, b, (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _quaternion_near(matrix: _Matrix, q: Quaternion) -> Quaternion:
     """Unit quaternion of a rotation matrix, with the sign for which it is nearer to q (Shepperd 1978)."""
     a, b, c = matrix
@@ -81,7 +82,7 @@ def _quaternion_near(matrix: _Matrix, q: Quaternion) -> Quaternion:
     return x * scale, y * scale, z * scale, w * scale
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _moved(y: Variables, at: Variables, p: np.record, h: float, pulls: bool, out: Variables) -> None:
     """Write y + h f(at) into out, which may be ``at``; the attitude is advanced as a matrix."""
     q, w, d, u = parts_of(at)
@@ -96,11 +97,11 @@ def _moved(y: Variables, at: Variables, p: np.record, h: float, pulls: bool, out
     out[HAND_WORK], out[HEAT] = y[HAND_WORK] + h * work, y[HEAT] + h * heat
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _step(
     y: Variables, p: np.record, h: float, pulls: bool, tableau: FloatArray, _k: FloatArray, out: Variables
 ) -> None:
-    copy_numbers(y, out)
+    copy_variables(y, out)
     for i in range(tableau.shape[1]):
         _moved(y, out, p, tableau[i + 1, i] * h, pulls, out)
 
@@ -108,12 +109,15 @@ def _step(
 def _steps(tableau: FloatArray) -> Kernel:
     """The kernel of a method with this tableau, in which each stage uses only the previous one."""
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", allocates=False)
     def steps(y: Variables, p: np.record, h: float, n: int) -> int:
         return repeated(_step, tableau, y, p, h, n)
 
     return steps
 
+
+euler_steps = _steps(ONE_STAGE)
+midpoint_steps = _steps(np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 1.0]]))
 
 EULER = Integrator(
     name="euler",
@@ -123,7 +127,7 @@ EULER = Integrator(
     limits="Explicit: gains energy at every step, useless beyond |ω|h of about 0.1.",
     stability_limit=0.1,
     supports=EVALUATED | {NO_GYROSCOPIC_TERM},
-    kernel=_steps(ONE_STAGE),
+    kernel=euler_steps,
 )
 
 MIDPOINT = Integrator(
@@ -134,5 +138,5 @@ MIDPOINT = Integrator(
     limits="Explicit: energy drifts with h³ per step; diverges beyond |ω|h of about 1.",
     stability_limit=0.3,
     supports=EVALUATED | {NO_GYROSCOPIC_TERM},
-    kernel=_steps(np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 1.0]])),
+    kernel=midpoint_steps,
 )

@@ -17,33 +17,40 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...base.compilation import copy_numbers, njit
+from ...base.compilation import local_matrix, local_numbers, njit
 from ...base.rotation import exponential, multiply, normalize
 from ...base.simd import Packed, filled, four, joined, load, number, store
 from ...base.vectors import FloatArray
+from ..loads import NO_GYROSCOPIC_TERM
 from ..problem import (
     DISPLACEMENT,
     HAND_WORK,
     HEAT,
     SPIN,
+    VARIABLES,
     VELOCITY,
     Variables,
     accelerations,
+    copy_variables,
     is_good,
     parts_of,
     stretch,
     tension_margin,
 )
-from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
+from .integrator import EVALUATED, Integrator, Kernel
 from .string_law import is_one_sided, shortening_heat
 
 Step = Callable[[Variables, np.record, float, bool, FloatArray, FloatArray, Variables], None]
 """One step (y, p, h, pulls, tableau, k, out) of h seconds from variables y into out with the string's law given.
-tableau (s + 1, s): the weights aᵢⱼ of s stages, and as its last row those of the step, bⱼ; k (s, 16): memory for rates.
+tableau (s + 1, s): the weights aᵢⱼ of s stages, and as its last row those of the step, bⱼ; k (≥ s, 16): memory for
+rates.
 """
 
 ONE_STAGE = np.array([[0.0], [1.0]])
 """The tableau of Euler's method."""
+
+MOST_STAGES = 12
+"""Stages for whose rates a kernel has memory: those of dop853."""
 
 _MAX_PARTS = 1000
 """Maximum number of parts of a step; more is chattering in a step too long for its string: the rest uses one law."""
@@ -54,7 +61,7 @@ _RESOLUTION = 2.0**-49
 """Fraction of a step to which the time of a change of law is determined."""
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def _rates(z: Packed, p: np.record, pulls: bool) -> Packed:
     """Time derivatives of the variables z, four by four: q; ω and the hand's work; d and the damper's heat; u."""
     qx, qy, qz, qw = number(z, 0), number(z, 1), number(z, 2), number(z, 3)
@@ -73,7 +80,7 @@ def _rates(z: Packed, p: np.record, pulls: bool) -> Packed:
     return joined(turned, four(*turning, work), four(*u, heat), four(*moving, 0.0))
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def tableau_step(
     y: Variables, p: np.record, h: float, pulls: bool, tableau: FloatArray, k: FloatArray, out: Variables
 ) -> None:
@@ -103,14 +110,15 @@ def tableau_step(
     out[HAND_WORK], out[HEAT] = number(end, 7), number(end, 11)
 
 
-@njit(inline="always", error_model="numpy")
+@njit(error_model="numpy", allocates=False, inline="always")
 def repeated(step: Step, tableau: FloatArray, y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place, each split where a pull-only string becomes slack or taut; returns the
     number of good ones.
 
     Inlined into the kernel that calls it, since numba can't cache compiled code that takes a function as an argument.
     """
-    new, k = y.copy(), np.zeros((tableau.shape[1], 16))
+    new, k = local_numbers(VARIABLES), local_matrix(MOST_STAGES, 16)
+    copy_variables(y, new)
     for done in range(n):
         if is_one_sided(p):
             _step_on_string(step, tableau, y, p, h, k, new)
@@ -118,18 +126,19 @@ def repeated(step: Step, tableau: FloatArray, y: Variables, p: np.record, h: flo
             step(y, p, h, True, tableau, k, new)
         if not is_good(new):
             return done
-        copy_numbers(new, y)
+        copy_variables(new, y)
     return n
 
 
-@njit(inline="always", error_model="numpy")
+@njit(error_model="numpy", allocates=False, inline="always")
 def _step_on_string(
     step: Step, tableau: FloatArray, y: Variables, p: np.record, h: float, k: FloatArray, end: Variables
 ) -> None:
     """A step of h seconds from y into ``end``, split where the law of tension changes: the law has a kink there (a
     jump, with a damper), and a step across it would lose its order.
     """
-    here, left, resolution = y.copy(), h, h * _RESOLUTION
+    here, left, resolution = local_numbers(VARIABLES), h, h * _RESOLUTION
+    copy_variables(y, here)
     for part in range(_MAX_PARTS):
         # 1. Step over all that is left, with the law at its start.
         low, high, at_low = 0.0, left, tension_margin(here, p)
@@ -161,18 +170,31 @@ def _step_on_string(
         left -= high
         if left <= resolution:
             break
-        copy_numbers(end, here)
+        copy_variables(end, here)
 
 
 def explicit(tableau: FloatArray) -> Kernel:
-    """The kernel of the explicit method with this tableau (s + 1, s)."""
+    """The kernel of the explicit method with this tableau (s + 1, s), s ≤ MOST_STAGES."""
+    assert tableau.shape[1] <= MOST_STAGES, tableau.shape
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", allocates=False)
     def steps(y: Variables, p: np.record, h: float, n: int) -> int:
         return repeated(tableau_step, tableau, y, p, h, n)
 
     return steps
 
+
+rk4_steps = explicit(
+    np.array(
+        [
+            [0.0, 0.0, 0.0, 0.0],
+            [0.5, 0.0, 0.0, 0.0],
+            [0.0, 0.5, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
+        ]
+    )
+)
 
 RK4 = Integrator(
     name="rk4",
@@ -182,17 +204,7 @@ RK4 = Integrator(
     limits="Explicit: diverges beyond |ω|h of about 2.8; energy drifts with h⁵ per step.",
     stability_limit=1.0,
     supports=EVALUATED | {NO_GYROSCOPIC_TERM},
-    kernel=explicit(
-        np.array(
-            [
-                [0.0, 0.0, 0.0, 0.0],
-                [0.5, 0.0, 0.0, 0.0],
-                [0.0, 0.5, 0.0, 0.0],
-                [0.0, 0.0, 1.0, 0.0],
-                [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
-            ]
-        )
-    ),
+    kernel=rk4_steps,
 )
 
 
@@ -261,6 +273,8 @@ DOP853_TABLEAU[12, [0, 5, 6, 7, 8, 9, 10, 11]] = [
     0.04471061572777259,
 ]
 
+dop853_steps = explicit(DOP853_TABLEAU)
+
 DOP853 = Integrator(
     name="dop853",
     order=8,
@@ -269,11 +283,11 @@ DOP853 = Integrator(
     limits="Explicit: accurate up to |ω|h of about 1, diverges beyond about 4.",
     stability_limit=2.0,
     supports=EVALUATED,
-    kernel=explicit(DOP853_TABLEAU),
+    kernel=dop853_steps,
 )
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _semi_implicit_step(
     y: Variables, p: np.record, h: float, pulls: bool, _tableau: FloatArray, _k: FloatArray, out: Variables
 ) -> None:
@@ -289,7 +303,7 @@ def _semi_implicit_step(
     out[HAND_WORK], out[HEAT] = y[HAND_WORK] + h * work, y[HEAT] + h * heat
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def semi_implicit_euler_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     return repeated(_semi_implicit_step, ONE_STAGE, y, p, h, n)

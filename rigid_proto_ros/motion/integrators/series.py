@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from ...base.compilation import copy_numbers, njit
+from ...base.compilation import local_matrix, local_numbers, njit
 from ...base.rotation import norm, normalize
 from ...base.simd import (
     Packed,
@@ -36,9 +36,13 @@ from ...base.simd import (
     triple,
 )
 from ...base.vectors import FloatArray
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, is_good
+from ..loads import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VARIABLES, VELOCITY, Variables, copy_variables, is_good
 from ..string import NO_DIRECTION
-from .integrator import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE, Integrator
+from .integrator import Integrator
+
+MAX_DEGREE = 26
+"""Largest degree of a series: what the smallest ``accuracy`` that can be asked for, 1e-16, takes (``degree_for``)."""
 
 
 @njit(error_model="numpy", allocates=False)
@@ -194,20 +198,24 @@ of convergence (|ω|h of about 1 to 3) the best method for that; beyond it the s
 """
 
 
-@njit(error_model="numpy")
+_MOST_COEFFICIENTS = MAX_DEGREE + 1
+
+
+@njit(error_model="numpy", allocates=False)
 def taylor_steps_of_degree(y: Variables, p: np.record, h: float, n: int, degree: int) -> int:
-    """Up to n steps of h seconds in place by series of this degree; returns the number of good ones."""
-    c, new = np.zeros((degree + 1, SPIN_COLUMNS)), y.copy()
+    """Up to n steps of h seconds in place by series of this degree, ≤ MAX_DEGREE; returns the number of good ones."""
+    c, new = local_matrix(_MOST_COEFFICIENTS, SPIN_COLUMNS), local_numbers(VARIABLES)
+    copy_variables(y, new)
     for done in range(n):
         spin_series(y, p, degree, c)
         spin_at(c, degree, h, new)
         if not is_good(new):
             return done
-        copy_numbers(new, y)
+        copy_variables(new, y)
     return n
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def taylor_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     return taylor_steps_of_degree(y, p, h, n, TAYLOR_DEGREE)

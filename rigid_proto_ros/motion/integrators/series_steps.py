@@ -19,7 +19,6 @@ committed, so that the times of sampling never change the steps.
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
@@ -33,6 +32,7 @@ from ..problem import ATTITUDE, HEAT, VARIABLES, Variables, damping_functions, i
 from ..string import most_yielding
 from .series import (
     A_KNOT,
+    MAX_DEGREE,
     MOTION_COLUMNS,
     SPIN_COLUMNS,
     VARIABLES_AT,
@@ -66,7 +66,6 @@ PART_ON_A_STRING = 0.1
 poles.
 """
 
-MAX_DEGREE = 26
 _HIGHER = 3
 """Added to the degree of a series of the spin for the whole motion, where the cost of a step besides its series is
 higher.
@@ -171,7 +170,7 @@ _LOG2_MOST = -0.15200309344504997
 # log₂ and 2ˣ to two digits from the exponent of a double: ten times faster than libm, with the same bits everywhere.
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def fast_log2(x: float) -> float:
     """log₂ x for x > 0 with an error below 0.006; −1023 for subnormal x."""
     bits = bits_of(x)
@@ -181,21 +180,28 @@ def fast_log2(x: float) -> float:
     return float((bits >> MANTISSA_BITS) - BIAS) + f + f * (1.0 - f) * (0.4427 - 0.164 * f)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def fast_exp2(x: float) -> float:
     """2ˣ with a relative error below 0.001, for x clamped to ±1000."""
-    whole = math.floor(min(max(x, -1000.0), 1000.0))
-    f = min(max(x, -1000.0), 1000.0) - whole
-    power: float = double_of((int(whole) + BIAS) << MANTISSA_BITS)
+    x = min(max(x, -1000.0), 1000.0)
+    whole = int(x)
+    if whole > x:
+        whole -= 1
+    f = x - whole
+    power: float = double_of((whole + BIAS) << MANTISSA_BITS)
     return power * (1.0 + f - f * (1.0 - f) * (0.3069 + 0.0794 * f))
 
 
-@functools.cache
+_TO_NEAREST = 6755399441055744.0  # 1.5·2⁵²
+
+
+@njit(error_model="numpy", allocates=False)
 def degree_for(accuracy: float) -> int:
     """Degree with the least work per simulated time at this accuracy, as measured; the minimum is flat (12 at 1e-3, 19
     at 1e-9).
     """
-    return min(max(round(8.5 - 1.15 * logarithm(accuracy) / logarithm(10.0)), 6), MAX_DEGREE)
+    degree = 8.5 - 1.15 * logarithm(accuracy) / logarithm(10.0)
+    return min(max(int((degree + _TO_NEAREST) - _TO_NEAREST), 6), MAX_DEGREE)
 
 
 @njit(error_model="numpy", allocates=False)
@@ -286,6 +292,13 @@ def _count(control: np.record) -> None:
     control.series = False
 
 
+@njit(error_model="numpy", allocates=False)
+def spin_workspace(degree: int) -> tuple[int, int]:
+    """Workspace for the series of the spin alone, cleared when the method changes; a fifth of the other's size."""
+    return degree + 1, SPIN_COLUMNS
+
+
+@njit(error_model="numpy", allocates=False)
 def series_workspace(degree: int) -> tuple[int, int]:
     """Workspace for the coefficients of the step's first series and of its last one, and for the initial variables of
     the last one. They are kept until the step is committed, because samples within the step evaluate them.
@@ -348,7 +361,7 @@ def _lay_out(y: Variables, p: np.record, control: np.record, weights: Weights, c
         switch, after, h = next_law(series, p, degree, h, law, accuracy)
         if switch == NONE:
             break
-        before_ns = int(math.floor((gone + switch) * 1e9))
+        before_ns = int((gone + switch) * 1e9)
         if parts > 1 and before_ns * 1e-9 > gone:
             # One change of law per step: each multiplies the error of the step before it.
             return before_ns
@@ -360,7 +373,7 @@ def _lay_out(y: Variables, p: np.record, control: np.record, weights: Weights, c
         knot = knot_at(start, p)
         gone, law = gone + switch, after
         control.last_start, control.last_law = gone, law
-    length_ns = int(math.floor((gone + h) * 1e9))
+    length_ns = int((gone + h) * 1e9)
     # The last series must cover a part of the step.
     return length_ns if length_ns * 1e-9 > gone else length_ns + 1
 

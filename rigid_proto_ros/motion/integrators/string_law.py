@@ -20,12 +20,12 @@ import math
 
 import numpy as np
 
-from ...base.compilation import njit
+from ...base.compilation import local_matrix, local_numbers, njit
 from ...base.rotation import norm
 from ...base.vectors import FloatArray
 from ..problem import Variables, knot, parts_of, stretch
 from ..string import NO_DIRECTION
-from .series import A_KNOT, DISTANCE, STRETCH, TENSION, Knot, distance_series, stretch_at
+from .series import A_KNOT, DISTANCE, MAX_DEGREE, STRETCH, TENSION, Knot, distance_series, stretch_at
 
 SLACK, PULLS, SHORTENS = 0.0, 1.0, 2.0
 
@@ -44,13 +44,13 @@ _APPROACH = 0.75
 """Largest motion of the knot of a string that pushes in one step, as a fraction of its distance from the free end."""
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def is_one_sided(p: np.record) -> bool:
     """Whether a string is tied whose law can change, that is, a pull-only one."""
     return p.has_string and not p.bilateral
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def knot_at(y: Variables, p: np.record) -> Knot:
     """The knot of the string at variables y; zeros without a string."""
     if not p.has_string:
@@ -60,7 +60,7 @@ def knot_at(y: Variables, p: np.record) -> Knot:
     return *a, length, length - p.rest_length
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def law_of(y: Variables, p: np.record) -> float:
     """The law at variables y: SLACK, PULLS or SHORTENS."""
     if not is_one_sided(p):
@@ -71,7 +71,7 @@ def law_of(y: Variables, p: np.record) -> float:
     return PULLS if p.stiffness * x + p.string_damping * rate > 0.0 else SHORTENS
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def shortening_heat(p: np.record, before: float, after: float) -> float:
     """Energy that the damper dissipates while the string doesn't pull [J]: the loss of ½ k x² between two stretches."""
     before, after = max(before, 0.0), max(after, 0.0)
@@ -88,6 +88,10 @@ def shortening_heat(p: np.record, before: float, after: float) -> float:
 _DEEPEST = 110
 """Maximum number of bisections of an interval: they resolve 1e-15 s within 1e6 s to 12 digits."""
 
+_LEVELS = _DEEPEST + 1
+_MOST_COEFFICIENTS = 2 * MAX_DEGREE + 1
+"""Coefficients of |a|², the polynomial of the highest degree."""
+
 _RESOLUTION = 2.0**-51
 """Smallest width of an interval relative to its position in time."""
 
@@ -98,9 +102,12 @@ _MOST_TRIALS = 1200
 NONE = -1.0
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def first_rise(g: FloatArray, degree: int) -> float:
-    """First s in [0, 1] after which Σ gₖ sᵏ is positive, for a polynomial that isn't at 0; NONE if it never is."""
+    """First s in [0, 1] after which Σ gₖ sᵏ is positive, for a polynomial that isn't at 0; NONE if it never is.
+
+    degree: at most 2 MAX_DEGREE.
+    """
     while degree > 0 and g[degree] == 0.0:
         degree -= 1
     reach = g[0]
@@ -108,10 +115,10 @@ def first_rise(g: FloatArray, degree: int) -> float:
         reach += max(g[k], 0.0)
     if not reach > 0.0:
         return NONE
-    b = np.empty((_DEEPEST + 1, degree + 1))
+    b = local_matrix(_LEVELS, _MOST_COEFFICIENTS)
     _bernstein(g, degree, b[0])
-    begins, widths = np.zeros(_DEEPEST + 1), np.zeros(_DEEPEST + 1)
-    widths[0] = 1.0
+    begins, widths = local_numbers(_LEVELS), local_numbers(_LEVELS)
+    begins[0], widths[0] = 0.0, 1.0
     top = 0
     while top >= 0:
         begin, width = begins[top], widths[top]
@@ -135,7 +142,7 @@ def first_rise(g: FloatArray, degree: int) -> float:
     return NONE
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _bernstein(g: FloatArray, degree: int, b: FloatArray) -> None:
     """Bernstein coefficients b on [0, 1]: bᵢ = Σ C(i, k)/C(n, k) gₖ."""
     scale = 1.0
@@ -147,7 +154,7 @@ def _bernstein(g: FloatArray, degree: int, b: FloatArray) -> None:
             b[i] += b[i - 1]
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _signs(b: FloatArray, degree: int) -> tuple[int, int]:
     """Sign of the first coefficient that isn't zero, and how often the sign changes."""
     first, before, changes = 0, 0, 0
@@ -163,7 +170,7 @@ def _signs(b: FloatArray, degree: int) -> tuple[int, int]:
     return first, changes
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _halve(b: FloatArray, left: FloatArray, degree: int) -> None:
     """Bisection: coefficients of the left half into ``left``, those of the right one into b."""
     left[0] = b[0]
@@ -173,7 +180,7 @@ def _halve(b: FloatArray, left: FloatArray, degree: int) -> None:
         left[j] = b[0]
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _root(g: FloatArray, degree: int, low: float, high: float) -> float:
     """The only root in an interval over which the polynomial rises: Newton's method, safeguarded by bisection."""
     t = 0.5 * (low + high)
@@ -198,7 +205,7 @@ def _root(g: FloatArray, degree: int, low: float, high: float) -> float:
 # Along a series
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def next_law(
     c: FloatArray, p: np.record, degree: int, h: float, law: float, accuracy: float
 ) -> tuple[float, float, float]:
@@ -228,19 +235,18 @@ def next_law(
         h = 0.5 * told
 
 
-@njit(error_model="numpy")
-def _square_less_rest(a: FloatArray, x: float, rest: float) -> FloatArray:
-    """Coefficients of |a|² − rest² from those of a (n, 3); x: the stretch at 0."""
-    last = a.shape[0] - 1
-    g = np.zeros(2 * last + 1)
+@njit(error_model="numpy", allocates=False)
+def _square_less_rest(a: FloatArray, last: int, x: float, rest: float, g: FloatArray) -> None:
+    """Coefficients g of |a|² − rest² from those of a (≥ last + 1, 3); x: the stretch at 0."""
+    for k in range(2 * last + 1):
+        g[k] = 0.0
     for i in range(last + 1):
         for j in range(last + 1):
             g[i + j] += a[i, 0] * a[j, 0] + a[i, 1] * a[j, 1] + a[i, 2] * a[j, 2]
     g[0] = x * (2.0 * rest + x)
-    return g
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _tautens(c: FloatArray, p: np.record, degree: int, h: float) -> float:
     """Time at which |a|² first rises above the square of the rest length; NONE if it doesn't within h seconds."""
     rest = p.rest_length
@@ -253,13 +259,13 @@ def _tautens(c: FloatArray, p: np.record, degree: int, h: float) -> float:
             last = k
     if reach < rest:
         return NONE
-    a = np.empty((last + 1, 3))
+    a, g = local_matrix(_MOST_COEFFICIENTS, 3), local_numbers(_MOST_COEFFICIENTS)
     power = 1.0
     for k in range(last + 1):
         for j in range(3):
             a[k, j] = c[k, A_KNOT + j] * power
         power *= h
-    g = _square_less_rest(a, min(c[0, STRETCH], 0.0), rest)
+    _square_less_rest(a, last, min(c[0, STRETCH], 0.0), rest, g)
     left_out, top = 0.0, 2 * last
     while top > 2:
         left_out += abs(g[top])
@@ -270,7 +276,7 @@ def _tautens(c: FloatArray, p: np.record, degree: int, h: float) -> float:
     return time if time == NONE else time * h
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _stops_shortening(c: FloatArray, p: np.record, degree: int, h: float, g: FloatArray) -> tuple[float, float]:
     """Fraction of h at which the string's stretch is zero or it begins to pull, whichever is first, and the law after
     that.
@@ -295,7 +301,7 @@ def _stops_shortening(c: FloatArray, p: np.record, degree: int, h: float, g: Flo
     return pulls * end / h, PULLS
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _converges(c: FloatArray, p: np.record, degree: int, t: float, tolerance: float) -> bool:
     """Whether the series of the knot's distance gives the same tension as the motion's series."""
     stiffness, damping = p.stiffness, p.string_damping
@@ -312,7 +318,7 @@ def _converges(c: FloatArray, p: np.record, degree: int, t: float, tolerance: fl
     return bool(wrong <= tolerance * terms + 1e-14 * stiffness * c[0, DISTANCE] + 2e-15 * damping * speed)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def clear_of_the_end(c: FloatArray, p: np.record, degree: int, distance: float, h: float) -> float:
     """h, reduced so that along the series c the knot of a string that pushes, which starts at this distance from the
     free end, stays clear of it.
@@ -323,7 +329,7 @@ def clear_of_the_end(c: FloatArray, p: np.record, degree: int, distance: float, 
     return h
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", allocates=False)
 def _moves(c: FloatArray, degree: int, h: float) -> float:
     """Upper bound of the knot's displacement within h seconds [m]."""
     reach = 0.0

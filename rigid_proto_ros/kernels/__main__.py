@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""``python -m rigid_proto_ros.kernels [TARGET ...]``: build the kernels ahead into the user's cache.
+
+TARGET: ``native``, this machine's processor (the default); ``wasm``; or x86-64-v3, x86-64-v2, aarch64. ``--into
+FOLDER`` builds into another folder than the cache's. What is there for the present sources isn't built again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fcntl
+import gzip
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..base.errors import tell
+from ..base.library import check_own, file_name, kernels_folder, stamp, target
+
+
+def main() -> int:
+    """Build what is asked for; returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m rigid_proto_ros.kernels", description="Build the kernels ahead.")
+    parser.add_argument("targets", nargs="*", metavar="TARGET", default=["native"])
+    parser.add_argument("--into", metavar="FOLDER")
+    args = parser.parse_args()
+    try:
+        kinds = [
+            {"native": target, "wasm": lambda: "wasm32"}.get(name, lambda name=name: name)() for name in args.targets
+        ]
+        folder = Path(args.into or kernels_folder()) / stamp()
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        check_own(str(folder))
+        with alone(folder):
+            build([kind for kind in kinds if not (folder / file_name(kind)).is_file()], folder)
+        for kind in kinds:
+            print(folder / file_name(kind))
+    except Exception as error:
+        return tell(parser.prog, error)
+    return 0
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Wait for others that build into this folder, and keep them waiting."""
+    with open(folder / "lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def build(kinds: list[str], folder: Path) -> None:
+    """Build the files for these kinds of processors. Raises InputError and OSError."""
+    if not kinds:
+        return
+    began = time.monotonic()
+
+    def told(done: int, count: int) -> None:
+        if sys.stderr.isatty():
+            line = f"\r\033[Kkernels: {done} of {count}, {time.monotonic() - began:.0f} s"
+            print(line, end="", file=sys.stderr, flush=True)
+
+    # What a user has set for numba would change the code. Optimized code has intrinsics of this processor. numba and
+    # the package's modules read these when they are imported.
+    for name in [name for name in os.environ if name.startswith("NUMBA_")]:
+        del os.environ[name]
+    os.environ.update(NUMBA_OPT="0", RIGID_PROTO_KERNELS="building")
+    from .lowering import whole_module
+    from .targets import TARGETS, linked, object_code
+
+    whole = whole_module(told)
+    for kind in kinds:
+        with tempfile.TemporaryDirectory(dir=folder) as work:
+            made = linked(kind, object_code(whole, TARGETS[kind]), Path(work))
+            os.replace(made, folder / file_name(kind))
+    clear = "\r\033[K" if sys.stderr.isatty() else ""
+    sizes = [f"{kind} {size(folder / file_name(kind))}" for kind in kinds]
+    print(f"{clear}kernels built in {time.monotonic() - began:.0f} s: {', '.join(sizes)}", file=sys.stderr, flush=True)
+
+
+def size(file: Path) -> str:
+    """Size of a file, as it is and compressed."""
+    content = file.read_bytes()
+    return f"{len(content) / 1e3:.0f} kB ({len(gzip.compress(content)) / 1e3:.0f} gzipped)"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: MIT
+"""Stepping through a segment by the method that it needs: the kernels of all integrators in one compiled function.
+
+A method is a number in a record, the same on every machine: its way, and for fixed steps the place of its kernel among
+all. ``commit`` commits only steps that are functions of their initial variables, and ``reach`` takes one shorter step
+from there on a copy. So neither depends on the times of sampling.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...base.compilation import matrix_of, njit, record_type
+from ...base.vectors import FloatArray
+from ..problem import Variables
+from . import INTEGRATORS
+from .auto import steady_steps
+from .free_body import free_body_steps, free_body_strang_steps
+from .gram_schmidt import euler_steps, midpoint_steps
+from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Kernel, Method
+from .lie_midpoint import lie_midpoint_steps
+from .runge_kutta import dop853_steps, rk4_steps, semi_implicit_euler_steps
+from .series import MOTION_COLUMNS, taylor_steps
+from .series_steps import MAX_DEGREE, series_steps, series_workspace, spin_workspace
+
+KERNELS: tuple[Kernel, ...] = (
+    steady_steps,
+    free_body_steps,
+    free_body_strang_steps,
+    euler_steps,
+    midpoint_steps,
+    semi_implicit_euler_steps,
+    rk4_steps,
+    lie_midpoint_steps,
+    dop853_steps,
+    taylor_steps,
+)
+"""The kernels of fixed steps of all integrators, by number; the only adaptive one is ``series_steps``."""
+
+
+@njit(error_model="numpy", allocates=False)
+def fixed_steps(number: int, y: Variables, p: np.record, h: float, n: int) -> int:
+    """Up to n steps of h seconds in place by the kernel with this number; returns how many were good. WebAssembly has
+    no addresses of functions, and records hold none.
+    """
+    if number == 0:
+        return steady_steps(y, p, h, n)
+    if number == 1:
+        return free_body_steps(y, p, h, n)
+    if number == 2:
+        return free_body_strang_steps(y, p, h, n)
+    if number == 3:
+        return euler_steps(y, p, h, n)
+    if number == 4:
+        return midpoint_steps(y, p, h, n)
+    if number == 5:
+        return semi_implicit_euler_steps(y, p, h, n)
+    if number == 6:
+        return rk4_steps(y, p, h, n)
+    if number == 7:
+        return lie_midpoint_steps(y, p, h, n)
+    if number == 8:
+        return dop853_steps(y, p, h, n)
+    return taylor_steps(y, p, h, n)
+
+
+CONTROL = record_type(
+    [
+        ("accuracy", np.float64),  # requested local error rate [1/s]
+        ("degree", np.int64),  # of the series of the spin
+        ("accepted_ns", np.int64),  # length of the pending step, which isn't committed yet; 0 for none
+        ("elapsed_ns", np.int64),  # committed since the segment's start
+        ("steps", np.int64),  # committed
+        ("evaluations", np.int64),  # in committed steps, one for each series
+        ("pending", np.int64),  # evaluations spent on the pending step
+        # Largest error rates of a step [1/s] that are set by rounding instead of the accuracy; and those set by
+        # rounding of a string's tension.
+        ("floor_rate", np.float64),
+        ("pull_floor_rate", np.float64),
+        ("failed", np.bool_),  # even a step of a nanosecond is too long, or the motion diverged
+        ("series", np.bool_),  # the workspace holds the series about the committed variables
+        # Of the pending step, if the string's law changes within it:
+        ("law", np.float64),  # the string's law at its start
+        ("switch", np.float64),  # time [s] at which the last series replaces the first; infinite for none
+        ("last_start", np.float64),  # start time of the last series [s]
+        ("last_law", np.float64),  # the law of the last series
+    ]
+)
+"""State of an adaptive kernel between calls."""
+
+# Methods by number: those of all integrators, one after the other
+
+_METHODS = [method for integrator in INTEGRATORS.values() for method in integrator.methods]
+_FIRST = np.cumsum([0, *(len(integrator.methods) for integrator in INTEGRATORS.values())])
+_WAY = np.array([method.way for method in _METHODS])
+_KERNEL = np.array([KERNELS.index(method.kernel) if method.kernel in KERNELS else -1 for method in _METHODS])
+_EVALUATIONS = np.array([method.evaluations for method in _METHODS])
+_SLEEPS = np.array([method.sleeps for method in _METHODS])
+_SPIN_ALONE = np.array([method.spin_alone for method in _METHODS])
+
+
+@njit(error_model="numpy", allocates=False)
+def method_for(integrator: int, kind: int) -> int:
+    """The number of an integrator's method for a kind of segment; kind: 0 for one that doesn't choose."""
+    return int(_FIRST[integrator]) + kind
+
+
+@njit(error_model="numpy", allocates=False)
+def way_of(method: int) -> int:
+    """How a method steps: NOTHING, ONE_STEP, FIXED_STEPS or ADAPTIVE."""
+    return int(_WAY[method])
+
+
+@njit(error_model="numpy", allocates=False)
+def evaluations_of(method: int) -> int:
+    """Evaluations of the equations of motion per step of a method; adaptive ones count their own."""
+    return int(_EVALUATIONS[method])
+
+
+@njit(error_model="numpy", allocates=False)
+def sleeps(method: int) -> bool:
+    """Whether nothing moves by a method."""
+    return bool(_SLEEPS[method])
+
+
+@njit(error_model="numpy", allocates=False)
+def workspace_of(method: int, degree: int) -> tuple[int, int]:
+    """Rows and columns of the memory of an adaptive method, whose series of the spin have this degree."""
+    return spin_workspace(degree) if _SPIN_ALONE[method] else series_workspace(degree)
+
+
+ROOM = (2 * (MAX_DEGREE + 2) + 1) * MOTION_COLUMNS
+"""Doubles in the largest workspace, that of ``series_workspace`` at MAX_DEGREE."""
+
+
+def method_of(number: int) -> Method:
+    """The method with this number."""
+    return _METHODS[number]
+
+
+# Arguments of kernels: for literal ones they would be compiled a second time.
+_COMMITTING: Any = np.bool_(False)
+_SAMPLING: Any = np.bool_(True)
+_ONCE: Any = np.int64(1)
+
+
+@njit(error_model="numpy", allocates=False, forceinline=True)
+def commit(
+    method: int,
+    y: Variables,
+    p: np.record,
+    control: np.record,
+    following: Variables,
+    room: FloatArray,
+    step_ns: int,
+    span_ns: int,
+) -> tuple[int, int, bool]:
+    """Commit the steps in y that fit into ``span_ns``; returns the time advanced [ns], the number of steps counted
+    here, and whether all were good. room (ROOM,): memory for the workspace.
+    """
+    if way_of(method) == FIXED_STEPS:
+        wanted = span_ns // step_ns
+        if wanted <= 0:
+            return 0, 0, True
+        done = fixed_steps(_KERNEL[method], y, p, step_ns * 1e-9, wanted)
+        return done * step_ns, done, done == wanted
+    if way_of(method) == ADAPTIVE:
+        rows, columns = workspace_of(method, control.degree)
+        workspace = matrix_of(room, rows, columns)
+        advanced = series_steps(y, p, control, following, workspace, span_ns, _COMMITTING)
+        return advanced, 0, not control.failed
+    return 0, 0, True
+
+
+@njit(error_model="numpy", allocates=False, forceinline=True)
+def reach(
+    method: int,
+    y: Variables,
+    p: np.record,
+    control: np.record,
+    following: Variables,
+    room: FloatArray,
+    rest_ns: int,
+) -> bool:
+    """Take one step of ``rest_ns`` in y, a copy; returns whether it was good."""
+    if way_of(method) == NOTHING:
+        return True
+    if way_of(method) == ADAPTIVE:
+        rows, columns = workspace_of(method, control.degree)
+        workspace = matrix_of(room, rows, columns)
+        return bool(series_steps(y, p, control, following, workspace, rest_ns, _SAMPLING) == rest_ns)
+    return bool(fixed_steps(_KERNEL[method], y, p, rest_ns * 1e-9, _ONCE) == 1)

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: MIT
+"""A scene as numbers: one record (SCENE) of all that parameters decide about the motion, one (MESH) of what is computed
+from the mesh, and the body and the flight that compiled functions make of them.
+
+A setup, a row of a sweep, a flight of identify and the page all begin by ``begin``. Fields have the names of the
+parameters, with dots as underscores, and their units.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..base.arithmetic import exact_quotient
+from ..base.compilation import copy_numbers, exported, local_matrix, local_numbers, njit, record_type
+from ..base.vectors import Matrix3, Vector3
+from ..mass import MODEL_COMS
+from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
+from ..mass.moments import MOMENTS
+from ..mass.properties import SCALE_LIMITS
+from ..mass.tensor import NEARLY, POSSIBLE, judged_tensor
+from ..motion.body import LENGTH, BodyRow, fill_body
+from ..motion.integrators import INTEGRATORS
+from ..motion.integrators.series_steps import degree_for
+from ..motion.loads import NEED_ANGULAR_DAMPING, NEED_NO_GYROSCOPIC_TERM, NEED_STRING, NEEDS
+from ..motion.problem import begin_body
+from ..motion.state import fill_initial_row
+from . import refusals as rf
+from .flight import FLIGHT, NEVER
+from .refusals import REFUSAL, refuse, refuse_tensor
+from .string_control import follows_rates, tie
+
+MAX_BALLASTS = 32
+
+SCENE = record_type(
+    [
+        ("scale", np.float64, 3),  # [m per mesh unit]
+        ("mass", np.float64),  # [kg]; 0: computed from the density
+        ("density", np.float64),  # [kg/m³]
+        ("inertia_model", np.int64),  # number in INERTIA_MODELS
+        ("inertia_model_com", np.int64),  # number in MODEL_COMS
+        ("explicit_inertia_mass", np.float64),  # [kg]
+        ("explicit_inertia_center_of_mass", np.float64, 3),  # [mesh coordinates]
+        ("explicit_inertia_tensor", np.float64, 6),  # ixx ixy ixz iyy iyz izz [kg m²]
+        ("ballasts", np.int64),  # how many there are
+        ("ballast", np.float64, (MAX_BALLASTS, 4)),  # masses [kg], above 0, and their positions [mesh coordinates]
+        ("gyroscopic", np.bool_),
+        ("gravity", np.float64, 3),  # [m/s², world]
+        ("linear_damping", np.float64),  # [N s/m]
+        ("angular_damping", np.float64),  # [N m s]
+        ("initial_position", np.float64, 3),  # [m, world]
+        ("initial_orientation_xyzw", np.float64, 4),  # needn't be normalized
+        ("initial_linear_velocity", np.float64, 3),  # [m/s, world]
+        ("initial_angular_velocity", np.float64, 3),  # [rad/s, world]
+        ("initial_string_mass", np.float64),  # [kg]; 0: the effective mass at the start
+        ("integrator", np.int64),  # number in INTEGRATORS
+        ("step", np.float64),  # [s]
+        ("accuracy", np.float64),  # [1/s]
+        ("wrench_timeout", np.float64),  # [s]; 0: none
+        ("poke_duration", np.float64),  # [s]
+        ("string_attached", np.bool_),
+        ("string_attach", np.float64, 3),  # [mesh coordinates]
+        ("string_target", np.float64, 3),  # [m, world]
+        ("string_stiffness", np.float64),  # [N/m]
+        ("string_frequency", np.float64),  # [rad/s], overrides the stiffness if > 0
+        ("string_damping_ratio", np.float64),
+        ("string_rest_length", np.float64),  # [m]
+        ("string_bilateral", np.bool_),
+        ("string_timeout", np.float64),  # [s]; 0: none
+    ]
+)
+
+SOLID, SHELL, POINTS, BOUNDING_BOX, EXPLICIT = range(5)
+"""Numbers of INERTIA_MODELS; all but the last one are a mesh's."""
+OF_SOLID = MODEL_COMS.index("solid")
+
+MESH = record_type(
+    [
+        ("has_surface", np.bool_),  # False: there is no mesh
+        ("extent", np.float64, 3),  # sides of the bounding box [mesh units]
+        ("solid", MOMENTS),
+        ("shell", MOMENTS),
+        ("points", MOMENTS),
+        ("bounding_box", MOMENTS),
+        ("stretch", np.float64, 3),  # |scale|/|scale_x| for which those of the shell hold
+        ("known", np.uint8, EXPLICIT),  # by the number of the model, whether its moments are there
+    ]
+)
+
+_SUPPORTS = np.array([sum(1 << k for k, need in enumerate(NEEDS) if need in i.supports) for i in INTEGRATORS.values()])
+"""By the integrator's number, the bits of what it supports."""
+
+_TO_NEAREST = 6755399441055744.0  # 1.5·2⁵²
+
+
+@njit(error_model="numpy", allocates=False)
+def nearest_integer(x: float) -> int:
+    """x rounded to a whole number, halves to the even one, |x| < 2⁶²."""
+    return int((x + _TO_NEAREST) - _TO_NEAREST) if abs(x) < 2.0**51 else int(x)
+
+
+@njit(error_model="numpy", allocates=False)
+def timeout_ns(seconds: float) -> int:
+    """A timeout [ns]: 0, which means never, for 0 s alone."""
+    return max(1, nearest_integer(seconds * 1e9)) if seconds != 0.0 else 0
+
+
+# The body
+
+
+@njit(error_model="numpy", allocates=False)
+def explicit_tensor(scene: np.record, inertia: Matrix3) -> None:
+    """The explicit tensor as a matrix."""
+    given = scene.explicit_inertia_tensor
+    inertia[0, 0], inertia[1, 1], inertia[2, 2] = given[0], given[3], given[5]
+    inertia[0, 1] = inertia[1, 0] = given[1]
+    inertia[0, 2] = inertia[2, 0] = given[2]
+    inertia[1, 2] = inertia[2, 1] = given[4]
+
+
+@njit(error_model="numpy", allocates=False)
+def _moments_of(mesh: np.record, model: int) -> np.record:
+    moments: np.record = mesh.bounding_box
+    if model == SOLID:
+        moments = mesh.solid
+    elif model == SHELL:
+        moments = mesh.shell
+    elif model == POINTS:
+        moments = mesh.points
+    return moments
+
+
+@njit(error_model="numpy", allocates=False)
+def _are_known(scene: np.record, mesh: np.record, refusal: np.record) -> bool:
+    """Whether the moments are there that the scene needs: of its model, and of the solid for a density or its COM."""
+    s, model = scene.scale, scene.inertia_model
+    fits = mesh.known[model] != 0
+    if model == SHELL:
+        for k in range(3):
+            fits = fits and abs(s[k]) / abs(s[0]) == mesh.stretch[k]
+    if not fits:
+        return refuse(refusal, rf.NO_MOMENTS, model, 0.0, 0.0, 0.0)
+    if mesh.known[SOLID] == 0 and (scene.mass == 0.0 or scene.inertia_model_com == OF_SOLID):
+        return refuse(refusal, rf.NO_MOMENTS, SOLID, 0.0, 0.0, 0.0)
+    return True
+
+
+@njit(error_model="numpy", allocates=False)
+def _spread(
+    scene: np.record,
+    mesh: np.record,
+    com: Vector3,
+    inertia: Matrix3,
+    moments: Vector3,
+    axes: Matrix3,
+    refusal: np.record,
+) -> float:
+    """Total mass [kg] of a model whose mass is distributed over a mesh, 0 if it is refused; fills COM (3,), inertia (3,
+    3), its principal moments (3,) and axes (3, 3).
+    """
+    if not _are_known(scene, mesh, refusal):
+        return 0.0
+    s, mass, model = scene.scale, scene.mass, scene.inertia_model
+    if mass == 0.0:
+        mass = scene.density * mesh.solid.measure * abs(s[0] * s[1] * s[2])
+        if not 1e-300 < mass < math.inf:
+            refuse(refusal, rf.MASS, 0, mass, 0.0, 0.0)
+            return 0.0
+    # A shell's moments include the stretch: the uniform part and the mirroring are left.
+    left = local_numbers(3)
+    for k in range(3):
+        left[k] = math.copysign(abs(s[0]), s[k]) if model == SHELL else s[k]
+    unit = _moments_of(mesh, model)
+    at_solid = scene.inertia_model_com == OF_SOLID
+    placed, ballast = mesh.solid if at_solid else unit, scene.ballast[: scene.ballasts]
+    return spread_mass(mass, unit, placed, at_solid, s, left, ballast, com, inertia, moments, axes)
+
+
+@exported(SCENE, MESH, "f8[:]", REFUSAL, returns="b1")
+def make_body(scene: np.record, mesh: np.record, body: BodyRow, refusal: np.record) -> bool:
+    """Fill the row of a scene's body (BODY,); returns False, with the reason, where there is none. A warning about the
+    tensor (TENSOR, detail NEARLY) is noted, too.
+    """
+    s, com, inertia = scene.scale, local_numbers(3), local_matrix(3, 3)
+    moments, axes = local_numbers(3), local_matrix(3, 3)
+    refusal.code = rf.ACCEPTED
+    for k in range(3):
+        if not SCALE_LIMITS[0] <= abs(s[k]) <= SCALE_LIMITS[1]:
+            return refuse(refusal, rf.SCALE, 0, 0.0, 0.0, 0.0)
+    if scene.inertia_model == EXPLICIT:
+        given = local_matrix(3, 3)
+        explicit_tensor(scene, given)
+        flaw = judged_tensor(given, moments)
+        if flaw != POSSIBLE:
+            refuse_tensor(refusal, flaw, given, 1)
+        if flaw != POSSIBLE and flaw != NEARLY:
+            return False
+        ballast, center = scene.ballast[: scene.ballasts], scene.explicit_inertia_center_of_mass
+        mass = given_mass(scene.explicit_inertia_mass, center, given, s, ballast, com, inertia, moments, axes)
+        if scene.ballasts > 0:
+            refusal.code = rf.ACCEPTED
+            flaw = judged_tensor(inertia, moments)
+    else:
+        mass = _spread(scene, mesh, com, inertia, moments, axes, refusal)
+        if refusal.code != rf.ACCEPTED:
+            return False
+        flaw = POSSIBLE if is_plainly_good(moments) else judged_tensor(inertia, moments)
+    if flaw != POSSIBLE:
+        refuse_tensor(refusal, flaw, inertia, 0)
+        if flaw != NEARLY:
+            return False
+    diagonal = 0.0
+    for k in range(3):
+        # Within an ulp of where it is, at a product of mesh coordinate and scale: so it survives being sent back by
+        # message.
+        com[k] = exact_quotient(com[k], s[k]) * s[k]
+        side = mesh.extent[k] * s[k]
+        diagonal += side * side
+    fill_body(mass, com, inertia, moments, axes, s, body)
+    if mesh.has_surface:
+        body[LENGTH] = 0.5 * math.sqrt(diagonal)
+    return True
+
+
+# The flight
+
+
+@njit(error_model="numpy", allocates=False)
+def set_rules(scene: np.record, flight: np.record) -> None:
+    """What of a scene holds for the commands and segments of a flight: integrator, accuracy, times."""
+    flight.integrator, flight.supports = scene.integrator, _SUPPORTS[scene.integrator]
+    flight.chooses = scene.integrator == rf.AUTO
+    flight.accuracy, flight.degree = scene.accuracy, degree_for(scene.accuracy)
+    flight.step_ns = nearest_integer(scene.step * 1e9)
+    flight.timeout_ns, flight.poke_ns = timeout_ns(scene.wrench_timeout), nearest_integer(scene.poke_duration * 1e9)
+    flight.string_timeout_ns = timeout_ns(scene.string_timeout)
+
+
+@njit(error_model="numpy", allocates=False)
+def needs_of(scene: np.record, tied: bool) -> int:
+    """What a scene asks of its integrator without any load, as bits of NEEDS."""
+    needs = NEED_ANGULAR_DAMPING if scene.angular_damping != 0.0 else 0
+    if not scene.gyroscopic:
+        needs |= NEED_NO_GYROSCOPIC_TERM
+    return needs | NEED_STRING if tied else needs
+
+
+@njit(error_model="numpy", allocates=False)
+def meets(scene: np.record, needs: int, refusal: np.record) -> bool:
+    """Whether the scene's integrator supports all of these needs."""
+    if needs & ~_SUPPORTS[scene.integrator] == 0:
+        return True
+    return refuse(refusal, rf.INTEGRATOR, scene.integrator, float(needs), 0.0, 0.0)
+
+
+@exported(SCENE, MESH, FLIGHT, REFUSAL, returns="b1")
+def begin(scene: np.record, mesh: np.record, flight: np.record, refusal: np.record) -> bool:
+    """Begin the flight of a scene, a record of zeros: body, state and string at time 0, before its first segment.
+    Returns False, with the reason, for a scene that is refused.
+    """
+    return make_body(scene, mesh, flight.body, refusal) and begin_with_body(scene, flight, refusal)
+
+
+@njit(error_model="numpy", allocates=False)
+def begin_with_body(scene: np.record, flight: np.record, refusal: np.record) -> bool:
+    """The same for a flight that has its body already."""
+    body = flight.body
+    attitude, velocity, spin = (
+        scene.initial_orientation_xyzw,
+        scene.initial_linear_velocity,
+        scene.initial_angular_velocity,
+    )
+    if not fill_initial_row(scene.initial_position, attitude, velocity, spin, flight.row):
+        return refuse(refusal, rf.ORIENTATION, 0, 0.0, 0.0, 0.0)
+    copy_numbers(flight.row, flight.start)
+    begin_body(flight.common, body, scene, 1.0 if scene.gyroscopic else 0.0)
+    set_rules(scene, flight)
+    # None yet: the first method that adapts its steps gets a clean workspace, as every other does.
+    flight.method = -1
+    flight.string_release_ns = NEVER
+    for k in range(3):
+        flight.string_attach[k] = scene.string_attach[k]
+    if not meets(scene, needs_of(scene, scene.string_attached), refusal):
+        return False
+    if not follows_rates(scene, body, scene.string_attached, scene.string_attach, refusal):
+        return False
+    if scene.string_attached:
+        tie(scene, flight, scene.string_target, 0, scene.initial_string_mass)
+    return True
