@@ -73,7 +73,7 @@ def description() -> dict[str, Any]:
 
 
 def named_records() -> dict[str, np.dtype[Any]]:
-    """Types of records that are variables of the package's modules, by their names. Raises InputError if two share one."""
+    """Types of records that are variables of the package, by their names. Raises InputError if two share one."""
     found: dict[str, np.dtype[Any]] = {}
     for module in [module for name, module in sys.modules.items() if name.startswith(PACKAGE)]:
         for name, kind in vars(module).items():
