@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.compilation import new_record, place_of
+from ..base.compilation import bound, new_record, place_of
 from ..base.errors import CommandRefused
 from ..base.simd import aligned
 from ..base.vectors import Attitude, FloatArray
@@ -95,6 +95,8 @@ class FlightArrays:
         self._room = np.ndarray(ROOM, np.float64, memory, room_at)
         self._table = memory.data.cast("B")[loads_at:events_at]
         self._string = memory.data.cast("B")[_STRING_AT:_STRING_END]
+        self.call = bound(operate, self.flight, self._loads, self._events, self._room)
+        """Perform an operation, by its number and a time [ns]; returns its result: for END_DUE, whether anything ended."""
 
     def _grow(self, rows: int) -> None:
         """Have at least this number of rows; what is there is kept."""
@@ -112,7 +114,7 @@ class FlightArrays:
         load_ids = numbers[_LOAD_IDS]
         numbers[:] = setup.integers
         numbers[_LOAD_IDS] = load_ids
-        self.call(BEGIN)
+        self.call(BEGIN, 0)
 
     def change(self, old: Setup, new: Setup) -> None:
         """Go on as the flight of another setup; raises CommandRefused."""
@@ -163,13 +165,10 @@ class FlightArrays:
         check_load(self.flight, setup.mesh, setup.vertices, setup.triangles, kind, load, self._refusal)
         return refused_command(self._refusal)
 
-    def call(self, what: int, until_ns: int = 0) -> int:
-        """Perform an operation; returns its result: for END_DUE, whether anything ended."""
-        return operate(self.flight, self._loads, self._events, self._room, what, until_ns)
-
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; returns False when the motion failed."""
-        return self.call(FLY, until_ns) == _REACHED
+        reached: bool = self.call(FLY, until_ns) == _REACHED
+        return reached
 
     def accelerations(self) -> FloatArray:
         """Accelerations now (6,): of the COM [m/s², world], angular [rad/s², body axes]."""
