@@ -16,14 +16,9 @@ import numpy as np
 from ...base.compilation import copy_numbers, njit
 from ...base.rotation import matrix_elements, norm
 from ...base.vectors import FloatArray, Quaternion, Vector
-<<<<<<< HEAD
 from ..loads import NO_GYROSCOPIC_TERM
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, accelerations, copy_variables, parts_of
-from .integrator import EVALUATED, Integrator, Kernel
-=======
 from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, accelerations, parts_of
-from .integrator import EVALUATED, NO_GYROSCOPIC_TERM, Integrator, Kernel
->>>>>>> integrators
+from .integrator import EVALUATED, Integrator, Kernel
 from .runge_kutta import ONE_STAGE, repeated
 
 _Matrix = tuple[Vector, Vector, Vector]

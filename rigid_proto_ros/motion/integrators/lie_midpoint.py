@@ -25,14 +25,9 @@ import numpy as np
 from ...base.compilation import copy_numbers, local_numbers, njit
 from ...base.rotation import multiply, normalize, rotate
 from ...base.vectors import Quaternion, Vector
-<<<<<<< HEAD
 from ..loads import ANGULAR_DAMPING
-from ..problem import VARIABLES, Variables, copy_variables, is_good, parts_of, torque
-from .integrator import LOADS, Integrator
-=======
 from ..problem import VARIABLES, Variables, is_good, parts_of, torque
-from .integrator import ANGULAR_DAMPING, LOADS, Integrator
->>>>>>> integrators
+from .integrator import LOADS, Integrator
 
 _MAX_ITERATIONS = 60
 """Newton's method needs 3 to 6; many more only if the step is too long to converge."""

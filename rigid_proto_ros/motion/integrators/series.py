@@ -36,12 +36,8 @@ from ...base.simd import (
     triple,
 )
 from ...base.vectors import FloatArray
-<<<<<<< HEAD
 from ..loads import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VARIABLES, VELOCITY, Variables, copy_variables, is_good
-=======
 from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VARIABLES, VELOCITY, Variables, is_good
->>>>>>> integrators
 from ..string import NO_DIRECTION
 from .integrator import Integrator
 
