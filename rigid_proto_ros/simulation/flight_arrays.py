@@ -33,6 +33,7 @@ _ROW_BYTES, _EVENT_BYTES = LOAD_ROW.itemsize, EVENT.itemsize
 _FLIGHT_BYTES, _STATE_AT = FLIGHT.itemsize, place_of(FLIGHT, "row")
 _LOAD_AT = place_of(LOAD_ROW, "load")
 _STRING_AT, _STRING_END = place_of(FLIGHT, "string"), place_of(FLIGHT, "sums")
+_TIED_IN_STRING = place_of(FLIGHT, "tied") - _STRING_AT
 
 
 # Indices of integers in the flight's memory that are accessed at every advance or reset: the fastest access to single
@@ -96,7 +97,8 @@ class FlightArrays:
         self._table = memory.data.cast("B")[loads_at:events_at]
         self._string = memory.data.cast("B")[_STRING_AT:_STRING_END]
         self.call = bound(operate, self.flight, self._loads, self._events, self._room)
-        """Perform an operation, by its number and a time [ns]; returns its result: for END_DUE, whether anything ended."""
+        """Perform an operation, by its number and a time [ns]; returns its result: of END_DUE, whether anything ended.
+        """
 
     def _grow(self, rows: int) -> None:
         """Have at least this number of rows; what is there is kept."""
@@ -182,8 +184,8 @@ class FlightArrays:
 
     @property
     def string_bytes(self) -> bytes:
-        """All that is known of the string, to be compared."""
-        return bytes(self._string)
+        """All that is known of a tied string, to be compared; empty without one."""
+        return bytes(self._string) if self._string[_TIED_IN_STRING] else b""
 
     @property
     def string(self) -> StringState | None:

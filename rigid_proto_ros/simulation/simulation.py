@@ -139,7 +139,7 @@ class Simulation:
     def _notify_string(self) -> None:
         """Notify the observer of the string if it has changed since the last notification."""
         arrays = self._arrays
-        told, self._told_string = self._told_string, arrays.string_bytes if arrays.flight.tied else b""
+        told, self._told_string = self._told_string, arrays.string_bytes
         if told != self._told_string and StringChanged in self.observer.takes:
             self.observer.on(self._string_as_tied())
 
