@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arithmetic import exact_quotient
-from ..base.compilation import copy_fields, new_record
+from ..base.compilation import copy_fields, copy_of, new_record
 from ..base.errors import CommandRefused, InputError, MeshError
 from ..base.vectors import Vector3
 from ..mass import INERTIA_MODELS, MODEL_COMS
@@ -209,7 +209,7 @@ def scene_record(parameters: Parameters, like: tuple[Setup, Collection[str]] | N
     """The numbers of parameters (simulation/record.py, SCENE); raises InputError for more ballast than it holds. like:
     as for ``build_scenario``.
     """
-    scene: np.record = new_record(SCENE) if like is None else like[0].scene.copy()
+    scene: np.record = new_record(SCENE) if like is None else copy_of(like[0].scene)
     names = PARAMETERS if like is None else like[1]
     for name in names:
         if name in _SCENE_VALUES:

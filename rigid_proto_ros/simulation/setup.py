@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.compilation import new_record
+from ..base.compilation import new_record, new_records
 from ..base.errors import CommandRefused, InputError, TensorError
 from ..base.vectors import Points, Records, StateRow, Triangles, Vector, Vector3
 from ..mass import INERTIA_MODELS
@@ -40,9 +40,9 @@ Provider = Callable[[str, Vector3], np.record]
 @dataclass(frozen=True, eq=False)
 class Setup:
     """scene: a record SCENE, and mesh: a record MESH, neither ever modified. surface: of the mesh, or None.
-    mesh_sha256: equal values mean the same mesh, so that at equal scales a change of COM moves the COM and not the mesh. contacts:
-    mesh coordinates by name. thrusters: by name, in its order. flights (1,): FLIGHT at time 0, before its first
-    segment, ``initial`` (13,) its state row and ``integers`` its memory. warnings: about the tensor.
+    mesh_sha256: equal values mean the same mesh, so that at equal scales a change of COM moves the COM and not the
+    mesh. contacts: mesh coordinates by name. thrusters: by name, in its order. flights (1,): FLIGHT at time 0, before
+    its first segment, ``initial`` (13,) its state row and ``integers`` its memory. warnings: about the tensor.
     """
 
     scene: np.record
@@ -122,14 +122,14 @@ def make_setup(
     lacks the moments of a model that the scene needs.
     """
     mesh = new_record(MESH) if mesh is None else mesh
-    flights, refusal = np.zeros(1, FLIGHT), new_record(REFUSAL)
+    flights, refusal = new_records(1, FLIGHT), new_record(REFUSAL)
     while not begin(scene, mesh, flights[0], refusal):
-        if refusal.code != rf.NO_MOMENTS:
+        if refusal["code"] != rf.NO_MOMENTS:
             raise _refused_scene(scene, refusal, mesh_name)
         if provide is None:
             raise InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
         mesh = provide(INERTIA_MODELS[refusal.detail], scene.scale)
-    warnings = _tensor_warnings(scene, refusal, mesh_name) if refusal.code == rf.TENSOR else ()
+    warnings = _tensor_warnings(scene, refusal, mesh_name) if refusal["code"] == rf.TENSOR else ()
     return Setup(scene, mesh, surface, mesh_sha256, contacts or {}, thrusters or {}, flights, warnings)
 
 
