@@ -320,7 +320,10 @@ def _local_array(count: int, shape: tuple[int, ...], number: Any) -> tuple[Any, 
 
     def code(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
         of_numbers = context.get_data_type(number)
-        memory = cgutils.alloca_once(builder, ir.ArrayType(of_numbers, count))
+        # Once a call, not in every turn of a loop. numba's own function for this also fills it with zeros.
+        with builder.goto_entry_block():
+            memory = builder.alloca(ir.ArrayType(of_numbers, count))
+        memory.align = 64
         return _array_at(context, builder, kind, builder.bitcast(memory, of_numbers.as_pointer()), shape)
 
     return kind, code
