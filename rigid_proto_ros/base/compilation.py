@@ -76,6 +76,7 @@ def njit(*, allocates: bool = True, cache: bool = True, **options: Any) -> Calla
         if WAY == "building":
             # Python's wrappers around each compiled function take a sixth of the time.
             options.update(no_cpython_wrapper=True, no_cfunc_wrapper=True)
+            options.setdefault("forceinline", False)  # otherwise all that such a function calls would be forced, too
         compiled: Any = numba.njit(**options)(function)
         if cache and WAY == "jit":
             compiled._cache = jit.KernelCache(function)  # noqa: SLF001 (where enable_caching puts it)
