@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import fcntl
+import gc
 import gzip
 import os
 import sys
@@ -71,6 +72,7 @@ def build(kinds: list[str], folder: Path) -> None:
     from .lowering import whole_module
     from .targets import TARGETS, linked, object_code
 
+    gc.disable()  # it would search what numba keeps again and again
     whole = whole_module(told)
     for kind in kinds:
         with tempfile.TemporaryDirectory(dir=folder) as work:

@@ -14,7 +14,7 @@ from typing import Any
 import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import boolean, float64, from_dtype, int64, types
-from numba.core import cgutils, codegen
+from numba.core import callconv, cgutils, codegen
 from numba.core.errors import NumbaError
 from numba.np.arrayobj import populate_array
 
@@ -35,12 +35,26 @@ def _finish_without_code(library: Any) -> None:
     library._finalized = True  # noqa: SLF001 (numba has no option)
 
 
+def _raise_unless_index(raising: Callable[..., None]) -> Callable[..., None]:
+    """Numba's code that raises an exception. An index of a tuple is no more checked than one of an array."""
+
+    def code(convention: Any, builder: Any, kind: type, *arguments: Any, **options: Any) -> None:
+        if kind is IndexError:
+            builder.unreachable()
+        else:
+            raising(convention, builder, kind, *arguments, **options)
+
+    return code
+
+
 def whole_module(told: Callable[[int, int], None]) -> Any:
     """The module. ``told`` is called with the number of kernels that are done, and of all."""
     numbas: Any = codegen
     numbas.CPUCodeLibrary.finalize = _finish_without_code
     numbas.JITCodeLibrary.get_pointer_to_function = lambda *_: 0
     numbas.JITCPUCodegen.set_env = lambda *_: None
+    convention: Any = callconv.CPUCallConv
+    convention.return_user_exc = _raise_unless_index(convention.return_user_exc)
     package = __package__.partition(".")[0]
     for module in MODULES:
         importlib.import_module(f"{package}.{module}")

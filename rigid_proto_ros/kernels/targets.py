@@ -100,13 +100,14 @@ def _check_raises(text: str) -> None:
     """Refuse kernels that may raise an exception. Raises InputError with their names, and which exceptions."""
     raising = set(re.findall(rf'call void @"?{re.escape(RAISES)}(\w+)', text))
     if raising:
-        pickled = re.findall(r'@\.const\.pickledata\S* = .*? c"(.*)"', text)
-        found = [
-            re.sub(rb"\\([0-9A-F]{2})", lambda digits: bytes.fromhex(digits[1].decode()), one.encode())
-            for one in pickled
-        ]
+        pickled = re.findall(r'@\.const\.pickledata\.[0-9a-f]+(?:\.\d+)? = .*? c"(.*)"', text)
+        found = [re.sub(rb"\\(\\|..)", _unescaped, one.encode()) for one in pickled]
         reasons = {f"{kind.__name__}{values} in {place}" for kind, values, place in map(pickle.loads, found)}
         raise InputError(", ".join(sorted(raising)), "; ".join(sorted(reasons)), "kernels that raise nothing")
+
+
+def _unescaped(found: re.Match[bytes]) -> bytes:
+    return b"\\" if found[1] == b"\\" else bytes.fromhex(found[1].decode())
 
 
 def undefined_symbols(code: bytes) -> set[str]:

@@ -16,6 +16,15 @@ from .tensor import MAX_MOMENT_RATIO, TRIANGLE_SLACK_COMPUTED, principal_axes_ke
 
 
 @njit(error_model="numpy", allocates=False)
+def _as_inertia(second: Matrix3, inertia: Matrix3) -> None:
+    """Fill the inertia (3, 3) of second moments ∫ x xᵀ (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            inertia[i, j] = 0.0 - second[i, j]  # no -0
+        inertia[i, i] = second[(i + 1) % 3, (i + 1) % 3] + second[(i + 2) % 3, (i + 2) % 3]
+
+
+@njit(error_model="numpy", allocates=False)
 def _loaded(
     mass: float,
     center: Vector3,
@@ -26,8 +35,8 @@ def _loaded(
     moved: Vector3,
     inertia: Matrix3,
 ) -> float:
-    """Total mass [kg]; fills the COM ``moved`` (3,) relative to the stretched reference, and the inertia (3, 3), ballast
-    included.
+    """Total mass [kg], ballast included; fills the COM ``moved`` (3,) relative to the stretched reference, and the
+    inertia (3, 3).
 
     mass [kg]; center (3,) relative to the reference and second (3, 3) about it, both stretched already; ``points`` (k,
     4): ballast in mesh coordinates; ``stretch`` and ``reference`` (3,) convert its positions. Each point mass is added
@@ -54,10 +63,7 @@ def _loaded(
             for i in range(3):
                 for j in range(3):
                     gathered[i, j] += m * (offset[i] * offset[j])  # symmetric to the bit
-    for i in range(3):
-        for j in range(3):
-            inertia[i, j] = 0.0 - gathered[i, j]  # no -0
-        inertia[i, i] = gathered[(i + 1) % 3, (i + 1) % 3] + gathered[(i + 2) % 3, (i + 2) % 3]
+    _as_inertia(gathered, inertia)
     return total
 
 

@@ -26,6 +26,7 @@ from ..base.files import whole_file
 from ..base.vectors import Points, Triangles
 from ..mesh.reading import Mesh, load_mesh
 from ..mesh.solids import box_surface, can_unite, convex_hull, united_surface
+from ..mesh.topology import turned_triangles
 from .moments import referenced_vertices
 from .properties import MeshMoments, Surface
 from .repair import close_surface, repair_surface
@@ -55,7 +56,7 @@ class MeshBody:
     def triangles(self) -> Triangles:
         """Triangles (m, 3), reversed if the file winds them inward throughout."""
         triangles = self.moments.triangles
-        return np.ascontiguousarray(triangles[:, [0, 2, 1]]) if self.verdict.inward else triangles
+        return turned_triangles(triangles) if self.verdict.inward else triangles
 
 
 def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", accept_open: float = 0.0) -> MeshBody:
@@ -90,7 +91,7 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
         verdict.findings.insert(0, Finding("open_accepted", WARNING, message))
     stand_in: Callable[[], Surface] | None = None
     if verdict.united:
-        outward = triangles[:, [0, 2, 1]] if verdict.inward else triangles
+        outward = turned_triangles(triangles) if verdict.inward else triangles
         stand_in = functools.cache(lambda: united_surface(vertices, outward)[:2])
     elif fallback and verdict.usable and not verdict.closed:
         points = referenced_vertices(vertices, triangles)

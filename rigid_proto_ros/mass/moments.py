@@ -20,11 +20,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ..base.arithmetic import fast_two_sum, pair_add, pair_divide, pair_multiply, two_product, two_sum
-from ..base.compilation import exported, local_matrix, local_numbers, matrix_of, new_record, njit, record_type
+from ..base.arithmetic import (
+    exponent_of,
+    fast_two_sum,
+    pair_add,
+    pair_divide,
+    pair_multiply,
+    scaled,
+    two_product,
+    two_sum,
+)
+from ..base.compilation import exported, local_matrix, local_numbers, matrix_of, njit, record_type
 from ..base.errors import MeshError
 from ..base.simd import Packed, filled, fused_multiply_add, load, number, store
 from ..base.vectors import BoolArray, FloatArray, IntArray, Points, Triangles, Vector3
@@ -78,13 +88,21 @@ class Moments:
         """Centroid (3,) in mesh coordinates, without ``center_low``."""
         return self.reference + self.center
 
-    @property
+    @cached_property
     def record(self) -> np.record:
         """The same as MOMENTS."""
-        found = new_record(MOMENTS)
-        for name in MOMENTS.names or ():
-            found[name] = getattr(self, name)
-        return found
+        numbers, record = _new_moments()
+        numbers[0] = self.measure
+        numbers[1:4], numbers[4:7] = self.reference, self.center
+        numbers[7:10], numbers[10:] = self.center_low, self.second
+        return record
+
+
+def _new_moments() -> tuple[FloatArray, np.record]:
+    """Memory for moments as numbers (16,), in their order, and as MOMENTS: fields by name take longer than a kernel."""
+    numbers = np.zeros(16)
+    record: np.record = numbers.view(MOMENTS)[0]
+    return numbers, record
 
 
 MODELS = ("solid", "shell", "points", "bounding_box")
@@ -193,7 +211,7 @@ def _exact_reference(lower: Vector3, upper: Vector3, reference: Vector3) -> tupl
         is_point = is_point and low == high
     if is_point:
         return 0.0, 0.0
-    return math.ldexp(1.0, -math.frexp(size)[1]), size
+    return scaled(1.0, -exponent_of(size)), size
 
 
 @njit(error_model="numpy", allocates=False)
@@ -267,6 +285,12 @@ def _across(lanes: Packed) -> float:
     """The sum of eight numbers, by halves (pairwise)."""
     even = (number(lanes, 0) + number(lanes, 4)) + (number(lanes, 2) + number(lanes, 6))
     return even + ((number(lanes, 1) + number(lanes, 5)) + (number(lanes, 3) + number(lanes, 7)))
+
+
+@njit(error_model="numpy", allocates=False)
+def _clear(sums: FloatArray) -> None:
+    for k in range(10):
+        sums[k, 0] = sums[k, 1] = 0.0
 
 
 @njit(error_model="numpy", allocates=False)
@@ -420,8 +444,7 @@ def signed_solid_moments(vertices: Points, triangles: Triangles, how: int, room:
     if how == AS_NEEDED:
         in_pairs = triangles.shape[0] <= SMALL_MESH
     if not in_pairs:
-        for k in range(10):
-            sums[k, 0] = sums[k, 1] = 0.0
+        _clear(sums)
         edges = _blocked_sums(vertices, triangles, reference, factor, corners, sums)
         rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
         in_pairs = how == AS_NEEDED and not rounding <= ROUNDING_LIMIT * abs(sums[0, 0])
@@ -527,8 +550,7 @@ def _shell(
     for i in range(vertices.shape[0]):
         for k in range(3):
             points[i, k] = (points[i, k] - reference[k]) * factor
-    for k in range(10):
-        sums[k, 0] = sums[k, 1] = 0.0
+    _clear(sums)
     _shell_sums(points, triangles, starts, sums)
     if not _central(sums, reference, factor, (1.0, 3.0, 12.0), 2, found):
         return NO_AREA
@@ -545,8 +567,7 @@ def _points(vertices: Points, used: BoolArray, lower: Vector3, upper: Vector3, f
     if size == 0.0:
         return ONE_POINT
     count = 0
-    for k in range(10):
-        sums[k, 0] = sums[k, 1] = 0.0
+    _clear(sums)
     for i in range(vertices.shape[0]):
         if used[i]:
             x = (vertices[i, 0] - reference[0]) * factor
@@ -621,11 +642,11 @@ def moments_of(
     return FOUND
 
 
-def _moments(code: int, found: np.record, vertices: Points) -> Moments:
-    """What a kernel has found; raises MeshError where there is nothing."""
+def _moments(code: int, numbers: FloatArray, vertices: Points) -> Moments:
+    """What a kernel has found, numbers (16,); raises MeshError where there is nothing."""
     if code != FOUND:
         raise MeshError("mesh", _REASONS[code].format(len(vertices) - 1))
-    return Moments(float(found.measure), found.reference, found.center, found.center_low, found.second)
+    return Moments(float(numbers[0]), numbers[1:4], numbers[4:7], numbers[7:10], numbers[10:])
 
 
 def solid_moments(vertices: Points, triangles: Triangles, *, compensated: bool | None = None) -> Moments:
@@ -638,8 +659,9 @@ def solid_moments(vertices: Points, triangles: Triangles, *, compensated: bool |
     """
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
-    found, how = new_record(MOMENTS), AS_NEEDED if compensated is None else IN_PAIRS if compensated else PLAIN
-    return _moments(signed_solid_moments(vertices, triangles, how, np.empty(ROOM), found), found, vertices)
+    numbers, found = _new_moments()
+    how = AS_NEEDED if compensated is None else IN_PAIRS if compensated else PLAIN
+    return _moments(signed_solid_moments(vertices, triangles, how, np.empty(ROOM), found), numbers, vertices)
 
 
 def mesh_moments(
@@ -667,10 +689,11 @@ def mesh_moments(
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
     starts = np.empty(0, np.int64) if polygon_starts is None else np.ascontiguousarray(polygon_starts, np.int64)
-    number, found = MODELS.index(model), new_record(MOMENTS)
+    number = MODELS.index(model)
+    numbers, found = _new_moments()
     used = np.empty(len(vertices) if number in (POINTS, BOX) else 0, np.bool_)
     room = np.empty(max(ROOM, 3 * len(vertices)) if number in (SOLID, SHELL) else 0)
-    return _moments(moments_of(number, vertices, triangles, starts, scale, used, room, found), found, vertices)
+    return _moments(moments_of(number, vertices, triangles, starts, scale, used, room, found), numbers, vertices)
 
 
 def referenced_vertices(vertices: Points, triangles: Triangles) -> Points:

@@ -22,6 +22,7 @@ from ..mesh.topology import (
     mesh_topology,
     rims,
     surplus_copies,
+    turned_triangles,
 )
 from .moments import referenced_vertices, solid_moments
 
@@ -232,7 +233,7 @@ def _check_overlap(verdict: Verdict, nesting: Nesting, volume: float, vertices: 
     pairs = int(np.count_nonzero(np.triu(nesting.crossing)))
     overlap, whole, parts = f"{counted(pairs, 'pair')} of components overlap", 0.0, 0.0
     if verdict.inward:
-        volume, triangles = -volume, triangles[:, [0, 2, 1]]
+        volume, triangles = -volume, turned_triangles(triangles)
     if verdict.closed:
         with contextlib.suppress(MeshError):
             points, faces, parts = united_surface(vertices, triangles, nesting)

@@ -16,6 +16,7 @@ from ..base.compilation import exported, local_matrix, njit
 from ..base.errors import MeshError, is_missing
 from ..base.rotation import matrix_elements, normalize
 from ..base.vectors import FloatArray, Points, Triangles
+from .topology import turned_triangles
 
 _LIBRARIES = ("images", "effects", "materials", "cameras", "lights", "animations", "animation_clips", "controllers")
 _UNUSED = (*(f"library_{kind}" for kind in _LIBRARIES), "bind_material", "instance_camera", "instance_light", "extra")
@@ -66,7 +67,7 @@ def _mirrors(matrix: FloatArray) -> bool:
         for i in range(k + 1, 3):
             if abs(rows[i, k]) > abs(rows[best, k]):
                 best = i
-        if not rows[best, k] != 0.0:
+        if rows[best, k] == 0.0:
             return False
         if best != k:
             negative = not negative
@@ -118,7 +119,7 @@ class Assembly:
             points, matrix = (np.ascontiguousarray(of, dtype=np.float64) for of in (vertices, matrix))
         placed = np.empty((len(points), 3))
         if place_vertices(points, matrix, placed):
-            triangles = triangles[:, [0, 2, 1]]
+            triangles = turned_triangles(triangles)
         self._vertices.append(placed)
         self._triangles.append(triangles + self._count)
         self._count += len(vertices)

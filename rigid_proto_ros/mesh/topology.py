@@ -62,9 +62,9 @@ def first_equal_rows(rows: IntArray, first: IntArray, room: IntArray) -> None:
 
 @exported("f8[:,:]", "i8[:,:]", "i8[:]", "i8[:,:]", returns="i8", nogil=True)
 def weld_triangles(vertices: Points, triangles: Triangles, room: IntArray, corners: Triangles) -> int:
-    """Fill ``corners`` (m, 3) with triangles (m, 3) over the first of the vertices (n, 3) at each bit-equal position (−0
-    equals 0). Returns 1; 0 and leaves ``corners`` as they are if all positions differ; −1 if a triangle uses a vertex
-    outside 0 to n − 1. room: workspace, see ``topology_room``.
+    """Fill ``corners`` (m, 3) with triangles (m, 3) over the first of the vertices (n, 3) at each bit-equal position
+    (−0 equals 0). Returns 1; 0 and leaves ``corners`` as they are if all positions differ; −1 if a triangle uses a
+    vertex outside 0 to n − 1. room: workspace, see ``topology_room``.
     """
     count = vertices.shape[0]
     for t in range(triangles.shape[0]):
@@ -351,6 +351,14 @@ def mesh_topology(vertices: Points, triangles: Triangles) -> Topology:
     edges, component, components = _edges(corners, len(vertices), room)
     mark_duplicates(corners, room, duplicates)
     return Topology(corners, edges, component, components, duplicates)
+
+
+def turned_triangles(triangles: Triangles) -> Triangles:
+    """The triangles (m, 3), wound the other way."""
+    triangles = np.ascontiguousarray(triangles, dtype=np.int64)
+    turned = np.empty_like(triangles)
+    turn_triangles(triangles, turned)
+    return turned
 
 
 def doubled_faces(topology: Topology) -> int:

@@ -190,22 +190,6 @@ def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | 
         raise InputError("ghost.integrator", refusal.received, refusal.accepted) from None
 
 
-def scene_record(parameters: Parameters) -> np.record:
-    """The numbers of parameters (simulation/record.py, SCENE); raises InputError for more ballast than it holds."""
-    scene = new_record(SCENE)
-    for name, value_of in _SCENE_VALUES:
-        scene[name] = value_of(parameters)
-    for name, choices, value_of in _SCENE_CHOICES:
-        scene[name] = choices.index(value_of(parameters))
-    points = [mass for mass in parameters.point_masses if mass[0] > 0.0]
-    if len(points) > MAX_BALLASTS:
-        raise InputError("ballast", f"{len(points)} point masses", f"at most {MAX_BALLASTS} with a mass")
-    scene["ballasts"] = len(points)
-    for place, point in zip(scene.ballast, points, strict=False):
-        place[:] = point
-    return scene
-
-
 _SCENE_CHOICES = [
     (name, choices, attrgetter(name))
     for name, choices in {
@@ -222,27 +206,47 @@ _SCENE_VALUES = [
 """Fields of a scene's record, and the parameters that they are: those of the same name, with dots as underscores."""
 
 
+def scene_record(parameters: Parameters) -> np.record:
+    """The numbers of parameters (simulation/record.py, SCENE); raises InputError for more ballast than it holds."""
+    scene = new_record(SCENE)
+    for name, value_of in _SCENE_VALUES:
+        scene[name] = value_of(parameters)
+    for name, choices, value_of in _SCENE_CHOICES:
+        scene[name] = choices.index(value_of(parameters))
+    points = [mass for mass in parameters.point_masses if mass[0] > 0.0]
+    if len(points) > MAX_BALLASTS:
+        raise InputError("ballast", f"{len(points)} point masses", f"at most {MAX_BALLASTS} with a mass")
+    scene["ballasts"] = len(points)
+    for place, point in zip(scene.ballast, points, strict=False):
+        place[:] = point
+    return scene
+
+
 def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup:
     for point in parameters.point_masses:
         if not point[0] >= 0.0:
             raise InputError("ballast", point, "mass >= 0 [kg] and x, y, z, all finite")
-    scene = scene_record(parameters)
-    mesh = new_record(MESH) if body_mesh is None else body_mesh.numbers
-    setup = make_setup(
-        scene,
-        mesh,
-        surface=body_mesh.surface if body_mesh else None,
-        mesh_sha256=body_mesh.mesh.sha256 if body_mesh else "",
-        contacts=dict(parameters.contacts),
-        thrusters={
-            name: make_thruster(
-                name, numbers, parameters.thruster.bidirectional, nanoseconds(parameters.thruster.minimum_on_time)
-            )
-            for name, numbers in sorted(parameters.thrusters.items())
-        },
-        provide=None if body_mesh is None else body_mesh.provide,
-        mesh_name=body_mesh.mesh.name if body_mesh else "",
-    )
+    thrusters = {
+        name: make_thruster(
+            name, numbers, parameters.thruster.bidirectional, nanoseconds(parameters.thruster.minimum_on_time)
+        )
+        for name, numbers in sorted(parameters.thrusters.items())
+    }
+    try:
+        setup = make_setup(
+            scene_record(parameters),
+            new_record(MESH) if body_mesh is None else body_mesh.numbers,
+            surface=body_mesh.surface if body_mesh else None,
+            mesh_sha256=body_mesh.mesh.sha256 if body_mesh else "",
+            contacts=dict(parameters.contacts),
+            thrusters=thrusters,
+            provide=None if body_mesh is None else body_mesh.provide,
+            mesh_name=body_mesh.mesh.name if body_mesh else "",
+        )
+    except InputError as error:
+        if error.field == "scale":  # as it was given, by one number or three
+            raise InputError("scale", list(parameters.scale), error.accepted) from None
+        raise
     if parameters.imu_contact and parameters.imu_contact not in parameters.contacts:
         known = ", ".join(sorted(parameters.contacts)) or "the body has none"
         raise InputError("imu_contact", parameters.imu_contact, f"'' for the COM, or a contact ({known})")

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Inertia models, scale, density, mass and ballast: all closed form on ten numbers."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from mass_solids import box, circle, moved, prism
@@ -45,6 +47,46 @@ def test_shell_of_a_box_is_the_sum_of_its_six_plates():
     ixx = mass[0] * (b * b + c * c) / 12 + mass[1] * (c * c / 12 + b * b / 4) + mass[2] * (b * b / 12 + c * c / 4)
     properties = MeshMoments(*box((a, b, c), 2)).mass_properties("shell", mass=1.0)
     assert properties.inertia[0, 0] == pytest.approx(ixx, rel=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_stretched_shell_is_about_a_vertex_and_put_back_with_one_rounding_and_its_rest(seed):
+    """Both as rational arithmetic has them, to the bit: reference r + b s, and what it lacks, of sizes far apart, too."""
+    random = np.random.default_rng(seed)
+    size, shift = 10.0 ** random.uniform(-8, 8, 2)
+    vertices = size * random.normal(size=(9, 3)) + shift * random.normal(size=3)
+    triangles = random.permutation(random.integers(0, 9, (12, 3)))
+    scale = random.choice([1.0, -1.0], 3) * 10.0 ** random.uniform(-9, 9, 3)
+    stretch = np.abs(scale) / abs(scale[0])
+    base = vertices[triangles[0, 0]]
+    about = mesh_moments("shell", (vertices - base) * stretch, triangles)
+    exact = [Fraction(r) + Fraction(b) * Fraction(s) for r, b, s in zip(about.reference, base, stretch, strict=True)]
+    rest = [float(place - Fraction(float(place))) for place in exact]
+    found = mesh_moments("shell", vertices, triangles, scale=scale)
+    assert found.reference.tolist() == [float(place) for place in exact]
+    assert found.center_low.tolist() == (about.center_low + rest).tolist()
+    assert found.measure == about.measure
+    assert found.center.tolist() == about.center.tolist() and found.second.tolist() == about.second.tolist()
+
+
+REASONS = {
+    "there are no faces": (np.eye(3), np.empty((0, 3))),
+    "a face uses a vertex outside 0 to 2": (np.eye(3), [[0, 1, 3]]),
+    "a vertex coordinate is not finite": (np.diag([1.0, np.nan, 1.0]), [[0, 1, 2]]),
+    "all vertices lie in one point": (np.ones((3, 3)), [[0, 1, 2]]),
+    "the surface encloses no volume": (np.eye(3), [[0, 1, 2], [0, 2, 1]]),
+    "the surface has no area": (np.diag([1.0, 0.0, 0.0]), [[0, 1, 2]]),
+}
+
+
+@pytest.mark.parametrize("reason", REASONS)
+def test_a_mesh_without_the_moments_of_a_model_says_why(reason):
+    vertices, triangles = REASONS[reason]
+    models = {"all vertices lie in one point": MODELS[:3], "the surface encloses no volume": MODELS[:1]}
+    models["the surface has no area"] = MODELS[1:2]
+    for model in models.get(reason, MODELS):
+        with pytest.raises(MeshError, match=reason):
+            mesh_moments(model, vertices, np.array(triangles, dtype=np.int64))
 
 
 def test_a_stretched_shell_far_from_the_origin_keeps_its_digits(lopsided):

@@ -9,7 +9,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_proto_ros.motion.surface import Surface
+from rigid_proto_ros.motion.surface import Surface, inward_normal
 
 CUBE = Surface(
     np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]),
@@ -110,6 +110,18 @@ def test_the_size_of_the_direction_does_not_matter():
 def test_the_inward_normal_of_a_cube_is_its_symmetry_axis(point, outward):
     expected = -np.array(outward) / np.linalg.norm(outward)
     assert np.abs(CUBE.inward_normal(point) - expected).max() <= 1e-15
+
+
+def test_two_faces_that_lie_on_each_other_have_no_normal():
+    normal, folded = np.full(3, np.nan), np.array([[0, 1, 2], [0, 2, 1]])
+    assert not inward_normal(np.eye(3), folded, np.zeros(3), np.ones(3), normal)
+    assert normal.tolist() == [0.0, 0.0, 0.0] == Surface(np.eye(3), folded).inward_normal([0.0, 0.0, 0.0]).tolist()
+    assert inward_normal(CUBE.vertices, CUBE.triangles, np.zeros(3), CUBE.extent, normal)
+
+
+def test_the_extent_is_of_the_vertices_that_faces_use():
+    stray = np.concatenate([CUBE.vertices, [[7.0, -8.0, 9.0]]])
+    assert Surface(stray, CUBE.triangles).extent.tolist() == [1.0, 1.0, 1.0]
 
 
 @settings(max_examples=20, deadline=None)

@@ -241,6 +241,9 @@ FREE_BODY = Integrator(
 SMALL_ARGUMENT = 0.03
 """Below it the Maclaurin series of sn, truncated after u⁹, errs by 2e-19 (for m = 1 the next term is 0.0089 u¹¹)."""
 
+_LEVELS = 13
+"""Maximum number of Landen transformations."""
+
 _DUPLICATION = 3e-3
 """Relative spread of the arguments at which the error of Carlson's fifth-order series (sixth power) is about 1e-16."""
 
@@ -305,15 +308,15 @@ def _by_series(u: float, m: float) -> tuple[float, float, float]:
 def _by_landen(u: float, m1: float) -> tuple[float, float, float]:
     """Bulirsch's sncndn: descending Landen transformations of cot am, which keeps small cn and dn accurate."""
     squeeze = m1
-    means, roots = (0.0,) * 14, (0.0,) * 14
+    means, roots = local_numbers(_LEVELS), local_numbers(_LEVELS)
     a, d, c, levels = 1.0, 1.0, 0.0, 0
     while True:
-        means = _set(means, levels, a)
+        means[levels] = a
         squeeze = math.sqrt(squeeze)
-        roots = _set(roots, levels, squeeze)
+        roots[levels] = squeeze
         c = 0.5 * (a + squeeze)
         levels += 1
-        if abs(a - squeeze) <= 1e-8 * a or levels == 13:
+        if abs(a - squeeze) <= 1e-8 * a or levels == _LEVELS:
             break
         squeeze *= a
         a = c
@@ -330,27 +333,6 @@ def _by_landen(u: float, m1: float) -> tuple[float, float, float]:
         a = c / b
     sn = math.copysign(1.0 / math.sqrt(c * c + 1.0), s)
     return sn, c * sn, d
-
-
-@njit(error_model="numpy", allocates=False)
-def _set(values: tuple[float, ...], index: int, value: float) -> tuple[float, ...]:
-    """A tuple of 14 with one entry replaced: tuples stay in registers, an array would be allocated at each call."""
-    return (
-        value if index == 0 else values[0],
-        value if index == 1 else values[1],
-        value if index == 2 else values[2],
-        value if index == 3 else values[3],
-        value if index == 4 else values[4],
-        value if index == 5 else values[5],
-        value if index == 6 else values[6],
-        value if index == 7 else values[7],
-        value if index == 8 else values[8],
-        value if index == 9 else values[9],
-        value if index == 10 else values[10],
-        value if index == 11 else values[11],
-        value if index == 12 else values[12],
-        value if index == 13 else values[13],
-    )
 
 
 @njit(error_model="numpy", allocates=False)
