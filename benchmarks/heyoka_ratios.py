@@ -26,16 +26,15 @@ from motion_measures import errors
 from problem_references import reference_row
 from problems import JUDGED_BY_VARIANTS, PROBLEMS, Problem, variants
 from result_table import ResultTable
-from rigid_proto_ros.base.compilation import entry_of, njit
-from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion import loads as ld
 from rigid_proto_ros.motion.integrators.integrator import ADAPTIVE
-from rigid_proto_ros.simulation import flight as fl
-from rigid_proto_ros.simulation.batch import EXPLICIT, ROW, Batch, fly_rows
+from rigid_proto_ros.motion.integrators.stepping import way_of
+from rigid_proto_ros.simulation.batch import Batch, fly_rows
 from rigid_proto_ros.simulation.commands import HELD_WRENCH, IMPULSE, NO_SLOT, PULSE, UNNAMED_SLOT
-from rigid_proto_ros.simulation.flight_arrays import SIGNATURE
+from rigid_proto_ros.simulation.flight import LOAD_ROW
 from rigid_proto_ros.simulation.quantities import CODE, MEASURE
-from work_precision_ours import prepare_simulation, setup_of, simulation_of
+from rigid_proto_ros.simulation.record import SCENE
+from work_precision_ours import first_segment, prepare_simulation, setup_of
 from work_precision_ratios import time_at_error
 
 TARGETS = (1e-6, 1e-8, 1e-10)
@@ -57,32 +56,12 @@ COLUMNS = (
 """us: the flight alone. whole_us: set back and, of ours, commands submitted, then flown; nan of a kernel alone."""
 
 
-@njit(error_model="numpy", cache=False)
-def carry_from_start(flights, loads, events, methods, room, what, until_ns):
-    """One segment of the flight: its steps, and the look at the end."""
-    return fl.advance_segment(flights[0], methods, room, until_ns)
-
-
 def kernel_runs(problem: Problem, accuracy: float):
     """(run, row, restart) of the adaptive kernel on a problem of one segment; None where there are more."""
-    if not all(w.end is None and w.begin == 0.0 and not w.impulse for w in problem.wrenches):
+    segment, end_ns = first_segment(problem, "auto", 1e-3, accuracy), round(problem.duration * 1e9)
+    if segment is None or way_of(int(segment.simulation.flight.method)) != ADAPTIVE:
         return None
-    simulation = simulation_of(problem, "auto", 1e-3, accuracy)
-    # The first nanosecond begins the segment and compiles its kernel.
-    simulation.advance(1)
-    arrays = simulation._arrays
-    if arrays.methods[int(arrays.flight.method)]["way"] != ADAPTIVE:
-        return None
-    kernel, end_ns = entry_of(carry_from_start, SIGNATURE), round(problem.duration * 1e9)
-    flight = arrays.flight
-    start = flight.start.copy()
-
-    def restart():
-        flight.row[:] = start
-        fl.begin_variables(flight, arrays.methods, arrays.room)
-
-    held = arrays.arrays
-    return lambda: kernel(*held, 0, end_ns), lambda: flight.row.copy(), restart
+    return lambda: segment.fly(end_ns), segment.row.copy, segment.restart
 
 
 def whole(prepare):
@@ -121,27 +100,19 @@ def sweep_runs(problem: Problem, accuracy: float):
     """ROWS rows by a sweep's compiled block, of which the first is the problem's and the others nearly so."""
     if problem.spring is not None:
         return None
-    own = np.zeros(ROWS, ROW)
-    own["model"], own["scale"], own["explicit_inertia_mass"] = EXPLICIT, 1.0, problem.mass
-    own["explicit_inertia_tensor"] = np.array(problem.inertia)[np.triu_indices(3)]
-    own["gravity"], own["linear_damping"] = problem.gravity, problem.linear_damping
-    own["angular_damping"] = problem.angular_damping
-    row = np.array(problem.row)
-    own["initial_position"], own["initial_orientation_xyzw"], own["initial_linear_velocity"] = np.split(
-        row, (3, 7, 10)
-    )[:3]
-    spin = matrix_from_quaternion(row[3:7]) @ row[10:]
-    own["initial_angular_velocity"] = spin * (1.0 + 1e-3 * np.arange(ROWS)[:, None] / ROWS)
-    commands = np.zeros((1, len(problem.wrenches)), fl.LOAD_ROW)
+    setup = setup_of(problem, "auto", 1e-3, accuracy)
+    own = np.repeat(np.array([setup.scene], SCENE), ROWS)
+    own["initial_angular_velocity"] *= 1.0 + 1e-3 * np.arange(ROWS)[:, None] / ROWS
+    commands = np.zeros((1, len(problem.wrenches)), LOAD_ROW)
     for command, w in zip(commands[0], problem.wrenches, strict=True):
         command.kind = IMPULSE if w.impulse else HELD_WRENCH if w.end is None else PULSE
         command.duration_ns = -1 if w.end is None else round(w.end * 1e9) - round(w.begin * 1e9)
         command.slot = UNNAMED_SLOT if command.kind == HELD_WRENCH else NO_SLOT
         load, command.at_ns = command.load, round(w.begin * 1e9)
         load[ld.LOAD_AXES] = ld.BODY_AXES if w.axes == "body" else ld.WORLD_AXES
-        load[ld.HAS_POINT], load[ld.POINT : ld.POINT + 3] = 1.0, w.point
+        load[ld.PLACE], load[ld.POINT : ld.POINT + 3] = ld.AT_POINT, w.point
         load[ld.FORCE : ld.FORCE + 3], load[ld.TORQUE : ld.TORQUE + 3] = w.force, w.torque
-    batch = Batch(own, np.zeros((0, 4)), setup_of(problem, "auto", 1e-3, accuracy), commands)
+    batch = Batch(own, setup.mesh, commands)
     end = np.zeros((13, MEASURE))  # of kind FINAL
     end[:, CODE] = np.arange(13)
     looks = np.array([round(problem.duration * 1e9)]), end

@@ -2,30 +2,34 @@
 """Our integrators as contestants: the whole ``Simulation`` as a user runs it, and the bare compiled kernel.
 
 ``simulation`` times Simulation.advance: segments, commands and the look at the end included. ``kernel`` times what a peer's
-step function is timed by: the integrator's own loop over steps, called once from Python.
+step function is timed by: the compiled loop over steps, called once from Python.
 """
 
 from __future__ import annotations
 
 import sys
-import time
-from dataclasses import fields
+from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent), str(HERE.parent / "test")]
+
+from flights import StringSettings, flight_setup
 
 from peers import Contestant, Run
 from problems import Problem, Wrench
+from rigid_proto_ros.base.compilation import bound
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.problem import to_row
-from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.simulation.commands import WrenchCommand
+from rigid_proto_ros.simulation.effects import BEGIN, FLY, operate
+from rigid_proto_ros.simulation.flight import REACHED, steps_of_segment
 from rigid_proto_ros.simulation.setup import Setup
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -61,25 +65,17 @@ def _bind(prepare, name):
 
 def setup_of(problem: Problem, integrator: str, step: float, accuracy: float = 1e-9) -> Setup:
     """The problem as a Setup; ``step`` [s]."""
-    values = {
-        "body": make_body(problem.mass, np.zeros(3), np.array(problem.inertia)),
-        "inertia_model": "explicit",
-        "surface": None,
-        "geometry": ("",),
-        "contacts": {},
-        "gravity": np.array(problem.gravity),
-        "linear_damping": problem.linear_damping,
-        "angular_damping": problem.angular_damping,
-        "gyroscopic": True,
-        "integrator": INTEGRATORS[integrator],
-        "step_ns": round(step * 1e9),
-        "accuracy": accuracy,
-        "wrench_timeout_ns": 0,
-        "poke_duration_ns": 50_000_000,
-        "string": _string(problem),
-        "initial": np.array(problem.row),
-    }
-    return Setup(**{f.name: values[f.name] for f in fields(Setup) if f.name in values})
+    return flight_setup(
+        make_body(problem.mass, np.zeros(3), np.array(problem.inertia)),
+        integrator=integrator,
+        step_s=step,
+        initial=problem.row,
+        accuracy=accuracy,
+        gravity=problem.gravity,
+        linear_damping=problem.linear_damping,
+        angular_damping=problem.angular_damping,
+        string=_string(problem),
+    )
 
 
 def _string(problem: Problem) -> StringSettings:
@@ -131,9 +127,6 @@ def prepare_simulation(problem: Problem, step: float, integrator: str) -> Run | 
     simulation = simulation_of(problem, integrator, *arguments)
     if simulation is None:
         return None
-    begin = time.perf_counter()
-    simulation.advance(round(min(problem.duration, 10 * arguments[0]) * 1e9))
-    compile_s = time.perf_counter() - begin
     commands = commands_of(problem.wrenches)
 
     def restart():
@@ -153,43 +146,55 @@ def prepare_simulation(problem: Problem, step: float, integrator: str) -> Run | 
     restart()
     if simulation.refused:
         return None
-    return Run(restart, advance, row, lambda: simulation.steps, compile_s)
+    return Run(restart, advance, row, lambda: simulation.steps)
+
+
+@dataclass
+class Segment:
+    """The first segment of a problem's flight, by the compiled loop alone. fly(until_ns): one call; returns whether it came
+    there. row (13,): the state then.
+    """
+
+    simulation: Simulation
+    restart: Callable[[], None]
+    fly: Callable[[int], bool]
+    row: np.ndarray
+
+
+def first_segment(problem: Problem, integrator: str, step: float, accuracy: float = 1e-9) -> Segment | None:
+    """A problem of one segment; None where there are more, or where the integrator can't carry it."""
+    if not all(w.end is None and w.begin == 0.0 and not w.impulse for w in problem.wrenches):
+        return None
+    simulation = simulation_of(problem, integrator, step, accuracy)
+    if simulation is None or simulation.refused:
+        return None
+    # A command at time 0 acts with the first advance beyond it.
+    simulation.advance(1)
+    arrays = simulation._arrays
+    call = bound(operate, arrays.flight, arrays._loads, arrays._events, arrays._room)
+    begun = np.array(arrays.integers)
+
+    def restart():
+        arrays.integers[:] = begun.data
+        call(BEGIN, 0)
+
+    return Segment(simulation, restart, lambda until_ns: call(FLY, until_ns) == REACHED, arrays.row)
 
 
 def prepare_kernel(problem: Problem, step: float, integrator: str) -> Run | None:
     """The compiled loop alone, on problems of one segment whose end is a whole number of steps away."""
     steps = round(problem.duration / step)
-    one_segment = all(w.end is None and w.begin == 0.0 and not w.impulse for w in problem.wrenches)
-    if not one_segment or abs(steps * step - problem.duration) > 1e-9:
+    if integrator in ADAPTIVE or abs(steps * step - problem.duration) > 1e-9:
         return None
-    simulation = simulation_of(problem, integrator, step)
-    if simulation is None or simulation.refused:
+    segment = first_segment(problem, integrator, step)
+    if segment is None:
         return None
-    # A command at time 0 acts with the first advance beyond it.
-    simulation.advance(1)
-    flight = simulation.flight
-    p, kernel = flight.problem, INTEGRATORS[integrator].kernel
-    if kernel is None:
-        return None
-    begin = time.perf_counter()
-    start = flight.variables.copy()
-    kernel(start.copy(), p, 1e-9, 1)
-    compile_s = time.perf_counter() - begin
     now = {}
 
-    def restart():
-        now.update(y=start.copy(), done=0)
-
     def advance(until: float):
-        wanted = round(until / step) - now["done"]
-        now["good"] = kernel(now["y"], p, step, wanted) == wanted
-        now["done"] += wanted
+        now["good"] = segment.fly(round(until * 1e9))
 
     def row():
-        out = np.full(13, np.nan)
-        if now["good"]:
-            to_row(now["y"], p, now["done"] * step, out)
-        return out
+        return segment.row.copy() if now["good"] else np.full(13, np.nan)
 
-    restart()
-    return Run(restart, advance, row, lambda: now["done"], compile_s)
+    return Run(segment.restart, advance, row, lambda: int(steps_of_segment(segment.simulation.flight)))

@@ -18,7 +18,7 @@ import pytest
 from viser._messages import GuiUpdateMessage
 from workbench_page import bare_page
 
-from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
+from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.scene.scenario import Scenario, nanoseconds, read_scene
@@ -49,9 +49,7 @@ class FlownPage:
     page says in its corner."""
 
     def __init__(self, scene: str = "t_handle", lesson: str = "", anew: bool = False) -> None:
-        scenario = read_scene(scene)
-        warm_up(scenario.setup)  # compiled on the page's thread, kernels would let its socket time out
-        self.live = LiveSimulation(scenario)
+        self.live = LiveSimulation(read_scene(scene))
         self.live.announce()
         self.live.loop.begin_ghost()
         self.workbench = Workbench(self.live, lesson=lesson, anew=anew)

@@ -5,10 +5,10 @@ flights of every pair of features, and everyday throws.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from flights import SECOND, flight_setup, wrench
+from flights import SECOND, StringSettings, changed, flight_setup, wrench
 from reference_motion import angle_between, rotation_of
 from reference_taylor import DIGITS, ReferenceProblem, ReferenceString, reference_motion
 from scipy.spatial.transform import Rotation
@@ -16,16 +16,15 @@ from scipy.spatial.transform import Rotation
 from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.motion.body import Body, make_body
-from rigid_proto_ros.motion.integrators.integrator import (
+from rigid_proto_ros.motion.integrators.integrator import Integrator
+from rigid_proto_ros.motion.loads import (
     ANGULAR_DAMPING,
     BODY_FORCE,
     BODY_TORQUE,
     NO_GYROSCOPIC_TERM,
     STRING,
     WORLD_TORQUE,
-    Integrator,
 )
-from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.commands import MoveString
 from rigid_proto_ros.simulation.setup import Setup
@@ -39,17 +38,6 @@ MOVE_S, LOAD_S = (0.3, 0.4), (0.5, 0.7)
 
 
 @dataclass(frozen=True)
-class SizedSetup(Setup):
-    """A setup of a body without a mesh but of known size ℓ [m]."""
-
-    size: float = 1.0
-
-    @property
-    def length(self) -> float:
-        return self.size
-
-
-@dataclass(frozen=True)
 class Scene:
     """loads: axes, point (body axes, from the COM), force, torque of wrenches that act over load_s; moved: where the free end goes."""
 
@@ -59,8 +47,8 @@ class Scene:
     moved: tuple | None = None
 
     def simulation(self, **changes) -> Simulation:
-        """With some of the setup changed."""
-        simulation, (begin, end) = Simulation(replace(self.setup, **changes)), self.load_s
+        """With some of the setup changed (``flights.changed``)."""
+        simulation, (begin, end) = Simulation(changed(self.setup, **changes)), self.load_s
         for axes, point, force, torque in self.loads:
             place = f"point/{','.join(repr(float(c)) for c in point)}" if np.any(point) else "com"
             frame = f"{axes}@{place}"
@@ -108,31 +96,31 @@ class Scene:
             setup.body.mass,
             setup.body.inertia,
             tuple(setup.gravity),
-            linear_damping=setup.linear_damping,
-            angular_damping=setup.angular_damping,
-            gyroscopic=setup.gyroscopic,
+            linear_damping=float(setup.scene.linear_damping),
+            angular_damping=float(setup.scene.angular_damping),
+            gyroscopic=bool(setup.scene.gyroscopic),
             string=self._string(time_s),
             **loads,
         )
 
     def _string(self, time_s: float) -> ReferenceString | None:
         """k and c from the effective mass at the start, by plain linear algebra."""
-        body, string, row = self.setup.body, self.setup.string, self.setup.initial
-        if not string.attached:
+        body, scene, row = self.setup.body, self.setup.scene, self.setup.initial
+        if not scene.string_attached:
             return None
-        arm, target = np.array(string.attach) * body.scale - body.center_of_mass, np.array(string.target)
+        arm, target = scene.string_attach * body.scale - body.center_of_mass, scene.string_target
         R = Rotation.from_quat(row[3:7]).as_matrix()
         span = row[0:3] + R @ arm - target
         length = np.linalg.norm(span)
         levers = [np.cross(arm, way) for way in ([R.T @ span / length] if length > 0.0 else np.eye(3))]
         turning = float(np.mean([lever @ np.linalg.solve(body.inertia, lever) for lever in levers]))
         mass = 1.0 / (1.0 / body.mass + turning)
-        stiffness = mass * string.frequency**2 if string.frequency > 0.0 else string.stiffness
-        damping, velocity = 2.0 * string.damping_ratio * np.sqrt(stiffness * mass), ZERO
+        stiffness = float(mass * scene.string_frequency**2 or scene.string_stiffness)
+        damping, velocity = float(2.0 * scene.string_damping_ratio * np.sqrt(stiffness * mass)), ZERO
         if self.moved is not None and time_s >= MOVE_S[0]:
             way = np.array(self.moved) - target
             target, velocity = (target, way / (MOVE_S[1] - MOVE_S[0])) if time_s < MOVE_S[1] else (target + way, ZERO)
-        end = (tuple(target), stiffness, damping, string.rest_length, string.bilateral)
+        end = (tuple(target), stiffness, damping, float(scene.string_rest_length), bool(scene.string_bilateral))
         return ReferenceString(tuple(arm), *end, target_velocity=tuple(velocity))
 
 
@@ -266,8 +254,9 @@ def make_scene(features: dict, rng: np.random.Generator) -> Scene:
         linear_damping=body.mass * log_uniform(rng, 0.01, 3.0) if f["linear_damping"] else 0.0,
         angular_damping=body.principal_moments.min() * log_uniform(rng, 0.01, 3.0) if f["angular_damping"] else 0.0,
         string=string,
+        size=size,
     )
-    return Scene(SizedSetup(**vars(setup), size=size), loads, LOAD_S, moved)
+    return Scene(setup, loads, LOAD_S, moved)
 
 
 # What people try first: a bundled body thrown on a rope, all else as the parameters' defaults have it, in numbers that

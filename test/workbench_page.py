@@ -18,7 +18,7 @@ import numpy as np
 from viser._messages import RunJavascriptMessage
 
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
-from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
+from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.workbench.main import Workbench
 
@@ -108,9 +108,7 @@ class Flown:
     """A body that flies in real time, and its workbench. lesson: one that begins as the first browser is there."""
 
     def __init__(self, scene: str = "t_handle", lesson: str = "", port: int | None = None, endpoints=None) -> None:
-        scenario = read_scene(scene)
-        warm_up(scenario.setup)
-        self.live = LiveSimulation(scenario, endpoints=endpoints)
+        self.live = LiveSimulation(read_scene(scene), endpoints=endpoints)
         self.workbench = Workbench(self.live, port, lesson=lesson, anew=True)
         self.page, self.server = self.workbench.page, self.workbench.page.server
         self.live.announce()

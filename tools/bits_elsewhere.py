@@ -98,7 +98,7 @@ def in_root(age: str) -> tuple[bool, str]:
     place = root / "opt/bits"
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
-    for part in ("rigid_proto_ros", "test", "config"):
+    for part in ("rigid_proto_ros", "test", "config", "msg_examples"):
         shutil.copytree(HERE / part, place / part, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(HERE / "package.xml", place)
     for file in ("/etc/resolv.conf", "/etc/hosts", "/etc/pip.conf", "/etc/ssl/certs/ca-certificates.crt"):

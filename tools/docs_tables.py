@@ -26,14 +26,7 @@ from rigid_proto_ros.mass.inspection import inspect_mesh
 from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.integrators.integrator import (
-    BODY_FORCE,
-    BODY_TORQUE,
-    NO_GYROSCOPIC_TERM,
-    STRING,
-    WORLD_TORQUE,
-)
-from rigid_proto_ros.motion.problem import ENVIRONMENT_NEEDS
+from rigid_proto_ros.motion.loads import NEEDS
 from rigid_proto_ros.scene.lessons import lesson, lessons
 from rigid_proto_ros.scene.parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
 
@@ -76,10 +69,9 @@ def parameters() -> str:
 
 def integrators() -> str:
     """What each integrator is and doesn't support."""
-    needs = (BODY_TORQUE, WORLD_TORQUE, BODY_FORCE, *ENVIRONMENT_NEEDS.values(), STRING, NO_GYROSCOPIC_TERM)
     rows = []
     for integrator in INTEGRATORS.values():
-        lacks = [need for need in needs if need not in integrator.supports]
+        lacks = [need for need in NEEDS if need not in integrator.supports]
         order = "exact" if integrator.order is None else str(integrator.order)
         evaluations = str(integrator.evaluations)
         if integrator.kernel is None:  # it picks others

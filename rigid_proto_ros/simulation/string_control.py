@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.compilation import copy_numbers, local_numbers, njit
 from ..base.vectors import FloatArray, Triangles, Vector3
-from ..motion.body import AXES, BODY, BODY_SCALE, COM, MASS, MAX_ACCELERATION, MOMENTS, BodyRow, arm
+from ..motion.body import AXES, BODY_SCALE, COM, LENGTH, MASS, MAX_ACCELERATION, MOMENTS, BodyRow, arm
 from ..motion.integrators.auto import FASTEST
 from ..motion.state import to_body_axes
 from ..motion.string import (
@@ -280,7 +280,7 @@ def change_string(old: np.record, new: np.record, flight: np.record, old_body: B
     same = same and old.string_damping_ratio == new.string_damping_ratio
     same = same and old.string_rest_length == new.string_rest_length and old.string_bilateral == new.string_bilateral
     # Each change of parameters makes a new body, mostly with the same numbers.
-    for k in range(BODY):
+    for k in range(LENGTH):
         same = same and old_body[k] == flight.body[k]
     if not same:
         _take_spring(new, flight, 0.0)

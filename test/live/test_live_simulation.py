@@ -16,7 +16,7 @@ import pytest
 from conftest import ENDINGS, needs_rerun
 
 from rigid_proto_ros.base.errors import CommandRefused, InputError
-from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
+from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.pacing import SLICE_NS
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.rerun_view.session_files import read_runs, record
@@ -58,7 +58,6 @@ def live(watcher):
     scenario = make_scenario({"mesh": "t_handle", "start_paused": True, "contacts.tip": [0.0, 0.0, 0.07]})
     live = LiveSimulation(scenario, observers=[watcher])
     live.announce()
-    warm_up(scenario.setup)
     live.start()
     yield live
     live.stop()

@@ -1,24 +1,20 @@
 # SPDX-License-Identifier: MIT
 """auto picks the cheapest method per segment, says which and why, and sleeps when nothing moves."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from flights import AT_REST, SECOND, flight, spinning, wrench
+from flights import AT_REST, SECOND, StringSettings, flight, spinning, wrench
 from reference_motion import angle_between, free_motion
 from reference_scenes import BODY, ROW, error, scene_with
 
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.integrators.integrator import (
+from rigid_proto_ros.motion.loads import (
     ANGULAR_DAMPING,
     BODY_FORCE,
     BODY_TORQUE,
     NO_GYROSCOPIC_TERM,
     WORLD_TORQUE,
 )
-from rigid_proto_ros.motion.string import StringSettings
 
 GRAVITY = np.array((0.0, 0.0, -9.81))
 STRING = StringSettings(attached=True, attach=(0.1, 0.15, 0.2), target=(0.0, 0.0, 2.0), frequency=20.0, rest_length=1.0)
@@ -88,7 +84,7 @@ SCENES = {
     "all loads": ({BODY_TORQUE, BODY_FORCE, ANGULAR_DAMPING, WORLD_TORQUE}, None),
     "all loads, term dropped": ({BODY_TORQUE, BODY_FORCE, WORLD_TORQUE, NO_GYROSCOPIC_TERM}, None),
     "body force alone": ({BODY_FORCE}, None),
-    "string": (set(), replace(SOFT, stiffness=300.0, rest_length=0.8)),
+    "string": (set(), SOFT._replace(stiffness=300.0, rest_length=0.8)),
     "rubber band": ({BODY_TORQUE}, SOFT),
 }
 
@@ -97,7 +93,7 @@ SCENES = {
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_global_error_follows_the_accuracy(scene, accuracy):
     scene = scene_with(*SCENES[scene])
-    simulation = scene.simulation(integrator=INTEGRATORS["auto"], accuracy=accuracy)
+    simulation = scene.simulation(integrator="auto", accuracy=accuracy)
     # Local rates add up to at most the accuracy here, rounding aside: measured up to 0.4 of it.
     assert error(simulation.advance(SECOND).row, scene.reference(1.0)) <= accuracy + 1e-13
     assert simulation.steps < 60

@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: MIT
 """auto follows damping and strings up to the rate that it can resolve in real time; beyond, they are refused with what the body takes."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from flights import SECOND, flight, flight_setup, spinning, wrench
+from flights import SECOND, StringSettings, changed, flight, flight_setup, spinning, wrench
 from mpmath import mp, mpf
 
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.integrators import integrator_named
 from rigid_proto_ros.motion.integrators.auto import FASTEST
-from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.simulation.commands import Change, MoveString, TieString
 
 MOMENTS = (0.02, 0.03, 0.04)
@@ -76,7 +72,7 @@ def test_what_is_too_fast_is_refused_with_the_most_that_this_body_takes(paramete
     # It is taken, and a hair more isn't.
     name = parameter.removeprefix("string.")
     taken, refused = (
-        {name: part * said} if name == parameter else {"string": replace(changes["string"], **{name: part * said})}
+        {name: part * said} if name == parameter else {"string": changes["string"]._replace(**{name: part * said})}
         for part in (1.0, 1.01)
     )
     flight(body, integrator="auto", **taken)
@@ -87,18 +83,18 @@ def test_what_is_too_fast_is_refused_with_the_most_that_this_body_takes(paramete
 
 
 def test_tying_and_changing_in_flight_are_refused_and_counted():
-    settings = replace(tied(stiffness=1e13), attached=False)
+    settings = tied(stiffness=1e13)._replace(attached=False)
     setup = flight_setup(BODY, integrator="auto", string=settings)
     simulation = flight(BODY, integrator="auto", string=settings)
     simulation.submit(MoveString((0.0, 0.0, 1.0)), 1000)
-    simulation.submit(Change({}, lambda: replace(setup, angular_damping=1e6)), 2000)
-    simulation.submit(Change({}, lambda: replace(setup, string=replace(settings, stiffness=10.0))), 3000)
+    simulation.submit(Change({}, lambda: changed(setup, angular_damping=1e6)), 2000)
+    simulation.submit(Change({}, lambda: changed(setup, string=settings._replace(stiffness=10.0))), 3000)
     simulation.submit(MoveString((0.0, 0.0, 1.0)), 4000)
-    simulation.submit(Change({}, lambda: replace(setup, string=settings)), 5000)
+    simulation.submit(Change({}, lambda: changed(setup, string=settings)), 5000)
     # At the COM a string of 1e11 N/m swings the body slowly enough, at ARM it doesn't.
     simulation.submit(TieString("mesh", (0.0, 0.0, 0.0)), 6000)
-    softer = replace(settings, stiffness=3e11)
-    simulation.submit(Change({}, lambda: replace(setup, string=softer)), 7000)
+    softer = settings._replace(stiffness=3e11)
+    simulation.submit(Change({}, lambda: changed(setup, string=softer)), 7000)
     simulation.submit(TieString("mesh", ARM), 8000)
     simulation.advance(10_000)
     assert simulation.refused == {"integrator": 4}
@@ -106,6 +102,6 @@ def test_tying_and_changing_in_flight_are_refused_and_counted():
     assert simulation.string.stiffness == 3e11
     fixed = flight(BODY, integrator="rk4", string=settings)
     fixed.submit(MoveString((0.0, 0.0, 1.0)), 1000)
-    fixed.submit(Change({}, lambda: replace(setup, integrator=integrator_named("auto"))), 2000)
+    fixed.submit(Change({}, lambda: changed(setup, integrator="auto")), 2000)
     fixed.advance(10_000)
     assert fixed.refused == {"integrator": 1}

@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: MIT
 """An integrator that can't carry what a scene or a command asks for is refused, with those that can; facts about each."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from flights import SECOND, flight, flight_setup, spinning, wrench
+from flights import SECOND, StringSettings, changed, flight, flight_setup, spinning, wrench
 
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.integrators import INTEGRATORS, integrator_named
-from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.simulation.commands import Change, MoveString
 
 BODY = make_body(1.0, (0.0, 0.0, 0.0), np.diag((1.0, 2.0, 3.0)))
@@ -88,7 +85,7 @@ def test_a_change_to_an_integrator_that_cannot_carry_what_acts_is_refused_and_co
     setup = flight_setup(BODY, integrator="rk4", initial=SPIN)
     simulation = flight(BODY, integrator="rk4", initial=SPIN)
     simulation.submit(wrench("world", torque=(0.0, 0.0, 1.0)), 0)
-    simulation.submit(Change({}, lambda: replace(setup, integrator=integrator_named("free_body"))), SECOND)
+    simulation.submit(Change({}, lambda: changed(setup, integrator="free_body")), SECOND)
     simulation.advance(2 * SECOND)
     assert simulation.refused == {"integrator": 1}
     assert simulation.setup.integrator.name == "rk4"
@@ -97,7 +94,7 @@ def test_a_change_to_an_integrator_that_cannot_carry_what_acts_is_refused_and_co
 def test_a_command_scheduled_before_the_change_is_judged_again_when_it_acts():
     setup = flight_setup(BODY, integrator="rk4", initial=SPIN)
     simulation = flight(BODY, integrator="rk4", initial=SPIN)
-    simulation.submit(Change({}, lambda: replace(setup, integrator=integrator_named("free_body"))), SECOND)
+    simulation.submit(Change({}, lambda: changed(setup, integrator="free_body")), SECOND)
     simulation.submit(wrench("world", torque=(0.0, 0.0, 1.0)), 2 * SECOND)
     simulation.advance(3 * SECOND)
     assert simulation.refused == {"integrator": 1}

@@ -3,15 +3,14 @@
 
 import numpy as np
 import pytest
-from flights import SECOND, flight, spinning, wrench
+from flights import SECOND, StringSettings, flight, spinning, wrench
 from reference_scenes import error, scene_for, scene_with
 
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.integrators.integrator import NO_GYROSCOPIC_TERM, STRING
 from rigid_proto_ros.motion.integrators.series import taylor_steps_of_degree
+from rigid_proto_ros.motion.loads import NO_GYROSCOPIC_TERM, STRING
 from rigid_proto_ros.motion.problem import to_row
-from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.simulation.quantities import attitude_angle
 
 FLOOR = 2e-15
@@ -37,9 +36,7 @@ def measured_order(errors) -> tuple[float, int]:
 
 def check(name, scene, seconds=1, steps=STEPS):
     integrator, reference = INTEGRATORS[name], scene.reference(seconds)
-    errors = [
-        (n, error(scene.flown(seconds, integrator=integrator, step_ns=seconds * SECOND // n), reference)) for n in steps
-    ]
+    errors = [(n, error(scene.flown(seconds, integrator=name, step=seconds / n), reference)) for n in steps]
     order, used = measured_order(errors)
     assert used >= 4
     assert abs(order - integrator.order) <= 0.2, errors
@@ -58,7 +55,7 @@ def test_order_under_loads(name):
 @pytest.mark.parametrize("degree", [4, 6, 8])
 def test_order_of_taylor_series_is_their_degree(degree):
     scene = scene_for(INTEGRATORS["taylor"])
-    reference, simulation = scene.reference(1.0), scene.simulation(integrator=INTEGRATORS["taylor"])
+    reference, simulation = scene.reference(1.0), scene.simulation(integrator="taylor")
     simulation.advance(1)
     problem, errors = simulation.flight.problem, []
     for n in STEPS:
@@ -105,5 +102,5 @@ def test_order_on_a_string_through_slack_and_taut(name, string):
 def test_dop853_loses_nothing_where_the_string_turns_slack_or_taut(string):
     """Its errors leave too few digits to measure order 8 on a string; a step across the kink would err by 1e-4."""
     scene = scene_for(INTEGRATORS["dop853"], string=STRINGS[string])
-    row = scene.flown(1.0, integrator=INTEGRATORS["dop853"], step_ns=SECOND // 40)
+    row = scene.flown(1.0, integrator="dop853", step=1.0 / 40)
     assert error(row, scene.reference(1.0)) <= 1e-9  # measured up to 6e-11

@@ -3,18 +3,15 @@
 says wherever in a step it begins.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from flights import SECOND, flight, spinning, wrench
+from flights import SECOND, StringSettings, changed, flight, spinning, wrench
 from reference_scenes import BODY, ROW, log_uniform, random_body
 
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.motion.integrators.integrator import ANGULAR_DAMPING
-from rigid_proto_ros.motion.string import StringSettings
+from rigid_proto_ros.motion.loads import ANGULAR_DAMPING
 from rigid_proto_ros.simulation.commands import Change, MoveString, ReleaseString
 
 FRAMES = ("world@com", "world@point/.1,.2,.3", "body@point/.1,.2,.3", "body", "world@com;impulse")
@@ -31,16 +28,16 @@ def random_change(rng, simulation) -> Change:
 
     def apply():
         now = simulation.setup
-        changed = {
+        changes = {
             "mass": {"body": make_body(mass, now.body.center_of_mass, now.body.inertia * (mass / now.body.mass))},
             "body": {"body": body},
             "gravity": {"gravity": gravity},
             "damping": {"linear_damping": linear, "angular_damping": angular},
-            "step": {"step_ns": step_ns},
-            "string": {"string": replace(now.string, stiffness=stiffness)},
-            "gyroscopic": {"gyroscopic": not now.gyroscopic},
+            "step": {"step": step_ns * 1e-9},
+            "string": {"string_stiffness": stiffness},
+            "gyroscopic": {"gyroscopic": not now.scene.gyroscopic},
         }
-        return replace(now, **changed[kind])
+        return changed(now, **changes[kind])
 
     return Change({"kind": str(kind)}, apply)
 
@@ -56,7 +53,7 @@ def flown(name, seed, portions):
         gravity=np.array((0.0, 0.0, -9.81)),
         linear_damping=0.1,
         angular_damping=damping,
-        wrench_timeout_ns=3 * SECOND,
+        wrench_timeout=3.0,
         string=StringSettings(stiffness=80.0, rest_length=0.5),
     )
     rng, refused = np.random.default_rng(seed), 0

@@ -5,15 +5,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flights import SECOND, flight, spinning
+from flights import SECOND, flight_setup, spinning
 from reference_motion import angle_between, rotation_of
 
 from rigid_proto_ros.base.errors import TensorError
 from rigid_proto_ros.mass.tensor import check_tensor, principal_axes
 from rigid_proto_ros.motion.body import make_body
+from rigid_proto_ros.motion.problem import begin_body
 from rigid_proto_ros.scene.scenario import nanoseconds, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.simulation.simulation import Simulation
 
 
 def flown(scene: str, duration_s: float, script: str = "[]", **changes) -> OfflineRun:
@@ -36,10 +38,11 @@ def test_mislabelled_products_of_inertia_turn_the_principal_axes() -> None:
     # No rigid body has such a tensor, so a scene refuses it; let fly all the same, it turns otherwise from the start.
     with pytest.raises(TensorError):
         check_tensor(mislabelled)
-    turned, mistaken = (
-        flight(make_body(true.mass, np.zeros(3), tensor), initial=spinning([0.0, 0.0, 6.0])).advance(SECOND)
-        for tensor in (I, mislabelled)
-    )
+    setup = flight_setup(make_body(true.mass, np.zeros(3), I), initial=spinning([0.0, 0.0, 6.0]))
+    turned = Simulation(setup).advance(SECOND)
+    setup.flight.body[:] = make_body(true.mass, np.zeros(3), mislabelled).row
+    begin_body(setup.flight.common, setup.flight.body, setup.scene, 1.0)
+    mistaken = Simulation(setup).advance(SECOND)
     apart = np.degrees(angle_between(mistaken.orientation_xyzw, rotation_of(turned.orientation_xyzw)))
     assert apart == pytest.approx(ATTITUDE_OFF, abs=0.5)
 

@@ -8,14 +8,13 @@ import math
 
 import numpy as np
 import pytest
-from flights import SECOND, flight, flight_setup
+from flights import SECOND, StringSettings, flight, flight_setup
 from reference_scenes import Scene
 
 import problems
 from motion_measures import energy
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators.string_law import NONE, first_rise
-from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.scene.scenario import make_scenario
 from work_precision_ours import simulation_of
 

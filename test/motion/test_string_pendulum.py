@@ -5,12 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from flights import SECOND, flight
+from flights import SECOND, StringSettings, flight
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.simulation.commands import MoveString, TieString
 
 G = 9.81

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import rerun_flight as flight
 from drawn import Drawn
+from flights import StringSettings, flight_setup
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judged_meshes import body, volume
@@ -16,8 +17,6 @@ from judged_meshes import body, volume
 from rigid_proto_ros.base.rotation import matrix_from_quaternion, multiply
 from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.motion.string import StringSettings, tie
 from rigid_proto_ros.motion.surface import Surface
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.picture.arrows import FIRST, LONGEST, ArrowScales
@@ -37,6 +36,7 @@ from rigid_proto_ros.simulation.observer import (
 )
 from rigid_proto_ros.simulation.quantities import attitude_angle
 from rigid_proto_ros.simulation.setup import Setup
+from rigid_proto_ros.simulation.simulation import Simulation
 
 MOMENTS = st.tuples(*[st.floats(0.1, 10.0)] * 3).map(
     lambda s: np.sort(np.array([s[1] + s[2], s[0] + s[2], s[0] + s[1]])),
@@ -239,8 +239,10 @@ def test_the_string_runs_from_the_hand_to_its_knot_taut_or_slack_until_it_is_let
     rows[:, 2], rows[:, 9] = 0.01 * np.arange(60), 1.0
     knot, hand = np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.8])
     picture, drawn = pictured()
-    settings, body = StringSettings(stiffness=50.0, damping_ratio=0.0, rest_length=0.4), flight.SETUP.body
-    picture.on(StringChanged(0, tie(settings, body.mesh_point(knot), hand, body, State(0, rows[0]), 0), knot))
+    body = flight.SETUP.body
+    string = StringSettings(True, body.mesh_point(knot), hand, damping_ratio=0.0, rest_length=0.4)
+    tied = Simulation(flight_setup(body, initial=rows[0], string=string)).string
+    picture.on(StringChanged(0, tied, knot))
     picture.on(StringChanged(495_000_000, None, None))
     picture.draw(times(60), rows)
     strips = drawn.parts[style.STRING]

@@ -16,7 +16,6 @@ from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.publisher import Publisher
 
-from rigid_proto_ros.live.live_simulation import warm_up
 from rigid_proto_ros.ros.node import RigidBodyNode
 from rigid_proto_ros.scene import cdr
 
@@ -53,7 +52,7 @@ def fly(values: dict, counts: tuple[Counter, Counter], heard: bool = False) -> d
     """Fly for a moment, and count in the next half second. heard: by a subscriber who sends wrenches meanwhile."""
     published, made = counts
     node = RigidBodyNode(values)
-    node.states.pack_all(warm_up(node.live.loop.scenario.setup))
+    node.states.pack_all(node.live.loop.simulation.state)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     other = rclpy.create_node("other")

@@ -63,14 +63,12 @@ class Client:
 @pytest.fixture
 def services():
     """A client of the services of a flight on a real physics thread, as they are offered, without ROS; and the flight."""
-    from rigid_proto_ros.live.live_simulation import LiveSimulation, warm_up
+    from rigid_proto_ros.live.live_simulation import LiveSimulation
     from rigid_proto_ros.ros.simulation_interfaces import SERVICES, SimulationInterfaces
     from rigid_proto_ros.scene.scenario import make_scenario
 
     values = {"initial.angular_velocity": [0.1, 3.0, 0.1], "start_paused": True, "world_frame": "map"}
     live = LiveSimulation(make_scenario(values), "tool")
-    # As the node does: a kernel that compiles would hold the first request up for longer than it waits.
-    warm_up(live.scenario.setup)
     live.start()
     offered = {}
     node = SimpleNamespace(create_service=lambda _, name, answer: offered.update({name.removeprefix("~/"): answer}))

@@ -2,17 +2,15 @@
 """Where rounding limits a motion and not the accuracy asked for, that is said; and only there."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from flights import SECOND, flight, spinning
+from flights import SECOND, StringSettings, flight, spinning
 from reference_motion import angle_between, free_motion
 from scipy.spatial.transform import Rotation
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.string import StringSettings
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun
@@ -64,7 +62,7 @@ def test_a_floor_that_has_bound_is_told_until_the_reset_whatever_follows():
     assert "the string's length" in simulation.accuracy_floor
     simulation.reset()
     assert simulation.accuracy_floor == ""
-    everyday = flight(BOX, integrator="auto", initial=spinning((1, 2, 3)), string=replace(string, frequency=100.0))
+    everyday = flight(BOX, integrator="auto", initial=spinning((1, 2, 3)), string=string._replace(frequency=100.0))
     everyday.advance(SECOND)
     assert everyday.string is not None and everyday.accuracy_floor == ""
 

@@ -16,7 +16,7 @@ from test_golden_hashes import CHOSEN, SCENES, SEEDS, drawn_scenes, golden_scene
 
 from rigid_proto_ros.base.bundled import body_names
 from rigid_proto_ros.base.provenance import MOTION
-from rigid_proto_ros.motion import INTEGRATOR_FILES
+from rigid_proto_ros.motion import INTEGRATOR_NAMES
 
 found = functools.cache(lambda seed: outcome(random_scene(seed)))
 
@@ -112,7 +112,7 @@ def _entry_traits(entry: dict) -> Iterator[str]:
 
 
 WANTED = {
-    *(f"integrator {name}" for name in INTEGRATOR_FILES),
+    *(f"integrator {name}" for name in INTEGRATOR_NAMES),
     *(f"set {name}" for name in IN_FLIGHT | {"ballast"}),
     *(f"mesh {name}" for name in BODIES),
     *(f"model {name}" for name in (*MODELS, "explicit", "explicit without a mesh")),
@@ -167,7 +167,7 @@ def check(*seeds: int) -> None:
 def test_every_kind_of_body_load_string_and_change_occurs_at_least_ten_times() -> None:
     assert {trait: counted()[trait] for trait in WANTED if counted()[trait] < 10} == {}
     assert set(body_names()) >= set(BODIES) - {""}
-    assert set(CAN) == set(INTEGRATOR_FILES)
+    assert set(CAN) == set(INTEGRATOR_NAMES)
 
 
 def test_a_seed_means_the_same_scene_everywhere() -> None:

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from flights import SECOND
+from flights import SECOND, StringSettings, flight
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,7 +14,7 @@ from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.state import State
-from rigid_proto_ros.motion.string import StringSettings, free_end_at, tie
+from rigid_proto_ros.motion.string import free_end_at
 from rigid_proto_ros.scene.command_codec import of_event
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.commands import Change, ClearWrench, MoveString, ReleaseString, TieString
@@ -286,8 +286,8 @@ def test_a_span_that_is_rounding_alone_gives_the_effective_mass_no_direction(att
     body, arm = make_body(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.04])), np.array([0.1, 0.15, 0.2])
     mean = sum(1.0 / effective_mass(body, arm, n) for n in np.eye(3)) / 3.0
     q, target = np.array(attitude) / np.linalg.norm(attitude), far * np.array([0.3, -0.7, 1.1])
-    state = State(0, np.array([*(target - matrix_from_quaternion(q) @ arm), *q, *np.zeros(6)]))
-    string = tie(StringSettings(attached=True), arm, target, body, state, 0)
+    row = [*(target - matrix_from_quaternion(q) @ arm), *q, *np.zeros(6)]
+    string = flight(body, initial=row, string=StringSettings(True, tuple(arm), tuple(target))).string
     assert string.effective_mass == pytest.approx(1.0 / mean, rel=1e-12)
 
 

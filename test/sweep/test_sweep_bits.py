@@ -11,9 +11,9 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.scene.parameters import PARAMETERS
 from rigid_proto_ros.scene.scenario_run import OfflineRun
-from rigid_proto_ros.simulation import batch
 from rigid_proto_ros.simulation.batch import new_results
 from rigid_proto_ros.simulation.flight import floor_text
+from rigid_proto_ros.simulation.record import SCENE
 from rigid_proto_ros.sweep.rows import Chunk, FailedFlight, row_summary, run_chunk, simulate_row
 
 
@@ -156,19 +156,91 @@ def test_every_integrator_has_its_own_bits_in_a_batch(integrator: str) -> None:
     assert differing_rows(own, chunk) == []
 
 
-NOT_READ_BY_ROWS = """
-    mesh mesh_repair mesh_fallback inertia_model inertia_model_com gyroscopic initial.string_mass integrator step accuracy
-    publish_rate real_time_factor lockstep start_paused wrench_timeout poke_duration schedule_horizon string.timeout publish_clock
-    publish_tf imu_contact noise.imu noise.seed ghost.inertia_model ghost.integrator world_frame body_frame record viewer rerun_port
-    web_port workbench_port thruster.bidirectional thruster.minimum_on_time
-"""
-"""What all rows of a batch have in common: it is in their setup, or doesn't change the motion."""
+EVERYTHING = {
+    "scale": [1.1, 0.9, 1.2],
+    "mass": 0.2,
+    "density": 900.0,
+    "explicit_inertia": {
+        "mass": 0.3,
+        "center_of_mass": [0.01, 0.02, 0.03],
+        "tensor": [3e-4, 1e-5, -1e-5, 3.5e-4, 2e-5, 4e-4],
+    },
+    "gravity": [0.5, -0.7, -9.81],
+    "linear_damping": 0.02,
+    "angular_damping": 1e-5,
+    "initial": {
+        "position": [0.1, 0.2, -0.3],
+        "orientation_xyzw": [0.1, -0.2, 0.3, 0.9],
+        "linear_velocity": [0.2, -0.1, 0.3],
+        "angular_velocity": [0.5, 3.0, -1.0],
+        "string_mass": 0.05,
+    },
+    "step": 0.004,
+    "accuracy": 1e-7,
+    "wrench_timeout": 0.02,
+    "poke_duration": 0.03,
+    "string": {
+        "attached": True,
+        "attach": [0.01, 0.02, 0.07],
+        "target": [0.1, 0.2, 0.4],
+        "stiffness": 20.0,
+        "frequency": 30.0,
+        "damping_ratio": 0.2,
+        "rest_length": 0.1,
+        "timeout": 0.04,
+    },
+}
+"""A value other than zero for every number of a scene's record."""
+
+ONLY_WITH = {
+    "density": {"mass": 0.0},
+    **{f"explicit_inertia.{own}": {"inertia_model": "explicit"} for own in EVERYTHING["explicit_inertia"]},
+    "step": {"integrator": "rk4"},
+    "string.stiffness": {"string": {**EVERYTHING["string"], "frequency": 0.0}},
+}
+"""What a parameter needs to matter, beside the rest."""
+
+ONLY_FOR_TARGETS = {"string.timeout"}
+"""A string that is tied from the start has no timeout, and targets are the simulation's."""
+
+NUMBERS = [
+    name
+    for name, own in PARAMETERS.items()
+    if own.type in ("double", "doubles") and name.replace(".", "_") in SCENE.names
+]
 
 
-def test_the_batch_reads_every_parameter_that_decides_how_a_row_begins() -> None:
-    """A parameter that is new here is read by simulation/batch.py, or a sweep would leave it out without a word."""
-    unread = {name for name in PARAMETERS if name.replace(".", "_") not in batch.PARAMETERS}
-    assert unread == set(NOT_READ_BY_ROWS.split())
+def values_of(name: str) -> list:
+    """The value that EVERYTHING has for a parameter, and that with each of its numbers 1.25 times as large."""
+    value = EVERYTHING
+    for word in name.split("."):
+        value = value[word]
+    if not isinstance(value, list):
+        return [value, 1.25 * value]
+    return [value, *([1.25 * c if i == k else c for i, c in enumerate(value)] for k in range(len(value)))]
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_a_sweep_over_any_number_of_a_scene_has_the_bits_of_the_simulation_and_the_number_counts(name: str) -> None:
+    final = ["position", "orientation", "velocity", "spin", "kinetic_energy", "energy"]
+    spec = {
+        "scene": "t_handle",
+        "script": [
+            {"t": 0.01, "at": "tip", "force": [0.2, 0.0, 0.5]},
+            {"t": 0.02, "wrench": {"at": "left", "force": [0.0, 0.1, 0.1]}},
+        ],
+        "duration": 0.1,
+        "set": {**EVERYTHING, **ONLY_WITH.get(name, {})},
+        "vary": {name: {"list": values_of(name)}},
+        "measure": {"final": final, "max": ["potential_energy"]},
+    }
+    own = study(spec)
+    chunk = run_chunk(own, 0, own.rows)
+    assert chunk.simulated == 0
+    assert differing_rows(own, chunk) == []
+    measured = np.array([chunk.columns[column] for column in own.measures.columns])
+    is_other = (measured[:, 1:] != measured[:, :1]).any(axis=0)
+    assert not is_other.any() if name in ONLY_FOR_TARGETS else is_other.all()
 
 
 def test_a_row_that_is_too_fast_for_auto_is_refused_with_what_its_body_takes() -> None:

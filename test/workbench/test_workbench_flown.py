@@ -11,7 +11,6 @@ from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
-import numba
 import numpy as np
 import pytest
 
@@ -29,7 +28,7 @@ from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.simulation.observer import Published, SceneChanged
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.workbench import pointer
-from rigid_proto_ros.workbench.flight import COMPILING, RunMemory
+from rigid_proto_ros.workbench.flight import RunMemory
 from rigid_proto_ros.workbench.lessons import COURSES
 from rigid_proto_ros.workbench.page import CLASS_LABELS
 from rigid_proto_ros.workbench.panel import CENTRE_OF_MASS, SEE_INTO, motion_words
@@ -627,17 +626,12 @@ def test_before_time_begins_the_body_is_seen_above_the_floor() -> None:
         flown.end()
 
 
-def test_a_lesson_that_is_picked_while_kernels_are_compiled_begins_when_they_are(flown: FlownPage) -> None:
-    page, compiled = flown.page, threading.Event()
-
-    def compile_something() -> None:
-        numba.njit(lambda: 1.0)()
-        assert compiled.wait(PATIENCE_S)
-
-    page.flight.prepare(compile_something, lambda: None)
+def test_a_lesson_that_is_picked_while_the_page_is_busy_begins_when_it_no_longer_is(flown: FlownPage) -> None:
+    page, done = flown.page, threading.Event()
+    flown.do(lambda: page.flight.ask(lambda: done.wait(PATIENCE_S), "computing"))
     picking = flown._begin_update(flown.widget("Lesson"), lesson("hammer").title)
-    flown.until(lambda: f"{COMPILING} …" in page.bar._line.content, "word of what is waited for")
-    compiled.set()
+    flown.until(lambda: "computing …" in page.bar._line.content, "word of what is waited for")
+    done.set()
     picking.result(PATIENCE_S)
     flown.until(lambda: page.lessons._asked, "question")
     assert resolve_mesh(flown.scenario.parameters.mesh) == resolve_mesh("hammer")

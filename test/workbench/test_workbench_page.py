@@ -37,7 +37,6 @@ from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
 from rigid_proto_ros.workbench import lesson_file
-from rigid_proto_ros.workbench.flight import COMPILING
 
 pytestmark = [pytest.mark.drawn, pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)]
 
@@ -251,8 +250,8 @@ def test_body_string_and_controls_of_time_are_in_sight_in_windows_of_every_size(
     page.flown.live.pause(True)
     page.tab("Body")
     # What is waited for, and for how long, is to be read whole, too.
-    page.flown.page.flight.busy(COMPILING)
-    page.until(lambda: re.search(rf"{COMPILING} … [1-9]\d* s", page.text), "word of what is waited for")
+    page.flown.page.flight.busy("preparing the scene")
+    page.until(lambda: re.search(r"preparing the scene … [1-9]\d* s", page.text), "word of what is waited for")
     scrolled = []
     for width, height in ((1400, 800), (800, 360), (768, 1024), (390, 844)):
         page.page.set_viewport_size({"width": width, "height": height})

@@ -10,7 +10,6 @@ import socket
 from collections.abc import Iterator
 from types import SimpleNamespace
 
-import numba
 import pytest
 
 viser = pytest.importorskip("viser", reason="viser is not installed: no interactive page")
@@ -20,7 +19,7 @@ from workbench_page import PATIENCE_S, any_free_port
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view.ports import LOOPBACK
-from rigid_proto_ros.workbench.main import TITLE, address_of, serve
+from rigid_proto_ros.workbench.main import TITLE, address_of
 from rigid_proto_ros.workbench.server import make_server, refusal, stop_server
 
 
@@ -62,21 +61,6 @@ def test_a_port_asked_for_and_taken_is_refused_and_a_default_one_moves_on_and_is
     # A second one on this machine has its port in the tab's title, too.
     assert port > taken and title(server) == TITLE and title(other) == f"{TITLE} :{port}"
     stop_server(other)
-
-
-def test_the_address_is_told_while_kernels_that_the_mesh_needs_are_compiled(capsys) -> None:
-    def read():
-        assert capsys.readouterr().out == ""
-        numba.njit(lambda: 1.0)()
-        address = re.search(r"The workbench is at http://127.0.0.1:(\d+)", capsys.readouterr().out)
-        connection = http.client.HTTPConnection(LOOPBACK, int(address[1]), timeout=PATIENCE_S)
-        connection.request("GET", "/")
-        assert connection.getresponse().status == 200
-        connection.close()
-        raise InputError("mesh", "this one", "another one")
-
-    with pytest.raises(InputError, match="another one"):
-        serve(read, "t_handle", None, LOOPBACK, opens=False, wait=lambda: 0)
 
 
 def title(server) -> str:

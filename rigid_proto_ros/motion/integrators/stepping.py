@@ -22,8 +22,8 @@ from .gram_schmidt import euler_steps, midpoint_steps
 from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Kernel, Method
 from .lie_midpoint import lie_midpoint_steps
 from .runge_kutta import dop853_steps, rk4_steps, semi_implicit_euler_steps
-from .series import MOTION_COLUMNS, taylor_steps
-from .series_steps import MAX_DEGREE, series_steps, series_workspace, spin_workspace
+from .series import MAX_DEGREE, MOTION_COLUMNS, taylor_steps
+from .series_steps import series_steps, series_workspace, spin_workspace
 
 KERNELS: tuple[Kernel, ...] = (
     steady_steps,
