@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..base.errors import tell
+from ..base.errors import InputError, one_of, tell
 from ..base.files import whole_file
 from ..base.library import check_own, file_name, kernels_folder, stamp, target
 
@@ -75,12 +75,14 @@ def build(kinds: list[str], folder: Path) -> None:
     for name in [name for name in os.environ if name.startswith("NUMBA_")]:
         del os.environ[name]
     os.environ.update(NUMBA_OPT="0", RIGID_PROTO_KERNELS="building")
-    from .lowering import whole_module
+    from .lowering import lowered
     from .targets import TARGETS, linked, object_code
 
     gc.disable()  # it would search what numba keeps again and again
-    whole = whole_module(told)
+    whole = lowered(folder / "kernels.bc", told)
     for kind in kinds:
+        if kind not in TARGETS:
+            raise InputError("TARGET", kind, one_of(kind, ("native", "wasm", *TARGETS)))
         with tempfile.TemporaryDirectory(dir=folder) as work:
             made = linked(kind, object_code(whole, TARGETS[kind]), Path(work))
             os.replace(made, folder / file_name(kind))

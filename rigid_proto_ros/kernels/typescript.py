@@ -12,8 +12,8 @@ _HEAD = """\
 // Made by `make kernels` from the kernels and records of rigid_proto_ros: change those.
 //
 // Records and arrays lie in the memory of the WebAssembly module and are known by their address. An integer of 64 bits
-// is a number here, exact up to 2^53. A view of several numbers, such as a record's `row`, is one of the memory as it is
-// now: it ends when memory grows, which only `reserve` does.
+// is a number here, exact up to 2^53. A view of several numbers, such as a record's `row`, is one of the memory as it
+// is now: it ends when memory grows, which only `reserve` does.
 
 /** The sources that kernels and layouts are made from. */
 export const STAMP = "@STAMP@";
