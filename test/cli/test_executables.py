@@ -42,7 +42,7 @@ def without(monkeypatch: pytest.MonkeyPatch, *packages: str) -> None:
 @pytest.mark.parametrize(
     ("program", "package", "remedies"),
     [
-        *((program, "numba", ("numba not found by ", "make setup", "pip install numba")) for program in START),
+        *((program, "numpy", ("numpy not found by ", "make setup", "pip install numpy")) for program in START),
         ("rigid_body_node", "rclpy", ("/opt/ros/", "rigid_proto_ros[ros]")),
         ("poke_client", "rclpy", ("/opt/ros/", "rigid_proto_ros[ros]")),
     ],
@@ -57,7 +57,7 @@ def test_without_a_package_an_executable_says_what_to_source_or_install(
 
 
 def test_a_stream_that_the_shell_has_closed_is_open_to_nothing_also_for_processes_that_are_started(monkeypatch) -> None:
-    without(monkeypatch, "numba")
+    without(monkeypatch, "numpy")
     for name in ("stdin", "stdout", "stderr"):
         monkeypatch.setattr(sys, name, None)
     assert START["rigid_proto"]() == 2
