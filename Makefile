@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 .DEFAULT_GOAL := help
-.PHONY: always help setup run up workbench test lint pictures build bench stress soak clean pins
+.PHONY: always help setup kernels run up workbench test lint pictures build bench stress soak clean pins
 SHELL := /bin/bash
 # A make that a test starts has its own jobs.
 unexport MAKEFLAGS MFLAGS
@@ -25,6 +25,9 @@ setup: $(READY) ## .venv with all that run, up, test and lint need
 	@command -v python3 >/dev/null || { echo "make setup: python3 is missing; install it with: sudo apt install python3 python3-venv" >&2; exit 1; }
 	@python3 requirements/make_venv.py $*
 
+kernels: setup ## build the kernels of the present sources for this machine and for WebAssembly
+	@$(PY) -m rigid_proto_ros.kernels native wasm
+
 run: $(FOR_RUN) ## simulate a bundled body, or MESH=path/to.obj, for 10 s; leaves out/session.rrd
 	@$(ROS) .venv/bin/rigid_proto demo $(if $(MESH),--mesh "$(MESH)")
 
@@ -42,7 +45,6 @@ AGAIN := --reruns 1 --only-rerun "no .* within [0-9.]+ s" -rRs
 # Hundreds of processes are started: none of them should read our source anew.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: setup ## the whole suite; real meshes are found through RIGID_PROTO_MESHES
-	@$(ROS) $(PY) test/warm_kernels.py
 	$(ROS) $(PY) -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(AGAIN) -m "not stress and not bench and not soak" $(ARGS)
 
 lint: setup ## ruff and mypy

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rigid_proto_ros.base.provenance import cpu, versions
 
-PROVENANCE = ("date", "commit", "cpu", "python", "numba", "numpy")
+PROVENANCE = ("date", "commit", "cpu", "python", "kernels", "numpy")
 
 
 class ResultTable:
@@ -48,7 +48,7 @@ def provenance() -> dict[str, str]:
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "commit": _commit(),
         "cpu": f"{cpu()}, {vector_unit()}",
-        **{name: versions()[name] for name in ("python", "numba", "numpy")},
+        **{name: versions()[name] for name in ("python", "kernels", "numpy")},
     }
 
 

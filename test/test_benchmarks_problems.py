@@ -81,7 +81,7 @@ def test_result_table_reads_back_what_it_wrote(tmp_path):
     first, second = read_rows(table.path)
     assert (first["problem"], first["median_s"], first["status"]) == ("P1", 1.5e-6, "ok")
     assert math.isnan(second["median_s"])
-    assert {"date", "commit", "cpu", "numba"} <= set(first)
+    assert {"date", "commit", "cpu", "numpy"} <= set(first)
     with pytest.raises(ValueError, match="colour"):
         table.add({"colour": "red"})
 

@@ -14,7 +14,6 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-import yaml
 
 import rigid_proto_ros
 
@@ -111,18 +110,6 @@ def test_tests_and_headers_in_packages_go_and_nothing_else_does(script, monkeypa
     script.remove_what_no_flight_needs("python")
     assert not [folder for folder in gone if folder.exists()]
     assert not [folder for folder in kept if not folder.exists()]
-
-
-def test_the_set_up_compiles_what_every_scene_lesson_and_script_needs() -> None:
-    spec = importlib.util.spec_from_file_location("compile_kernels", SOURCE / "requirements" / "compile_kernels.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    flown = module.scenes_and_scripts()
-    assert {scene for scene, script in flown if script is None} == {p.stem for p in (SOURCE / "config").glob("*.yaml")}
-    scripts = [
-        p for p in (SOURCE / "msg_examples").glob("*.yaml") if isinstance(yaml.safe_load(p.read_text("utf-8")), list)
-    ]
-    assert {script for _, script in flown if script} == set(scripts) != set()
 
 
 def test_ctrl_c_ends_the_set_up_in_one_line(tmp_path: Path) -> None:

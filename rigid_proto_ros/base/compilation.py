@@ -9,15 +9,13 @@ by the environment variable RIGID_PROTO_KERNELS:
   that only serve others are part of the library; where Python calls one, it runs as plain Python.
 * ``interpreted``: all of them run as plain Python, for readable tracebacks. NUMBA_DISABLE_JIT=1 does the same.
 * ``building``: numba compiles them into each other, for the library (rigid_proto_ros/kernels).
-* ``jit``: numba compiles each when it is first called (base/jit.py).
 """
 
 from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -25,27 +23,25 @@ from numpy.typing import NDArray
 
 from . import library
 from .errors import InputError
+from .vectors import Records
 
-DEFAULT = "jit"
-WAYS = ("library", "interpreted", "building", "jit")
+WAYS = ("library", "interpreted", "building")
 
 
 def _chosen_way() -> str:
     plain = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-    way = os.environ.get("RIGID_PROTO_KERNELS") or ("interpreted" if plain else DEFAULT)
+    way = os.environ.get("RIGID_PROTO_KERNELS") or ("interpreted" if plain else "library")
     if way not in WAYS:
         raise InputError("RIGID_PROTO_KERNELS", way, ", ".join(WAYS))
     return way
 
 
 WAY = _chosen_way()
-COMPILED = WAY in ("building", "jit")
+COMPILED = WAY == "building"
 """Whether numba compiles; otherwise it isn't imported, and functions that aren't exported are plain Python."""
 INTERPRETED = WAY == "interpreted"
 
 if COMPILED:
-    # First, so that numba doesn't import what isn't needed.
-    from . import jit  # isort: skip
     import numba
     from llvmlite import ir
     from numba import types
@@ -59,12 +55,11 @@ Emitted = tuple[Any, Any]
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def njit(*, allocates: bool = True, cache: bool = True, **options: Any) -> Callable[[_Function], _Function]:
-    """numba's njit where numba compiles; elsewhere the function as it is. For a type checker it is that everywhere.
+def njit(*, allocates: bool = True, **options: Any) -> Callable[[_Function], _Function]:
+    """numba's njit where kernels are built; elsewhere the function as it is. For a type checker it is that everywhere.
 
     allocates: False for a function that creates no arrays except slices of given ones. References aren't counted then,
-    which saves two atomic operations per slice. numba refuses to compile such a function if it does allocate. cache:
-    False for a function outside this package.
+    which saves two atomic operations per slice. numba refuses to compile such a function if it does allocate.
     """
 
     def decorated(function: _Function) -> _Function:
@@ -72,35 +67,13 @@ def njit(*, allocates: bool = True, cache: bool = True, **options: Any) -> Calla
             return function
         # numba's internal name (tested with 0.68); without it the caller's value would apply.
         options["_nrt"] = allocates
-        if WAY == "building":
-            # Python's wrappers around each compiled function take a sixth of the time.
-            options.update(no_cpython_wrapper=True, no_cfunc_wrapper=True)
-        compiled: Any = numba.njit(**options)(function)
-        if cache and WAY == "jit":
-            compiled._cache = jit.KernelCache(function)  # noqa: SLF001 (where enable_caching puts it)
-        kernel: _Function = compiled
+        # Python's wrappers around each compiled function take a sixth of the time.
+        options.update(no_cpython_wrapper=True, no_cfunc_wrapper=True)
+        options.setdefault("forceinline", False)  # otherwise all that such a function calls would be forced, too
+        kernel: _Function = numba.njit(**options)(function)
         return kernel
 
     return decorated
-
-
-def entry_of(kernel: Callable[..., Any], signature: Any) -> Callable[..., Any]:
-    """The compiled function for this signature, called without type dispatch.
-
-    A call through numba's dispatcher determines the arguments' types each time, which takes longer than a short kernel.
-    """
-    if WAY != "jit":
-        return kernel
-    entry: Callable[..., Any] = compiled_for(kernel, signature).entry_point
-    return entry
-
-
-def compiled_for(kernel: Any, signature: Any) -> Any:
-    """numba's result of compiling a kernel for this signature, or of loading it from the cache."""
-    # By the types of its arguments, as a call does: numba caches what is compiled for a signature apart.
-    result = kernel.get_compile_result(signature)
-    assert result.signature.return_type == signature.return_type, result.signature
-    return result
 
 
 if COMPILED and not TYPE_CHECKING:
@@ -112,16 +85,6 @@ else:
         Where numba doesn't compile, another definition must take its place.
         """
         return function[0] if function else lambda given: given
-
-
-@contextmanager
-def notify_when_compiling(notify: Callable[[], None]) -> Iterator[None]:
-    """Call ``notify`` once, when the first kernel is compiled within the context."""
-    if WAY != "jit":
-        yield
-        return
-    with jit.notify_when_compiling(notify):
-        yield
 
 
 def exported(*arguments: Any, returns: str = "", nogil: bool = False) -> Callable[[_Function], _Function]:
@@ -159,7 +122,10 @@ def _local_array(count: int, shape: tuple[int, ...], number: Any) -> tuple[Any, 
 
     def code(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
         of_numbers = context.get_data_type(number)
-        memory = cgutils.alloca_once(builder, ir.ArrayType(of_numbers, count))
+        # Once a call, not in every turn of a loop. numba's own function for this also fills it with zeros.
+        with builder.goto_entry_block():
+            memory = builder.alloca(ir.ArrayType(of_numbers, count))
+        memory.align = 64
         return _array_at(context, builder, kind, builder.bitcast(memory, of_numbers.as_pointer()), shape)
 
     return kind, code
@@ -238,10 +204,21 @@ def record_type(fields: list[tuple[Any, ...]]) -> np.dtype[Any]:
     return np.dtype((np.record, np.dtype(fields, align=True)))
 
 
+def new_records(count: int, kind: np.dtype[Any]) -> Records:
+    """Records (count,) of zeros; NumPy's own way goes through all fields, and takes five times as long."""
+    return np.ndarray(count, kind, np.zeros(count * kind.itemsize, np.uint8))
+
+
 def new_record(kind: np.dtype[Any]) -> np.record:
     """A record of zeros."""
-    record: np.record = np.zeros(1, kind)[0]
+    record: np.record = new_records(1, kind)[0]
     return record
+
+
+def copy_of(record: np.record) -> np.record:
+    """A record of the same content."""
+    copied: np.record = np.ndarray(1, record.dtype, bytearray(record.tobytes()))[0]
+    return copied
 
 
 def place_of(kind: np.dtype[Any], name: str) -> int:

@@ -80,6 +80,7 @@ class Kernel:
         assert KERNELS.setdefault(self.name, self) is self, f"two kernels are named {self.name}"
         self.compiled: Any = None  # numba's dispatcher, where it compiles
         self._called: Any = None
+        self._bindings: dict[int, Callable[..., Callable[..., Any]]] = {}
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the library's function."""
@@ -92,30 +93,50 @@ class Kernel:
         """See ``compilation.bound``."""
         if self._called is None:
             self._prepared()
-        function, block, at = self._function, self._block(), 8 * len(self.returns)
-        given = struct.Struct("=" + "".join(map(_codes, self.arguments[: len(first)])))
-        given.pack_into(block, at, *self._values(first))
-        kinds, at = self.arguments[len(first) :], at + given.size
+        binding = self._bindings.get(len(first))
+        if binding is None:
+            binding = self._bindings[len(first)] = self._binding(len(first))
+        return binding(*first)
+
+    def _binding(self, count: int) -> Callable[..., Callable[..., Any]]:
+        """What makes a call of the first arguments, of which there are so many."""
+        function, result, new_block = self._function, self._result, self._block
+        start, kinds = 8 * len(self.returns), self.arguments[count:]
+        given = struct.Struct("=" + "".join(map(_codes, self.arguments[:count])))
+        at = start + given.size
+        fill = self._code(_source(self, "fill", count), "fill", given.pack_into)
         if len(kinds) == len(self.returns) == 1 and "b1" not in (*kinds, *self.returns):
-            # Half as long as by the general way.
-            as_bytes: Any = memoryview(block).cast("B")
-            taken, given_back = as_bytes.cast(_CODES[kinds[0]]), as_bytes.cast(_CODES[self.returns[0]])
-            slot = at // 8
+            taken_as, given_back_as, slot = _CODES[kinds[0]], _CODES[self.returns[0]], at // 8
 
-            def call_with_one(number: Any, _kept: Any = first) -> Any:
-                taken[slot] = number
+            def bind_with_one(*first: Any) -> Callable[..., Any]:
+                block = new_block()
+                fill(block, start, *first)
+                as_bytes: Any = memoryview(block).cast("B")
+                taken, given_back = as_bytes.cast(taken_as), as_bytes.cast(given_back_as)
+
+                def call_with_one(number: Any, _kept: Any = first) -> Any:
+                    taken[slot] = number
+                    function(block)
+                    return given_back[0]
+
+                # Half as long as by the general way.
+                return call_with_one
+
+            return bind_with_one
+        pack = struct.Struct("=" + "".join(map(_codes, kinds))).pack_into
+
+        def bind(*first: Any) -> Callable[..., Any]:
+            block = new_block()
+            fill(block, start, *first)
+
+            def call(*numbers: Any, _kept: Any = first) -> Any:
+                pack(block, at, *numbers)
                 function(block)
-                return given_back[0]
+                return result(block)
 
-            return call_with_one
-        pack, result = struct.Struct("=" + "".join(map(_codes, kinds))).pack_into, self._result
+            return call
 
-        def call(*numbers: Any, _kept: Any = first) -> Any:
-            pack(block, at, *numbers)
-            function(block)
-            return result(block)
-
-        return call
+        return bind
 
     def _prepared(self) -> Any:
         """Make what packs a block, calls the library's function and unpacks the block, as code for this signature."""
@@ -126,12 +147,17 @@ class Kernel:
         self._block = ctypes.c_int64 * (packed.size // 8)
         self._function = loaded(self.nogil)[self.name]
         self._function.restype = None
+        self._unpack = unpack
+        self._called = self._code(_source(self, "call", len(self.arguments)), "call", packed.pack_into)
+        return self._called
+
+    def _code(self, source: str, name: str, pack: Any) -> Any:
+        """The function of this name that a source defines."""
         known: dict[str, Any] = {f"kind{k}": place(argument)[0] for k, argument in enumerate(self.arguments)}
         known.update(array=np.ndarray, record=np.record, memory=_MEMORY, looked_at=self._values)
-        known.update(new_block=self._block, function=self._function, pack=packed.pack_into, unpack=unpack)
-        exec(_source(self), known)
-        self._called = known["call"]
-        return self._called
+        known.update(new_block=self._block, function=self._function, pack=pack, unpack=self._unpack)
+        exec(source, known)
+        return known[name]
 
     def _values(self, arguments: tuple[Any, ...]) -> list[Any]:
         """The arguments as a block has them. Raises TypeError."""
@@ -142,32 +168,34 @@ class Kernel:
         return values
 
 
-def _source(kernel: Kernel) -> str:
-    """Code of a function ``call``: a loop over the arguments would take twice as long."""
-    names = [f"a{k}" for k in range(len(kernel.arguments))]
+def _source(kernel: Kernel, name: str, count: int) -> str:
+    """Code of a function: ``call`` with all arguments, or ``fill`` a block with the first of them from an offset on. A
+    loop over the arguments would take twice as long.
+    """
+    names = [f"a{k}" for k in range(count)]
     checks, values = [], []
-    for k, (name, declared) in enumerate(zip(names, kernel.arguments, strict=True)):
+    for k, (own, declared) in enumerate(zip(names, kernel.arguments, strict=False)):
         kind, dimensions = place(declared)
         if kind is None:
-            values.append(name)
+            values.append(own)
         elif dimensions == 0:
-            checks.append(f"{name}.__class__ is record and {name}.dtype is kind{k}")
-            values.append(f"memory[id({name}) // {_WORD} + {_OF_RECORD}]")
+            checks.append(f"{own}.__class__ is record and {own}.dtype is kind{k}")
+            values.append(f"memory[id({own}) // {_WORD} + {_OF_RECORD}]")
         else:
-            in_order = f"{name}.flags.num & {_IN_ORDER} == {_IN_ORDER}"
-            checks.append(f"{name}.__class__ is array and {name}.dtype is kind{k} and {name}.ndim == {dimensions}")
+            in_order = f"{own}.flags.num & {_IN_ORDER} == {_IN_ORDER}"
+            checks.append(f"{own}.__class__ is array and {own}.dtype is kind{k} and {own}.ndim == {dimensions}")
             checks.append(in_order)
-            values.append(f"memory[id({name}) // {_WORD} + {_OF_ARRAY}], *{name}.shape")
+            values.append(f"memory[id({own}) // {_WORD} + {_OF_ARRAY}], *{own}.shape")
     result = {0: "None", 1: "unpack(block)[0]"}.get(len(kernel.returns), "unpack(block)")
+    calls = name == "call"
     return f"""
-def call({", ".join(names)}):
-    block = new_block()
+def {name}({", ".join(names if calls else ["block", "at", *names])}):
+    {"block, at = new_block(), 0" if calls else ""}
     if {" and ".join(checks) or "True"}:
-        pack(block, 0, {", ".join(values)})
+        pack(block, at, {", ".join(values)})
     else:
-        pack(block, 0, *looked_at(({"".join(name + ", " for name in names)})))
-    function(block)
-    return {result}
+        pack(block, at, *looked_at(({"".join(own + ", " for own in names)})))
+    {f"function(block); return {result}" if calls else ""}
 """
 
 
@@ -253,8 +281,10 @@ def kernels_folder() -> str:
 
 def check_own(folder: str) -> None:
     """Refuse a folder where somebody else could put a library. Raises InputError and OSError."""
-    found = os.stat(folder)
-    if found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o077:
+    found, user = os.stat(folder), getattr(os, "getuid", None)
+    if user is None:
+        return  # rights are another matter there
+    if found.st_uid != user() or stat.S_IMODE(found.st_mode) & 0o077:
         raise InputError("kernels", f"{folder} must be this user's and closed to others: remove it, or chmod 700")
 
 

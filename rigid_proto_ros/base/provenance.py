@@ -12,16 +12,15 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from llvmlite import binding
-
 from .. import __version__
+from .library import stamp
 
 MOTION = "2026-11-26d"
 """Since when the motion has had its present bits, with a letter from the second time on one day: versions with the same
 give the same ones, on any machine.
 """
 
-PACKAGES = ("numpy", "numba", "scipy", "pyarrow")
+PACKAGES = ("numpy", "scipy", "pyarrow")
 
 
 @cache
@@ -56,7 +55,7 @@ def versions(*others: str) -> dict[str, str]:
         "machine": platform.machine(),
         "c_library": c_library(),
         "python": platform.python_version(),
-        "llvm": ".".join(map(str, binding.llvm_version_info)),
+        "kernels": stamp(),
     }
     for name in (*PACKAGES, *others):
         try:

@@ -3,6 +3,8 @@
 
 TARGET: ``native``, this machine's processor (the default); ``wasm``; or x86-64-v3, x86-64-v2, aarch64. ``--into
 FOLDER`` builds into another folder than the cache's. What is there for the present sources isn't built again.
+``--typescript FILE`` writes what a page calls the kernels by, and with ``wasm`` the layouts of records are beside the
+module as ``kernels.json``.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..base.errors import tell
+from ..base.errors import InputError, one_of, tell
+from ..base.files import whole_file
 from ..base.library import check_own, file_name, kernels_folder, stamp, target
 
 
@@ -28,6 +31,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m rigid_proto_ros.kernels", description="Build the kernels ahead.")
     parser.add_argument("targets", nargs="*", metavar="TARGET", default=["native"])
     parser.add_argument("--into", metavar="FOLDER")
+    parser.add_argument("--typescript", metavar="FILE")
     args = parser.parse_args()
     try:
         kinds = [
@@ -38,6 +42,8 @@ def main() -> int:
         check_own(str(folder))
         with alone(folder):
             build([kind for kind in kinds if not (folder / file_name(kind)).is_file()], folder)
+        if "wasm32" in kinds or args.typescript:
+            describe(folder / "kernels.json", args.typescript)
         for kind in kinds:
             print(folder / file_name(kind))
     except Exception as error:
@@ -69,18 +75,33 @@ def build(kinds: list[str], folder: Path) -> None:
     for name in [name for name in os.environ if name.startswith("NUMBA_")]:
         del os.environ[name]
     os.environ.update(NUMBA_OPT="0", RIGID_PROTO_KERNELS="building")
-    from .lowering import whole_module
+    from .lowering import lowered
     from .targets import TARGETS, linked, object_code
 
     gc.disable()  # it would search what numba keeps again and again
-    whole = whole_module(told)
+    whole = lowered(folder / "kernels.bc", told)
     for kind in kinds:
+        if kind not in TARGETS:
+            raise InputError("TARGET", kind, one_of(kind, ("native", "wasm", *TARGETS)))
         with tempfile.TemporaryDirectory(dir=folder) as work:
             made = linked(kind, object_code(whole, TARGETS[kind]), Path(work))
             os.replace(made, folder / file_name(kind))
     clear = "\r\033[K" if sys.stderr.isatty() else ""
     sizes = [f"{kind} {size(folder / file_name(kind))}" for kind in kinds]
     print(f"{clear}kernels built in {time.monotonic() - began:.0f} s: {', '.join(sizes)}", file=sys.stderr, flush=True)
+
+
+def describe(layouts: Path, typescript: str | None) -> None:
+    """Write the layouts of records, and the page's file if one is asked for. Raises InputError and OSError."""
+    os.environ.setdefault("RIGID_PROTO_KERNELS", "interpreted")  # to describe them, kernels needn't run
+    from .layouts import as_json
+    from .typescript import source
+
+    with whole_file("--into", layouts) as file:
+        file.write_text(as_json())
+    if typescript:
+        with whole_file("--typescript", typescript) as file:
+            file.write_text(source())
 
 
 def size(file: Path) -> str:

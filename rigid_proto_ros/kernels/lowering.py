@@ -7,8 +7,8 @@ numba's own functions return a status and take arrays as their parts: ``i32 f(re
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -19,7 +19,9 @@ from numba.core.errors import NumbaError
 from numba.np.arrayobj import populate_array
 
 from ..base.errors import InputError
-from ..base.library import KERNELS, MODULES, Kernel, place
+from ..base.files import whole_file
+from ..base.library import KERNELS, Kernel, place
+from .layouts import import_kernels
 
 NUMBERS = {"f8": float64, "i8": int64, "b1": boolean}
 RAISES = "raises."
@@ -47,6 +49,17 @@ def _raise_unless_index(raising: Callable[..., None]) -> Callable[..., None]:
     return code
 
 
+def lowered(kept: Path, told: Callable[[int, int], None]) -> Any:
+    """The module, from a file where it is kept for other targets, or made and kept there. Raises InputError."""
+    import_kernels()
+    if kept.is_file():
+        return llvm.parse_bitcode(kept.read_bytes())
+    whole = whole_module(told)
+    with whole_file("--into", kept) as file:
+        file.write_bytes(whole.as_bitcode())
+    return whole
+
+
 def whole_module(told: Callable[[int, int], None]) -> Any:
     """The module. ``told`` is called with the number of kernels that are done, and of all."""
     numbas: Any = codegen
@@ -55,9 +68,6 @@ def whole_module(told: Callable[[int, int], None]) -> Any:
     numbas.JITCPUCodegen.set_env = lambda *_: None
     convention: Any = callconv.CPUCallConv
     convention.return_user_exc = _raise_unless_index(convention.return_user_exc)
-    package = __package__.partition(".")[0]
-    for module in MODULES:
-        importlib.import_module(f"{package}.{module}")
     whole = llvm.parse_assembly("")
     linked: set[int] = set()
 

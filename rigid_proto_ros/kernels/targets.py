@@ -18,7 +18,7 @@ from typing import Any
 import llvmlite.binding as llvm
 
 from ..base.errors import InputError
-from ..base.library import KERNELS, target
+from ..base.library import KERNELS, stamp, target
 from .lowering import FUSED, RAISES
 
 
@@ -133,11 +133,18 @@ def linked(kind: str, code: bytes, folder: Path) -> Path:
         options = ["--no-entry", "--strip-all", "--stack-first", "-z", f"stack-size={STACK_BYTES}"]
         exports = [f"--export={name}" for name in (*KERNELS, "__heap_base")]
         _run(*wasm_linker(), *options, *exports, "-o", made, given)
+        made.write_bytes(made.read_bytes() + _section("kernels", stamp().encode()))
     else:
         _check_undefined(undefined_symbols(code) - OF_LIBC)
         _run(*linker(kind), "-o", made, given)
         _close_stack(made)
     return made
+
+
+def _section(name: str, content: bytes) -> bytes:
+    """A section of a WebAssembly module that only other programs read; name and content have less than 128 bytes."""
+    named = bytes([len(name)]) + name.encode() + content
+    return bytes([0, len(named)]) + named
 
 
 def _check_undefined(names: set[str]) -> None:

@@ -50,7 +50,9 @@ _BLOCK = 256
 ROOM = 9 * _BLOCK
 """Doubles of workspace for a solid's moments."""
 _LANES = 8
-"""Triangles processed together in vector registers; an order chosen by the compiler would depend on the processor."""
+"""Triangles of which every one is added to another sum; an order chosen by the compiler would depend on the processor.
+"""
+_HALF = _LANES // 2
 _UNIT_ROUNDOFF = 2.0**-53
 _UNSCALED = np.ones(3)
 
@@ -255,14 +257,17 @@ def _central(
 def _gather(vertices: Points, triangles: Triangles, start: int, corners: FloatArray) -> int:
     """Copy the corners a, b, c of the triangles from ``start`` on into the columns of ``corners`` (9, n).
 
-    Returns their number, padded to a multiple of _LANES with triangles of zero size.
+    Returns their number, padded to a multiple of _LANES with triangles of zero size; −1 if one of them uses a vertex
+    that isn't there.
     """
+    last = vertices.shape[0] - 1
     count: int = min(corners.shape[1], triangles.shape[0] - start)
     for t in range(count):
-        for corner in range(3):
-            i = triangles[start + t, corner]
-            for k in range(3):
-                corners[3 * corner + k, t] = vertices[i, k]
+        a, b, c = triangles[start + t, 0], triangles[start + t, 1], triangles[start + t, 2]
+        if (a | b | c | (last - a) | (last - b) | (last - c)) < 0:
+            return -1
+        for k in range(3):
+            corners[k, t], corners[3 + k, t], corners[6 + k, t] = vertices[a, k], vertices[b, k], vertices[c, k]
     whole = -(-count // _LANES) * _LANES
     for row in range(9):
         for t in range(count, whole):
@@ -271,9 +276,13 @@ def _gather(vertices: Points, triangles: Triangles, start: int, corners: FloatAr
 
 
 @njit(error_model="numpy", allocates=False)
-def _corner(corners: FloatArray, corner: int, t: int, reference: Vector3, factor: float) -> tuple[Packed, ...]:
-    """x, y and z of one corner of _LANES triangles, relative to the reference in units of 1/factor."""
-    zero, first = filled(0.0, _LANES), 3 * corner * corners.shape[1] + t
+def _corner(
+    corners: FloatArray, corner: int, t: int, reference: Vector3, factor: float, zero: Packed
+) -> tuple[Packed, ...]:
+    """x, y and z of one corner of as many triangles as ``zero`` has lanes, relative to the reference in units of
+    1/factor.
+    """
+    first = 3 * corner * corners.shape[1] + t
     x = load(corners, first, zero)
     y = load(corners, first + corners.shape[1], zero)
     z = load(corners, first + 2 * corners.shape[1], zero)
@@ -282,9 +291,8 @@ def _corner(corners: FloatArray, corner: int, t: int, reference: Vector3, factor
 
 @njit(error_model="numpy", allocates=False)
 def _across(lanes: Packed) -> float:
-    """The sum of eight numbers, by halves (pairwise)."""
-    even = (number(lanes, 0) + number(lanes, 4)) + (number(lanes, 2) + number(lanes, 6))
-    return even + ((number(lanes, 1) + number(lanes, 5)) + (number(lanes, 3) + number(lanes, 7)))
+    """The sum of four numbers, by halves (pairwise)."""
+    return (number(lanes, 0) + number(lanes, 2)) + (number(lanes, 1) + number(lanes, 3))
 
 
 @njit(error_model="numpy", allocates=False)
@@ -295,9 +303,39 @@ def _clear(sums: FloatArray) -> None:
 
 @njit(error_model="numpy", allocates=False)
 def _add_across(sums: FloatArray, slot: int, lanes: Packed) -> None:
-    """Add the sum of eight numbers to one sum of ``sums`` (10, 2), without error."""
+    """Add the sum of four numbers to one sum of ``sums`` (10, 2), without error."""
     sums[slot, 0], error = two_sum(sums[slot, 0], _across(lanes))
     sums[slot, 1] += error
+
+
+@njit(error_model="numpy", allocates=False)
+def _half_block(corners: FloatArray, first: int, whole: int, reference: Vector3, factor: float) -> tuple[Packed, ...]:
+    """The ten sums of a block's triangles, and Σ(|b − a|² + |c − a|²), in _HALF lanes, from lane ``first`` on. The sums
+    of all lanes at once wouldn't stay in the registers of most processors.
+    """
+    zero = filled(0.0, _HALF)
+    v0, vx, vy, vz, size = zero, zero, zero, zero, zero
+    xx, xy, xz, yy, yz, zz = zero, zero, zero, zero, zero, zero
+    for t in range(first, whole, _LANES):
+        ax, ay, az = _corner(corners, 0, t, reference, factor, zero)
+        bx, by, bz = _corner(corners, 1, t, reference, factor, zero)
+        cx, cy, cz = _corner(corners, 2, t, reference, factor, zero)
+        ux, uy, uz = bx - ax, by - ay, bz - az
+        wx, wy, wz = cx - ax, cy - ay, cz - az
+        d = ax * (uy * wz - uz * wy) + ay * (uz * wx - ux * wz) + az * (ux * wy - uy * wx)
+        sx, sy, sz = ax + bx + cx, ay + by + cy, az + bz + cz
+        v0 = v0 + d
+        vx = vx + d * sx
+        vy = vy + d * sy
+        vz = vz + d * sz
+        xx = xx + d * (sx * sx + ax * ax + bx * bx + cx * cx)
+        xy = xy + d * (sx * sy + ax * ay + bx * by + cx * cy)
+        xz = xz + d * (sx * sz + ax * az + bx * bz + cx * cz)
+        yy = yy + d * (sy * sy + ay * ay + by * by + cy * cy)
+        yz = yz + d * (sy * sz + ay * az + by * bz + cy * cz)
+        zz = zz + d * (sz * sz + az * az + bz * bz + cz * cz)
+        size = size + (ux * ux + uy * uy + uz * uz + wx * wx + wy * wy + wz * wz)
+    return v0, vx, vy, vz, xx, xy, xz, yy, yz, zz, size
 
 
 @njit(error_model="numpy", allocates=False)
@@ -307,43 +345,27 @@ def _blocked_sums(
     """Add the solid's ten sums to ``sums`` (10, 2), zeros, in plain doubles, block by block; the sums of blocks are
     added without error. corners (9, _BLOCK): workspace.
 
-    Returns Σ(|b − a|² + |c − a|²), which measures the rounding error of d.
+    Returns Σ(|b − a|² + |c − a|²), which measures the rounding error of d; −1 if a triangle uses a vertex that isn't
+    there.
     """
     edges = 0.0
-    zero = filled(0.0, _LANES)
     for start in range(0, triangles.shape[0], _BLOCK):
-        v0, vx, vy, vz, size = zero, zero, zero, zero, zero
-        xx, xy, xz, yy, yz, zz = zero, zero, zero, zero, zero, zero
-        for t in range(0, _gather(vertices, triangles, start, corners), _LANES):
-            ax, ay, az = _corner(corners, 0, t, reference, factor)
-            bx, by, bz = _corner(corners, 1, t, reference, factor)
-            cx, cy, cz = _corner(corners, 2, t, reference, factor)
-            ux, uy, uz = bx - ax, by - ay, bz - az
-            wx, wy, wz = cx - ax, cy - ay, cz - az
-            d = ax * (uy * wz - uz * wy) + ay * (uz * wx - ux * wz) + az * (ux * wy - uy * wx)
-            sx, sy, sz = ax + bx + cx, ay + by + cy, az + bz + cz
-            v0 = v0 + d
-            vx = vx + d * sx
-            vy = vy + d * sy
-            vz = vz + d * sz
-            xx = xx + d * (sx * sx + ax * ax + bx * bx + cx * cx)
-            xy = xy + d * (sx * sy + ax * ay + bx * by + cx * cy)
-            xz = xz + d * (sx * sz + ax * az + bx * bz + cx * cz)
-            yy = yy + d * (sy * sy + ay * ay + by * by + cy * cy)
-            yz = yz + d * (sy * sz + ay * az + by * bz + cy * cz)
-            zz = zz + d * (sz * sz + az * az + bz * bz + cz * cz)
-            size = size + (ux * ux + uy * uy + uz * uz + wx * wx + wy * wy + wz * wz)
-        _add_across(sums, 0, v0)
-        _add_across(sums, 1, vx)
-        _add_across(sums, 2, vy)
-        _add_across(sums, 3, vz)
-        _add_across(sums, 4, xx)
-        _add_across(sums, 5, xy)
-        _add_across(sums, 6, xz)
-        _add_across(sums, 7, yy)
-        _add_across(sums, 8, yz)
-        _add_across(sums, 9, zz)
-        edges += _across(size)
+        whole = _gather(vertices, triangles, start, corners)
+        if whole < 0:
+            return -1.0
+        one = _half_block(corners, 0, whole, reference, factor)
+        other = _half_block(corners, _HALF, whole, reference, factor)
+        _add_across(sums, 0, one[0] + other[0])
+        _add_across(sums, 1, one[1] + other[1])
+        _add_across(sums, 2, one[2] + other[2])
+        _add_across(sums, 3, one[3] + other[3])
+        _add_across(sums, 4, one[4] + other[4])
+        _add_across(sums, 5, one[5] + other[5])
+        _add_across(sums, 6, one[6] + other[6])
+        _add_across(sums, 7, one[7] + other[7])
+        _add_across(sums, 8, one[8] + other[8])
+        _add_across(sums, 9, one[9] + other[9])
+        edges += _across(one[10] + other[10])
     return edges
 
 
@@ -388,18 +410,23 @@ def _add(sums: FloatArray, slot: int, p: _Pair) -> None:
 @njit(error_model="numpy", allocates=False)
 def _compensated_sums(
     vertices: Points, triangles: Triangles, reference: Vector3, factor: float, corners: FloatArray, sums: FloatArray
-) -> None:
+) -> bool:
     """Fill the solid's ten ``sums`` (10, 2) in pairs (about 104 bits), for bodies so thin that products of doubles
-    round too much; relative to the reference every corner is exact. corners (9, _BLOCK): workspace."""
+    round too much; relative to the reference every corner is exact. corners (9, _BLOCK): workspace. False if a triangle
+    uses a vertex that isn't there.
+    """
     of_lanes = local_numbers(160)
     for k in range(160):
         of_lanes[k] = 0.0
     zero = filled(0.0, _LANES)
     for start in range(0, triangles.shape[0], _BLOCK):
-        for t in range(0, _gather(vertices, triangles, start, corners), _LANES):
-            a = _corner(corners, 0, t, reference, factor)
-            b = _corner(corners, 1, t, reference, factor)
-            c = _corner(corners, 2, t, reference, factor)
+        whole = _gather(vertices, triangles, start, corners)
+        if whole < 0:
+            return False
+        for t in range(0, whole, _LANES):
+            a = _corner(corners, 0, t, reference, factor, zero)
+            b = _corner(corners, 1, t, reference, factor, zero)
+            c = _corner(corners, 2, t, reference, factor, zero)
             u, w = _sum(b, a, -1.0), _sum(c, a, -1.0)
             d = _times(_minor(u[1], w[2], u[2], w[1]), (a[0], zero))
             d = _plus(d, _times(_minor(u[2], w[0], u[0], w[2]), (a[1], zero)))
@@ -422,6 +449,7 @@ def _compensated_sums(
         for lane in range(_LANES):
             at = 2 * k * _LANES + lane
             sums[k, 0], sums[k, 1] = pair_add(sums[k, 0], sums[k, 1], of_lanes[at], of_lanes[at + _LANES])
+    return True
 
 
 @exported("f8[:,:]", "i8[:,:]", "i8", "f8[:]", MOMENTS, returns="i8", nogil=True)
@@ -432,24 +460,25 @@ def signed_solid_moments(vertices: Points, triangles: Triangles, how: int, room:
     """
     if triangles.shape[0] == 0 or vertices.shape[0] == 0:
         return NO_FACES
-    if _leads_outside(triangles, vertices.shape[0]):
-        return NO_VERTEX
     lower, upper, reference, sums = local_numbers(3), local_numbers(3), local_numbers(3), local_matrix(10, 2)
-    if not _bounds(vertices, lower, upper):
-        return NOT_FINITE
+    is_finite = _bounds(vertices, lower, upper)
     factor, size = _exact_reference(lower, upper, reference)
-    if size == 0.0:
-        return ONE_POINT
+    if not is_finite or size == 0.0:
+        if _leads_outside(triangles, vertices.shape[0]):
+            return NO_VERTEX
+        return NOT_FINITE if not is_finite else ONE_POINT
     corners, in_pairs = matrix_of(room, 9, _BLOCK), how == IN_PAIRS
     if how == AS_NEEDED:
         in_pairs = triangles.shape[0] <= SMALL_MESH
     if not in_pairs:
         _clear(sums)
         edges = _blocked_sums(vertices, triangles, reference, factor, corners, sums)
+        if edges < 0.0:
+            return NO_VERTEX
         rounding = _UNIT_ROUNDOFF * (size * factor) * 0.5 * edges
         in_pairs = how == AS_NEEDED and not rounding <= ROUNDING_LIMIT * abs(sums[0, 0])
-    if in_pairs:
-        _compensated_sums(vertices, triangles, reference, factor, corners, sums)
+    if in_pairs and not _compensated_sums(vertices, triangles, reference, factor, corners, sums):
+        return NO_VERTEX
     return FOUND if _central(sums, reference, factor, (6.0, 24.0, 120.0), 3, found) else NO_VOLUME
 
 

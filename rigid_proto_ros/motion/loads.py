@@ -309,6 +309,18 @@ def load_bytes(frame: Frame, force: Vector, torque: Vector, contacts: Mapping[st
     return _ROW.pack(_AXES_NUMBERS[axes], place, x, y, z, fx, fy, fz, tx, ty, tz, *normal)
 
 
+def is_light(row: bytes, body: Body) -> bool:
+    """Whether a load whose row has these bytes needs no look at the surface and stays far below MAX_ACCELERATION. False
+    for numbers that aren't finite.
+    """
+    axes, place, x, y, z, fx, fy, fz, tx, ty, tz, *_ = _ROW.unpack(row)
+    if axes == NORMAL_AXES or place > AT_POINT:
+        return False
+    amount = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz)
+    light: bool = amount * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light
+    return light
+
+
 def unresolved(code: int, frame: Frame, vertices: int) -> CommandRefused:
     """The error that says why the point of a frame wasn't found (``resolve_load``) on a mesh of so many vertices."""
     if code == MISSED:

@@ -154,23 +154,32 @@ def begin_string(
 
 
 @njit(error_model="numpy", allocates=False)
+def _torque_of_the_world(q: Quaternion, p: np.record) -> Vector:
+    """Rᵀτ_w + vee(M R)."""
+    W, M = p.torque_world, p.moment
+    x, y, z = rotate_inverse(*q, W[0], W[1], W[2])
+    # Row i of M R is Rᵀ times row i of M; vee takes (M R)₁₂ − (M R)₂₁ and so on, counted from 0.
+    _, m01, m02 = rotate_inverse(*q, M[0], M[1], M[2])
+    m10, _, m12 = rotate_inverse(*q, M[3], M[4], M[5])
+    m20, m21, _ = rotate_inverse(*q, M[6], M[7], M[8])
+    return x + (m12 - m21), y + (m20 - m02), z + (m01 - m10)
+
+
+# What most motions need of the torque is little, and inlined; whether LLVM would do so by itself depends on the order
+# in which functions are compiled.
+
+
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def undamped_torque(q: Quaternion, p: np.record) -> Vector:
     """Torque of the loads about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R)."""
     tx, ty, tz = p.torque_body[0], p.torque_body[1], p.torque_body[2]
     if p.has_world_torque:
-        W, M = p.torque_world, p.moment
-        x, y, z = rotate_inverse(*q, W[0], W[1], W[2])
-        # Row i of M R is Rᵀ times row i of M; vee takes (M R)₁₂ − (M R)₂₁ and so on, counted from 0.
-        _, m01, m02 = rotate_inverse(*q, M[0], M[1], M[2])
-        m10, _, m12 = rotate_inverse(*q, M[3], M[4], M[5])
-        m20, m21, _ = rotate_inverse(*q, M[6], M[7], M[8])
-        tx += x + (m12 - m21)
-        ty += y + (m20 - m02)
-        tz += z + (m01 - m10)
+        x, y, z = _torque_of_the_world(q, p)
+        tx, ty, tz = tx + x, ty + y, tz + z
     return tx, ty, tz
 
 
-@njit(error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def torque(q: Quaternion, w: Vector, p: np.record) -> Vector:
     """Torque of loads and damping about the COM in principal axes: τ_b + Rᵀτ_w + vee(M R) − c_ω ω."""
     tx, ty, tz = undamped_torque(q, p)
@@ -194,14 +203,6 @@ VELOCITY = 10  # (3,)
 HAND_WORK = 13
 HEAT = 14
 VARIABLES = 15
-
-
-@njit(error_model="numpy", allocates=False, forceinline=True)
-def copy_variables(of: Variables, to: Variables) -> None:
-    """Copy the variables of one array to another."""
-    for k in range(VARIABLES):
-        to[k] = of[k]
-
 
 MAX_SPEED = 1e100
 """|x|, |v| or |ω| beyond this is a runaway: squares of it still fit a double, and nothing physical is near."""
@@ -281,7 +282,7 @@ def parts_of(y: Variables) -> tuple[Quaternion, Vector, Vector, Vector]:
     return (y[0], y[1], y[2], y[3]), (y[4], y[5], y[6]), (y[7], y[8], y[9]), (y[10], y[11], y[12])
 
 
-@njit(error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def angular_acceleration(w: Vector, t: Vector, p: np.record) -> Vector:
     """Euler's equations in principal axes: ω' = I⁻¹(τ − ω × Iω); without the gyroscopic term I⁻¹τ."""
     A, B, C, g = p.moments[0], p.moments[1], p.moments[2], p.gyroscopic

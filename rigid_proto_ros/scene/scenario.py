@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from operator import attrgetter
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arithmetic import exact_quotient
-from ..base.compilation import copy_fields, new_record
+from ..base.compilation import copy_fields, copy_of, new_record
 from ..base.errors import CommandRefused, InputError, MeshError
 from ..base.vectors import Vector3
 from ..mass import INERTIA_MODELS, MODEL_COMS
@@ -95,7 +95,7 @@ class Scenario:
         parameters = self.parameters.replaced(changes)
         for one in (self, at_hand):
             if mesh is None and one is not None and _made_of(one.parameters) == _made_of(parameters):
-                return build_scenario(parameters, one.body_mesh)
+                return build_scenario(parameters, one.body_mesh, (self.setup, {*changes, "mass"}))
         return _of_parameters(parameters, mesh)
 
     @property
@@ -169,9 +169,13 @@ def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
     return parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback
 
 
-def build_scenario(parameters: Parameters, body_mesh: BodyMesh | None) -> Scenario:
-    """The scenario of parameters whose mesh is loaded already; raises InputError."""
-    setup = _setup(parameters, body_mesh)
+def build_scenario(
+    parameters: Parameters, body_mesh: BodyMesh | None, like: tuple[Setup, Collection[str]] | None = None
+) -> Scenario:
+    """The scenario of parameters whose mesh is loaded already; raises InputError. like: a setup, and the names of the
+    parameters that may differ from its own.
+    """
+    setup = _setup(parameters, body_mesh, like)
     return Scenario(parameters, body_mesh, setup, setup.warnings, _ghost_setup(parameters, body_mesh))
 
 
@@ -190,29 +194,30 @@ def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | 
         raise InputError("ghost.integrator", refusal.received, refusal.accepted) from None
 
 
-_SCENE_CHOICES = [
-    (name, choices, attrgetter(name))
-    for name, choices in {
-        "inertia_model": INERTIA_MODELS,
-        "inertia_model_com": MODEL_COMS,
-        "integrator": tuple(INTEGRATORS),
-    }.items()
-]
-_SCENE_VALUES = [
-    (name, attrgetter(parameter))
-    for parameter in PARAMETERS
-    if (name := parameter.replace(".", "_")) in (SCENE.names or ()) and name not in [c[0] for c in _SCENE_CHOICES]
-]
-"""Fields of a scene's record, and the parameters that they are: those of the same name, with dots as underscores."""
+_CHOICES = {"inertia_model": INERTIA_MODELS, "inertia_model_com": MODEL_COMS, "integrator": tuple(INTEGRATORS)}
+_SCENE_VALUES = {
+    name: (field, _CHOICES.get(name, ()), attrgetter(name))
+    for name in PARAMETERS
+    if (field := name.replace(".", "_")) in (SCENE.names or ())
+}
+"""Parameters that are numbers of a scene: the field of its record, which has the same name with dots as underscores,
+choices of which it is a number, and where the value stands.
+"""
 
 
-def scene_record(parameters: Parameters) -> np.record:
-    """The numbers of parameters (simulation/record.py, SCENE); raises InputError for more ballast than it holds."""
-    scene = new_record(SCENE)
-    for name, value_of in _SCENE_VALUES:
-        scene[name] = value_of(parameters)
-    for name, choices, value_of in _SCENE_CHOICES:
-        scene[name] = choices.index(value_of(parameters))
+def scene_record(parameters: Parameters, like: tuple[Setup, Collection[str]] | None = None) -> np.record:
+    """The numbers of parameters (simulation/record.py, SCENE); raises InputError for more ballast than it holds. like:
+    as for ``build_scenario``.
+    """
+    scene: np.record = new_record(SCENE) if like is None else copy_of(like[0].scene)
+    names = PARAMETERS if like is None else like[1]
+    for name in names:
+        if name in _SCENE_VALUES:
+            field, choices, value_of = _SCENE_VALUES[name]
+            value = value_of(parameters)
+            scene[field] = choices.index(value) if choices else value
+    if like is not None and not any(name.startswith("ballast.") for name in names):
+        return scene
     points = [mass for mass in parameters.point_masses if mass[0] > 0.0]
     if len(points) > MAX_BALLASTS:
         raise InputError("ballast", f"{len(points)} point masses", f"at most {MAX_BALLASTS} with a mass")
@@ -222,19 +227,25 @@ def scene_record(parameters: Parameters) -> np.record:
     return scene
 
 
-def _setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup:
+def _setup(
+    parameters: Parameters, body_mesh: BodyMesh | None, like: tuple[Setup, Collection[str]] | None = None
+) -> Setup:
     for point in parameters.point_masses:
         if not point[0] >= 0.0:
             raise InputError("ballast", point, "mass >= 0 [kg] and x, y, z, all finite")
-    thrusters = {
-        name: make_thruster(
-            name, numbers, parameters.thruster.bidirectional, nanoseconds(parameters.thruster.minimum_on_time)
-        )
-        for name, numbers in sorted(parameters.thrusters.items())
-    }
+    thrusters = (
+        like[0].thrusters
+        if like
+        else {
+            name: make_thruster(
+                name, numbers, parameters.thruster.bidirectional, nanoseconds(parameters.thruster.minimum_on_time)
+            )
+            for name, numbers in sorted(parameters.thrusters.items())
+        }
+    )
     try:
         setup = make_setup(
-            scene_record(parameters),
+            scene_record(parameters, like),
             new_record(MESH) if body_mesh is None else body_mesh.numbers,
             surface=body_mesh.surface if body_mesh else None,
             mesh_sha256=body_mesh.mesh.sha256 if body_mesh else "",

@@ -161,13 +161,14 @@ def fly_rows(
     sides = (batch, batch if references is None else references)
     results = new_results(len(batch.rows), len(measures))
     most = max(side.commands.shape[1] for side in sides) + 1
+    flown: Any = fly_scenes
     arguments: list[Any] = []
     for side in sides:
         step = side.commands.shape[1] if len(side.commands) > 1 else 0
         arguments += [side.rows, side.mesh, np.ascontiguousarray(side.commands).reshape(-1), step]
     loads, events = np.zeros(most, LOAD_ROW), np.zeros(4 * most + 4, EVENT)
     states, others = (np.zeros((len(sample_ns), STATE)) for _ in range(2))
-    fly_scenes(
+    flown(
         *arguments,
         references is not None,
         sample_ns,

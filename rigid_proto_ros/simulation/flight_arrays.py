@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.compilation import new_record, place_of
+from ..base.compilation import bound, new_record, place_of
 from ..base.errors import CommandRefused
 from ..base.simd import aligned
 from ..base.vectors import Attitude, FloatArray
@@ -33,6 +33,7 @@ _ROW_BYTES, _EVENT_BYTES = LOAD_ROW.itemsize, EVENT.itemsize
 _FLIGHT_BYTES, _STATE_AT = FLIGHT.itemsize, place_of(FLIGHT, "row")
 _LOAD_AT = place_of(LOAD_ROW, "load")
 _STRING_AT, _STRING_END = place_of(FLIGHT, "string"), place_of(FLIGHT, "sums")
+_TIED_IN_STRING = place_of(FLIGHT, "tied") - _STRING_AT
 
 
 # Indices of integers in the flight's memory that are accessed at every advance or reset: the fastest access to single
@@ -95,6 +96,9 @@ class FlightArrays:
         self._room = np.ndarray(ROOM, np.float64, memory, room_at)
         self._table = memory.data.cast("B")[loads_at:events_at]
         self._string = memory.data.cast("B")[_STRING_AT:_STRING_END]
+        self.call = bound(operate, self.flight, self._loads, self._events, self._room)
+        """Perform an operation, by its number and a time [ns]; returns its result: of END_DUE, whether anything ended.
+        """
 
     def _grow(self, rows: int) -> None:
         """Have at least this number of rows; what is there is kept."""
@@ -112,7 +116,7 @@ class FlightArrays:
         load_ids = numbers[_LOAD_IDS]
         numbers[:] = setup.integers
         numbers[_LOAD_IDS] = load_ids
-        self.call(BEGIN)
+        self.call(BEGIN, 0)
 
     def change(self, old: Setup, new: Setup) -> None:
         """Go on as the flight of another setup; raises CommandRefused."""
@@ -163,13 +167,10 @@ class FlightArrays:
         check_load(self.flight, setup.mesh, setup.vertices, setup.triangles, kind, load, self._refusal)
         return refused_command(self._refusal)
 
-    def call(self, what: int, until_ns: int = 0) -> int:
-        """Perform an operation; returns its result: for END_DUE, whether anything ended."""
-        return operate(self.flight, self._loads, self._events, self._room, what, until_ns)
-
     def fly(self, until_ns: int) -> bool:
         """Advance to ``until_ns``; returns False when the motion failed."""
-        return self.call(FLY, until_ns) == _REACHED
+        reached: bool = self.call(FLY, until_ns) == _REACHED
+        return reached
 
     def accelerations(self) -> FloatArray:
         """Accelerations now (6,): of the COM [m/s², world], angular [rad/s², body axes]."""
@@ -183,8 +184,8 @@ class FlightArrays:
 
     @property
     def string_bytes(self) -> bytes:
-        """All that is known of the string, to be compared."""
-        return bytes(self._string)
+        """All that is known of a tied string, to be compared; empty without one."""
+        return bytes(self._string) if self._string[_TIED_IN_STRING] else b""
 
     @property
     def string(self) -> StringState | None:

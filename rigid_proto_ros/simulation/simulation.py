@@ -139,7 +139,7 @@ class Simulation:
     def _notify_string(self) -> None:
         """Notify the observer of the string if it has changed since the last notification."""
         arrays = self._arrays
-        told, self._told_string = self._told_string, arrays.string_bytes if arrays.flight.tied else b""
+        told, self._told_string = self._told_string, arrays.string_bytes
         if told != self._told_string and StringChanged in self.observer.takes:
             self.observer.on(self._string_as_tied())
 
@@ -196,7 +196,7 @@ class Simulation:
         commands; counters are kept.
         """
         if self._wants_loads:
-            self._arrays.call(END_ALL)
+            self._arrays.call(END_ALL, 0)
             self._notify([])
         self.notify_floor(at_end=True)
         before = self.setup
@@ -317,7 +317,7 @@ class Simulation:
     def _act(self) -> None:
         """Apply everything that ends or begins now, and begin a new segment if anything did."""
         arrays, now_ns = self._arrays, self.time_ns
-        changed = bool(arrays.call(END_DUE))
+        changed = bool(arrays.call(END_DUE, 0))
         self._notify([])
         if self.thrusters.due_ns <= now_ns:
             loads, timed_out = self.thrusters.end_due(now_ns, self._timeout_ns)
@@ -337,7 +337,7 @@ class Simulation:
                 self.refuse(CommandRefused("schedule", error.field, error.received, error.accepted))
         self.listed = None
         if changed:
-            arrays.call(CUT)
+            arrays.call(CUT, 0)
             self._notify_string()
 
     def _apply(self, pending: Pending) -> None:
@@ -371,7 +371,7 @@ class Simulation:
             kind = HELD_WRENCH if load.is_zero else PULSE
             rows.append(Row(self.time_ns, _UNTIL_REPLACED_NS, kind, -1 - number, load.packed))
         arrays.put(rows)
-        arrays.call(APPLY)
+        arrays.call(APPLY, 0)
         if not self._wants_loads:
             return
         for now_ns, what, load_id, row_number in arrays.last_events():
@@ -423,7 +423,7 @@ class Simulation:
         self.failure = f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}"
         if self.string is not None and self.string.bilateral and self.string.rest_length:
             self.failure += "; a string that pushes has no direction where its knot meets its free end"
-        arrays.call(FINISH)
+        arrays.call(FINISH, 0)
         return self.state
 
     # Observables at the time of the last advance

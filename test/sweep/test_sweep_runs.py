@@ -36,7 +36,7 @@ def test_a_table_holds_every_row_in_order_and_what_it_was_made_with(tmp_path) ->
     assert content(file) == expected(own)
     kept = json.loads(pq.read_metadata(file).metadata[KEY])
     assert kept == metadata and kept["complete"] and kept["rows_by_compiled_batch"] == own.rows
-    assert kept["cpu"] and kept["numba"] and kept["seed"] == own.seed
+    assert kept["cpu"] and kept["kernels"] and kept["seed"] == own.seed
     assert [path.name for path in file.parent.iterdir()] == ["table.parquet"]
 
 

@@ -47,7 +47,7 @@ from ...base.arithmetic import (
     two_product,
     two_sum,
 )
-from ...base.compilation import local_numbers, njit
+from ...base.compilation import copy_numbers, local_numbers, njit
 from ...base.rotation import multiply, norm, normalize, rotate
 from ...base.vectors import Quaternion, Vector
 from ..loads import ANGULAR_DAMPING
@@ -55,7 +55,6 @@ from ..problem import (
     MAX_SPEED,
     VARIABLES,
     Variables,
-    copy_variables,
     damping_functions,
     is_good,
     parts_of,
@@ -417,7 +416,7 @@ def free_body_strang_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     moments = p.moments[0], p.moments[1], p.moments[2]
     new = local_numbers(VARIABLES)
-    copy_variables(y, new)
+    copy_numbers(y, new)
     pushed = _push(new, p)
     for done in range(n):
         _kick(new, p, 0.5 * h, pushed)
@@ -431,7 +430,7 @@ def free_body_strang_steps(y: Variables, p: np.record, h: float, n: int) -> int:
         _kick(new, p, 0.5 * h, pushed)
         if not is_good(new):
             return done
-        copy_variables(new, y)
+        copy_numbers(new, y)
     return n
 
 

@@ -13,11 +13,11 @@ import math
 
 import numpy as np
 
-from ...base.compilation import njit
+from ...base.compilation import copy_numbers, njit
 from ...base.rotation import matrix_elements, norm
 from ...base.vectors import FloatArray, Quaternion, Vector
 from ..loads import NO_GYROSCOPIC_TERM
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, accelerations, copy_variables, parts_of
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VELOCITY, Variables, accelerations, parts_of
 from .integrator import EVALUATED, Integrator, Kernel
 from .runge_kutta import ONE_STAGE, repeated
 
@@ -101,7 +101,7 @@ def _moved(y: Variables, at: Variables, p: np.record, h: float, pulls: bool, out
 def _step(
     y: Variables, p: np.record, h: float, pulls: bool, tableau: FloatArray, _k: FloatArray, out: Variables
 ) -> None:
-    copy_variables(y, out)
+    copy_numbers(y, out)
     for i in range(tableau.shape[1]):
         _moved(y, out, p, tableau[i + 1, i] * h, pulls, out)
 

@@ -22,11 +22,11 @@ import math
 
 import numpy as np
 
-from ...base.compilation import local_numbers, njit
+from ...base.compilation import copy_numbers, local_numbers, njit
 from ...base.rotation import multiply, normalize, rotate
 from ...base.vectors import Quaternion, Vector
 from ..loads import ANGULAR_DAMPING
-from ..problem import VARIABLES, Variables, copy_variables, is_good, parts_of, torque
+from ..problem import VARIABLES, Variables, is_good, parts_of, torque
 from .integrator import LOADS, Integrator
 
 _MAX_ITERATIONS = 60
@@ -35,7 +35,7 @@ _MAX_ITERATIONS = 60
 _ROUNDING = 2.0**-52
 
 
-@njit(error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def _half_turned(q: Quaternion, o: Vector, h: float) -> Quaternion:
     """Attitude at the middle of the step: q followed by half of the Cayley rotation of ω̄ = o."""
     a, b, c = 0.5 * h * o[0], 0.5 * h * o[1], 0.5 * h * o[2]
@@ -43,7 +43,7 @@ def _half_turned(q: Quaternion, o: Vector, h: float) -> Quaternion:
     return normalize(*multiply(*q, a, b, c, 1.0 + w))
 
 
-@njit(error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def _mean_torque(o: Vector, t: Vector, h: float) -> Vector:
     """t − ½h ω̄ × t for a torque t in the axes of the mean attitude."""
     s = math.sqrt(1.0 + 0.25 * h * h * (o[0] * o[0] + o[1] * o[1] + o[2] * o[2]))
@@ -51,7 +51,7 @@ def _mean_torque(o: Vector, t: Vector, h: float) -> Vector:
     return s * t[0] + along * o[0], s * t[1] + along * o[1], s * t[2] + along * o[2]
 
 
-@njit(error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def _change_of_momentum(q: Quaternion, o: Vector, p: np.record, h: float) -> Vector:
     """I(ω⁺ − ω) for the mean spin o."""
     tx, ty, tz = _mean_torque(o, torque(_half_turned(q, o, h), o, p), h)
@@ -60,7 +60,7 @@ def _change_of_momentum(q: Quaternion, o: Vector, p: np.record, h: float) -> Vec
     return h * (tx + gx), h * (ty + gy), h * (tz + gz)
 
 
-@njit(error_model="numpy", allocates=False)
+@njit(error_model="numpy", allocates=False, forceinline=True)
 def _newton_correction(o: Vector, r: Vector, h: float, p: np.record) -> Vector:
     """Newton correction δ: J δ = −r for the residual r of 2I(ω̄ − ω) − h(...) = 0.
 
@@ -127,11 +127,15 @@ def _step(y: Variables, p: np.record, h: float, out: Variables) -> bool:
 def lie_midpoint_steps(y: Variables, p: np.record, h: float, n: int) -> int:
     """Up to n steps of h seconds in place; returns the number of good ones."""
     new = local_numbers(VARIABLES)
-    copy_variables(y, new)
+    copy_numbers(y, new)
+    here, there = y, new
     for done in range(n):
-        if not _step(y, p, h, new) or not is_good(new):
-            return done
-        copy_variables(new, y)
+        if not _step(here, p, h, there) or not is_good(there):
+            n = done
+            break
+        here, there = there, here
+    if n % 2 == 1:
+        copy_numbers(new, y)
     return n
 
 

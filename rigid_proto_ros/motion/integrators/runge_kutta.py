@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...base.compilation import local_matrix, local_numbers, njit
+from ...base.compilation import copy_numbers, local_matrix, local_numbers, njit
 from ...base.rotation import exponential, multiply, normalize
 from ...base.simd import Packed, filled, four, joined, load, number, store
 from ...base.vectors import FloatArray
@@ -31,7 +31,6 @@ from ..problem import (
     VELOCITY,
     Variables,
     accelerations,
-    copy_variables,
     is_good,
     parts_of,
     stretch,
@@ -118,15 +117,20 @@ def repeated(step: Step, tableau: FloatArray, y: Variables, p: np.record, h: flo
     Inlined into the kernel that calls it, since numba can't cache compiled code that takes a function as an argument.
     """
     new, k = local_numbers(VARIABLES), local_matrix(MOST_STAGES, 16)
-    copy_variables(y, new)
+    copy_numbers(y, new)
+    # From one to the other and back: a copy would wait until all that is stored one by one can be loaded as vectors.
+    here, there = y, new
     for done in range(n):
         if is_one_sided(p):
-            _step_on_string(step, tableau, y, p, h, k, new)
+            _step_on_string(step, tableau, here, p, h, k, there)
         else:
-            step(y, p, h, True, tableau, k, new)
-        if not is_good(new):
-            return done
-        copy_variables(new, y)
+            step(here, p, h, True, tableau, k, there)
+        if not is_good(there):
+            n = done
+            break
+        here, there = there, here
+    if n % 2 == 1:
+        copy_numbers(new, y)
     return n
 
 
@@ -138,7 +142,7 @@ def _step_on_string(
     jump, with a damper), and a step across it would lose its order.
     """
     here, left, resolution = local_numbers(VARIABLES), h, h * _RESOLUTION
-    copy_variables(y, here)
+    copy_numbers(y, here)
     for part in range(_MAX_PARTS):
         # 1. Step over all that is left, with the law at its start.
         low, high, at_low = 0.0, left, tension_margin(here, p)
@@ -170,7 +174,7 @@ def _step_on_string(
         left -= high
         if left <= resolution:
             break
-        copy_variables(end, here)
+        copy_numbers(end, here)
 
 
 def explicit(tableau: FloatArray) -> Kernel:

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from ...base.compilation import local_matrix, local_numbers, njit
+from ...base.compilation import copy_numbers, local_matrix, local_numbers, njit
 from ...base.rotation import norm, normalize
 from ...base.simd import (
     Packed,
@@ -37,7 +37,7 @@ from ...base.simd import (
 )
 from ...base.vectors import FloatArray
 from ..loads import ANGULAR_DAMPING, BODY_FORCE, BODY_TORQUE
-from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VARIABLES, VELOCITY, Variables, copy_variables, is_good
+from ..problem import DISPLACEMENT, HAND_WORK, HEAT, SPIN, VARIABLES, VELOCITY, Variables, is_good
 from ..string import NO_DIRECTION
 from .integrator import Integrator
 
@@ -205,13 +205,17 @@ _MOST_COEFFICIENTS = MAX_DEGREE + 1
 def taylor_steps_of_degree(y: Variables, p: np.record, h: float, n: int, degree: int) -> int:
     """Up to n steps of h seconds in place by series of this degree, ≤ MAX_DEGREE; returns the number of good ones."""
     c, new = local_matrix(_MOST_COEFFICIENTS, SPIN_COLUMNS), local_numbers(VARIABLES)
-    copy_variables(y, new)
+    copy_numbers(y, new)
+    here, there = y, new
     for done in range(n):
-        spin_series(y, p, degree, c)
-        spin_at(c, degree, h, new)
-        if not is_good(new):
-            return done
-        copy_variables(new, y)
+        spin_series(here, p, degree, c)
+        spin_at(c, degree, h, there)
+        if not is_good(there):
+            n = done
+            break
+        here, there = there, here
+    if n % 2 == 1:
+        copy_numbers(new, y)
     return n
 
 

@@ -8,6 +8,7 @@ from there on a copy. So neither depends on the times of sampling.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,8 @@ from .gram_schmidt import euler_steps, midpoint_steps
 from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Kernel, Method
 from .lie_midpoint import lie_midpoint_steps
 from .runge_kutta import dop853_steps, rk4_steps, semi_implicit_euler_steps
-from .series import MOTION_COLUMNS, taylor_steps
-from .series_steps import MAX_DEGREE, series_steps, series_workspace, spin_workspace
+from .series import MAX_DEGREE, MOTION_COLUMNS, taylor_steps
+from .series_steps import series_steps, series_workspace, spin_workspace
 
 KERNELS: tuple[Kernel, ...] = (
     steady_steps,
@@ -40,31 +41,36 @@ KERNELS: tuple[Kernel, ...] = (
 """The kernels of fixed steps of all integrators, by number; the only adaptive one is ``series_steps``."""
 
 
-@njit(error_model="numpy", allocates=False)
-def fixed_steps(number: int, y: Variables, p: np.record, h: float, n: int) -> int:
-    """Up to n steps of h seconds in place by the kernel with this number; returns how many were good. WebAssembly has
-    no addresses of functions, and records hold none.
-    """
-    if number == 0:
-        return steady_steps(y, p, h, n)
-    if number == 1:
-        return free_body_steps(y, p, h, n)
-    if number == 2:
-        return free_body_strang_steps(y, p, h, n)
-    if number == 3:
-        return euler_steps(y, p, h, n)
-    if number == 4:
-        return midpoint_steps(y, p, h, n)
-    if number == 5:
-        return semi_implicit_euler_steps(y, p, h, n)
-    if number == 6:
-        return rk4_steps(y, p, h, n)
-    if number == 7:
-        return lie_midpoint_steps(y, p, h, n)
-    if number == 8:
-        return dop853_steps(y, p, h, n)
-    return taylor_steps(y, p, h, n)
+_Steps = Callable[[int, Variables, np.record, float, int], int]
 
+
+def _either(number: int, kernel: Kernel, others: _Steps) -> _Steps:
+    """The kernel for its own number, the others for any other one."""
+
+    @njit(error_model="numpy", allocates=False)
+    def steps(asked: int, y: Variables, p: np.record, h: float, n: int) -> int:
+        if asked == number:
+            return kernel(y, p, h, n)
+        return others(asked, y, p, h, n)
+
+    return steps
+
+
+@njit(error_model="numpy", allocates=False)
+def _no_steps(_asked: int, _y: Variables, _p: np.record, _h: float, _n: int) -> int:
+    return 0
+
+
+def _chained() -> _Steps:
+    """One if after another: WebAssembly has no addresses of functions, and records hold none."""
+    chain: _Steps = _no_steps
+    for number in reversed(range(len(KERNELS))):
+        chain = _either(number, KERNELS[number], chain)
+    return chain
+
+
+fixed_steps = _chained()
+"""(number, y, p, h, n): up to n steps of h seconds in place by a kernel of KERNELS; returns how many were good."""
 
 CONTROL = record_type(
     [
