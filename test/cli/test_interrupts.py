@@ -81,7 +81,6 @@ def ended(code: str, *arguments: str) -> subprocess.CompletedProcess:
 @pytest.mark.parametrize(
     ("module", "command"),
     [
-        ("numba", "rigid_proto simulate t_handle"),
         ("numpy", "rigid_proto inspect hammer"),
         ("yaml", "poke_client poke --force 0 0 1"),
         ("std_msgs", "poke_client poke --force 0 0 1"),

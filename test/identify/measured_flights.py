@@ -41,7 +41,7 @@ def flown(values, start, times_s, load=None):
     """Samples (m, SAMPLE) of a flight from the tracked frame's start (13,) at time 0."""
     times_ns = np.round(np.asarray(times_s) * 1e9).astype(np.int64)
     wrenches = (load or ms.load_history()).within(0, int(times_ns[-1]) + 1)
-    samples, good = tr.fly_rows(sh.flown_rows(np.asarray(start, float)[None], [values]), times_ns, wrenches)
+    samples, good = tr.fly_rows(*sh.flown_rows(np.asarray(start, float)[None], [values]), times_ns, wrenches)
     assert good.all()
     return times_ns, samples[0]
 

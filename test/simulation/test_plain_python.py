@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Without compilation (NUMBA_DISABLE_JIT=1) everything flies in plain Python: slowly, but with tracebacks that can be read."""
+"""Uncompiled (RIGID_PROTO_KERNELS=interpreted) everything flies in plain Python: slowly, but with tracebacks that can be read."""
 
 import json
 import os
@@ -58,7 +58,7 @@ main(['simulate', 't_handle', '--duration', '0.02', '--json'])
     ran = subprocess.run(
         [sys.executable, "-c", code],
         cwd=TESTS,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        env={**os.environ, "RIGID_PROTO_KERNELS": "interpreted"},
         capture_output=True,
         text=True,
         check=False,
