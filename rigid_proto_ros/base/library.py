@@ -237,8 +237,8 @@ def _address_and_extents(argument: Any, kind: np.dtype[Any], dimensions: int, na
 
 
 def target() -> str:
-    """The kind of processor that the library is for: RIGID_PROTO_PROCESSOR, or the best of ``x86-64-v4``, ``x86-64-v3``,
-    ``x86-64-v2`` and ``aarch64`` that this one is. Raises InputError for another one.
+    """The kind of processor that the library is for: RIGID_PROTO_PROCESSOR, or the best of ``x86-64-v4``,
+    ``x86-64-v3``, ``x86-64-v2`` and ``aarch64`` that this one is. Raises InputError for another one.
     """
     if asked := os.environ.get("RIGID_PROTO_PROCESSOR", ""):
         return asked

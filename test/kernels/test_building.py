@@ -45,7 +45,11 @@ def ran(code: str, folder: Path, **environment: str) -> subprocess.Popen:
     ("body", "returns", "told"),
     [
         ("if n > 3:\n        raise ValueError('too many')\n    return a[n]", "f8", "ValueError('too many',)"),
-        ("b = np.zeros(n)\n    b[0] = a[0]\n    return b[0]", "f8", "No implementation of function Function(<built-in function zeros>)"),
+        (
+            "b = np.zeros(n)\n    b[0] = a[0]\n    return b[0]",
+            "f8",
+            "No implementation of function Function(<built-in function zeros>)",
+        ),
         ("return math.sin(a[n])", "f8", "call sin"),
         ("return n // (n - 1)", "f8", "as declared: f8"),
         ("return a.nothing", "f8", "Unknown attribute 'nothing'"),
