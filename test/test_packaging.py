@@ -245,9 +245,10 @@ def test_package_xml_recipe_and_citation_agree_with_the_package() -> None:
 
 @pytest.mark.stress
 def test_the_wheel_inspects_simulates_and_serves_the_page_in_an_empty_environment(
-    source_copy: Path, tmp_path: Path
+    source_copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With what PyPI gives, for this Python. It carries the kernels: nothing is built, and no compiler comes with it."""
+    monkeypatch.delenv("PYTHONPATH", raising=False)
     run(sys.executable, "-P", "-m", "rigid_proto_ros.kernels", "wheel", cwd=source_copy, PYTHONPATH=str(source_copy))
     run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", tmp_path, ".", cwd=source_copy)
     (wheel,) = tmp_path.glob("*.whl")
