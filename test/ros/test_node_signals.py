@@ -92,7 +92,8 @@ def test_a_node_that_builds_its_kernels_ends_at_once(ros_environment, tmp_path, 
     environment = {**ros_environment, "RIGID_PROTO_KERNELS_FOLDER": str(tmp_path / "kernels")}
     node = start_node(environment, tmp_path / "node")
     node.wait_for("building the kernels")
-    children = descendants(node.pid)
+    while not (children := descendants(node.pid)):
+        time.sleep(0.01)
     assert node.end(number, within_s=10.0) == 0, node.errors
     assert not [pid for pid in children if alive(pid)]
     assert "Traceback" not in node.errors
