@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Repeats what recorded_calls.py recorded by the kernels in WebAssembly, and compares every byte of memory and every
-// number returned: replay_calls.mjs MODULE FILE. Prints how many calls of each kernel were equal; status 1 if any wasn't.
+// number returned: replay_calls.mjs MODULE FILE [KERNEL ARRAY], where calls of that kernel get that array empty. Prints how many calls of each kernel were equal; status 1 if any wasn't.
 //
 // Numbers that are no numbers count as equal, whatever their bits: WebAssembly leaves open which of them an operation gives.
 import fs from "node:fs";
 import zlib from "node:zlib";
 
 const PAGE = 65536;
-const [modulePath, filePath] = process.argv.slice(2);
+const [modulePath, filePath, otherKernel, emptied] = process.argv.slice(2);
 const content = zlib.gunzipSync(fs.readFileSync(filePath), { maxOutputLength: 2 ** 32 - 1 });
 const headEnd = content.indexOf(10);
 const kernels = JSON.parse(content.toString("utf8", 0, headEnd));
@@ -39,7 +39,7 @@ let at = headEnd + 1;
 const take = (bytes) => content.subarray(at, (at += bytes));
 const counts = new Map(kernels.map(({ name }) => [name, { equal: 0, different: 0 }]));
 while (at < content.length) {
-  const { name, returns, slots, addresses } = kernels[take(2).readUInt16LE()];
+  const { name, returns, slots, addresses, lengths } = kernels[take(2).readUInt16LE()];
   const given = Buffer.from(take(8 * slots));
   const returned = take(8 * returns);
   const regions = [];
@@ -65,6 +65,7 @@ while (at < content.length) {
     // An array without elements has no region, and its address doesn't matter.
     given.writeBigUInt64LE(BigInt(of ? of.place + Number(address - of.address) : base), 8 * slot);
   }
+  if (name === otherKernel) given.writeBigUInt64LE(0n, 8 * lengths[emptied]);
   for (const { place, before } of regions) before.copy(bytes, place);
   given.copy(bytes, block);
   exports[name](block);
