@@ -92,12 +92,11 @@ def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
     folder = tmp_path / ROOT.name / "motion" / "integrators"
     (folder / "heun.py").write_text(HEUN, "utf-8")
     names = (folder.parent / "__init__.py").read_text("utf-8")
-    names = names.replace('    "rk4": "runge_kutta",\n', '    "rk4": "runge_kutta",\n    "heun": "heun",\n')
+    names = names.replace('    "rk4",\n', '    "rk4",\n    "heun",\n')
     (folder.parent / "__init__.py").write_text(names, "utf-8")
-    stepping = (folder / "stepping.py").read_text("utf-8")
-    stepping = stepping.replace("from .integrator import", "from .heun import heun_steps\nfrom .integrator import")
-    stepping = stepping.replace("    rk4_steps,\n", "    rk4_steps,\n    heun_steps,\n")
-    (folder / "stepping.py").write_text(stepping, "utf-8")
+    listed = (folder / "__init__.py").read_text("utf-8")
+    listed = listed.replace("from .integrator import", "from .heun import HEUN\nfrom .integrator import")
+    (folder / "__init__.py").write_text(listed.replace("        RK4,\n", "        RK4,\n        HEUN,\n"), "utf-8")
     done = subprocess.run(
         [sys.executable, "-c", FLY], cwd=tmp_path, env=_only(tmp_path), capture_output=True, text=True, check=False
     )
