@@ -56,7 +56,7 @@ def test_steps_and_evaluations_are_counted_by_the_integrator_that_made_them() ->
 
 def test_a_step_is_rounded_to_the_nearest_nanosecond() -> None:
     for step_s, step_ns in ((1e-3 + 4e-10, 1_000_000), (1e-3 + 6e-10, 1_000_001), (2e-9, 2), (1.4e-9, 1)):
-        assert make_scenario({"step": step_s}).setup.step_ns == step_ns
+        assert make_scenario({"step": step_s}).setup.flight.step_ns == step_ns
 
 
 def test_contacts_move_with_a_mesh_that_is_scaled_in_flight() -> None:
