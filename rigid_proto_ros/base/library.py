@@ -237,15 +237,20 @@ def _address_and_extents(argument: Any, kind: np.dtype[Any], dimensions: int, na
 
 
 def target() -> str:
-    """The kind of processor that the library is for: ``x86-64-v3``, ``x86-64-v2`` or ``aarch64``. Raises InputError for
-    another one.
+    """The kind of processor that the library is for: RIGID_PROTO_PROCESSOR, or the best of ``x86-64-v4``, ``x86-64-v3``,
+    ``x86-64-v2`` and ``aarch64`` that this one is. Raises InputError for another one.
     """
+    if asked := os.environ.get("RIGID_PROTO_PROCESSOR", ""):
+        return asked
     machine = platform.machine().lower()
     if machine in ("aarch64", "arm64"):
         return "aarch64"
     if machine not in ("x86_64", "amd64"):
         raise InputError("kernels", machine, "x86_64 or aarch64; RIGID_PROTO_KERNELS=interpreted runs anywhere, slowly")
-    return "x86-64-v3" if {"avx2", "fma", "bmi2"} <= _cpu_flags() else "x86-64-v2"
+    flags = _cpu_flags()
+    if not {"avx2", "fma", "bmi2"} <= flags:
+        return "x86-64-v2"
+    return "x86-64-v4" if {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"} <= flags else "x86-64-v3"
 
 
 def _cpu_flags() -> set[str]:

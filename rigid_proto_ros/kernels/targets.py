@@ -34,6 +34,7 @@ class Target:
 
 
 TARGETS = {
+    "x86-64-v4": Target("x86_64-unknown-linux-gnu", "x86-64-v4"),
     "x86-64-v3": Target("x86_64-unknown-linux-gnu", "x86-64-v3"),
     "x86-64-v2": Target("x86_64-unknown-linux-gnu", "x86-64-v2", fuses=False),
     "aarch64": Target("aarch64-unknown-linux-gnu", "generic"),

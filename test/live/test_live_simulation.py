@@ -95,7 +95,7 @@ def test_parameters_refused_when_they_act_are_again_what_they_were(live):
     assert live.loop.simulation.setup.integrator.name == "auto"
     live.set_parameters({"linear_damping": 0.5})
     live.step()
-    assert live.loop.simulation.setup.linear_damping == 0.5
+    assert live.loop.simulation.setup.scene.linear_damping == 0.5
 
 
 @pytest.mark.parametrize("first", ["inertia_model", "scale"])

