@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 .DEFAULT_GOAL := help
-.PHONY: always help setup kernels run up workbench test lint pictures build bench stress soak clean pins
+.PHONY: always help setup kernels run up workbench test lint pictures wheel build bench stress soak clean pins
 SHELL := /bin/bash
 # A make that a test starts has its own jobs.
 unexport MAKEFLAGS MFLAGS
@@ -25,8 +25,10 @@ setup: $(READY) ## .venv with all that run, up, test and lint need
 	@command -v python3 >/dev/null || { echo "make setup: python3 is missing; install it with: sudo apt install python3 python3-venv" >&2; exit 1; }
 	@python3 requirements/make_venv.py $*
 
-kernels: setup ## build the kernels of the present sources for this machine and for WebAssembly
-	@$(PY) -m rigid_proto_ros.kernels native wasm
+kernels: setup ## build the kernels for this machine and for WebAssembly, and page/src/kernels.ts
+	@$(PY) requirements/wasm_tools.py linker
+	@mkdir -p page/src
+	@$(PY) -m rigid_proto_ros.kernels native wasm --typescript page/src/kernels.ts
 
 run: $(FOR_RUN) ## simulate a bundled body, or MESH=path/to.obj, for 10 s; leaves out/session.rrd
 	@$(ROS) .venv/bin/rigid_proto demo $(if $(MESH),--mesh "$(MESH)")
@@ -45,6 +47,7 @@ AGAIN := --reruns 1 --only-rerun "no .* within [0-9.]+ s" -rRs
 # Hundreds of processes are started: none of them should read our source anew.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: setup ## the whole suite; real meshes are found through RIGID_PROTO_MESHES
+	@$(PY) requirements/wasm_tools.py linker node
 	$(ROS) $(PY) -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(AGAIN) -m "not stress and not bench and not soak" $(ARGS)
 
 lint: setup ## ruff and mypy
@@ -56,6 +59,11 @@ pictures: setup run ## draw the pictures of README and lessons anew (needs mesa-
 	.venv/bin/rigid_proto snapshot out/session.rrd --at 4.05 -o docs/flight.png
 	$(PY) docs/lessons/pictures.py
 	PYTHONPATH=test $(PY) docs/page_pictures.py docs
+
+wheel: setup ## dist/: a wheel with the kernels of this machine's architecture
+	@rm -rf rigid_proto_ros/kernels/lib
+	@$(PY) -m rigid_proto_ros.kernels wheel
+	$(PY) -m pip --disable-pip-version-check wheel --quiet --no-deps --no-build-isolation -w dist .
 
 build: setup ## colcon build into build/, install/ and log/; then: source install/setup.bash
 	$(ROS) $(PY) -m colcon build --packages-select rigid_proto_ros
@@ -77,7 +85,7 @@ stress: setup ## long and hostile tests, those of random examples with new ones,
 	$(if $(ARGS),,$(PY) tools/bits_elsewhere.py)
 
 clean: ## everything that was made here, the environments included
-	rm -rf .venv .venv-bench build install log out *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage
+	rm -rf .venv .venv-bench build install log out dist rigid_proto_ros/kernels/lib *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 PINS := .venv/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate --no-header --no-emit-package pip

