@@ -91,12 +91,19 @@ def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
     shutil.copytree(ROOT, tmp_path / ROOT.name, ignore=shutil.ignore_patterns("__pycache__"))
     folder = tmp_path / ROOT.name / "motion" / "integrators"
     (folder / "heun.py").write_text(HEUN, "utf-8")
-    names = (folder.parent / "__init__.py").read_text("utf-8")
-    names = names.replace('    "rk4",\n', '    "rk4",\n    "heun",\n')
-    (folder.parent / "__init__.py").write_text(names, "utf-8")
-    listed = (folder / "__init__.py").read_text("utf-8")
-    listed = listed.replace("from .integrator import", "from .heun import HEUN\nfrom .integrator import")
-    (folder / "__init__.py").write_text(listed.replace("        RK4,\n", "        RK4,\n        HEUN,\n"), "utf-8")
+    changes = {
+        folder.parent / "__init__.py": {'    "rk4",\n': '    "rk4",\n    "heun",\n'},
+        folder / "__init__.py": {
+            "from .integrator import": "from .heun import HEUN\nfrom .integrator import",
+            "        RK4,\n": "        RK4,\n        HEUN,\n",
+        },
+    }
+    for file, replaced in changes.items():
+        text = file.read_text("utf-8")
+        for old, new in replaced.items():
+            assert text.count(old) == 1, (file, old)
+            text = text.replace(old, new)
+        file.write_text(text, "utf-8")
     done = subprocess.run(
         [sys.executable, "-c", FLY], cwd=tmp_path, env=_only(tmp_path), capture_output=True, text=True, check=False
     )
