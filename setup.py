@@ -67,10 +67,6 @@ def commands() -> dict[str, type]:
         return {}
 
     class WheelWithKernels(bdist_wheel):
-        def finalize_options(self) -> None:
-            super().finalize_options()
-            self.root_is_pure = False
-
         def get_tag(self) -> tuple[str, str, str]:
             machine = platform.machine()
             return "py3", "none", f"manylinux_2_17_{machine}.musllinux_1_1_{machine}"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """``python -m rigid_proto_ros.kernels [TARGET ...]``: build the kernels ahead into the user's cache.
 
-TARGET: ``native``, this machine's processor (the default); ``wasm``; x86-64-v3, x86-64-v2 or aarch64; or ``wheel``, all
+TARGET: ``native``, this machine's processor (the default); ``wasm``; x86-64-v4, -v3, -v2 or aarch64; or ``wheel``, all
 kinds of processors of this machine's architecture, into the package, as a wheel carries them. What is there for the
 present sources isn't built again.
 ``--typescript FILE`` writes what a page calls the kernels by, and with ``wasm`` the layouts of records are beside the
@@ -26,7 +26,7 @@ from ..base.errors import InputError, one_of, tell
 from ..base.files import whole_file
 from ..base.library import carried_folder, check_own, file_name, kernels_folder, stamp, target
 
-KINDS = ("x86-64-v3", "x86-64-v2", "aarch64")
+KINDS = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "aarch64")
 
 
 def main() -> int:
@@ -54,7 +54,7 @@ def main() -> int:
 def kinds_of(name: str) -> list[str]:
     """Kinds of processors that a target stands for. Raises InputError."""
     own = target()
-    alike = ["aarch64"] if own == "aarch64" else ["x86-64-v3", "x86-64-v2"]
+    alike = [kind for kind in KINDS if kind.startswith("x86") == own.startswith("x86")]
     known = {"native": [own], "wasm": ["wasm32"], "wheel": alike, **{kind: [kind] for kind in KINDS}}
     if name not in known:
         raise InputError("TARGET", name, one_of(name, known))

@@ -41,8 +41,6 @@ def test_a_processor_without_the_operation_flies_to_the_same_bits_by_a_library_o
     built("x86-64-v2")
     code = """
 import sys; sys.path[:0] = ['.', '..', '../simulation']
-from rigid_proto_ros.base import library
-library.target = lambda: sys.argv[1]
 from test_fused import wrong
 from random_scenes import random_scene
 from scene_outcomes import outcome, text_of
@@ -50,10 +48,12 @@ assert wrong(5000) == []
 for seed in range(20):
     print(text_of(outcome(random_scene(seed))))
 """
+
+    def of(kind: str) -> dict[str, str]:
+        return {**os.environ, "RIGID_PROTO_PROCESSOR": kind}
+
     told = [
-        subprocess.run(
-            [sys.executable, "-c", code, kind], cwd=HERE, env=os.environ, capture_output=True, check=True
-        ).stdout
+        subprocess.run([sys.executable, "-c", code], cwd=HERE, env=of(kind), capture_output=True, check=True).stdout
         for kind in (library.target(), "x86-64-v2")
     ]
     assert told[0] == told[1] and told[0].count(b"\n") > 100
