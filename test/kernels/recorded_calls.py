@@ -9,7 +9,7 @@
 Several can be given, one after the other. The file is compressed: a line of JSON about the kernels, then the calls. Of each the kernel's number, its block before, the
 numbers returned, and the regions of memory that its records and arrays take, overlapping ones as one: address, size, and
 the content before and after. Of a region that was in a call before, the content is XORed with what that call left; what
-came after is XORed with what was before. Nearly all of it is zeros then.
+came after is XORed with what was before. Nearly all of it is zeros then. What is known is forgotten where it becomes too much.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ from rigid_proto_ros.base import library
 from rigid_proto_ros.kernels.layouts import import_kernels
 
 TESTS = Path(__file__).parents[1]
+MOST_KNOWN = 1 << 28
+"""How many bytes of regions are remembered, here and in replay_calls.mjs."""
 
 
 class Recorder:
@@ -38,7 +40,8 @@ class Recorder:
 
     def __init__(self, stream) -> None:
         import_kernels()
-        self._stream, self._known = stream, {}
+        self._stream = stream
+        self._known, self._known_bytes = {}, 0
         self._numbers = {name: number for number, name in enumerate(library.KERNELS)}
         kernels = [
             {"name": name, "returns": len(kernel.returns), **_places(kernel)}
@@ -64,7 +67,10 @@ class Recorder:
             known = self._known.get((at, size))
             parts.append(struct.pack("<QI", at, size))
             parts += [(content if known is None else content ^ known).tobytes(), (content ^ after).tobytes()]
+            self._known_bytes += size if known is None else 0
             self._known[at, size] = after
+        if self._known_bytes > MOST_KNOWN:
+            self._known, self._known_bytes = {}, 0
         self._stream.write(b"".join(parts))
 
 

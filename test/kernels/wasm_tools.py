@@ -48,7 +48,7 @@ def replayed(calls: Path, of: Path, *emptied: str) -> dict:
     """Numbers of recorded calls that were equal and different in a module, and of each kernel; emptied: a kernel and
     which of its arrays it gets without elements.
     """
-    command = [node(), "--max-old-space-size=8000", HERE / "replay_calls.mjs", of, calls, *emptied]
+    command = [node(), HERE / "replay_calls.mjs", of, calls, *emptied]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
     assert done.returncode in (0, 1) and done.stdout, done.stderr
     return json.loads(done.stdout)

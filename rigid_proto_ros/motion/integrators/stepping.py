@@ -29,7 +29,7 @@ KERNELS: tuple[Kernel, ...] = tuple(
         method.kernel for method in _METHODS if method.kernel is not None and method.way in (ONE_STEP, FIXED_STEPS)
     )
 )
-"""The kernels of all integrators that take steps of given lengths, by number; the only adaptive one is ``series_steps``."""
+"""The kernels that take steps of given lengths, by number; the only adaptive one is ``series_steps``."""
 
 
 _Steps = Callable[[int, Variables, np.record, float, int], int]
