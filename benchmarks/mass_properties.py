@@ -350,7 +350,7 @@ def main() -> None:
     np.seterr(all="ignore")
     table = ResultTable(args.o, COLUMNS)
     everything = tools()
-    everything[0].compute(everything[0].prepare(*sphere(40)))  # compiled before anything is timed
+    everything[0].compute(everything[0].prepare(*sphere(40)))  # loaded before anything is timed
     everything[1].compute(everything[1].prepare(*sphere(40)))
     everything[2].compute(everything[2].prepare(*sphere(40)))
     everything[0].compute(everything[0].prepare(*sphere(200)))

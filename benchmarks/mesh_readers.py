@@ -162,7 +162,7 @@ def main() -> None:
             file.write_bytes(data)
             times: dict[str, list[float]] = {tool: [] for tool in TOOLS}
             count = 0
-            for turn in range(REPETITIONS + 1):  # the first compiles and fills the page cache
+            for turn in range(REPETITIONS + 1):  # the first loads what it needs and fills the page cache
                 for tool, (read, _) in TOOLS.items():
                     start = time.perf_counter()
                     count = len(read(file)[1])

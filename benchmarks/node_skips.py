@@ -139,13 +139,6 @@ def at_start() -> Iterator[tuple[str, str, float, float]]:
         start_up_s(RIGID_PROTO_CACHE="off"),
         usual,
     )
-    with tempfile.TemporaryDirectory() as folder:
-        yield (
-            "start of the node: kernels compiled, or cached",
-            "s",
-            start_up_s(count=1, NUMBA_CACHE_DIR=folder),
-            usual,
-        )
 
 
 def recording() -> str:

@@ -106,7 +106,7 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / f"session{suffix}"
                 bare.append(flight(Nobody(), flown)[0])
-                # The first run compiles and loads: it's a short one, thrown away.
+                # The first run loads what it needs: it's a short one, thrown away.
                 if repeat == 0:
                     flight(recorder(path), 3)
                 taken, memory = flight(recorder(path), flown)

@@ -107,7 +107,7 @@ def reference_attitude(study: Study, row: int) -> np.ndarray:
 
 
 def sweep_time(study: Study) -> float:
-    """Seconds of a whole run, the table included, with everything compiled and loaded."""
+    """Seconds of a whole run, the table included, with everything loaded."""
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         run_study(study, Path(folder) / "t.parquet", progress=False)

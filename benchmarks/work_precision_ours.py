@@ -22,14 +22,13 @@ from flights import StringSettings, flight_setup
 
 from peers import Contestant, Run
 from problems import Problem, Wrench
-from rigid_proto_ros.base.compilation import bound
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.simulation.commands import WrenchCommand
-from rigid_proto_ros.simulation.effects import BEGIN, FLY, operate
-from rigid_proto_ros.simulation.flight import REACHED, steps_of_segment
+from rigid_proto_ros.simulation.effects import BEGIN
+from rigid_proto_ros.simulation.flight import steps_of_segment
 from rigid_proto_ros.simulation.setup import Setup
 from rigid_proto_ros.simulation.simulation import Simulation
 
@@ -171,14 +170,13 @@ def first_segment(problem: Problem, integrator: str, step: float, accuracy: floa
     # A command at time 0 acts with the first advance beyond it.
     simulation.advance(1)
     arrays = simulation._arrays
-    call = bound(operate, arrays.flight, arrays._loads, arrays._events, arrays._room)
     begun = np.array(arrays.integers)
 
     def restart():
         arrays.integers[:] = begun.data
-        call(BEGIN, 0)
+        arrays.call(BEGIN, 0)
 
-    return Segment(simulation, restart, lambda until_ns: call(FLY, until_ns) == REACHED, arrays.row)
+    return Segment(simulation, restart, arrays.fly, arrays.row)
 
 
 def prepare_kernel(problem: Problem, step: float, integrator: str) -> Run | None:

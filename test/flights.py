@@ -15,6 +15,7 @@ from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.motion.body import Body, make_body
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.motion.problem import begin_body
 from rigid_proto_ros.motion.state import State
 from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.simulation.observer import Logged, Observer
@@ -132,6 +133,12 @@ def _with_start(scene: np.record, row, **others) -> Setup:
     if flight.tied:
         tie(scene, flight, scene.string_target, 0, scene.initial_string_mass)
     return setup
+
+
+def put_body(setup: Setup, body: Body) -> None:
+    """Let another body of the same size fly, also one that no rigid body can be."""
+    setup.flight.body[:] = body.row
+    begin_body(setup.flight.common, setup.flight.body, setup.scene, float(setup.scene.gyroscopic))
 
 
 def flight(body: Body, **values) -> Simulation:

@@ -17,7 +17,7 @@ from rigid_proto_ros.base.interrupts import end_with_this_thread
 
 SOURCE = Path(__file__).resolve().parent.parent
 READY_S = 180.0
-"""Longer than a first start with all kernels to compile on a loaded machine; every wait's end."""
+"""Longer than a first start that builds the kernels takes on a loaded machine; every wait's end."""
 
 
 def command(name: str, *arguments: object) -> list[str]:

@@ -91,13 +91,19 @@ def test_the_steps_for_an_integrator_add_one(tmp_path: Path) -> None:
     shutil.copytree(ROOT, tmp_path / ROOT.name, ignore=shutil.ignore_patterns("__pycache__"))
     folder = tmp_path / ROOT.name / "motion" / "integrators"
     (folder / "heun.py").write_text(HEUN, "utf-8")
-    names = (folder.parent / "__init__.py").read_text("utf-8")
-    names = names.replace('    "rk4": "runge_kutta",\n', '    "rk4": "runge_kutta",\n    "heun": "heun",\n')
-    (folder.parent / "__init__.py").write_text(names, "utf-8")
-    stepping = (folder / "stepping.py").read_text("utf-8")
-    stepping = stepping.replace("from .integrator import", "from .heun import heun_steps\nfrom .integrator import")
-    stepping = stepping.replace("    rk4_steps,\n", "    rk4_steps,\n    heun_steps,\n")
-    (folder / "stepping.py").write_text(stepping, "utf-8")
+    changes = {
+        folder.parent / "__init__.py": {'    "rk4",\n': '    "rk4",\n    "heun",\n'},
+        folder / "__init__.py": {
+            "from .integrator import": "from .heun import HEUN\nfrom .integrator import",
+            "        RK4,\n": "        RK4,\n        HEUN,\n",
+        },
+    }
+    for file, replaced in changes.items():
+        text = file.read_text("utf-8")
+        for old, new in replaced.items():
+            assert text.count(old) == 1, (file, old)
+            text = text.replace(old, new)
+        file.write_text(text, "utf-8")
     done = subprocess.run(
         [sys.executable, "-c", FLY], cwd=tmp_path, env=_only(tmp_path), capture_output=True, text=True, check=False
     )

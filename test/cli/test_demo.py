@@ -5,13 +5,10 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_process import SOURCE, from_source, run
 
 pytest.importorskip("rclpy")
 pytest.importorskip("rerun")
@@ -60,15 +57,3 @@ def test_a_real_mesh_flies_too_and_hangs_where_the_state_says(ros_environment, t
     monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
     check_flown(capfd, monkeypatch, tmp_path, "--duration", "10", "--mesh", str(meshes / "spot.obj"))
     assert [name for name, _ in read_session(SESSION).attachments] == ["spot.obj"]
-
-
-@pytest.mark.stress
-def test_what_the_set_up_compiles_is_all_that_the_first_flight_needs(ros_environment, tmp_path):
-    environment = {**ros_environment, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
-    for part in ("integrators", "flight", "first"):
-        command = [sys.executable, str(SOURCE / "requirements" / "compile_kernels.py"), part]
-        subprocess.run(command, env=from_source(environment), check=True)
-    compiled = sorted((tmp_path / "kernels").rglob("*.nbc"))
-    done = run("rigid_proto", "demo", environment=environment, cwd=tmp_path)
-    assert done.returncode == 0 and "compiling" not in done.stderr, done.stderr
-    assert compiled and sorted((tmp_path / "kernels").rglob("*.nbc")) == compiled

@@ -168,7 +168,7 @@ def test_a_wrong_value_of_a_parameter_is_told_in_one_line_also_of_one_that_every
 
 
 FULL_BYTES = 1_000_000
-"""Larger than any kernel that may be compiled and kept on the way."""
+"""Far less than what would be recorded."""
 
 
 @pytest.mark.parametrize("ending", ENDINGS)

@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: MIT
 """Records every call of an exported kernel into a file, for replay_calls.mjs: what it was given and what it made of it.
 
-    recorded_calls.py FILE [SCENES [FIRST]]
+    recorded_calls.py FILE scenes FIRST COUNT      random scenes of these seeds
+    recorded_calls.py FILE others                  tests that call the kernels that scenes don't
+    recorded_calls.py FILE golden BEGINNING        the computations of the golden hashes whose names begin so
+    recorded_calls.py FILE mesh PATH OFFSET        verdict and moments of all models of a mesh, moved along each axis
 
-flies so many random scenes, of the random seeds from FIRST on; with FIRST 0 it also runs what calls the other kernels.
-
-The file is compressed: a line of JSON about the kernels, then the calls. Of each the kernel's number, its block before, the
+Several can be given, one after the other. The file is compressed: a line of JSON about the kernels, then the calls. Of each the kernel's number, its block before, the
 numbers returned, and the regions of memory that its records and arrays take, overlapping ones as one: address, size, and
 the content before and after. Of a region that was in a call before, the content is XORed with what that call left; what
-came after is XORed with what was before. Nearly all of it is zeros then.
+came after is XORed with what was before. Nearly all of it is zeros then. What is known is forgotten where it becomes too much.
 """
 
 from __future__ import annotations
 
 import ctypes
 import gzip
+import inspect
 import json
 import os
 import struct
@@ -29,6 +31,8 @@ from rigid_proto_ros.base import library
 from rigid_proto_ros.kernels.layouts import import_kernels
 
 TESTS = Path(__file__).parents[1]
+MOST_KNOWN = 1 << 28
+"""How many bytes of regions are remembered, here and in replay_calls.mjs."""
 
 
 class Recorder:
@@ -36,7 +40,8 @@ class Recorder:
 
     def __init__(self, stream) -> None:
         import_kernels()
-        self._stream, self._known = stream, {}
+        self._stream = stream
+        self._known, self._known_bytes = {}, 0
         self._numbers = {name: number for number, name in enumerate(library.KERNELS)}
         kernels = [
             {"name": name, "returns": len(kernel.returns), **_places(kernel)}
@@ -62,7 +67,10 @@ class Recorder:
             known = self._known.get((at, size))
             parts.append(struct.pack("<QI", at, size))
             parts += [(content if known is None else content ^ known).tobytes(), (content ^ after).tobytes()]
+            self._known_bytes += size if known is None else 0
             self._known[at, size] = after
+        if self._known_bytes > MOST_KNOWN:
+            self._known, self._known_bytes = {}, 0
         self._stream.write(b"".join(parts))
 
 
@@ -107,14 +115,16 @@ def _forget() -> None:
 
 
 def _places(kernel: library.Kernel) -> dict:
-    """Number of slots of a kernel's block, and which of them are addresses."""
-    slot, addresses = len(kernel.returns), []
-    for declared in kernel.arguments:
+    """Number of slots of a kernel's block, which of them are addresses, and where each array's length is, by name."""
+    slot, addresses, lengths = len(kernel.returns), [], {}
+    for name, declared in zip(inspect.signature(kernel.function).parameters, kernel.arguments, strict=True):
         kind, dimensions = library.place(declared)
         if kind is not None:
             addresses.append(slot)
+        if dimensions:
+            lengths[name] = slot + 1
         slot += 1 + dimensions
-    return {"slots": slot, "addresses": addresses}
+    return {"slots": slot, "addresses": addresses, "lengths": lengths}
 
 
 def _regions(kernel: library.Kernel, numbers) -> Iterator[tuple[int, int]]:
@@ -139,13 +149,39 @@ def _regions(kernel: library.Kernel, numbers) -> Iterator[tuple[int, int]]:
         yield begin, end - begin
 
 
-def fly(scenes: int, first: int) -> None:
+def scenes(first: str, count: str) -> None:
     """So many random scenes."""
     from random_scenes import random_scene
     from scene_outcomes import outcome
 
-    for seed in range(first, first + scenes):
+    for seed in range(int(first), int(first) + int(count)):
         outcome(random_scene(seed))
+
+
+def golden(beginning: str) -> None:
+    """What gives the golden hashes whose names begin so."""
+    from test_golden_hashes import computations
+
+    chosen = [compute for name, compute in computations().items() if name.startswith(beginning)]
+    assert chosen, beginning
+    for compute in chosen:
+        compute()
+
+
+def mesh(path: str, offset: str) -> None:
+    """All that is computed of a mesh that lies elsewhere."""
+    from dataclasses import replace
+
+    from test_golden_hashes import moments
+
+    from rigid_proto_ros.mass.properties import MeshMoments
+    from rigid_proto_ros.mesh.reading import load_mesh
+    from rigid_proto_ros.mesh.topology import mesh_topology
+
+    read = load_mesh(path)
+    read = replace(read, vertices=np.ascontiguousarray(read.vertices + float(offset)))
+    mesh_topology(read.vertices, read.triangles)
+    moments(MeshMoments(read.vertices, read.triangles, read.polygon_starts, name=path))
 
 
 def call_small_ones() -> None:
@@ -190,20 +226,30 @@ OTHERS = (
 """Tests of this suite that call the other kernels: of meshes, sweeps and identification."""
 
 
-def main(file: Path, scenes: int = 60, first: int = 0) -> None:
-    """Record so many scenes, and with the first ones all the rest."""
+def others() -> None:
+    """Kernels that scenes don't call."""
     import pytest
 
+    call_small_ones()
+    # Whether they pass is told where they run by themselves.
+    pytest.main(["-q", "-p", "no:cacheprovider", *" ".join(OTHERS).split()])
+
+
+SOURCES = {"scenes": (scenes, 2), "others": (others, 0), "golden": (golden, 1), "mesh": (mesh, 2)}
+"""What can be recorded, and how many words it takes."""
+
+
+def main(file: Path, words: list[str]) -> None:
+    """Record what is asked for."""
     os.environ["RIGID_PROTO_CACHE"] = "off"
     os.chdir(TESTS)
     with recorded(file):
-        fly(scenes, first)
-        if first == 0:
-            call_small_ones()
-            # Whether they pass is told where they run by themselves.
-            pytest.main(["-q", "-p", "no:cacheprovider", *" ".join(OTHERS).split()])
+        while words:
+            source, count = SOURCES[words[0]]
+            source(*words[1 : 1 + count])
+            words = words[1 + count :]
 
 
 if __name__ == "__main__":
     sys.path[:0] = [str(TESTS), str(TESTS / "simulation")]
-    main(Path(sys.argv[1]).absolute(), *map(int, sys.argv[2:]))
+    main(Path(sys.argv[1]).absolute(), sys.argv[2:])

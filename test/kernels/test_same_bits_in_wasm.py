@@ -14,21 +14,50 @@ from wasm_tools import HERE, module, node, replayed
 
 from rigid_proto_ros.base.library import KERNELS
 from rigid_proto_ros.kernels.layouts import description, import_kernels
+from rigid_proto_ros.mass.moments import MODELS
 
 OF_OTHERS = {"make_body"}
 """Kernels that only other kernels call."""
 
 
+def recorded(folder: Path, *words: object) -> Path:
+    """A file of the calls that this makes, see recorded_calls.py."""
+    module(), node()
+    command = [sys.executable, HERE / "recorded_calls.py", folder / "calls", *words]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder / "calls"
+
+
 @pytest.fixture(scope="module")
 def calls(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The calls of sixty random scenes and of tests of meshes, sweeps and identification."""
-    module(), node()
-    file = tmp_path_factory.mktemp("recorded") / "calls"
-    done = subprocess.run(
-        [sys.executable, HERE / "recorded_calls.py", file], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return file
+    return recorded(tmp_path_factory.mktemp("recorded"), "scenes", 0, 60, "others")
+
+
+def check_equal(calls: Path, least: int) -> None:
+    came = replayed(calls, module())
+    assert came["different"] == 0, {name: of for name, of in came["kernels"].items() if of["different"]}
+    assert came["equal"] >= least
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("first", range(0, 2000, 50))
+def test_two_thousand_random_scenes(tmp_path: Path, first: int) -> None:
+    check_equal(recorded(tmp_path, "scenes", first, 50), 500)
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("beginning", ["mass", "moments", "scene", "whole scene", "script", "by", "auto", "rows"])
+def test_the_computations_of_the_golden_hashes(tmp_path: Path, beginning: str) -> None:
+    check_equal(recorded(tmp_path, "golden", beginning), 1)
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("offset", [0.0, 1e6])
+@pytest.mark.parametrize("name", ["spot.obj", "sword.obj", "sword_quads.obj", "nefertiti_lowres.obj"])
+def test_moments_of_real_meshes(meshes: Path, tmp_path: Path, name: str, offset: float) -> None:
+    check_equal(recorded(tmp_path, "mesh", meshes / name, offset), len(MODELS))
 
 
 @pytest.mark.slow
@@ -47,6 +76,17 @@ def test_a_product_and_a_sum_for_each_fused_operation_would_be_noticed(calls: Pa
     came = replayed(calls, other)["kernels"]
     # Measured for scenes alone: 100 of 125 and 5 of 867.
     assert came["moments_of"]["different"] > 50 and came["operate"]["different"] > 0
+
+
+@pytest.mark.slow
+def test_a_knot_that_is_not_projected_onto_the_surface_would_be_noticed(calls: Path) -> None:
+    came = replayed(calls, module(), "command", "triangles")
+    changed = {name for name, of in came["kernels"].items() if of["different"]}
+    assert changed == {"command"}
+
+
+def test_the_module_is_small() -> None:
+    assert module().stat().st_size <= 300_000
 
 
 def test_records_are_told_with_the_places_that_numpy_gives_them() -> None:

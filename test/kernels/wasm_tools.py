@@ -44,9 +44,11 @@ def built(target: str) -> Path:
     return Path(done.stdout.split()[-1])
 
 
-def replayed(calls: Path, of: Path) -> dict:
-    """Numbers of recorded calls that were equal and different in a module, and of each kernel."""
-    command = [node(), "--max-old-space-size=8000", HERE / "replay_calls.mjs", of, calls]
+def replayed(calls: Path, of: Path, *emptied: str) -> dict:
+    """Numbers of recorded calls that were equal and different in a module, and of each kernel; emptied: a kernel and
+    which of its arrays it gets without elements.
+    """
+    command = [node(), HERE / "replay_calls.mjs", of, calls, *emptied]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
     assert done.returncode in (0, 1) and done.stdout, done.stderr
     return json.loads(done.stdout)

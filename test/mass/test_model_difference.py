@@ -27,7 +27,7 @@ def turned(moments, rotation_vector, com=(0.0, 0.0, 0.0)) -> MassProperties:
     return MassProperties(1.0, np.array(com), R @ np.diag(moments) @ R.T)
 
 
-@settings(deadline=None)  # the first example compiles
+@settings(deadline=None)
 @given(st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.tuples(*[st.floats(-3.0, 3.0)] * 3))
 def test_axes_are_turned_by_the_angle_between_the_two_bodies(small, any_turn) -> None:
     true = turned((1.0, 2.0, 2.5), any_turn)

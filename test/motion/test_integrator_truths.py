@@ -61,10 +61,10 @@ def test_an_axisymmetric_body_precesses_as_goldstein_says(name):
 
 @pytest.mark.parametrize("name", ["free_body", "auto", "rk4", "dop853"])
 def test_spin_flips_come_at_the_quarter_periods_of_elliptic_integrals(name):
-    """I = (3, 5, 9), L = (0, 2, .01): nearly about the middle axis. ω₂ vanishes every half period, 2K(m)/ω_p (Landau and
+    """I = (3, 5, 7), L = (0, 2, .01): nearly about the middle axis. ω₂ vanishes every half period, 2K(m)/ω_p (Landau and
     Lifshitz, Mechanics, section 37); it starts at its extreme.
     """
-    moments, momentum = np.array((3.0, 5.0, 9.0)), np.array((0.0, 2.0, 0.01))
+    moments, momentum = np.array((3.0, 5.0, 7.0)), np.array((0.0, 2.0, 0.01))
     w = momentum / moments
     simulation = flight(make_body(1.0, (0.0, 0.0, 0.0), np.diag(moments)), integrator=name, initial=spinning(w))
     with mpmath.workdps(40):

@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flights import SECOND, flight_setup, spinning
+from flights import SECOND, flight_setup, put_body, spinning
 from reference_motion import angle_between, rotation_of
 
 from rigid_proto_ros.base.errors import TensorError
 from rigid_proto_ros.mass.tensor import check_tensor, principal_axes
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.motion.problem import begin_body
 from rigid_proto_ros.scene.scenario import nanoseconds, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
@@ -40,8 +39,7 @@ def test_mislabelled_products_of_inertia_turn_the_principal_axes() -> None:
         check_tensor(mislabelled)
     setup = flight_setup(make_body(true.mass, np.zeros(3), I), initial=spinning([0.0, 0.0, 6.0]))
     turned = Simulation(setup).advance(SECOND)
-    setup.flight.body[:] = make_body(true.mass, np.zeros(3), mislabelled).row
-    begin_body(setup.flight.common, setup.flight.body, setup.scene, 1.0)
+    put_body(setup, make_body(true.mass, np.zeros(3), mislabelled))
     mistaken = Simulation(setup).advance(SECOND)
     apart = np.degrees(angle_between(mistaken.orientation_xyzw, rotation_of(turned.orientation_xyzw)))
     assert apart == pytest.approx(ATTITUDE_OFF, abs=0.5)

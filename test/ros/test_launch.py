@@ -59,7 +59,7 @@ def test_client_accepts_the_options_that_the_launch_file_gives_it(capsys) -> Non
     for option in ("--node", "--timeout", "--reset"):
         assert f'"{option}"' in text
     script = SOURCE / "msg_examples" / "flip_and_poke.yaml"
-    # The first start compiles for a minute or two; a client without a limit ends with its node.
+    # The first start may build the kernels for minutes; a client without a limit ends with its node.
     assert '"--timeout", "0"' in text and "on_exit=Shutdown()" in text
     assert poke_client([str(script), "--node", "/a/b", "--timeout", "0", "--reset", "--dry-run"]) == 0
     assert '"at": "tip"' in capsys.readouterr().out

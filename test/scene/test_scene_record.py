@@ -6,13 +6,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rigid_proto_ros.base.compilation import copy_fields, new_record
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.mass import INERTIA_MODELS
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.scene.parameters import AT_RESET, LIVE, PARAMETERS, PATTERNS, Parameter, Parameters
-from rigid_proto_ros.scene.scenario import make_scenario, scene_record
+from rigid_proto_ros.scene.scenario import Scenario, make_scenario, scene_record
 from rigid_proto_ros.simulation.record import BOUNDING_BOX, EXPLICIT, MAX_BALLASTS, POINTS, SCENE, SHELL, SOLID
 from rigid_proto_ros.simulation.refusals import AUTO
+from rigid_proto_ros.simulation.setup import make_setup
+
+NAN, INF = float("nan"), float("inf")
 
 OF_BALLAST = ("ballasts", "ballast")
 """Fields of the point masses, whose names are the user's choice."""
@@ -125,3 +129,50 @@ def test_more_ballast_than_the_record_holds_is_refused_with_words() -> None:
     with pytest.raises(InputError, match=f"^{accepted}$"):
         full.with_changes({"ballast.more": [0.01, 0.0, 0.0, 0.0]})
     assert make_scenario(many_ballasts(2 * MAX_BALLASTS, 0.0)).setup.body.mass == alone.setup.body.mass
+
+
+TIED = {"string.attached": True, "string.target": [0.0, 0.0, 1.0], "ballast.a": [0.1, 0.1, 0.0, 0.0]}
+MESHED = make_scenario({"mesh": "book", "mass": 1.0, **TIED})
+BARE = make_scenario({"mesh": "", "inertia_model": "explicit", **TIED})
+IMPOSSIBLE = [
+    *((MESHED, f"scale.{k}", value) for k in range(3) for value in (NAN, INF, -INF, 0.0, 1e-10, 1e10)),
+    *((MESHED, "mass", value) for value in (NAN, INF, -INF, -1.0)),
+    *((MESHED, "ballast.0", value) for value in (NAN, INF, -INF)),
+    *((BARE, f"explicit_inertia_tensor.{k}", value) for k in range(6) for value in (NAN, INF, -INF)),
+    *((BARE, f"explicit_inertia_tensor.{k}", value) for k in (0, 3, 5) for value in (-1.0, 0.0, 2.1)),
+    *((BARE, f"explicit_inertia_center_of_mass.{k}", value) for k in range(3) for value in (NAN, INF, -INF)),
+    *((BARE, "explicit_inertia_mass", value) for value in (NAN, INF, -INF)),
+    *((BARE, f"initial_orientation_xyzw.{k}", value) for k in range(4) for value in (INF, -INF)),
+    *((BARE, f"initial_orientation_xyzw.{k}", NAN) for k in (0, 3)),
+    (BARE, "initial_orientation_xyzw.3", 0.0),
+    # What auto follows up to a limit.
+    *((BARE, f"{name}_damping", INF) for name in ("linear", "angular")),
+    *((BARE, f"string_{name}", INF) for name in ("stiffness", "frequency", "damping_ratio")),
+    *((MESHED, f"string_attach.{k}", INF) for k in range(3)),
+]
+
+
+@pytest.mark.parametrize(("scenario", "place", "value"), IMPOSSIBLE)
+def test_a_number_that_no_body_and_no_start_has_is_refused_also_where_it_is_written_straight_into_the_record(
+    scenario: Scenario, place: str, value: float
+) -> None:
+    scene, setup = new_record(SCENE), scenario.setup
+    copy_fields(setup.scene, scene)
+    name, _, number = place.partition(".")
+    numbers = scene[name].reshape(-1) if number else None
+    if numbers is None:
+        scene[name] = value
+    else:
+        numbers[int(number)] = value
+    with pytest.raises(InputError):
+        make_setup(scene, setup.mesh, setup.surface, provide=scenario.body_mesh and scenario.body_mesh.provide)
+
+
+@pytest.mark.parametrize("density", [NAN, INF, -INF, -1.0, 0.0])
+def test_a_density_that_gives_no_mass_is_refused_in_the_record(density: float) -> None:
+    scenario = make_scenario({"mesh": "book"})
+    scene = new_record(SCENE)
+    copy_fields(scenario.setup.scene, scene)
+    scene.density = density
+    with pytest.raises(InputError, match="^mass: got .*; accepted: density . volume within 1e-300 .. 1e300 kg$"):
+        make_setup(scene, scenario.setup.mesh, scenario.setup.surface)

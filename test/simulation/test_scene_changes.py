@@ -42,8 +42,8 @@ def flown(setup: Setup) -> FlightArrays:
     arrays.start_over(setup)
     load = np.array([0.0, 0.0, 0.0, 0.0, 0.0, *(setup.body.mass * np.array([0.1, 0.2, 0.3])), *[0.0] * 6])
     arrays.put([Row(0, 5 * MS, PULSE, NO_SLOT, load.tobytes())])
-    arrays.call(APPLY)
-    arrays.call(CUT)
+    arrays.call(APPLY, 0)
+    arrays.call(CUT, 0)
     assert arrays.fly(2 * MS)
     return arrays
 

@@ -120,14 +120,15 @@ def test_a_file_that_is_uploaded_while_another_is_prepared_can_be_simulated(flow
     text = b"# z up\n" + resolve_mesh("hammer").read_bytes()
     flown.do(lambda: folder.take("first.obj", text))
 
+    held = threading.Event()
+
     async def uploads_meanwhile() -> None:
+        page.flight.ask(lambda: held.wait(60.0))
         flying = asyncio.ensure_future(folder._fly({}))
         await asyncio.sleep(0.0)
         await folder.take("second.obj", text)
         await flying
 
-    held = threading.Event()
-    page.flight.prepare(lambda: held.wait(60.0), lambda: None)
     threading.Timer(0.5, held.set).start()
     flown.do(uploads_meanwhile)
     flown.fly(0.0)
@@ -163,8 +164,6 @@ def test_a_fault_of_the_program_is_said(flown: FlownPage, monkeypatch, caplog) -
     monkeypatch.setattr(flown.live, "reset", lambda: 1 / 0)
     flown.press("Reset", of="Simulation")
     flown.until(lambda: flown.said == ["Failed: ZeroDivisionError: division by zero"], "fault")
-    flown.page.flight.prepare(lambda: 1 / 0, lambda: None)
-    flown.until(lambda: flown.said == ["Failed: ZeroDivisionError: division by zero"] * 2, "fault before the start")
     assert "in <lambda>" in caplog.text
 
 

@@ -17,28 +17,19 @@ from ...base.compilation import matrix_of, njit, record_type
 from ...base.vectors import FloatArray
 from ..problem import Variables
 from . import INTEGRATORS
-from .auto import steady_steps
-from .free_body import free_body_steps, free_body_strang_steps
-from .gram_schmidt import euler_steps, midpoint_steps
-from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, Kernel, Method
-from .lie_midpoint import lie_midpoint_steps
-from .runge_kutta import dop853_steps, rk4_steps, semi_implicit_euler_steps
-from .series import MAX_DEGREE, MOTION_COLUMNS, taylor_steps
+from .integrator import ADAPTIVE, FIXED_STEPS, NOTHING, ONE_STEP, Kernel, Method
+from .series import MAX_DEGREE, MOTION_COLUMNS
 from .series_steps import series_steps, series_workspace, spin_workspace
 
-KERNELS: tuple[Kernel, ...] = (
-    steady_steps,
-    free_body_steps,
-    free_body_strang_steps,
-    euler_steps,
-    midpoint_steps,
-    semi_implicit_euler_steps,
-    rk4_steps,
-    lie_midpoint_steps,
-    dop853_steps,
-    taylor_steps,
+_METHODS = [method for integrator in INTEGRATORS.values() for method in integrator.methods]
+"""Those of all integrators, one after the other, by number."""
+
+KERNELS: tuple[Kernel, ...] = tuple(
+    dict.fromkeys(
+        method.kernel for method in _METHODS if method.kernel is not None and method.way in (ONE_STEP, FIXED_STEPS)
+    )
 )
-"""The kernels of fixed steps of all integrators, by number; the only adaptive one is ``series_steps``."""
+"""The kernels that take steps of given lengths, by number; the only adaptive one is ``series_steps``."""
 
 
 _Steps = Callable[[int, Variables, np.record, float, int], int]
@@ -96,9 +87,6 @@ CONTROL = record_type(
 )
 """State of an adaptive kernel between calls."""
 
-# Methods by number: those of all integrators, one after the other
-
-_METHODS = [method for integrator in INTEGRATORS.values() for method in integrator.methods]
 _FIRST = np.cumsum([0, *(len(integrator.methods) for integrator in INTEGRATORS.values())])
 _WAY = np.array([method.way for method in _METHODS])
 _KERNEL = np.array([KERNELS.index(method.kernel) if method.kernel in KERNELS else -1 for method in _METHODS])
