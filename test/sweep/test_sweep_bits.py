@@ -255,6 +255,17 @@ def test_a_row_that_is_too_fast_for_auto_is_refused_with_what_its_body_takes() -
         assert reasons[0] is None and "for this body: auto follows rates up to" in reasons[1]
 
 
+@pytest.mark.parametrize(("name", "values"), [("script.1.force.x", [1e20, 0.1]), ("mass", [1e-18, 0.1])])
+def test_a_row_whose_load_is_too_large_for_its_body_is_refused_with_its_reason(name: str, values: list[float]) -> None:
+    script = [{"t": 0.01, "at": "com", "force": [0.1, 0.0, 0.0], "duration": 0.02}]
+    chunk = run_chunk(
+        study({"scene": "t_handle", "script": script, "duration": 0.05, "vary": {name: {"list": values}}}), 0, 2
+    )
+    assert chunk.simulated == 1
+    first, second = chunk.columns["failure"].tolist()
+    assert second is None and "accepted: at most 1e+15 of each for a body of" in first
+
+
 def test_a_floor_of_accuracy_is_in_the_table_whoever_flew_the_row() -> None:
     vary = {"initial.angular_velocity": {"list": [[0.1, 0.2, 3.0], [6e4, 7e4, -3e4]]}}
     spec = {"scene": "t_handle", "set": {"accuracy": 1e-12}, "duration": 0.01, "vary": vary}
