@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Repeats recorded calls by the kernels of another processor, under an emulator: replay_elsewhere.py KIND CALLS EMULATOR.
 
-    python test/kernels/recorded_calls.py /tmp/calls scenes 0 60
-    python test/kernels/replay_elsewhere.py aarch64 /tmp/calls qemu-aarch64-static
+    python test/kernels/recorded_calls.py out/calls scenes 0 60
+    python test/kernels/replay_elsewhere.py aarch64 out/calls qemu-aarch64-static
 
 Needs ziglang, whose compiler makes the runner, and the emulator (Debian: qemu-user-static). Prints how many calls of each
 kernel were equal to the bit; status 1 if any wasn't.
