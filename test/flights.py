@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigid_proto_ros.base.compilation import copy_fields, new_record
+from rigid_proto_ros.base.compilation import copy_of, new_record
 from rigid_proto_ros.base.vectors import Vector
 from rigid_proto_ros.mass.properties import MeshMoments
 from rigid_proto_ros.mass.tensor import six_from_tensor
@@ -17,9 +17,11 @@ from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.problem import begin_body
 from rigid_proto_ros.motion.state import State
+from rigid_proto_ros.parameters.declarations import Parameters
+from rigid_proto_ros.scene.scenario import scene_record
 from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.simulation.observer import Logged, Observer
-from rigid_proto_ros.simulation.record import EXPLICIT, MESH, SCENE
+from rigid_proto_ros.simulation.record import EXPLICIT, MESH
 from rigid_proto_ros.simulation.setup import Setup, make_setup
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.simulation.string_control import tie
@@ -86,8 +88,8 @@ def flight_setup(
 
     size: its length ℓ [m], where that isn't 1. changes: of a record SCENE, and ``string``.
     """
-    values = {"accuracy": 1e-9, "poke_duration": 0.05, "gyroscopic": True, "string": StringSettings(), **changes}
-    scene, mesh = new_record(SCENE), new_record(MESH)
+    values = {"wrench_timeout": 0.0, "string": StringSettings(), **changes}
+    scene, mesh = scene_record(Parameters()), new_record(MESH)
     if size > 0.0:
         mesh.has_surface, mesh.extent[0] = True, 2.0 * size
     _write(scene, {"body": body, "integrator": integrator, "step": step_s, **values})
@@ -96,8 +98,7 @@ def flight_setup(
 
 def changed(setup: Setup, *, initial=None, **changes) -> Setup:
     """The setup of a scene with some values changed, named as in ``flight_setup``."""
-    scene = new_record(SCENE)
-    copy_fields(setup.scene, scene)
+    scene = copy_of(setup.scene)
     _write(scene, changes)
     own = {name: getattr(setup, name) for name in ("mesh", "surface", "mesh_sha256", "contacts", "thrusters")}
     return _with_start(scene, setup.initial if initial is None else initial, **own)

@@ -48,7 +48,7 @@ FLY = """
 import json
 import numpy as np
 import docs_tables
-from rigid_proto_ros.scene import parameters
+from rigid_proto_ros.parameters import declarations
 from rigid_proto_ros.base.errors import CommandRefused
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scenario import make_scenario
@@ -68,7 +68,7 @@ try:
     refusal = ""
 except CommandRefused as error:
     refusal = str(error)
-choices = parameters.PARAMETERS["integrator"].choices
+choices = declarations.PARAMETERS["integrator"].choices
 print(json.dumps({"changes": changes, "refusal": refusal, "choices": choices, "table": docs_tables.integrators()}))
 """
 

@@ -18,7 +18,7 @@ MODULES = {
     for path in sorted(ROOT.rglob("*.py"))
 }
 ORDER = (
-    *("base", "mesh", "mass", "motion", "simulation", "scene", "session"),
+    *("base", "mesh", "mass", "motion", "parameters", "simulation", "scene", "session"),
     *("picture", "rerun_view", "export", "live", "workbench", "ros", "sweep", "identify", "robots", "cli", "kernels"),
 )
 """Folders in the order of imports: each knows only those before it."""

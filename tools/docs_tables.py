@@ -27,8 +27,8 @@ from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.loads import NEEDS
+from rigid_proto_ros.parameters.declarations import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
 from rigid_proto_ros.scene.lessons import lesson, lessons
-from rigid_proto_ros.scene.parameters import LIVE, PARAMETERS, PATTERNS, READ_ONLY, Parameter
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"

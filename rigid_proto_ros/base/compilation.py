@@ -110,8 +110,8 @@ def exported(*arguments: Any, returns: str = "", nogil: bool = False) -> Callabl
 
 
 def bound(kernel: Callable[..., Any], *first: Any) -> Callable[..., Any]:
-    """An exported kernel with its first arguments given, which are kept; what is left must be numbers. Much quicker to
-    call than the kernel; in one thread at a time.
+    """An exported kernel with its first arguments given, which are kept; all others, and the only result, must be
+    integers. Much quicker to call than the kernel; in one thread at a time.
     """
     return kernel.bound(*first) if isinstance(kernel, library.Kernel) else functools.partial(kernel, *first)
 
@@ -242,6 +242,35 @@ def _record_copier(_typing_context: Any, of: Any, to: Any) -> Emitted:
 
     return types.none(of, to), code
 
+
+if TYPE_CHECKING or not COMPILED:
+
+    def numbers_in(record: np.record) -> NDArray[np.float64]:
+        """See below."""
+        return np.frombuffer(record.tobytes(), np.float64)
+
+    def integers_in(record: np.record) -> NDArray[np.int64]:
+        """See below."""
+        return np.frombuffer(record.tobytes(), np.int64)
+
+else:
+
+    def _view_of_record(number: Any) -> Any:
+        def view(_typing_context: Any, record: Any) -> Emitted:
+            kind = types.Array(number, 1, "C")
+
+            def code(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+                data = builder.bitcast(arguments[0], context.get_data_type(number).as_pointer())
+                return _array_at(context, builder, kind, data, (record.size // 8,))
+
+            return kind(record), code
+
+        return view
+
+    numbers_in = intrinsic(_view_of_record(types.float64))
+    """numbers_in(record): the content of a record of 8-byte fields as doubles (n,), whatever they are; to be read."""
+    integers_in = intrinsic(_view_of_record(types.int64))
+    """integers_in(record): the same as integers."""
 
 copy_record = intrinsic(_record_copier) if COMPILED else copy_fields
 """copy_record(of, to): copy a record to another one of the same type. An assignment would be compiled to a load and a

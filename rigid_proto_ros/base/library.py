@@ -21,6 +21,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .cache import PACKAGE, source_stamp, user_cache
 from .errors import InputError, is_missing
@@ -80,7 +81,7 @@ class Kernel:
         assert KERNELS.setdefault(self.name, self) is self, f"two kernels are named {self.name}"
         self.compiled: Any = None  # numba's dispatcher, where it compiles
         self._called: Any = None
-        self._bindings: dict[int, Callable[..., Callable[..., Any]]] = {}
+        self._bind: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the library's function."""
@@ -91,64 +92,24 @@ class Kernel:
 
     def bound(self, *first: Any) -> Callable[..., Any]:
         """See ``compilation.bound``."""
-        if self._called is None:
+        if self._bind is None:
             self._prepared()
-        binding = self._bindings.get(len(first))
-        if binding is None:
-            binding = self._bindings[len(first)] = self._binding(len(first))
-        return binding(*first)
-
-    def _binding(self, count: int) -> Callable[..., Callable[..., Any]]:
-        """What makes a call of the first arguments, of which there are so many."""
-        function, result, new_block = self._function, self._result, self._block
-        start, kinds = 8 * len(self.returns), self.arguments[count:]
-        given = struct.Struct("=" + "".join(map(_codes, self.arguments[:count])))
-        at = start + given.size
-        fill = self._code(_source(self, "fill", count), "fill", given.pack_into)
-        if len(kinds) == len(self.returns) == 1 and "b1" not in (*kinds, *self.returns):
-            taken_as, given_back_as, slot = _CODES[kinds[0]], _CODES[self.returns[0]], at // 8
-
-            def bind_with_one(*first: Any) -> Callable[..., Any]:
-                block = new_block()
-                fill(block, start, *first)
-                as_bytes: Any = memoryview(block).cast("B")
-                taken, given_back = as_bytes.cast(taken_as), as_bytes.cast(given_back_as)
-
-                def call_with_one(number: Any, _kept: Any = first) -> Any:
-                    taken[slot] = number
-                    function(block)
-                    return given_back[0]
-
-                # Half as long as by the general way.
-                return call_with_one
-
-            return bind_with_one
-        pack = struct.Struct("=" + "".join(map(_codes, kinds))).pack_into
-
-        def bind(*first: Any) -> Callable[..., Any]:
-            block = new_block()
-            fill(block, start, *first)
-
-            def call(*numbers: Any, _kept: Any = first) -> Any:
-                pack(block, at, *numbers)
-                function(block)
-                return result(block)
-
-            return call
-
-        return bind
+            count = len(first)
+            assert {*self.arguments[count:], *self.returns} == {"i8"} and len(self.returns) == 1, self.name
+            given = struct.Struct("=8x" + "".join(map(_codes, self.arguments[:count])))
+            self._bind = self._code(_binding(self, count, given.size // 8), "bind", given.pack_into)
+        bound: Callable[..., Any] = self._bind(*first)
+        return bound
 
     def _prepared(self) -> Any:
         """Make what packs a block, calls the library's function and unpacks the block, as code for this signature."""
         out = "".join(_CODES[kind] for kind in self.returns)
         packed = struct.Struct(f"={8 * len(self.returns)}x{''.join(map(_codes, self.arguments))}")
-        unpack = struct.Struct(f"={out}").unpack_from
-        self._result = (lambda block: unpack(block)[0]) if len(self.returns) == 1 else unpack if out else _nothing
+        self._unpack = struct.Struct(f"={out}").unpack_from
         self._block = ctypes.c_int64 * (packed.size // 8)
         self._function = loaded(self.nogil)[self.name]
         self._function.restype = None
-        self._unpack = unpack
-        self._called = self._code(_source(self, "call", len(self.arguments)), "call", packed.pack_into)
+        self._called = self._code(_calling(self), "call", packed.pack_into)
         return self._called
 
     def _code(self, source: str, name: str, pack: Any) -> Any:
@@ -168,13 +129,11 @@ class Kernel:
         return values
 
 
-def _source(kernel: Kernel, name: str, count: int) -> str:
-    """Code of a function: ``call`` with all arguments, or ``fill`` a block with the first of them from an offset on. A
-    loop over the arguments would take twice as long.
-    """
-    names = [f"a{k}" for k in range(count)]
+def _filling(arguments: tuple[Any, ...]) -> str:
+    """Code that fills a block with arguments a0, a1 and so on. A loop over them would take twice as long."""
+    names = [f"a{k}" for k in range(len(arguments))]
     checks, values = [], []
-    for k, (own, declared) in enumerate(zip(names, kernel.arguments, strict=False)):
+    for k, (own, declared) in enumerate(zip(names, arguments, strict=True)):
         kind, dimensions = place(declared)
         if kind is None:
             values.append(own)
@@ -186,21 +145,42 @@ def _source(kernel: Kernel, name: str, count: int) -> str:
             checks.append(f"{own}.__class__ is array and {own}.dtype is kind{k} and {own}.ndim == {dimensions}")
             checks.append(in_order)
             values.append(f"memory[id({own}) // {_WORD} + {_OF_ARRAY}], *{own}.shape")
-    result = {0: "None", 1: "unpack(block)[0]"}.get(len(kernel.returns), "unpack(block)")
-    calls = name == "call"
     return f"""
-def {name}({", ".join(names if calls else ["block", "at", *names])}):
-    {"block, at = new_block(), 0" if calls else ""}
+    block = new_block()
     if {" and ".join(checks) or "True"}:
-        pack(block, at, {", ".join(values)})
+        pack(block, 0, {", ".join(values)})
     else:
-        pack(block, at, *looked_at(({"".join(own + ", " for own in names)})))
-    {f"function(block); return {result}" if calls else ""}
+        pack(block, 0, *looked_at(({"".join(own + ", " for own in names)})))
 """
 
 
-def _nothing(_block: Any) -> None:
-    return None
+def _calling(kernel: Kernel) -> str:
+    """Code of ``call``, with all arguments."""
+    names = ", ".join(f"a{k}" for k in range(len(kernel.arguments)))
+    result = {0: "None", 1: "unpack(block)[0]"}.get(len(kernel.returns), "unpack(block)")
+    return f"""
+def call({names}):
+{_filling(kernel.arguments)}
+    function(block)
+    return {result}
+"""
+
+
+def _binding(kernel: Kernel, count: int, slot: int) -> str:
+    """Code of ``bind``, which takes the first arguments and returns a call with the others, integers from a slot on."""
+    names = ", ".join(f"a{k}" for k in range(count))
+    numbers = [f"n{k}" for k in range(len(kernel.arguments) - count)]
+    put = "\n        ".join(f"block[{slot + k}] = {own}" for k, own in enumerate(numbers))
+    return f"""
+def bind({names}):
+{_filling(kernel.arguments[:count])}
+    def call({", ".join(numbers)}, kept=({names},)):
+        {put}
+        function(block)
+        return block[0]
+
+    return call
+"""
 
 
 def place(declared: Any) -> tuple[np.dtype[Any] | None, int]:
@@ -217,6 +197,11 @@ def _codes(declared: Any) -> str:
     """How struct packs an argument."""
     kind, dimensions = place(declared)
     return _CODES[declared] if kind is None else "q" * (1 + dimensions)
+
+
+def address_of(array: NDArray[Any]) -> int:
+    """Address of an array's content."""
+    return int(_MEMORY[id(array) // _WORD + _OF_ARRAY])
 
 
 def _address_and_extents(argument: Any, kind: np.dtype[Any], dimensions: int, name: str) -> tuple[int, ...]:

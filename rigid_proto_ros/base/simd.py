@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .compilation import COMPILED, Emitted, intrinsic, njit
+from .library import address_of
 from .vectors import FloatArray
 
 if COMPILED:
@@ -53,7 +54,7 @@ def aligned(count: int, before: int = 0) -> FloatArray:
     vector that crosses two lines takes twice as long.
     """
     whole = np.empty(count + LINE)
-    first = -(whole.__array_interface__["data"][0] // 8 + before) % LINE
+    first = -(address_of(whole) // 8 + before) % LINE
     return whole[first : first + count]
 
 

@@ -59,7 +59,7 @@ def add_arguments(parser: Parser) -> None:
 
 def _instead_of(option: str) -> str:
     """A hint for a parameter that was given as an option."""
-    from ..scene.parameters import PARAMETERS
+    from ..parameters.declarations import PARAMETERS
 
     name = option.removeprefix("--").replace("-", "_")
     return f"a parameter is set by --set {name}=VALUE" if name in PARAMETERS else ""

@@ -31,8 +31,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("workbench", is_missing("viser", "workbench"))
     from ..base.interrupts import leave
     from ..live.shutdown import Shutdown
+    from ..parameters.declarations import Parameters
     from ..rerun_view.ports import LOOPBACK
-    from ..scene.parameters import Parameters
     from ..scene.scenario import make_scenario
     from ..scene.scene_file import scene_file, scene_values
     from ..workbench.main import serve

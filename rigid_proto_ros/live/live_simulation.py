@@ -19,8 +19,8 @@ from typing import Any
 
 from ..base.errors import CommandRefused, InputError
 from ..motion.state import State
+from ..parameters.declarations import with_mass_of_density
 from ..scene.command_codec import frame_names
-from ..scene.parameters import with_mass_of_density
 from ..scene.scenario import Scenario
 from ..scene.scenario_run import notify_start
 from ..simulation.commands import Change, Command

@@ -4,14 +4,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.compilation import exported, njit
 from ..base.rotation import matrix_elements, matrix_from_quaternion, rotate, times, to_unit
-from ..base.vectors import Attitude, FloatArray, Matrix3, Numbers, StateRow, Vector3
+from ..base.vectors import Attitude, FloatArray, Matrix3, StateRow, Vector3
 
 
 @dataclass(slots=True)
@@ -54,23 +53,6 @@ class State:
     def angular_velocity(self) -> Vector3:
         """ω in world axes [rad/s]."""
         return times(self.rotation, self.angular_velocity_body)
-
-    def moved(self, values: Mapping[str, Numbers]) -> State:
-        """A copy with another position, orientation_xyzw, linear_velocity or angular_velocity, all in world axes; the
-        others, including ω in world axes, stay unchanged.
-        """
-        row = np.empty(13)
-        attitude = values.get("orientation_xyzw", self.orientation_xyzw)
-        velocity = values.get("linear_velocity", self.linear_velocity)
-        spin = values.get("angular_velocity", self.angular_velocity)
-        position = values.get("position", self.position)
-        x, q, v, w = (np.array(numbers, dtype=float) for numbers in (position, attitude, velocity, spin))
-        fill_initial_row(x, q, v, w, row)
-        if "orientation_xyzw" not in values:
-            row[3:7] = self.orientation_xyzw
-            if "angular_velocity" not in values:
-                row[10:13] = self.angular_velocity_body
-        return State(self.time_ns, row)
 
     def kinetic_energy(self, mass: float, inertia: Matrix3) -> float:
         """½ m|v|² + ½ ωᵀIω [J]."""

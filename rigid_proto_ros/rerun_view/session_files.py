@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import InputError, is_missing
 from ..base.files import is_same_file, output_file
-from ..scene.parameters import Parameters
+from ..parameters.declarations import Parameters
 from ..scene.scenario import Scenario
 from ..simulation.observer import Reset
 

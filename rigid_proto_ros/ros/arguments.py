@@ -15,7 +15,7 @@ from rclpy.utilities import remove_ros_args
 
 from ..base.command_line import Parser, number_from
 from ..base.errors import InputError
-from ..scene.parameters import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
+from ..parameters.declarations import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
 from ..scene.scene_file import scene_values, typed_value
 from ..scene.script import MAX_TIME_S
 

@@ -215,7 +215,7 @@ def open_page(node: RigidBodyNode) -> Callable[[], None]:
 
 def _asked_for(name: str, port: int) -> int | None:
     """None for a default port, which may move to the next free one."""
-    from ..scene.parameters import PARAMETERS
+    from ..parameters.declarations import PARAMETERS
 
     return None if port == PARAMETERS[name].default else port
 

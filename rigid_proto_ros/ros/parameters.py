@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter as RosParameter
 
 from ..base.errors import InputError
 from ..live.live_simulation import LiveSimulation
-from ..scene.parameters import (
+from ..parameters.declarations import (
     LIVE,
     PARAMETERS,
     READ_ONLY,

@@ -22,8 +22,8 @@ from std_msgs.msg import String
 
 from ..live.pacing import Stamps
 from ..motion.state import State
+from ..parameters.declarations import Parameters
 from ..scene import cdr
-from ..scene.parameters import Parameters
 from ..scene.scenario_run import ScenarioRun
 from ..scene.sensor_noise import ImuNoise, imu_noise
 from ..session.messages import PROJECTIONS, applied_bytes, inertia_bytes

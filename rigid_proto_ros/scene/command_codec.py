@@ -12,6 +12,7 @@ from typing import Any
 from ..base.errors import CommandRefused, InputError
 from ..base.vectors import vector
 from ..motion.frames import RESERVED_WORDS, parse_frame
+from ..parameters.declarations import Parameters
 from ..simulation.commands import (
     Change,
     ClearWrench,
@@ -24,7 +25,6 @@ from ..simulation.commands import (
     WrenchCommand,
 )
 from . import cdr
-from .parameters import Parameters
 from .script import MESH_FRAME
 
 MARKS = ("reset", "pause", "step", "timeout", "clock")

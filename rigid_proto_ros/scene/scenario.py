@@ -20,19 +20,26 @@ from ..base.arithmetic import exact_quotient
 from ..base.compilation import copy_fields, copy_of, new_record
 from ..base.errors import CommandRefused, InputError, MeshError
 from ..base.vectors import Vector3
-from ..mass import INERTIA_MODELS, MODEL_COMS
+from ..mass import INERTIA_MODELS
 from ..mass.from_mesh import mesh_body
 from ..mass.moments import STRETCHED
 from ..mass.properties import MeshMoments
 from ..mesh.locate import resolve_mesh
 from ..mesh.reading import Mesh
-from ..motion.integrators import INTEGRATORS
 from ..motion.surface import Surface
+from ..parameters.declarations import (
+    PARAMETERS,
+    READ_ONLY,
+    Parameters,
+    Value,
+    convert_all,
+    parameter_named,
+    with_mass_of_density,
+)
 from ..simulation.commands import nanoseconds
-from ..simulation.record import MAX_BALLASTS, MESH, SCENE
+from ..simulation.record import MAX_BALLASTS, MESH, SCENE, SCENE_PARAMETERS, field_of
 from ..simulation.setup import Setup, make_setup
 from ..simulation.thrusters import make_thruster
-from .parameters import PARAMETERS, READ_ONLY, Parameters, Value, convert_all, parameter_named, with_mass_of_density
 from .scene_file import read_scene_text, scene_file, scene_values
 from .yaml_text import yaml_value
 
@@ -194,14 +201,9 @@ def _ghost_setup(parameters: Parameters, body_mesh: BodyMesh | None) -> Setup | 
         raise InputError("ghost.integrator", refusal.received, refusal.accepted) from None
 
 
-_CHOICES = {"inertia_model": INERTIA_MODELS, "inertia_model_com": MODEL_COMS, "integrator": tuple(INTEGRATORS)}
-_SCENE_VALUES = {
-    name: (field, _CHOICES.get(name, ()), attrgetter(name))
-    for name in PARAMETERS
-    if (field := name.replace(".", "_")) in (SCENE.names or ())
-}
-"""Parameters that are numbers of a scene: the field of its record, which has the same name with dots as underscores,
-choices of which it is a number, and where the value stands.
+_SCENE_VALUES = {name: (field_of(name), PARAMETERS[name].choices, attrgetter(name)) for name in SCENE_PARAMETERS}
+"""Of parameters that are numbers of a scene: the field of its record, the choices of which it is a number, and where
+the value stands.
 """
 
 
@@ -218,7 +220,7 @@ def scene_record(parameters: Parameters, like: tuple[Setup, Collection[str]] | N
             scene[field] = choices.index(value) if choices else value
     if like is not None and not any(name.startswith("ballast.") for name in names):
         return scene
-    points = [mass for mass in parameters.point_masses if mass[0] > 0.0]
+    points = [mass for mass in parameters.point_masses if mass[0] != 0.0]
     if len(points) > MAX_BALLASTS:
         raise InputError("ballast", f"{len(points)} point masses", f"at most {MAX_BALLASTS} with a mass")
     scene["ballasts"] = len(points)
@@ -230,9 +232,6 @@ def scene_record(parameters: Parameters, like: tuple[Setup, Collection[str]] | N
 def _setup(
     parameters: Parameters, body_mesh: BodyMesh | None, like: tuple[Setup, Collection[str]] | None = None
 ) -> Setup:
-    for point in parameters.point_masses:
-        if not point[0] >= 0.0:
-            raise InputError("ballast", point, "mass >= 0 [kg] and x, y, z, all finite")
     thrusters = (
         like[0].thrusters
         if like

@@ -19,7 +19,7 @@ import yaml
 from ..base.bundled import scene_names, scene_path
 from ..base.errors import InputError, MeshError, did_you_mean, printable
 from ..mesh.locate import resolve_mesh
-from .parameters import is_ros_parameter, parameter_named
+from ..parameters.declarations import is_ros_parameter, parameter_named
 from .yaml_text import compose_yaml, key_of, read_text, refused, typed
 
 GONE = re.compile(

@@ -18,6 +18,7 @@ from typing import Any
 from ..base.errors import CommandRefused, InputError, did_you_mean
 from ..base.vectors import Vector
 from ..motion.frames import CONTACT_NAME, FIXED_POINTS, RESERVED_WORDS, SLOT_NAME, Frame
+from ..parameters.declarations import ZERO
 from ..simulation.commands import (
     STATE_VALUES,
     Change,
@@ -31,7 +32,6 @@ from ..simulation.commands import (
     WrenchCommand,
     nanoseconds,
 )
-from .parameters import ZERO
 from .yaml_text import flow, load_json, load_yaml, plain, read_text
 
 Entries = dict[str, Any] | list[Any]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.vectors import FloatArray
-from .parameters import Parameters
+from ..parameters.declarations import Parameters
 
 _WHITE, _BIAS = 0, 2
 

@@ -21,8 +21,8 @@ from ..base.vectors import StateRow, vector
 from ..motion.body import Body
 from ..motion.frames import Frame
 from ..motion.loads import Load
+from ..parameters.declarations import PARAMETERS
 from ..scene.command_codec import MARKS, of_event
-from ..scene.parameters import PARAMETERS
 from ..scene.scenario import Scenario, make_scenario, scene_text
 from ..scene.script import entry_of, script_text
 from ..simulation.commands import HELD_WRENCH, TIE_AXES, UNNAMED_SLOT, TieString, WrenchCommand, slot_name

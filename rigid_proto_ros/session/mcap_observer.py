@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 from ..base.errors import InputError
 from ..base.files import file_for_one_writer
 from ..base.provenance import cpu, versions
+from ..parameters.declarations import Parameters
 from ..scene import cdr
 from ..scene.command_codec import frame_names
-from ..scene.parameters import Parameters
 from ..scene.scenario import mesh_file, mesh_sha256_of
 from ..simulation.observer import (
     AccuracyFloor,

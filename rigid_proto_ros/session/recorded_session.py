@@ -20,8 +20,8 @@ import numpy as np
 from ..base.errors import InputError, MeshError
 from ..base.vectors import FloatArray, IntArray, StateRow
 from ..mesh.reading import Mesh, load_mesh, read_mesh
+from ..parameters.declarations import Parameters, convert_all
 from ..scene.command_codec import frame_names, of_event
-from ..scene.parameters import Parameters, convert_all
 from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
 from ..scene.scenario_run import ScenarioRun, notify_start
 from ..scene.scene_file import read_scene_text

@@ -12,7 +12,7 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 from ..base.errors import CommandRefused, InputError
 from ..base.vectors import Vector
@@ -66,20 +66,12 @@ class Stamped:
     stamp_ns: int = 0
     entry: int = field(default=0, compare=False)
 
-    @property
-    def duration_ns(self) -> int:
-        """Duration that the command states [ns], or −1."""
-        return -1
-
-    @property
-    def flight_kind(self) -> int:
-        """Kind in the flight's tables."""
-        return CLEAR
-
-    @property
-    def slot(self) -> int:
-        """Number of the slot whose load it replaces."""
-        return NO_SLOT
+    duration_ns = -1
+    """Duration that the command states [ns], or −1."""
+    flight_kind = CLEAR
+    """Kind in the flight's tables."""
+    slot = NO_SLOT
+    """Number of the slot whose load it replaces."""
 
     @property
     def numbers(self) -> bytes:
@@ -100,6 +92,20 @@ class WrenchCommand(Stamped):
     force: Vector
     torque: Vector
     sent: str | None = field(default=None, compare=False)
+    duration_ns: int = field(init=False, compare=False, repr=False)
+    flight_kind: int = field(init=False, compare=False, repr=False)
+    slot: int = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        frame = self.frame
+        if self.held and frame.impulse:
+            raise CommandRefused("frame", "frame_id", self.frame_id, "on the wrench topic no ;impulse: that is a poke")
+        # Computed once: a command may act many times.
+        self.duration_ns = -1 if frame.duration_s is None else nanoseconds(frame.duration_s)
+        # A held wrench with a duration is a pulse in its slot.
+        held = HELD_WRENCH if self.held and frame.duration_s is None else PULSE
+        self.flight_kind = IMPULSE if frame.impulse else held
+        self.slot = slot_number(frame.slot) if frame.slot else UNNAMED_SLOT if self.held else NO_SLOT
 
     @property
     def frame_id(self) -> str:
@@ -125,30 +131,6 @@ class WrenchCommand(Stamped):
             "force": list(self.force),
             "torque": list(self.torque),
         }
-
-    @property
-    def duration_ns(self) -> int:
-        """Duration that the command states [ns], or −1."""
-        seconds = self.frame.duration_s
-        return -1 if seconds is None else nanoseconds(seconds)
-
-    @property
-    def flight_kind(self) -> int:
-        """Kind in the flight's tables: a held wrench with a duration is a pulse in its slot."""
-        if self.frame.impulse:
-            return IMPULSE
-        return HELD_WRENCH if self.held and self.frame.duration_s is None else PULSE
-
-    @property
-    def slot(self) -> int:
-        """Number of the slot whose load it replaces."""
-        if self.frame.slot:
-            return slot_number(self.frame.slot)
-        return UNNAMED_SLOT if self.held else NO_SLOT
-
-    def __post_init__(self) -> None:
-        if self.held and self.frame.impulse:
-            raise CommandRefused("frame", "frame_id", self.frame_id, "on the wrench topic no ;impulse: that is a poke")
 
 
 @dataclass(slots=True)
@@ -180,6 +162,7 @@ class SetState(Stamped):
     values: Mapping[str, tuple[float, ...]]
     kind = "state"
     rank = Rank.CHANGE
+    flight_kind = SET_STATE
 
     def __post_init__(self) -> None:
         for name, numbers in self.values.items():
@@ -189,11 +172,6 @@ class SetState(Stamped):
             _check_numbers(f"state, {name}", numbers)
         if not any(self.values.get("orientation_xyzw", (1.0,))):
             raise CommandRefused("state", "state, orientation_xyzw", [0.0] * 4, "four numbers, not all zero")
-
-    @property
-    def flight_kind(self) -> int:
-        """See Stamped."""
-        return SET_STATE
 
     @property
     def numbers(self) -> bytes:
@@ -253,6 +231,7 @@ class TieString(Stamped):
     frame_id: str = ""
     contact: str = ""
     kind = "string_attach"
+    flight_kind = TIE_STRING
     rank = Rank.STRING_ATTACH
 
     def __post_init__(self) -> None:
@@ -264,11 +243,6 @@ class TieString(Stamped):
     def content(self) -> dict[str, Any]:
         """The command as an event line keeps it."""
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "axes": self.axes, "point": list(self.point)}
-
-    @property
-    def flight_kind(self) -> int:
-        """See Stamped."""
-        return TIE_STRING
 
     @property
     def numbers(self) -> bytes:
@@ -283,6 +257,7 @@ class MoveString(Stamped):
     point: Vector
     frame_id: str = ""
     kind = "string_target"
+    flight_kind = MOVE_STRING
     rank = Rank.STRING_TARGET
 
     def __post_init__(self) -> None:
@@ -292,11 +267,6 @@ class MoveString(Stamped):
     def content(self) -> dict[str, Any]:
         """The command as an event line keeps it."""
         return {"stamp_ns": self.stamp_ns, "frame_id": self.frame_id, "point": list(self.point)}
-
-    @property
-    def flight_kind(self) -> int:
-        """See Stamped."""
-        return MOVE_STRING
 
     @property
     def numbers(self) -> bytes:
@@ -309,12 +279,8 @@ class ReleaseString(Stamped):
     """Release the string."""
 
     kind = "string_release"
+    flight_kind = RELEASE_STRING
     rank = Rank.CHANGE
-
-    @property
-    def flight_kind(self) -> int:
-        """See Stamped."""
-        return RELEASE_STRING
 
     @property
     def content(self) -> dict[str, Any]:
@@ -362,21 +328,17 @@ Listed = tuple[int, int]
 Command = WrenchCommand | ThrusterCommand | SetState | ClearWrench | Change | TieString | MoveString | ReleaseString
 
 
-class Row(NamedTuple):
-    """A command as the flight's tables have it, a row of LOAD_ROW (simulation/flight.py)."""
-
-    time_ns: int
-    duration_ns: int
-    kind: int
-    slot: int
-    load: bytes
+Row = tuple[int, int, int, int, bytes]
+"""A command as the flight's tables have it: time [ns], duration [ns], kind, slot and load, as in LOAD_ROW
+(simulation/flight.py).
+"""
 
 
 @dataclass(slots=True)
 class Pending:
     """A command waiting for its time. order: sort key among commands with equal times (``order_of``). listed: its place
-    in a list, if it is an entry of one. row: of a wrench or poke, its load (LOAD,), resolved on this surface but for a
-    ray.
+    in a list, if it is an entry of one. row: of a wrench or poke whose load is resolved, that load (LOAD,).
+    resolved_on: the surface that it holds for, None of a body without a mesh; False where it isn't resolved.
     """
 
     time_ns: int
@@ -384,14 +346,14 @@ class Pending:
     order: tuple[int, int, int, int] = (0, 0, 0, 0)
     listed: Listed | None = None
     row: bytes = b""
-    surface: Surface | None = None
+    resolved_on: Surface | None | Literal[False] = False
 
 
 def row_of(pending: Pending) -> Row:
     """A command as the flight's tables have it."""
     command = pending.command
     numbers = pending.row or command.numbers
-    return Row(pending.time_ns, command.duration_ns, command.flight_kind, command.slot, numbers)
+    return pending.time_ns, command.duration_ns, command.flight_kind, command.slot, numbers
 
 
 Waiting = tuple[int, tuple[int, int, int, int], Pending]

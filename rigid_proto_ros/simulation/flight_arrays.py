@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Iterator
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -75,7 +76,6 @@ class FlightArrays:
 
     def __init__(self) -> None:
         self.first_due = 0
-        self._refusal = new_record(REFUSAL)
         self._allocate(FIRST_ROWS)
         self.integers[_LOAD_IDS] = 0
 
@@ -86,19 +86,25 @@ class FlightArrays:
         loads_at = _FLIGHT_BYTES
         events_at = loads_at + rows * _ROW_BYTES
         room_at = events_at + events * _EVENT_BYTES
-        memory = aligned(room_at // 8 + ROOM, before=room_at // 8).view(np.int64)
-        self.integers = memory[: _FLIGHT_BYTES // 8].data
-        self._flights = np.ndarray(1, FLIGHT, memory)
-        self.flight: np.record = self._flights[0]
-        self.row = np.ndarray(13, np.float64, memory, _STATE_AT)
-        self._loads = np.ndarray(rows, LOAD_ROW, memory, loads_at)
-        self._events = np.ndarray(events, EVENT, memory, events_at)
-        self._room = np.ndarray(ROOM, np.float64, memory, room_at)
-        self._table = memory.data.cast("B")[loads_at:events_at]
-        self._string = memory.data.cast("B")[_STRING_AT:_STRING_END]
+        numbers = aligned(room_at // 8 + ROOM, before=room_at // 8)
+        memory = numbers.view(np.int64).data
+        self.integers = memory[: _FLIGHT_BYTES // 8]
+        self.row = numbers[_STATE_AT // 8 : _STATE_AT // 8 + 13]
+        self.flight: np.record = np.ndarray(1, FLIGHT, numbers)[0]
+        self._loads = np.ndarray(rows, LOAD_ROW, numbers, loads_at)
+        self._events = np.ndarray(events, EVENT, numbers, events_at)
+        self._room = numbers[room_at // 8 :]
+        as_bytes = memory.cast("B")
+        self._table = as_bytes[loads_at:events_at]
+        self._string = as_bytes[_STRING_AT:_STRING_END]
         self.call = bound(operate, self.flight, self._loads, self._events, self._room)
         """Perform an operation, by its number and a time [ns]; returns its result: of END_DUE, whether anything ended.
         """
+
+    @cached_property
+    def _refusal(self) -> np.record:
+        """The last refusal."""
+        return new_record(REFUSAL)
 
     def _grow(self, rows: int) -> None:
         """Have at least this number of rows; what is there is kept."""
@@ -135,12 +141,12 @@ class FlightArrays:
         """Put commands into the table, after the active loads, to be applied next."""
         first = last = self.first_due = self.integers[_ACTING]
         table, room = self._table, len(self._loads)
-        for *numbers, load in rows:
+        for time_ns, duration_ns, kind, slot, load in rows:
             if last == room:
                 self._grow(2 * room + 2)
                 table, room = self._table, len(self._loads)
             at = _ROW_BYTES * last
-            _pack(table, at, *numbers, 0, 0)
+            _pack(table, at, time_ns, duration_ns, kind, slot, 0, 0)
             table[at + _LOAD_AT : at + _LOAD_AT + len(load)] = load
             last += 1
         self.integers[_DUE], self.integers[_DUE_END] = first, last
@@ -153,7 +159,7 @@ class FlightArrays:
     def apply(self, pending: Pending, setup: Setup) -> None:
         """Apply a command of any kind but thrusters and changes of parameters now; raises CommandRefused."""
         sent, surface = pending.command, (setup.mesh, setup.vertices, setup.triangles)
-        if isinstance(sent, WrenchCommand) and not (pending.row and pending.surface is setup.surface):
+        if isinstance(sent, WrenchCommand) and pending.resolved_on is not setup.surface:
             pending.row = load_bytes(sent.frame, sent.force, sent.torque, setup.contacts)
         self.put([row_of(pending)])
         if not command(setup.scene, *surface, self.flight, self._loads, self._events, self._refusal):
@@ -163,7 +169,7 @@ class FlightArrays:
 
     def refusal_of(self, pending: Pending, setup: Setup) -> CommandRefused:
         """Why body or integrator couldn't take the resolved load of a command."""
-        kind, load = row_of(pending).kind, np.frombuffer(bytearray(pending.row))
+        kind, load = pending.command.flight_kind, np.frombuffer(bytearray(pending.row))
         check_load(self.flight, setup.mesh, setup.vertices, setup.triangles, kind, load, self._refusal)
         return refused_command(self._refusal)
 

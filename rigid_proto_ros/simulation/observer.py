@@ -257,14 +257,14 @@ class EventLog:
     def reset(self) -> None:
         """Start a new chain."""
         self.count = 0
-        self._hash = hashlib.sha256()
+        self._hash: Any = None  # made when the first line is chained
         self._noted: list[tuple[int, Command | tuple[str, dict[str, Any]]]] = []
 
     @property
     def sha256(self) -> str:
         """Hash of the chain so far, in hex."""
         self._chain_noted()
-        return self._hash.hexdigest()
+        return self._hash.hexdigest() if self._hash else hashlib.sha256().hexdigest()
 
     def append(self, time_ns: int, kind: str, content: Mapping[str, Any]) -> str:
         """Add an event and return its line."""
@@ -288,5 +288,6 @@ class EventLog:
 
     def _chain(self, time_ns: int, kind: str, content: Mapping[str, Any]) -> str:
         line = json.dumps({"time_ns": time_ns, "kind": kind, "content": content})
+        self._hash = self._hash or hashlib.sha256()
         self._hash.update((line + "\n").encode())
         return line

@@ -2,19 +2,32 @@
 """A scene as numbers: one record (SCENE) of all that parameters decide about the motion, one (MESH) of what is computed
 from the mesh, and the body and the flight that compiled functions make of them.
 
-A setup, a row of a sweep, a flight of identify and the page all begin by ``begin``. Fields have the names of the
-parameters, with dots as underscores, and their units.
+A setup, a row of a sweep, a flight of identify and the page all begin by ``begin``. Fields of SCENE have the names of
+the parameters (parameters/declarations.py), with dots as underscores, their units and their bounds: a record that
+breaks them is refused, whoever filled it.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from ..base.arithmetic import exact_quotient
-from ..base.compilation import copy_numbers, exported, local_matrix, local_numbers, njit, record_type
-from ..base.vectors import Matrix3, Vector3
+from ..base.compilation import (
+    copy_numbers,
+    exported,
+    integers_in,
+    local_matrix,
+    local_numbers,
+    njit,
+    numbers_in,
+    place_of,
+    record_type,
+)
+from ..base.errors import InputError
+from ..base.vectors import BoolArray, FloatArray, Matrix3, Vector3
 from ..mass import MODEL_COMS
 from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
 from ..mass.moments import MOMENTS
@@ -26,6 +39,7 @@ from ..motion.integrators.series_steps import degree_for
 from ..motion.loads import NEED_ANGULAR_DAMPING, NEED_NO_GYROSCOPIC_TERM, NEED_STRING, NEEDS
 from ..motion.problem import begin_body
 from ..motion.state import fill_initial_row
+from ..parameters.declarations import PARAMETERS, PATTERNS, Parameter
 from . import refusals as rf
 from .flight import FLIGHT, NEVER
 from .refusals import REFUSAL, refuse, refuse_tensor
@@ -33,41 +47,34 @@ from .string_control import follows_rates, tie
 
 MAX_BALLASTS = 32
 
+SCENE_PARAMETERS = (
+    *("scale", "mass", "density", "inertia_model", "inertia_model_com"),
+    *("explicit_inertia.mass", "explicit_inertia.center_of_mass", "explicit_inertia.tensor"),
+    *("gyroscopic", "gravity", "linear_damping", "angular_damping"),
+    *("initial.position", "initial.orientation_xyzw", "initial.linear_velocity", "initial.angular_velocity"),
+    *("initial.string_mass", "integrator", "step", "accuracy", "wrench_timeout", "poke_duration"),
+    *("string.attached", "string.attach", "string.target", "string.stiffness", "string.frequency"),
+    *("string.damping_ratio", "string.rest_length", "string.bilateral", "string.timeout"),
+)
+"""Parameters that are numbers of a scene; one that is a choice is the place among its choices, and true is 1."""
+
+
+def field_of(parameter: str) -> str:
+    """Name of a parameter's field in SCENE."""
+    return parameter.replace(".", "_")
+
+
+def _type_of(parameter: Parameter) -> tuple[Any, ...]:
+    if parameter.type == "doubles":
+        return np.float64, max(parameter.lengths)
+    return (np.float64 if parameter.type == "double" else np.int64,)
+
+
 SCENE = record_type(
     [
-        ("scale", np.float64, 3),  # [m per mesh unit]
-        ("mass", np.float64),  # [kg]; 0: computed from the density
-        ("density", np.float64),  # [kg/m³]
-        ("inertia_model", np.int64),  # number in INERTIA_MODELS
-        ("inertia_model_com", np.int64),  # number in MODEL_COMS
-        ("explicit_inertia_mass", np.float64),  # [kg]
-        ("explicit_inertia_center_of_mass", np.float64, 3),  # [mesh coordinates]
-        ("explicit_inertia_tensor", np.float64, 6),  # ixx ixy ixz iyy iyz izz [kg m²]
+        *((field_of(name), *_type_of(PARAMETERS[name])) for name in SCENE_PARAMETERS),
         ("ballasts", np.int64),  # how many there are
-        ("ballast", np.float64, (MAX_BALLASTS, 4)),  # masses [kg], above 0, and their positions [mesh coordinates]
-        ("gyroscopic", np.bool_),
-        ("gravity", np.float64, 3),  # [m/s², world]
-        ("linear_damping", np.float64),  # [N s/m]
-        ("angular_damping", np.float64),  # [N m s]
-        ("initial_position", np.float64, 3),  # [m, world]
-        ("initial_orientation_xyzw", np.float64, 4),  # needn't be normalized
-        ("initial_linear_velocity", np.float64, 3),  # [m/s, world]
-        ("initial_angular_velocity", np.float64, 3),  # [rad/s, world]
-        ("initial_string_mass", np.float64),  # [kg]; 0: the effective mass at the start
-        ("integrator", np.int64),  # number in INTEGRATORS
-        ("step", np.float64),  # [s]
-        ("accuracy", np.float64),  # [1/s]
-        ("wrench_timeout", np.float64),  # [s]; 0: none
-        ("poke_duration", np.float64),  # [s]
-        ("string_attached", np.bool_),
-        ("string_attach", np.float64, 3),  # [mesh coordinates]
-        ("string_target", np.float64, 3),  # [m, world]
-        ("string_stiffness", np.float64),  # [N/m]
-        ("string_frequency", np.float64),  # [rad/s], overrides the stiffness if > 0
-        ("string_damping_ratio", np.float64),
-        ("string_rest_length", np.float64),  # [m]
-        ("string_bilateral", np.bool_),
-        ("string_timeout", np.float64),  # [s]; 0: none
+        ("ballast", np.float64, (MAX_BALLASTS, 4)),  # masses [kg], and their positions [mesh coordinates]
     ]
 )
 
@@ -90,6 +97,68 @@ MESH = record_type(
 
 _SUPPORTS = np.array([sum(1 << k for k, need in enumerate(NEEDS) if need in i.supports) for i in INTEGRATORS.values()])
 """By the integrator's number, the bits of what it supports."""
+
+
+def _bounds() -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Of each number of SCENE, all of 8 bytes: the least and the largest one accepted, and whether it is an integer."""
+    count = SCENE.itemsize // 8
+    lower, upper, integer = np.zeros(count), np.zeros(count), np.zeros(count, np.bool_)
+
+    def put(field: str, least: float, largest: float, whole: bool) -> None:
+        first = place_of(SCENE, field) // 8
+        at = slice(first, first + SCENE[field].itemsize // 8)
+        lower[at], upper[at], integer[at] = least, largest, whole
+
+    for name in SCENE_PARAMETERS:
+        one = PARAMETERS[name]
+        if one.type in ("double", "doubles"):
+            put(field_of(name), np.nextafter(one.lower, np.inf) if one.above else one.lower, one.upper, False)
+        else:
+            put(field_of(name), 0.0, len(one.choices or (False, True)) - 1.0, True)
+    put("ballasts", 0.0, MAX_BALLASTS, True)
+    point = PATTERNS["ballast."]
+    put("ballast", point.lower, point.upper, False)
+    lower[place_of(SCENE, "ballast") // 8 :: 4] = 0.0  # masses
+    return lower, upper, integer
+
+
+_LOWER, _UPPER, _IS_INTEGER = _bounds()
+_BALLAST = place_of(SCENE, "ballast") // 8
+"""Place of the first ballast among the numbers."""
+
+
+@njit(error_model="numpy", allocates=False)
+def _is_within_bounds(scene: np.record, refusal: np.record) -> bool:
+    numbers, integers = numbers_in(scene), integers_in(scene)
+    k, end = 0, _BALLAST
+    while k < end:
+        x = float(integers[k]) if _IS_INTEGER[k] else numbers[k]
+        if not _LOWER[k] <= x <= _UPPER[k]:
+            return refuse(refusal, rf.OUT_OF_BOUNDS, k, x, 0.0, 0.0)
+        k += 1
+        if k == _BALLAST:  # how many there are is known to be possible now
+            end += 4 * scene.ballasts
+    for k in range(3):
+        if abs(scene.scale[k]) < SCALE_LIMITS[0]:
+            return refuse(refusal, rf.SCALE, 0, 0.0, 0.0, 0.0)
+    return True
+
+
+def out_of_bounds(scene: np.record, place: int) -> InputError:
+    """The error that says that the number at this place of a scene isn't within its bounds."""
+    if place >= _BALLAST:
+        point = (place - _BALLAST) // 4
+        return InputError("ballast", tuple(scene.ballast[point].tolist()), "mass >= 0 [kg] and x, y, z, all finite")
+    at = 8 * place
+    field = next(
+        name for name in SCENE.names or () if place_of(SCENE, name) <= at < place_of(SCENE, name) + SCENE[name].itemsize
+    )
+    received = scene[field].tolist()
+    if field == "ballasts":
+        return InputError("ballast", f"{received} point masses", f"0 to {MAX_BALLASTS}")
+    parameter = next(PARAMETERS[name] for name in SCENE_PARAMETERS if field_of(name) == field)
+    return InputError(parameter.name, received, parameter.accepted)
+
 
 _TO_NEAREST = 6755399441055744.0  # 1.5·2⁵²
 
@@ -185,9 +254,8 @@ def make_body(scene: np.record, mesh: np.record, body: BodyRow, refusal: np.reco
     s, com, inertia = scene.scale, local_numbers(3), local_matrix(3, 3)
     moments, axes = local_numbers(3), local_matrix(3, 3)
     refusal.code = rf.ACCEPTED
-    for k in range(3):
-        if not SCALE_LIMITS[0] <= abs(s[k]) <= SCALE_LIMITS[1]:
-            return refuse(refusal, rf.SCALE, 0, 0.0, 0.0, 0.0)
+    if not _is_within_bounds(scene, refusal):
+        return False
     if scene.inertia_model == EXPLICIT:
         given = local_matrix(3, 3)
         explicit_tensor(scene, given)

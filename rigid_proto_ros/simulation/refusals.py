@@ -38,7 +38,8 @@ REFUSAL = record_type(
     MAGNITUDE,  # numbers: linear and angular acceleration [m/s², rad/s²], mass [kg]
     PULL,  # of a string's target; numbers: the target
     UNRESOLVED,  # detail: why a load's point wasn't found (motion/loads.py)
-) = range(11)
+    OUT_OF_BOUNDS,  # detail: place of the number in SCENE (simulation/record.py); numbers: the number
+) = range(12)
 
 RATES = (
     ("linear_damping", "N s/m"),

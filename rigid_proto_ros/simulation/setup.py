@@ -26,7 +26,7 @@ from . import refusals as rf
 from .commands import IMPULSE, Command, MoveString, ThrusterCommand, WrenchCommand
 from .effects import check_load
 from .flight import FLIGHT
-from .record import EXPLICIT, MESH, begin
+from .record import EXPLICIT, MESH, begin, out_of_bounds
 from .refusals import REFUSAL, needs_in, refused_command
 from .thrusters import Thruster
 
@@ -135,6 +135,8 @@ def make_setup(
 
 def _refused_scene(scene: np.record, refusal: np.record, mesh_name: str) -> InputError:
     code = refusal.code
+    if code == rf.OUT_OF_BOUNDS:
+        return out_of_bounds(scene, refusal.detail)
     if code == rf.SCALE:
         try:
             scale_vector(scene.scale.tolist())
@@ -170,8 +172,8 @@ def _tensor_warnings(scene: np.record, refusal: np.record, mesh_name: str) -> tu
 
 
 def check_command(command: Command, setup: Setup) -> bytes:
-    """The row of a command's load (LOAD,), resolved on a body of this setup where it isn't a ray's; empty for what is
-    no load. Raises CommandRefused for what a body of this setup can't take.
+    """The row of a command's load (LOAD,), resolved on a body of this setup; empty for a ray's, whose point is known
+    when it acts, and for what is no load. Raises CommandRefused for what a body of this setup can't take.
     """
     if isinstance(command, WrenchCommand):
         return _load_row(command, setup)
@@ -191,7 +193,7 @@ def _load_row(command: WrenchCommand, setup: Setup) -> bytes:
     load = np.frombuffer(found)
     if not check_load(setup.flight, setup.mesh, setup.vertices, setup.triangles, command.flight_kind, load, refusal):
         raise refused_load(refusal, command, setup)
-    return bytes(found)
+    return b"" if command.frame.point[0] == "ray" else bytes(found)
 
 
 def refused_load(refusal: np.record, command: Command, setup: Setup) -> CommandRefused:

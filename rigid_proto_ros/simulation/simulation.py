@@ -170,7 +170,7 @@ class Simulation:
         self._arrivals += 1
         pending = Pending(when_ns, command, order_of(command, listed, self._arrivals), listed)
         if row:
-            pending.row, pending.surface = row, setup.surface
+            pending.row, pending.resolved_on = row, setup.surface
         self._push(pending)
         if self.follower is not None:
             self.follower(command, when_ns, listed)
@@ -245,13 +245,13 @@ class Simulation:
             until_ns = self.thrusters.due_ns
         if not pending or pending[0][0] >= until_ns:
             return until_ns, ()
-        due: list[Pending] = []
+        surface, due = self.setup.surface, list[Pending]()
         while pending:
             entry = pending[0]
             if entry[0] >= until_ns:
                 break
             first = entry[-1]
-            if not self._is_ready(first):
+            if first.resolved_on is not surface and not self._is_plain_clear(first.command):
                 until_ns = first.time_ns
                 # All commands with the same time are applied together.
                 while due and due[-1].time_ns == until_ns:
@@ -259,17 +259,12 @@ class Simulation:
                 break
             heappop(pending)
             due.append(first)
-        self._arrays.put(row_of(pending) for pending in due)
+        self._arrays.put(map(row_of, due))
         return until_ns, due
 
-    def _is_ready(self, pending: Pending) -> bool:
-        """Whether the compiled flight can apply the command as it is."""
-        if isinstance(pending.command, WrenchCommand):
-            # A ray is resolved when it acts, and so is what was resolved on another mesh.
-            known = pending.row and pending.surface is self.setup.surface
-            return bool(known) and pending.command.frame.point[0] != "ray"
+    def _is_plain_clear(self, command: Command) -> bool:
         # A clear also switches off thrusters that push, which the compiled flight doesn't know.
-        return isinstance(pending.command, ClearWrench) and not self.thrusters.pushing
+        return isinstance(command, ClearWrench) and not self.thrusters.pushing
 
     def _notify(self, due: Sequence[Pending]) -> None:
         """Log the commands that were applied, and notify the observer of the loads that began and ended."""
@@ -366,10 +361,10 @@ class Simulation:
 
     def _thrust(self, loads: list[tuple[int, Load]]) -> None:
         """Apply loads of thrusters, by number, until they are replaced."""
-        arrays, rows = self._arrays, []
+        arrays, rows = self._arrays, list[Row]()
         for number, load in loads:
             kind = HELD_WRENCH if load.is_zero else PULSE
-            rows.append(Row(self.time_ns, _UNTIL_REPLACED_NS, kind, -1 - number, load.packed))
+            rows.append((self.time_ns, _UNTIL_REPLACED_NS, kind, -1 - number, load.packed))
         arrays.put(rows)
         arrays.call(APPLY, 0)
         if not self._wants_loads:

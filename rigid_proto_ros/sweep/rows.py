@@ -21,7 +21,7 @@ from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.vectors import BoolArray, FloatArray, IntArray, Records
 from ..motion.loads import FORCE, TORQUE
-from ..scene.parameters import HUGE, Value, parameter_named, with_mass_of_density
+from ..parameters.declarations import HUGE, Value, parameter_named, with_mass_of_density
 from ..scene.scenario import Scenario, build_scenario
 from ..scene.scenario_run import OfflineRun
 from ..scene.script import MAX_TIME_S, expand_script, script_text
@@ -30,7 +30,7 @@ from ..simulation import batch
 from ..simulation import flight as fl
 from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand, row_of
 from ..simulation.quantities import CONTEXT, STATE, begin_context, measure_flight
-from ..simulation.record import SCENE
+from ..simulation.record import SCENE, SCENE_PARAMETERS, field_of
 from ..simulation.setup import Setup, check_command
 from ..simulation.simulation import Simulation
 from .sampling import Draw, as_text
@@ -48,14 +48,9 @@ class NotBatchable(Exception):
     """The compiled batch can't fly the rows of a study; the simulation can."""
 
 
-def _field_of(parameter: str) -> str:
-    return parameter.replace(".", "_")
-
-
 def _is_number_of_scene(parameter: str) -> bool:
     """Whether a parameter is one of the numbers in a scene's record."""
-    numbers = parameter_named(parameter).type in ("double", "doubles")
-    return numbers and _field_of(parameter) in (SCENE.names or ())
+    return parameter in SCENE_PARAMETERS and parameter_named(parameter).type in ("double", "doubles")
 
 
 class BatchMaker:
@@ -87,10 +82,7 @@ class BatchMaker:
             if place is not None:
                 _write(commands, place, column, good)
             elif vary.target.parameter not in self._reference:
-                declared = parameter_named(vary.target.parameter)
-                _keep(good, column > declared.lower if declared.above else column >= declared.lower)
-                _keep(good, column <= declared.upper)
-                own = rows[_field_of(declared.name)]
+                own = rows[field_of(vary.target.parameter)]
                 if vary.target.path:
                     own[:, vary.target.path[0]] = column
                 else:

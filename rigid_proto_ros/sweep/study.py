@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..base.bundled import example_names, example_path, study_names, study_path
 from ..base.errors import InputError, did_you_mean
 from ..base.vectors import IntArray
-from ..scene.parameters import (
+from ..parameters.declarations import (
     READ_ONLY,
     Parameters,
     Value,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..base.errors import InputError, one_of
-from ..scene.parameters import READ_ONLY, Parameter, Value, parameter_named
+from ..parameters.declarations import READ_ONLY, Parameter, Value, parameter_named
 from ..scene.script import ENTRY_KEYS
 
 _COMPONENTS = {3: "x y z", 4: "x y z w", 6: "ixx ixy ixz iyy iyz izz"}

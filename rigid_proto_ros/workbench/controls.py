@@ -17,7 +17,7 @@ import numpy as np
 import viser
 
 from ..base.errors import InputError
-from ..scene.parameters import parameter_named
+from ..parameters.declarations import parameter_named
 from ..scene.yaml_text import scalar
 from .flight import Flight
 

@@ -23,7 +23,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.vectors import FloatArray, IntArray, StateRow
 from ..live.live_simulation import LiveSimulation
-from ..scene.parameters import parameter_named
+from ..parameters.declarations import parameter_named
 from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
 from ..scene.scene_file import read_scene_text
 from ..session.as_script import branch_at

@@ -12,9 +12,9 @@ import viser
 
 from ..base.bundled import scene_names
 from ..live.live_simulation import LiveSimulation
+from ..parameters.declarations import Parameters
 from ..rerun_view.ports import LOOPBACK
 from ..rerun_view.viewers import has_display
-from ..scene.parameters import Parameters
 from ..scene.scenario import Scenario
 from .page import Page
 from .server import make_server, stop_server

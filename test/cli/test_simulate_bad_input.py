@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from rigid_proto_ros.cli.main import main as rigid_proto
+from rigid_proto_ros.parameters.declarations import PARAMETERS
 from rigid_proto_ros.ros.arguments import given_arguments, own_arguments
 from rigid_proto_ros.ros.main import NodeProcess
 from rigid_proto_ros.ros.main import main as rigid_body_node
 from rigid_proto_ros.ros.poke_client import main as poke_client
-from rigid_proto_ros.scene.parameters import PARAMETERS
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 MESHES = {

@@ -8,7 +8,7 @@ from flights import SECOND, bundled_body, flight, spinning
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.motion.integrators.integrator import ONE_STEP
-from rigid_proto_ros.simulation.commands import CLEAR, NO_SLOT, Row
+from rigid_proto_ros.simulation.commands import CLEAR, NO_SLOT
 
 MOMENTS = np.array((1.0, 2.0, 3.0))
 BODY = make_body(1.0, (0.0, 0.0, 0.0), np.diag(MOMENTS))
@@ -25,7 +25,7 @@ def stepped(simulation, h_ns, first, last):
     if simulation.setup.integrator.methods[0].way == ONE_STEP:
         for block in range(first, last, BLOCK):
             end = min(block + BLOCK, last)
-            arrays.put(Row(k * h_ns, -1, CLEAR, NO_SLOT, b"") for k in range(block, end))
+            arrays.put((k * h_ns, -1, CLEAR, NO_SLOT, b"") for k in range(block, end))
             assert arrays.fly(end * h_ns)
         assert arrays.flight.segments == last + 1
     else:

@@ -23,10 +23,10 @@ from ros_process import running_node
 from node_interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation
+from rigid_proto_ros.parameters.declarations import PARAMETERS, READ_ONLY, is_ros_parameter
 from rigid_proto_ros.ros.arguments import given_arguments
 from rigid_proto_ros.ros.diagnostics import WARNING_S, Diagnostics
 from rigid_proto_ros.ros.main import make_viewer, open_page
-from rigid_proto_ros.scene.parameters import PARAMETERS, READ_ONLY, is_ros_parameter
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text
 from rigid_proto_ros.simulation.simulation import Simulation

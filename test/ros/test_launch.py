@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import pytest
 
 import rigid_proto_ros
+from rigid_proto_ros.parameters.declarations import PARAMETERS
 from rigid_proto_ros.ros.poke_client import main as poke_client
-from rigid_proto_ros.scene.parameters import PARAMETERS
 
 SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
 FILE = SOURCE / "launch" / "rigid_body.launch.py"

@@ -11,8 +11,8 @@ pytest.importorskip("rclpy")
 
 from rigid_proto_ros.live.pacing import Stamps
 from rigid_proto_ros.motion.state import State
+from rigid_proto_ros.parameters.declarations import Parameters
 from rigid_proto_ros.ros.publishers import StatePublisher
-from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 

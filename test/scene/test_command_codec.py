@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.frames import Frame
+from rigid_proto_ros.parameters.declarations import Parameters
 from rigid_proto_ros.scene import cdr
 from rigid_proto_ros.scene.command_codec import MARKS, frame_names, of_event, of_message
-from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.script import (
     entry_of,
     expand_schedule,

@@ -10,7 +10,7 @@ from ros_client import RosClient
 from ros_process import running_node
 
 from rigid_proto_ros.base.errors import InputError
-from rigid_proto_ros.scene.parameters import PARAMETERS, PATTERNS, READ_ONLY, Parameter
+from rigid_proto_ros.parameters.declarations import PARAMETERS, PATTERNS, READ_ONLY, Parameter
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.scene.scene_file import scene_values
 

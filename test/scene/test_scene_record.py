@@ -3,17 +3,32 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
-from rigid_proto_ros.base.compilation import copy_fields, new_record
+from rigid_proto_ros.base.compilation import copy_of, new_record, new_records
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.mass import INERTIA_MODELS
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.scene.parameters import AT_RESET, LIVE, PARAMETERS, PATTERNS, Parameter, Parameters
+from rigid_proto_ros.motion.integrators.stepping import ROOM
+from rigid_proto_ros.parameters.declarations import AT_RESET, LIVE, PARAMETERS, PATTERNS, Parameter, Parameters
 from rigid_proto_ros.scene.scenario import Scenario, make_scenario, scene_record
-from rigid_proto_ros.simulation.record import BOUNDING_BOX, EXPLICIT, MAX_BALLASTS, POINTS, SCENE, SHELL, SOLID
-from rigid_proto_ros.simulation.refusals import AUTO
+from rigid_proto_ros.simulation.effects import change
+from rigid_proto_ros.simulation.flight import LOAD_ROW
+from rigid_proto_ros.simulation.record import (
+    BOUNDING_BOX,
+    EXPLICIT,
+    MAX_BALLASTS,
+    POINTS,
+    SCENE,
+    SCENE_PARAMETERS,
+    SHELL,
+    SOLID,
+    field_of,
+)
+from rigid_proto_ros.simulation.refusals import AUTO, OUT_OF_BOUNDS, REFUSAL
 from rigid_proto_ros.simulation.setup import make_setup
 
 NAN, INF = float("nan"), float("inf")
@@ -33,11 +48,7 @@ NOT_OF_THE_MOTION = {
 """Parameters that change in flight or at a reset, and leave the motion as it is."""
 
 
-def field_of(name: str) -> str:
-    return name.replace(".", "_")
-
-
-DECLARED = {field_of(name): parameter for name, parameter in PARAMETERS.items() if field_of(name) in SCENE.names}
+DECLARED = {field_of(name): PARAMETERS[name] for name in SCENE_PARAMETERS}
 
 
 def test_every_field_is_a_parameter_or_of_the_ballast() -> None:
@@ -61,7 +72,7 @@ def test_a_field_has_the_type_that_its_parameter_declares(field: str) -> None:
         # Whatever else a parameter accepts, its record has the longest.
         assert (number, shape) == (np.float64, (max(declared.lengths),))
     else:
-        types = {"double": np.float64, "bool": np.bool_, "string": np.int64}
+        types = {"double": np.float64, "bool": np.int64, "string": np.int64}
         assert (number, shape) == (types[declared.type], ())
         assert declared.type != "string" or declared.choices
 
@@ -134,45 +145,76 @@ def test_more_ballast_than_the_record_holds_is_refused_with_words() -> None:
 TIED = {"string.attached": True, "string.target": [0.0, 0.0, 1.0], "ballast.a": [0.1, 0.1, 0.0, 0.0]}
 MESHED = make_scenario({"mesh": "book", "mass": 1.0, **TIED})
 BARE = make_scenario({"mesh": "", "inertia_model": "explicit", **TIED})
+
+
+def beyond(declared: Parameter) -> list[float]:
+    """Numbers that a parameter doesn't accept, as its field holds them."""
+    if declared.type not in ("double", "doubles"):
+        return [-1, len(declared.choices or (False, True)), 2**62]
+    lower = declared.lower if declared.above else np.nextafter(declared.lower, -INF)
+    bounds = [bound for bound in (lower, np.nextafter(declared.upper, INF)) if np.isfinite(bound)]
+    return [NAN, INF, -INF, *map(float, bounds)]
+
+
+def written(scenario: Scenario, field: str, number: int, value: float) -> np.record:
+    """The scenario's record with one number of a field written straight into it."""
+    scene = copy_of(scenario.setup.scene)
+    if scene[field].shape:
+        scene[field].reshape(-1)[number] = value
+    else:
+        scene[field] = value
+    return scene
+
+
+@pytest.mark.parametrize("scenario", [MESHED, BARE], ids=["meshed", "bare"])
+@pytest.mark.parametrize("field", DECLARED)
+def test_a_number_out_of_bounds_is_refused_with_its_parameters_words_wherever_the_record_comes_from(
+    scenario: Scenario, field: str
+) -> None:
+    declared, setup = DECLARED[field], scenario.setup
+    for number in range(setup.scene[field].size):
+        for value in beyond(declared):
+            scene = written(scenario, field, number, value)
+            received = re.escape(str(scene[field].tolist()))
+            with pytest.raises(InputError, match=f"^{re.escape(declared.name)}: got .*; accepted: ") as refused:
+                make_setup(scene, setup.mesh, setup.surface)
+            assert refused.value.accepted == declared.accepted and re.search(received, str(refused.value))
+            # A change in flight leaves the flight as it is.
+            flight, loads, refusal = copy_of(setup.flight), new_records(1, LOAD_ROW), new_record(REFUSAL)
+            assert not change(setup.scene, scene, setup.mesh, True, flight, loads, np.zeros(ROOM), refusal)
+            assert refusal.code == OUT_OF_BOUNDS and flight.tobytes() == setup.flight.tobytes()
+
+
+@pytest.mark.parametrize("count", [-1, MAX_BALLASTS + 1, 2**62])
+def test_a_number_of_ballasts_that_the_record_has_no_room_for_is_refused(count: int) -> None:
+    with pytest.raises(InputError, match=f"^ballast: got '{count} point masses'; accepted: 0 to {MAX_BALLASTS}$"):
+        make_setup(written(BARE, "ballasts", 0, count), BARE.setup.mesh)
+
+
+@pytest.mark.parametrize(("number", "value"), [(0, -1e-300), *((k, v) for k in range(4) for v in (NAN, INF, -INF))])
+def test_a_point_mass_that_there_is_none_of_is_refused(number: int, value: float) -> None:
+    with pytest.raises(InputError, match="^ballast: got .*; accepted: mass >= 0 .kg. and x, y, z, all finite$"):
+        make_setup(written(BARE, "ballast", number, value), BARE.setup.mesh)
+    # Of rows that aren't used nothing is read.
+    unused = written(BARE, "ballast", 4 + number, value)
+    assert make_setup(unused, BARE.setup.mesh).body.mass == BARE.setup.body.mass
+
+
 IMPOSSIBLE = [
-    *((MESHED, f"scale.{k}", value) for k in range(3) for value in (NAN, INF, -INF, 0.0, 1e-10, 1e10)),
-    *((MESHED, "mass", value) for value in (NAN, INF, -INF, -1.0)),
-    *((MESHED, "ballast.0", value) for value in (NAN, INF, -INF)),
-    *((BARE, f"explicit_inertia_tensor.{k}", value) for k in range(6) for value in (NAN, INF, -INF)),
-    *((BARE, f"explicit_inertia_tensor.{k}", value) for k in (0, 3, 5) for value in (-1.0, 0.0, 2.1)),
-    *((BARE, f"explicit_inertia_center_of_mass.{k}", value) for k in range(3) for value in (NAN, INF, -INF)),
-    *((BARE, "explicit_inertia_mass", value) for value in (NAN, INF, -INF)),
-    *((BARE, f"initial_orientation_xyzw.{k}", value) for k in range(4) for value in (INF, -INF)),
-    *((BARE, f"initial_orientation_xyzw.{k}", NAN) for k in (0, 3)),
-    (BARE, "initial_orientation_xyzw.3", 0.0),
+    *((MESHED, "scale", k, value) for k in range(3) for value in (0.0, 1e-10)),
+    *((BARE, "explicit_inertia_tensor", k, value) for k in (0, 3, 5) for value in (-1.0, 0.0, 2.1)),
+    (BARE, "initial_orientation_xyzw", 3, 0.0),
     # What auto follows up to a limit.
-    *((BARE, f"{name}_damping", INF) for name in ("linear", "angular")),
-    *((BARE, f"string_{name}", INF) for name in ("stiffness", "frequency", "damping_ratio")),
-    *((MESHED, f"string_attach.{k}", INF) for k in range(3)),
+    *((BARE, f"{name}_damping", 0, 1e60) for name in ("linear", "angular")),
+    *((BARE, f"string_{name}", 0, value) for name, value in (("stiffness", 1e29), ("frequency", 1e8))),
+    *((MESHED, "string_attach", k, 1e100) for k in range(3)),
 ]
 
 
-@pytest.mark.parametrize(("scenario", "place", "value"), IMPOSSIBLE)
+@pytest.mark.parametrize(("scenario", "field", "number", "value"), IMPOSSIBLE)
 def test_a_number_that_no_body_and_no_start_has_is_refused_also_where_it_is_written_straight_into_the_record(
-    scenario: Scenario, place: str, value: float
+    scenario: Scenario, field: str, number: int, value: float
 ) -> None:
-    scene, setup = new_record(SCENE), scenario.setup
-    copy_fields(setup.scene, scene)
-    name, _, number = place.partition(".")
-    numbers = scene[name].reshape(-1) if number else None
-    if numbers is None:
-        scene[name] = value
-    else:
-        numbers[int(number)] = value
+    scene, setup = written(scenario, field, number, value), scenario.setup
     with pytest.raises(InputError):
         make_setup(scene, setup.mesh, setup.surface, provide=scenario.body_mesh and scenario.body_mesh.provide)
-
-
-@pytest.mark.parametrize("density", [NAN, INF, -INF, -1.0, 0.0])
-def test_a_density_that_gives_no_mass_is_refused_in_the_record(density: float) -> None:
-    scenario = make_scenario({"mesh": "book"})
-    scene = new_record(SCENE)
-    copy_fields(scenario.setup.scene, scene)
-    scene.density = density
-    with pytest.raises(InputError, match="^mass: got .*; accepted: density . volume within 1e-300 .. 1e300 kg$"):
-        make_setup(scene, scenario.setup.mesh, scenario.setup.surface)

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from rigid_proto_ros.scene.parameters import Parameters
+from rigid_proto_ros.parameters.declarations import Parameters
 from rigid_proto_ros.scene.sensor_noise import ImuNoise, imu_noise
 
 ZERO = [0.0, 0.0, 0.0]

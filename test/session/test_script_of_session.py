@@ -26,8 +26,8 @@ from hypothesis.strategies import (
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.state import State
+from rigid_proto_ros.parameters.declarations import with_mass_of_density
 from rigid_proto_ros.scene.command_codec import of_event
-from rigid_proto_ros.scene.parameters import with_mass_of_density
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun, ScenarioRun
 from rigid_proto_ros.scene.scene_file import read_scene_text

@@ -33,8 +33,8 @@ from rigid_proto_ros.mass.properties import MeshMoments, explicit_mass_propertie
 from rigid_proto_ros.mass.tensor import principal_axes
 from rigid_proto_ros.mesh.reading import load_mesh
 from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.parameters.declarations import Parameters
 from rigid_proto_ros.scene.lessons import lesson
-from rigid_proto_ros.scene.parameters import Parameters
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script, read_script

@@ -13,7 +13,7 @@ from random_scenes import random_scene
 from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.motion.problem import PROBLEM
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.simulation.commands import NO_SLOT, PULSE, Row
+from rigid_proto_ros.simulation.commands import NO_SLOT, PULSE
 from rigid_proto_ros.simulation.effects import APPLY, CUT
 from rigid_proto_ros.simulation.flight import FLIGHT
 from rigid_proto_ros.simulation.flight_arrays import FlightArrays
@@ -41,7 +41,7 @@ def flown(setup: Setup) -> FlightArrays:
     arrays = FlightArrays()
     arrays.start_over(setup)
     load = np.array([0.0, 0.0, 0.0, 0.0, 0.0, *(setup.body.mass * np.array([0.1, 0.2, 0.3])), *[0.0] * 6])
-    arrays.put([Row(0, 5 * MS, PULSE, NO_SLOT, load.tobytes())])
+    arrays.put([(0, 5 * MS, PULSE, NO_SLOT, load.tobytes())])
     arrays.call(APPLY, 0)
     arrays.call(CUT, 0)
     assert arrays.fly(2 * MS)

@@ -330,3 +330,17 @@ def test_a_target_that_would_pull_beyond_every_measure_is_refused_when_it_takes_
     assert simulation.refused == {"magnitude": 1}
     untouched, _ = simulated()
     assert (end.row == untouched.advance(SECOND).row).all()
+
+
+@pytest.mark.parametrize("rest_length", [0.0, 0.1])
+@pytest.mark.parametrize("power", range(4, 100, 6))
+def test_a_body_that_flies_too_fast_for_any_step_on_a_string_fails_in_bounded_work(power, rest_length):
+    """Where no step of a nanosecond tells when the string's law changes, there is no end to shortening it."""
+    values = {
+        "string.attached": True,
+        "string.rest_length": rest_length,
+        "initial.linear_velocity": [0, 0, 10.0**power],
+    }
+    simulation = Simulation(make_scenario({"mesh": "t_handle", **values}).setup)
+    simulation.advance(10_000)
+    assert simulation.failure or simulation.steps <= 10_000

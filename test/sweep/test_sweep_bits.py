@@ -9,7 +9,7 @@ from sweep_studies import HUNG, POKES, PULLED, STRUCTURE, study
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.motion.integrators import INTEGRATORS
-from rigid_proto_ros.scene.parameters import PARAMETERS
+from rigid_proto_ros.parameters.declarations import PARAMETERS
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.simulation.batch import new_results
 from rigid_proto_ros.simulation.flight import floor_text

@@ -12,6 +12,7 @@ Python's division would raise an exception in the middle of it.
 from __future__ import annotations
 
 from ...base.errors import CommandRefused, InputError
+from .. import INTEGRATOR_NAMES
 from .auto import AUTO
 from .free_body import FREE_BODY, FREE_BODY_STRANG
 from .gram_schmidt import EULER, MIDPOINT
@@ -20,7 +21,7 @@ from .lie_midpoint import LIE_MIDPOINT
 from .runge_kutta import DOP853, RK4, SEMI_IMPLICIT_EULER
 from .series import TAYLOR
 
-INTEGRATORS: dict[str, Integrator] = {
+_INTEGRATORS = {
     integrator.name: integrator
     for integrator in (
         AUTO,
@@ -35,6 +36,8 @@ INTEGRATORS: dict[str, Integrator] = {
         FREE_BODY_STRANG,
     )
 }
+INTEGRATORS: dict[str, Integrator] = {name: _INTEGRATORS[name] for name in INTEGRATOR_NAMES}
+"""By name, in the order of their numbers in a scene."""
 
 
 def check_supported(integrator: Integrator, needs: frozenset[str]) -> None:

@@ -359,6 +359,8 @@ def _lay_out(y: Variables, p: np.record, control: np.record, weights: Weights, c
         if not is_one_sided(p) or parts >= _MAX_PARTS:
             break
         switch, after, h = next_law(series, p, degree, h, law, accuracy)
+        if h == 0.0:
+            return 0
         if switch == NONE:
             break
         before_ns = int((gone + switch) * 1e9)

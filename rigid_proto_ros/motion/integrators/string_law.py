@@ -210,7 +210,7 @@ def next_law(
     c: FloatArray, p: np.record, degree: int, h: float, law: float, accuracy: float
 ) -> tuple[float, float, float]:
     """Time of the first change of law within h seconds, NONE for never; the law that follows; and the part of h [s] for
-    which this is known.
+    which this is known, 0 if that is less than a nanosecond.
     """
     if law == SLACK:
         return _tautens(c, p, degree, h), PULLS, h
@@ -233,6 +233,8 @@ def next_law(
         if told == NONE or _converges(c, p, degree, told, tolerance):
             return NONE if time == NONE else time * h, after, h
         h = 0.5 * told
+        if not h * 1e9 >= 1.0:
+            return NONE, law, 0.0
 
 
 @njit(error_model="numpy", allocates=False)
