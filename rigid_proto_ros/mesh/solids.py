@@ -98,16 +98,25 @@ def _united(
     return list(parts.values())
 
 
+def hull_is_missing() -> str:
+    """What to install for ``convex_hull``; empty where it is there."""
+    try:
+        import scipy.spatial  # noqa: F401 (looked for)
+    except ImportError:
+        return is_missing("scipy", "meshes")
+    return ""
+
+
 def convex_hull(points: Points) -> tuple[Points, Triangles]:
     """Vertices (n, 3), a subset of points (k, 3), and outward triangles (m, 3) of their convex hull, accurate to
     rounding of the extent, by Qhull (Barber, Dobkin, Huhdanpaa, ACM TOMS 22, 1996).
 
     Raises MeshError when the points lie in one plane, and without SciPy.
     """
-    try:
-        from scipy.spatial import ConvexHull, QhullError
-    except ImportError:
-        raise MeshError("mesh_fallback", f"hull: {is_missing('scipy', 'meshes')}; box needs no package") from None
+    if missing := hull_is_missing():
+        raise MeshError("mesh_fallback", f"hull: {missing}; box needs no package")
+    from scipy.spatial import ConvexHull, QhullError
+
     remedy = "; use box instead" if np.ptp(points, axis=0).min() > 0.0 else ""
     flat = MeshError("mesh_fallback", f"the points lie in one plane and have no hull with a volume{remedy}")
     # Scaled to the same extent in all directions, which leaves the hull's faces as they are: Qhull would treat a thin

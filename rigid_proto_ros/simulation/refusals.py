@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from decimal import ROUND_DOWN, Context
-
 import numpy as np
 
 from ..base.compilation import njit, record_type
@@ -80,6 +78,8 @@ def refused_command(refusal: np.record) -> CommandRefused:
         except CommandRefused as error:
             return error
     if refusal.code == RATE:
+        from decimal import ROUND_DOWN, Context  # 3 ms, which no start needs
+
         parameter, unit = RATES[refusal.detail]
         # Three digits, which rounded up would be refused themselves.
         digits = Context(prec=3, rounding=ROUND_DOWN).create_decimal_from_float(b)
