@@ -221,21 +221,31 @@ def _address_and_extents(argument: Any, kind: np.dtype[Any], dimensions: int, na
 # The library
 
 
+X86_64 = {
+    "x86-64-v4": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl", "avx2", "fma", "bmi2"},
+    "x86-64-v3": {"avx2", "fma", "bmi2"},
+    "x86-64-v2": set[str](),
+}
+"""Kinds of processors, the best one first, and what each can do, by Linux's names."""
+KINDS = (*X86_64, "aarch64")
+
+
 def target() -> str:
-    """The kind of processor that the library is for: RIGID_PROTO_PROCESSOR, or the best of ``x86-64-v4``,
-    ``x86-64-v3``, ``x86-64-v2`` and ``aarch64`` that this one is. Raises InputError for another one.
+    """The kind of processor that the library is for: the best one that this processor is, or RIGID_PROTO_PROCESSOR.
+    Raises InputError where it isn't one of those, and on another machine.
     """
-    if asked := os.environ.get("RIGID_PROTO_PROCESSOR", ""):
-        return asked
     machine = platform.machine().lower()
     if machine in ("aarch64", "arm64"):
-        return "aarch64"
-    if machine not in ("x86_64", "amd64"):
+        able = ["aarch64"]
+    elif machine in ("x86_64", "amd64"):
+        flags = _cpu_flags()
+        able = [kind for kind, needed in X86_64.items() if needed <= flags]
+    else:
         raise InputError("kernels", machine, "x86_64 or aarch64; RIGID_PROTO_KERNELS=interpreted runs anywhere, slowly")
-    flags = _cpu_flags()
-    if not {"avx2", "fma", "bmi2"} <= flags:
-        return "x86-64-v2"
-    return "x86-64-v4" if {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"} <= flags else "x86-64-v3"
+    asked = os.environ.get("RIGID_PROTO_PROCESSOR") or able[0]
+    if asked not in able:
+        raise InputError("RIGID_PROTO_PROCESSOR", asked, f"what this processor is: {', '.join(able)}")
+    return asked
 
 
 def _cpu_flags() -> set[str]:
@@ -295,12 +305,13 @@ def loaded(nogil: bool) -> Any:
             folder = os.path.join(kernels_folder(), stamp())
             path = os.path.join(folder, name)
             if not os.path.isfile(path):
+                os.makedirs(folder, mode=0o700, exist_ok=True)
                 _build()
             check_own(folder)
         _check_addresses()
         return (ctypes.CDLL if nogil else ctypes.PyDLL)(path)
     except OSError as error:
-        raise InputError("kernels", str(error)) from None
+        raise InputError("kernels", f"{error}; RIGID_PROTO_KERNELS_FOLDER names another folder for them") from None
 
 
 def _check_addresses() -> None:

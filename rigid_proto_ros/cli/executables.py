@@ -48,7 +48,11 @@ def _start(program: str, module: str, needs_ros: bool = False, interrupted: int 
         print(f"{program}: {remedy}", file=sys.stderr)
         return 2
     package = __package__.rpartition(".")[0]
-    status = importlib.import_module(f"{package}.{module}").main()
+    try:
+        status = importlib.import_module(f"{package}.{module}").main()
+    except MemoryError:  # while modules are imported; what a program runs says so itself
+        print(f"{program}: out of memory", file=sys.stderr)
+        return 2
     interrupts.done()
     return interrupts.leave(status)
 

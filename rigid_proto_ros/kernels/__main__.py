@@ -24,9 +24,7 @@ from pathlib import Path
 
 from ..base.errors import InputError, one_of, tell
 from ..base.files import whole_file
-from ..base.library import carried_folder, check_own, file_name, kernels_folder, stamp, target
-
-KINDS = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "aarch64")
+from ..base.library import KINDS, carried_folder, check_own, file_name, kernels_folder, stamp, target
 
 
 def main() -> int:

@@ -2,6 +2,7 @@
 """Kernels come from a library that was built for the present sources, and from nowhere else."""
 
 import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -67,6 +68,55 @@ def test_a_file_that_is_no_library_is_refused_in_one_line(tmp_path: Path) -> Non
     code = "from rigid_proto_ros.cli.main import main; import sys; sys.exit(main(['simulate', 't_handle', '--json']))"
     done = said(code, RIGID_PROTO_KERNELS_FOLDER=str(tmp_path))
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and "kernels" in done.stderr
+
+
+def test_a_folder_that_cannot_be_made_is_told_with_what_names_another(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    code = "from rigid_proto_ros.cli.main import main; import sys; sys.exit(main(['simulate', 't_handle', '--json']))"
+    done = said(code, RIGID_PROTO_KERNELS_FOLDER=str(tmp_path / "file"))
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
+    assert "RIGID_PROTO_KERNELS_FOLDER names another folder" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("machine", "flags", "best"),
+    [
+        ("x86_64", "sse2", "x86-64-v2"),
+        ("AMD64", "sse2 avx2 fma", "x86-64-v2"),
+        ("x86_64", "sse2 avx2 fma bmi2", "x86-64-v3"),
+        ("x86_64", "avx2 fma bmi2 avx512f avx512bw avx512cd avx512dq avx512vl", "x86-64-v4"),
+        ("aarch64", "fp asimd", "aarch64"),
+    ],
+)
+def test_the_library_is_for_the_best_that_the_processor_is(
+    monkeypatch: pytest.MonkeyPatch, machine: str, flags: str, best: str
+) -> None:
+    monkeypatch.delenv("RIGID_PROTO_PROCESSOR", raising=False)
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+    monkeypatch.setattr(library, "_cpu_flags", lambda: set(flags.split()))
+    assert library.target() == best
+    # What it isn't would end the process at its first instruction.
+    monkeypatch.setenv("RIGID_PROTO_PROCESSOR", "aarch64" if machine != "aarch64" else "x86-64-v2")
+    with pytest.raises(InputError, match=f"accepted: what this processor is: .*{best}"):
+        library.target()
+
+
+def test_on_another_machine_one_line_says_what_runs_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(platform, "machine", lambda: "riscv64")
+    with pytest.raises(InputError, match="RIGID_PROTO_KERNELS=interpreted runs anywhere, slowly"):
+        library.target()
+
+
+@pytest.mark.parametrize("most_kb", [400_000, 150_000])
+def test_with_little_memory_it_works_or_says_so_in_one_line(most_kb: int) -> None:
+    pytest.importorskip("resource")
+    code = f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({most_kb} * 1024,) * 2); "
+    code += (
+        "import sys; from rigid_proto_ros.cli.executables import rigid_proto; sys.argv[1:] = ['inspect', 'hammer']; "
+    )
+    done = said(code + "sys.exit(rigid_proto())")
+    told = done.stderr.splitlines()
+    assert (done.returncode, told) == (0, []) or (done.returncode, len(told)) == (2, 1), done.stderr
 
 
 def test_an_unknown_way_to_run_kernels_is_refused_with_those_that_there_are() -> None:
