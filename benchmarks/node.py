@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What the node costs, in real processes: CPU, rate, jitter, latency, start-up, memory, floods, skipped work.
+"""What the node costs, in real processes: CPU, rate, jitter, latency, memory, floods, skipped work.
 
-    python benchmarks/node.py [--short] [--only start_up,processor,...] [--out FOLDER]
+    python benchmarks/node.py [--short] [--only processor,rate,...] [--out FOLDER]
 
 Writes node.csv and node_skips.csv, with the machine's load beside each figure; docs/benchmarks.md shows them.
 """
@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import statistics
 import sys
 import tempfile
 import time
@@ -37,7 +36,6 @@ SKIP_COLUMNS = ("skipped", "unit", "done", "as_it_is", "load_1min")
 def main() -> None:
     """Measure, print and write."""
     parts = {
-        "start_up": start_up,
         "processor": processor,
         "baselines": baselines,
         "rate": rate,
@@ -82,18 +80,6 @@ def listened_to(note, what: str, process: Process, seconds: float) -> None:
         time.sleep(1.0)
         note(what, "cpu", process.cpu_share(seconds), "%")
         note(what, "rate", result_of(listener)["rate"], "1/s")
-
-
-def start_up(note, seconds: float) -> None:
-    """From the start of the process until it says that it flies, kernels and mesh cached by a first start."""
-    node().end()
-    for label, parameters in (("start", []), ("start with recording", [f"record:={_recording()}"])):
-        times = []
-        for _ in range(5):
-            began = time.monotonic()
-            with node(*parameters, wait_s=0.0):
-                times.append(time.monotonic() - began)
-        note(label, "median", statistics.median(times), "s")
 
 
 def processor(note, seconds: float) -> None:

@@ -281,6 +281,16 @@ def node_load() -> str:
     return f"{sentence}\n\n{_table(('node', 'share of a core', 'publications per second'), rows)}"
 
 
+def start_up() -> str:
+    """Time and memory of whole processes, from the last benchmark's own numbers."""
+    measured = read_rows(RESULTS / "start_up.csv")
+    rows = [
+        (row["what"], f"{row['seconds']:.2f} s", f"{row['ratio']:.2f} × {row['beside']}", f"{row['memory_mb']:.0f} MB")
+        for row in measured
+    ]
+    return f"{_measured_on(measured[0])}.\n\n{_table(('process', 'time', 'beside', 'memory'), rows)}"
+
+
 def skipped_work() -> str:
     """Work that is left out, and what it would cost, from the last benchmark's own numbers."""
     measured = read_rows(RESULTS / "node_skips.csv")
@@ -362,6 +372,7 @@ TABLES = {
     "gallery": gallery,
     "motions": motions,
     "node": node_load,
+    "start_up": start_up,
     "skipped": skipped_work,
     "identification": identification,
     "figures": figures,
