@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Types of vectors and arrays; without numba, which a program that only sends commands doesn't need."""
+"""Types of vectors and arrays; without the kernels, which a program that only sends commands doesn't need."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The commands: one union type for scripts, messages, event lines and the simulation. Importing it doesn't load numba,
+"""The commands: one union type for scripts, messages, event lines and the simulation. Importing it loads no kernel,
 which a program that only sends commands doesn't need.
 
 ``order_of`` defines the order of commands with equal times.
