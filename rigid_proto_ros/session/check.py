@@ -54,15 +54,15 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
     Returns the first difference, or None. Raises InputError for a session that can't be decoded, or lacks what a check
     needs: the topics named, or its beginning.
     """
-    states = _states_in_order(session)
-    if not states:
+    states = session.states
+    if not states.topics:
         lacks = ", ".join(session.missing) or "states"
         accepted = "states from a start or reset on; without them there is nothing to verify"
         raise NotVerifiableError("--verify", f"a recording without {lacks}", accepted)
     if session.missing:
         accepted = "a recording that holds them from a start or reset on"
         raise InputError("--verify", f"a recording without {', '.join(session.missing)}", accepted)
-    first_ns, recorded = states[0][0], session.lines
+    first_ns, recorded = states.first_ns, session.lines
     began_later = NotVerifiableError(
         "--verify",
         f"a recording that begins at {first_ns / 1e9:.9g} s, in the middle of a run",
@@ -79,7 +79,7 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         return Difference(times_ns[broken - 1], what, tampered=True)
     computed = _Lines()
     again = resimulation(session, computed)
-    compared = 0
+    compared, number_of_states = 0, states.count * len(states.topics)
     for count, (time_ns, name, row) in enumerate(states):
         difference, state = _advance(again, time_ns, computed.lines, recorded, compared)
         if difference is not None:
@@ -87,14 +87,14 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         compared = len(computed.lines)
         if again.simulation.failure and again.simulation.time_ns != time_ns:
             return Difference(time_ns, again.simulation.failure)
-        if what := _row_difference(count + 1, name, row, state):
+        if what := _row_difference(count + 1, name, np.asarray(row), state):
             if count == 0 and not recorded and first_ns > 0:
                 raise began_later
             # At its own time a command acts after the state.
             before = sum(acted_ns < time_ns for acted_ns in times_ns)
             return Difference(time_ns, what, f"command {before}: {recorded[before - 1]}" if before else "")
         if count % 1000 == 0:
-            progress(count / len(states))
+            progress(count / number_of_states)
     end_ns = max(again.simulation.time_ns, again.end_ns)
     difference, _ = _advance(again, end_ns, computed.lines, recorded, compared)
     missing = len(computed.lines)
@@ -142,17 +142,6 @@ def _advance(
         what = f"command {len(computed) + 1} was applied in the recording, but is refused here: {refused}"
         return Difference(again.simulation.time_ns, what), row
     return None, row
-
-
-def _states_in_order(session: RecordedSession) -> list[tuple[int, str, FloatArray]]:
-    """Time, topic ("" for the state itself) and row of everything to compare, in the order of time."""
-    streams = {"": (session.times, session.rows)}
-    if session.published:
-        streams = {name: (published.times, published.rows) for name, published in session.published.items()}
-    merged = [
-        (int(t), name, row) for name, (times, rows) in streams.items() for t, row in zip(times, rows, strict=True)
-    ]
-    return sorted(merged, key=lambda state: state[0])
 
 
 def _row_difference(number: int, name: str, recorded: FloatArray, computed: FloatArray) -> str:

@@ -1,23 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""A recorded flight as plain arrays and text, whatever file it was read from; the mesh that it flew, found by its hash;
-and the flight computed anew from its scene and its events, and told to an observer once more.
+"""A recorded flight, in memory or in a file; the mesh that it flew, found by its hash; and the flight computed anew from
+its scene and its events, and told to an observer once more.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+from array import array
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..base.errors import InputError, MeshError
+from ..base.rotation import rotate, rotate_inverse
 from ..base.vectors import FloatArray, IntArray, StateRow
 from ..mesh.reading import Mesh, load_mesh, read_mesh
 from ..scene.command_codec import frame_names, of_event
@@ -34,9 +38,28 @@ SAME = 1e-6
 """[m, and of a quaternion's parts] How near a computed state must be to a recorded one to be the same."""
 
 
+class States(Protocol):
+    """The states of one run, read anew by each pass over them: time [ns, simulated], topic and row, in the order of time.
+    Of a recording a row is what the topic published (``messages.PROJECTIONS``); of a run in memory the topic is "" and
+    the row the state's own, in ``simulation/observer.py``'s ``STATE_FIELDS`` order.
+
+    topics: those with any states. count: how many times there are; first_ns, end_ns: the first and the last, 0 without
+    states.
+    """
+
+    topics: tuple[str, ...]
+    count: int
+    first_ns: int
+    end_ns: int
+
+    def __iter__(self) -> Iterator[tuple[int, str, Sequence[float] | FloatArray]]: ...
+
+
 @dataclass(frozen=True)
-class StampedRows:
-    """What one topic published: times (n,) int64 [ns, simulated] and rows (n, k) float64."""
+class StateRows:
+    """States, or what one topic published of them, in memory: times (n,) int64 [ns, simulated] and rows (n, k) float64.
+    Those of a run are in the order of time.
+    """
 
     times: IntArray
     rows: FloatArray
@@ -44,29 +67,49 @@ class StampedRows:
     def __len__(self) -> int:
         return len(self.times)
 
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """See ``States``."""
+        return ("",) if len(self) else ()
+
+    @property
+    def count(self) -> int:
+        """See ``States``."""
+        return len(self)
+
+    @property
+    def first_ns(self) -> int:
+        """See ``States``."""
+        return int(self.times[0]) if len(self) else 0
+
+    @property
+    def end_ns(self) -> int:
+        """See ``States``."""
+        return int(self.times[-1]) if len(self) else 0
+
+    def __iter__(self) -> Iterator[tuple[int, str, FloatArray]]:
+        return ((time_ns, "", row) for time_ns, row in zip(self.times.tolist(), self.rows, strict=True))
+
+
+NO_STATES = StateRows(np.empty(0, np.int64), np.empty((0, 13)))
+
 
 @dataclass
 class RecordedSession:
     """One run, as its recording holds it.
 
     scene: the parameters at the run's start as a params file. events: (time_ns, JSON line) in order, lines as logged.
-    refusals: (time_ns, text). times (n,) int64 [ns, simulated] and rows (n, 13) float64, exactly the published states
-    in ``simulation/observer.py``'s ``STATE_FIELDS`` order. complete: the file was finished properly.
-
-    A bag holds no state rows but what the node published of them: ``published``, by topic; ``rows`` are then found from
-    those, for the eye. scenes: the texts of the scene topic from the run's start on, in order. node_name: what stands
-    before the topics' names. missing: topics that a check would need. attachments: (name, bytes) of files inside;
-    made_with: the processor, and versions by package; accuracy_floor: why the motion is held to less than its accuracy,
-    as an .mcap of ours says it; folder: where the session lies.
+    states: those that were published. complete: the file was finished properly. scenes: the texts of the scene topic
+    from the run's start on, in order. node_name: what stands before the topics' names. missing: topics that a check
+    would need. attachments: (name, bytes) of files inside; made_with: the processor, and versions by package;
+    accuracy_floor: why the motion is held to less than its accuracy, as an .mcap of ours says it; folder: where the
+    session lies.
     """
 
     scene: str = ""
     events: list[tuple[int, str]] = field(default_factory=list)
-    refusals: list[tuple[int, str]] = field(default_factory=list)
-    times: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
-    rows: FloatArray = field(default_factory=lambda: np.empty((0, 13)))
+    states: States = NO_STATES
     complete: bool = True
-    published: dict[str, StampedRows] = field(default_factory=dict)
     scenes: list[str] = field(default_factory=list)
     node_name: str = "rigid_body"
     missing: tuple[str, ...] = ()
@@ -88,7 +131,68 @@ class RecordedSession:
     @property
     def end_ns(self) -> int:
         """Simulated time [ns] of the last state; 0 without states."""
-        return int(self.times[-1]) if len(self.times) else 0
+        return self.states.end_ns
+
+    def state_rows(self) -> Iterator[tuple[int, FloatArray]]:
+        """Time [ns] and state row (13,) of every state, one after another; of a recording one a time, put together from
+        what was published, in which velocities that weren't are 0.
+        """
+        for time_ns, published in groupby(self.states, key=itemgetter(0)):
+            shown = {}
+            for _, topic, row in published:
+                if topic:
+                    shown[topic] = row
+                else:
+                    yield time_ns, np.asarray(row)
+            if "pose" in shown or "odom" in shown:
+                yield time_ns, _put_together(shown)
+
+    @cached_property
+    def _rows(self) -> StateRows:
+        if isinstance(self.states, StateRows):
+            return self.states
+        times, numbers = array("q"), array("d")
+        for time_ns, row in self.state_rows():
+            times.append(time_ns)
+            numbers.extend(row)
+        return StateRows(np.frombuffer(times, np.int64), np.frombuffer(numbers).reshape(-1, 13))
+
+    @property
+    def times(self) -> IntArray:
+        """Times (n,) [ns] of ``state_rows``, in memory from then on, as are ``rows``."""
+        return self._rows.times
+
+    @property
+    def rows(self) -> FloatArray:
+        """State rows (n, 13) of ``state_rows``."""
+        return self._rows.rows
+
+    @cached_property
+    def published(self) -> dict[str, StateRows]:
+        """What each topic published, in memory from then on."""
+        found = {topic: (array("q"), array("d")) for topic in self.states.topics}
+        for time_ns, topic, row in self.states:
+            found[topic][0].append(time_ns)
+            found[topic][1].extend(row)
+        return {
+            topic: StateRows(np.frombuffer(times, np.int64), np.frombuffer(numbers).reshape(len(times), -1))
+            for topic, (times, numbers) in found.items()
+        }
+
+
+def _put_together(shown: dict[str, Sequence[float] | FloatArray]) -> FloatArray:
+    """A state row (13,) from what the topics published of one state."""
+    state = np.zeros(13)
+    if "odom" in shown:
+        odom = shown["odom"]
+        state[:7] = odom[:7]
+        state[7:10], state[10:13] = rotate(*odom[3:7], *odom[7:10]), odom[10:13]
+    if "pose" in shown:
+        state[:7] = shown["pose"]
+    if "twist" in shown:
+        twist = shown["twist"]
+        state[7:10], state[10:13] = twist[:3], rotate_inverse(*state[3:7].tolist(), *twist[3:6])
+    return state
 
 
 def decode_event(line: str, number: int) -> tuple[int, str, dict[str, Any]]:
@@ -261,14 +365,14 @@ def _begins_at_start(session: RecordedSession) -> bool:
     """Whether the flight computed from the start comes to the first recorded state. Of a recording that was begun later
     it isn't known what a ghost did before.
     """
-    if not len(session.times) or session.times.min() == 0:
+    time_ns, row = next(session.state_rows(), (0, None))
+    if row is None or time_ns == 0:
         return True
-    first = int(session.times.argmin())
     try:
-        computed = resimulation(session).advance(int(session.times[first]))
+        computed = resimulation(session).advance(time_ns)
     except InputError:
         return False
-    return bool(np.abs(computed[:7] - session.rows[first, :7]).max() < SAME)
+    return bool(np.abs(computed[:7] - row[:7]).max() < SAME)
 
 
 def play(
@@ -295,9 +399,8 @@ def play(
         again.announce()
         if again.scenario.ghost is not None and _begins_at_start(session):
             again.begin_ghost()
-    for count, k in enumerate(np.argsort(session.times, kind="stable").tolist()):
-        progress(count, len(session.times))
-        time_ns, row = int(session.times[k]), session.rows[k]
+    for count, (time_ns, row) in enumerate(session.state_rows()):
+        progress(count, session.states.count)
         if again is None:
             observer.on(Published(time_ns, row))
             continue
@@ -306,10 +409,11 @@ def play(
         except InputError:
             # A command that is refused here: from now on only the recorded states are shown.
             computed = row
-        # A bag holds of a state what was published of it, and no more.
-        alike = bool(session.published) and all(
+        # A recording holds of a state what was published of it, and no more.
+        topics = [topic for topic in session.states.topics if topic]
+        alike = bool(topics) and all(
             np.allclose(PROJECTIONS[name](computed.tolist()), PROJECTIONS[name](row.tolist()), rtol=1e-12, atol=1e-12)
-            for name in session.published
+            for name in topics
         )
         again.publish(time_ns, computed if alike else row)
     if again is not None and all_events:

@@ -17,7 +17,7 @@ from ros_process import command, from_source
 from rigid_proto_ros.base import interrupts
 from rigid_proto_ros.cli import executables
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.session.check import verify
 
 

@@ -19,7 +19,8 @@ from rigid_proto_ros.base.errors import CommandRefused, InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.pacing import SLICE_NS
 from rigid_proto_ros.motion.frames import parse_frame
-from rigid_proto_ros.rerun_view.session_files import read_runs, record
+from rigid_proto_ros.rerun_view.recorders import record
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.scene.parameters import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun

@@ -23,7 +23,8 @@ from rigid_proto_ros.rerun_view.backend import ROS_TIME
 from rigid_proto_ros.rerun_view.layout import Subject, blueprint
 from rigid_proto_ros.rerun_view.observer import FileRecorder
 from rigid_proto_ros.rerun_view.rrd_reading import FRAME_HEAD, read_session, record_batches, whole_bytes
-from rigid_proto_ros.rerun_view.session_files import read_runs, record
+from rigid_proto_ros.rerun_view.recorders import record
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.session.mailbox import STALLED_S
 from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.simulation.observer import (

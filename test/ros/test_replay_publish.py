@@ -20,7 +20,7 @@ from scripts import EVERY_KIND
 
 from rigid_proto_ros.base.bundled import scene_path
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.ros import replay_publisher
 from rigid_proto_ros.session.recorded_session import decode_event
 

@@ -24,7 +24,7 @@ from ros_process import running_node
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mesh.locate import resolve_mesh
-from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.scene import cdr
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.scene.script import read_script

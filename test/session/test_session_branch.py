@@ -11,7 +11,7 @@ pytest.importorskip("mcap")
 from flights import SECOND, EventLines
 
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scene_file import read_scene_text

@@ -22,7 +22,7 @@ from mcap.reader import make_reader
 from rigid_proto_ros.base.bundled import example_path, scene_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import read_script

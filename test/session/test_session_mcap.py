@@ -27,7 +27,8 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.mesh.locate import resolve_mesh
-from rigid_proto_ros.rerun_view.session_files import make_recorder, read_runs
+from rigid_proto_ros.rerun_view.recorders import make_recorders
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun, notify_start
 from rigid_proto_ros.scene.script import read_script

@@ -11,7 +11,7 @@ pytest.importorskip("mcap")
 
 from rigid_proto_ros.base.provenance import versions
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.session.check import Difference, made_with_table
 
 RECORDED = Path(__file__).parents[1] / "recorded"
