@@ -47,7 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--verify", action="store_true", help="repeat the simulation and compare; exit 1 at the first difference"
     )
-    parser.add_argument("--record", metavar="FILE", help="draw the session into an .rrd (for Rerun), or write it anew as .mcap")
+    parser.add_argument(
+        "--record", metavar="FILE", help="draw the session into an .rrd (for Rerun), or write it anew as .mcap"
+    )
     parser.add_argument(
         "--repair", metavar="FILE", help="write a readable file with the complete part of a damaged session"
     )

@@ -18,7 +18,6 @@ from .exports import add_exports, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
-    from ..session.mailbox import WritingObserver
 
 DURATION_NS = 10_000_000_000
 AFTER_SCRIPT_NS = 1_000_000_000
@@ -31,7 +30,7 @@ EXAMPLES = (
         "a scene with scripted pokes; prints one JSON object",
     ),
     (
-        'rigid_proto simulate hammer --set gravity="[0, 0, -9.81]" --duration 2 --record out/hammer.mcap,out/hammer.rrd',
+        'rigid_proto simulate hammer --set gravity="[0, 0, -9.81]" --record out/hammer.mcap,out/hammer.rrd',
         "with gravity; a recording, and a view of it for Rerun",
     ),
 )
@@ -98,10 +97,8 @@ def run(args: argparse.Namespace) -> int:
         from ..export.flight_record import FlightRecord
 
         record = FlightRecord()
-    recorders: list[WritingObserver] = []
     with ExitStack() as closing:
-        if files:
-            recorders = make_recorders(names, parameters=scenario.parameters, on_error=_warn, simulated_log=True)
+        recorders = make_recorders(names, parameters=scenario.parameters, on_error=_warn, simulated_log=True)
         for recorder in recorders:
             closing.callback(recorder.close)
         watching = [*recorders, *filter(None, [record])]

@@ -163,8 +163,8 @@ class SimulationLoop(ScenarioRun):
         return acting.setup
 
     def stop_recording(self, going_on: str = "") -> None:
-        """``record`` names no more than this from now on, which is no event and doesn't touch the motion; behind changes that wait, of
-        which one may have begun the recording, it is one of them.
+        """``record`` names no more than this from now on, which is no event and doesn't touch the motion; behind
+        changes that wait, of which one may have begun the recording, it is one of them.
         """
         change = Change({"record": going_on})
         if self._waiting:

@@ -282,9 +282,7 @@ class RerunObserver(WritingObserver):
 class FileRecorder(RerunObserver):
     """Records to a file. Raises InputError for a file that can't be written."""
 
-    def __init__(
-        self, path: str, name: str = "rigid_body", on_error: Callable[[str], None] | None = None
-    ) -> None:
+    def __init__(self, path: str, name: str = "rigid_body", on_error: Callable[[str], None] | None = None) -> None:
         self.path = Path(path)
         self._write_at_s = 0.0
         super().__init__(name, path, on_error)

@@ -44,11 +44,11 @@ def check_session(path: Path) -> None:
     """Raise InputError for a session that isn't there, or is an .rrd file, which is never read back."""
     if not path.exists():
         raise InputError("session", f"there is no file and no folder {str(path)!r}")
-    view = False
-    with suppress(OSError):  # a folder, or what is refused when it is read
-        with open(path, "rb") as stream:
-            view = stream.read(len(RRD_MAGIC)) == RRD_MAGIC
-    if view or path.suffix == ".rrd":
+    head = b""
+    # A folder, or what is refused when it is read.
+    with suppress(OSError), open(path, "rb") as stream:
+        head = stream.read(len(RRD_MAGIC))
+    if head == RRD_MAGIC or path.suffix == ".rrd":
         beside = path.with_suffix(".mcap")
         given = str(beside) if beside.exists() else "the .mcap of the same flight (record and --record take both names)"
         raise InputError("session", f"{path} is a view for Rerun, shown by `rerun {path}`; accepted: {given}")

@@ -73,6 +73,7 @@ STATE_DEPTH, EVENT_DEPTH = 10, 1000
 LATCHED = frozenset({"scene", "inertia"})
 """Topics whose last message waits for subscribers that come later."""
 
+
 def offered_qos(name: str) -> str:
     """Quality of service of a topic's publisher in the node, as rosbag2 writes it into a channel's metadata
     (``offered_qos_profiles``, format 9, of Jazzy): with it a replay of the bag latches what was latched.

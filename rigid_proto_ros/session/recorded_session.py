@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A recorded flight, in memory or in a file; the mesh that it flew, found by its hash; and the flight computed anew from
-its scene and its events, and told to an observer once more.
+"""A recorded flight, in memory or in a file; the mesh that it flew, found by its hash; and the flight computed anew
+from its scene and its events, and told to an observer once more.
 """
 
 from __future__ import annotations
@@ -39,7 +39,9 @@ SAME = 1e-6
 
 
 class States(Protocol):
-    """The states of one run, read anew by each pass over them: time [ns, simulated], topic and row, in the order of time.
+    """The states of one run, read anew by each pass over them: time [ns, simulated], topic and row, in the order of
+    time.
+
     Of a recording a row is what the topic published (``messages.PROJECTIONS``); of a run in memory the topic is "" and
     the row the state's own, in ``simulation/observer.py``'s ``STATE_FIELDS`` order.
 
