@@ -49,12 +49,15 @@ class States(Protocol):
     states.
     """
 
-    topics: tuple[str, ...]
-    count: int
-    first_ns: int
-    end_ns: int
-
-    def __iter__(self) -> Iterator[tuple[int, str, Sequence[float] | FloatArray]]: ...
+    @property
+    def topics(self) -> tuple[str, ...]: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def first_ns(self) -> int: ...
+    @property
+    def end_ns(self) -> int: ...
+    def __iter__(self) -> Iterator[tuple[int, str, Sequence[float]]]: ...
 
 
 @dataclass(frozen=True)
@@ -89,8 +92,8 @@ class StateRows:
         """See ``States``."""
         return int(self.times[-1]) if len(self) else 0
 
-    def __iter__(self) -> Iterator[tuple[int, str, FloatArray]]:
-        return ((time_ns, "", row) for time_ns, row in zip(self.times.tolist(), self.rows, strict=True))
+    def __iter__(self) -> Iterator[tuple[int, str, Sequence[float]]]:
+        return ((time_ns, "", row.tolist()) for time_ns, row in zip(self.times.tolist(), self.rows, strict=True))
 
 
 NO_STATES = StateRows(np.empty(0, np.int64), np.empty((0, 13)))
@@ -182,7 +185,7 @@ class RecordedSession:
         }
 
 
-def _put_together(shown: dict[str, Sequence[float] | FloatArray]) -> FloatArray:
+def _put_together(shown: dict[str, Sequence[float]]) -> FloatArray:
     """A state row (13,) from what the topics published of one state."""
     state = np.zeros(13)
     if "odom" in shown:
