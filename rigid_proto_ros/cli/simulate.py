@@ -18,6 +18,7 @@ from .exports import add_exports, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
+    from ..scene.scenario import Scenario
 
 DURATION_NS = 10_000_000_000
 AFTER_SCRIPT_NS = 1_000_000_000
@@ -77,7 +78,8 @@ def run(args: argparse.Namespace) -> int:
     from ..simulation.commands import nanoseconds
     from ..simulation.observer import Observers
 
-    scenario = read_scene(args.scene, dict(map(_setting, args.set)), _warn)
+    settings = dict(map(_setting, args.set))
+    scenario = read_scene(args.scene, settings, _warn)
     for warning in scenario.warnings:
         _warn(warning)
     script = read_script(args.script) if args.script else []
@@ -85,12 +87,10 @@ def run(args: argparse.Namespace) -> int:
     duration_ns = max(DURATION_NS, last_ns + AFTER_SCRIPT_NS) if args.duration is None else nanoseconds(args.duration)
     if beyond := sum(command.stamp_ns >= duration_ns for command in script):
         _warn(f"{beyond} of the script's {len(script)} commands act at or after the end, {duration_ns / 1e9:.9g} s")
-    names = ",".join(filter(None, (args.record or scenario.parameters.record, args.bag)))
-    files = []
-    if names:
+    files = _recorded(scenario, args, "record" in settings)
+    if files:
         # Check everything that can be refused now, before a recording of an earlier run is overwritten.
         OfflineRun(scenario, script)
-        files = _recorded(names, args)
     check_exports(args)
     record: FlightRecord | None = None
     if asked(args):
@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
 
         record = FlightRecord()
     with ExitStack() as closing:
-        recorders = make_recorders(names, parameters=scenario.parameters, on_error=_warn, simulated_log=True)
+        recorders = make_recorders(",".join(files), parameters=scenario.parameters, on_error=_warn, simulated_log=True)
         for recorder in recorders:
             closing.callback(recorder.close)
         watching = [*recorders, *filter(None, [record])]
@@ -139,13 +139,16 @@ def _setting(text: str) -> tuple[str, object]:
     return name.strip(), scalar(value.strip())
 
 
-def _recorded(names: str, args: argparse.Namespace) -> list[str]:
+def _recorded(scenario: Scenario, args: argparse.Namespace, set_by_option: bool) -> list[str]:
     """The files to record to, all of which can be written; raises InputError."""
     from ..rerun_view.recorders import recording_names
+    from ..scene.scene_file import check_record
 
     if args.bag and Path(args.bag).suffix.lower() != ".mcap":
         raise InputError("--bag", args.bag, "a file that ends in .mcap")
-    files = recording_names(names)
+    if not args.record and not set_by_option:
+        check_record(scenario.parameters.record)
+    files = recording_names(",".join(filter(None, (args.record or scenario.parameters.record, args.bag))))
     for file in files:
         check_writable("--bag" if file == args.bag else "--record" if args.record else "record", file)
     return files

@@ -45,18 +45,24 @@ class States(Protocol):
     Of a recording a row is what the topic published (``messages.PROJECTIONS``); of a run in memory the topic is "" and
     the row the state's own, in ``simulation/observer.py``'s ``STATE_FIELDS`` order.
 
-    topics: those with any states. count: how many times there are; first_ns, end_ns: the first and the last, 0 without
-    states.
     """
 
     @property
-    def topics(self) -> tuple[str, ...]: ...
+    def topics(self) -> tuple[str, ...]:
+        """Those with any states."""
+
     @property
-    def count(self) -> int: ...
+    def count(self) -> int:
+        """How many times there are."""
+
     @property
-    def first_ns(self) -> int: ...
+    def first_ns(self) -> int:
+        """The first time [ns]; 0 without states."""
+
     @property
-    def end_ns(self) -> int: ...
+    def end_ns(self) -> int:
+        """The last time [ns]; 0 without states."""
+
     def __iter__(self) -> Iterator[tuple[int, str, Sequence[float]]]: ...
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.ros.arguments import given_arguments, own_arguments
 from rigid_proto_ros.ros.main import NodeProcess
@@ -245,6 +246,30 @@ def test_a_view_given_for_a_session_is_answered_with_what_to_give(beside, tmp_pa
         told = one_line(capfd, rigid_proto, words)
         assert "flight.rrd is a view for Rerun" in told and "rerun flight.rrd" in told
         assert told.rstrip().endswith("accepted: flight.mcap") if beside else "the .mcap of the same flight" in told
+
+
+def test_a_scene_records_only_below_the_working_folder_unless_the_command_line_names_the_file(
+    tmp_path, monkeypatch, capfd
+):
+    folder, elsewhere = tmp_path / "here", str(tmp_path / "x.mcap")
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    scene = folder / "scene.yaml"
+    for place in (elsewhere, "../x.mcap", f"out/x.rrd,{elsewhere}"):
+        scene.write_text(f"rigid_body: {{ros__parameters: {{mesh: book, record: '{place}'}}}}\n")
+        said = one_line(capfd, rigid_proto, ["simulate", str(scene), "--duration", "0.1"])
+        assert "x.mcap" in said and "below the working folder" in said
+        with pytest.raises(InputError, match="below the working folder"):
+            given_arguments(["node", "--ros-args", "--params-file", str(scene)], "rigid_body", print)
+    assert [file.name for file in tmp_path.iterdir()] == ["here"]
+    for named in (["--record", elsewhere], ["--set", f"record={elsewhere}"]):
+        assert rigid_proto(["simulate", str(scene), "--duration", "0.1", *named]) == 0
+        Path(elsewhere).unlink()
+    named = ["node", "--ros-args", "--params-file", str(scene), "-p", f"record:={elsewhere}"]
+    assert given_arguments(named, "rigid_body", print)["record"] == elsewhere
+    scene.write_text("rigid_body: {ros__parameters: {mesh: book, record: out/x.mcap}}\n")
+    assert rigid_proto(["simulate", str(scene), "--duration", "0.1"]) == 0
+    assert (folder / "out" / "x.mcap").exists()
 
 
 def test_a_binary_file_is_no_scene_script_or_session(tmp_path, capfd):
