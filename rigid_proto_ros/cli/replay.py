@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.command_line import Progress, number_from
-from ..base.errors import InputError, is_missing, printable
+from ..base.errors import InputError, printable
 from ..base.files import check_whole_file, check_writable, is_same_file, whole_file
 from .exports import add_exports, asked, check_exports, write_exports
 
@@ -76,10 +76,8 @@ def run(args: argparse.Namespace) -> int:
         _check_place("--record", file, args.session, check_writable)
     _check_place("--as-scene", args.as_scene, args.session, check_whole_file)
     check_exports(args)
-    try:
-        from ..session.bag import read_runs, repair
-    except ImportError:
-        raise InputError("session", is_missing("mcap", "mcap")) from None
+    from ..session.bag import read_runs, repair
+
     if args.repair:
         repair(Path(args.session), Path(args.repair))
     runs = read_runs(args.session, "" if args.publish == "commands" else args.node)

@@ -21,11 +21,15 @@ if TYPE_CHECKING:
     from ..session.recorded_session import RecordedSession
 
 
+LIBRARIES = {".mcap": ("mcap", "mcap", "mcap"), ".rrd": ("rerun", "rerun-sdk", "rerun")}
+"""What writes a file of this ending: module, package, and the extra that installs it."""
+
+
 def recording_names(names: str) -> list[str]:
     """The files that ``record`` names, separated by commas: at most one .mcap and one .rrd; raises InputError."""
     files = [name.strip() for name in names.split(",") if name.strip()]
     endings = [Path(file).suffix.lower() for file in files]
-    if len(set(endings)) < len(files) or not {".mcap", ".rrd"}.issuperset(endings):
+    if len(set(endings)) < len(files) or not LIBRARIES.keys() >= set(endings):
         accepted = "a file that ends in .mcap (the recording) or .rrd (a view for Rerun), or one of each with a comma"
         raise InputError("record", names, accepted)
     return files
@@ -48,15 +52,14 @@ def make_recorders(
     # What can be refused is refused before an earlier recording is overwritten.
     for file in recording_names(names):
         _check_place(file)
-        if Path(file).suffix.lower() == ".rrd" and importlib.util.find_spec("rerun") is None:
-            raise InputError("record", is_missing("rerun-sdk", "rerun"))
+        module, package, extra = LIBRARIES[Path(file).suffix.lower()]
+        if importlib.util.find_spec(module) is None:
+            raise InputError("record", is_missing(package, extra))
     with ExitStack() as opened:
         for file in recording_names(names):
             if Path(file).suffix.lower() == ".mcap":
-                try:
-                    from ..session.mcap_observer import McapObserver
-                except ImportError:
-                    raise InputError("record", is_missing("mcap", "mcap")) from None
+                from ..session.mcap_observer import McapObserver
+
                 recorder: WritingObserver = McapObserver(file, node_name, parameters, on_error, simulated_log, files)
             else:
                 from .observer import FileRecorder

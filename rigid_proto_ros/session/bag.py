@@ -17,15 +17,18 @@ from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from pathlib import Path
 
-import zstandard
-from mcap import records
-from mcap.stream_reader import StreamReader, breakup_chunk
-from mcap.writer import MCAP0_MAGIC, Writer
-
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.files import is_same_file, output_file, whole_file
 from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_stamp, read_state, read_string
 from .recorded_session import RecordedSession, decode_event
+
+try:
+    import zstandard
+    from mcap import records
+    from mcap.stream_reader import StreamReader, breakup_chunk
+    from mcap.writer import MCAP0_MAGIC, Writer
+except ImportError:
+    raise InputError("session", is_missing("mcap", "mcap")) from None
 
 ROS_PROFILE = "ros2"
 
