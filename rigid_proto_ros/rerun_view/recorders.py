@@ -95,14 +95,11 @@ def record(
 
     Raises InputError for a session without a scene and a file that can't be written.
     """
-    from ..session.recorded_session import play, recorded_parameters, resimulation
+    from ..session.recorded_session import check_playable, play, recorded_parameters
 
     # What is refused is refused before a recording of an earlier flight is overwritten.
     for session in runs:
-        if given is None and (session.missing or not session.scene):
-            raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
-        if given is None:
-            resimulation(session)
+        check_playable(session, given)
     total = sum(session.states.count for session in runs)
     told, last = 0, runs[-1]
 

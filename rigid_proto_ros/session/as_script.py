@@ -63,9 +63,9 @@ def script_of_session(session: RecordedSession) -> SceneAndScript:
     writer = _Writer()
     again = writer.again = resimulation(session, writer)
     scenario = writer.last = again.scenario
-    again.advance(again.end_ns)
+    again.finish()
     if writer.lines != session.lines:
-        raise InputError("events", f"{len(session.lines)} lines", "all lines of the log since the start or a reset")
+        raise InputError("events", f"{len(session.events)} lines", "all lines of the log since the start or a reset")
     # What differs from the defaults, without what belongs to the running node.
     values = {
         name: value

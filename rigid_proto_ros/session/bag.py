@@ -3,7 +3,7 @@
 they were cut, and the runs in them: a reset starts simulated time again, and a recording holds it all in one. What is
 whole of a cut file is written anew.
 
-A file is read once for all but the states, which are many: they are read again where they are needed.
+A file is read once for all but states and events, which may be many: they are read again where they are needed.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 from ..base.errors import InputError, is_missing
 from ..base.files import is_same_file, output_file, whole_file
@@ -202,7 +203,9 @@ class _Span:
 
 @dataclass
 class _Cut:
-    """Where a run may begin: log [ns], and how many messages of each state topic lie before it in the file."""
+    """Where a run may begin: log [ns], and how many messages of each state topic and how many events lie before it in
+    the file.
+    """
 
     log: int
     counts: dict[str, int]
@@ -210,30 +213,42 @@ class _Cut:
 
 @dataclass
 class _Body:
-    """Topics below one prefix. events and scenes: (log [ns], text). names: the topics declared, without the prefix.
-    spans and counts: by state topic; cut: a reset has come since its last message.
+    """Topics below one prefix. names: those declared, without the prefix. scenes: (log [ns], text). spans: by state
+    topic; counts: of messages, by topic; cut: state topics since whose last message a reset has come. undecodable: what
+    is wrong with the first event that can't be decoded; timeouts: there are such events; offset: a clock was followed.
     """
 
     names: set[str] = field(default_factory=set)
-    events: list[tuple[int, str]] = field(default_factory=list)
     scenes: list[tuple[int, str]] = field(default_factory=list)
     resets: list[_Cut] = field(default_factory=list)
     spans: dict[str, list[_Span]] = field(default_factory=lambda: {name: [] for name in PROJECTIONS})
-    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(PROJECTIONS, 0))
+    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys((*PROJECTIONS, "events"), 0))
     cut: set[str] = field(default_factory=set)
+    undecodable: InputError | None = None
+    timeouts: bool = False
+    offset: bool = False
 
     def take(self, name: str, topic: str, log: int, data: bytes) -> None:
         """A message; raises InputError for one that can't be decoded."""
         if name == "scene":
             self.scenes.append((log, read_string(data, topic)))
         elif name == "events":
-            line = read_string(data, topic)
-            self.events.append((log, line))
-            if _is_reset(line):
-                self.resets.append(_Cut(log, dict(self.counts)))
-                self.cut = set(PROJECTIONS)
+            self._take_event(log, read_string(data, topic))
         else:
             self._take_state(name, log, read_stamp(data, topic))
+
+    def _take_event(self, log: int, line: str) -> None:
+        kind, content = "", dict[str, Any]()
+        try:
+            _, kind, content = decode_event(line, self.counts["events"] + 1)
+        except InputError as error:  # said where this body is the one that counts
+            self.undecodable = self.undecodable or error
+        self.timeouts |= kind == "timeout"
+        self.offset |= kind == "clock" and bool(content.get("offset_ns"))
+        if kind == "reset":
+            self.resets.append(_Cut(log, dict(self.counts)))
+            self.cut = set(PROJECTIONS)
+        self.counts["events"] += 1
 
     def _take_state(self, name: str, log: int, stamp_ns: int) -> None:
         spans = self.spans[name]
@@ -245,13 +260,6 @@ class _Body:
             spans[-1].end_ns = stamp_ns
             spans[-1].states += 1
         self.counts[name] += 1
-
-
-def _is_reset(line: str) -> bool:
-    try:
-        return decode_event(line, 0)[1] == "reset"
-    except InputError:  # said with its number where this body is the one that counts
-        return False
 
 
 @dataclass
@@ -295,14 +303,14 @@ def _read(path: Path) -> _Content:
     return content
 
 
-# States, read again
+# States and events, read again
 
 
-class _StateReader:
-    """The states of one body in a recording, by run. Runs that are read in their order take one pass over the file;
-    what is kept in memory is by how much one topic is ahead of another in it.
+class _Reader:
+    """Messages of one body in a recording, by run. Runs that are read in their order take one pass over the file; what
+    is kept in memory is by how much one topic is ahead of another in it.
 
-    names: state topics of the body, by topic.
+    names: topics without their prefix, by topic.
     """
 
     def __init__(self, path: Path, names: Mapping[str, str]) -> None:
@@ -315,10 +323,28 @@ class _StateReader:
         self._wanted = dict(self._read)
         self._waiting: dict[str, deque[tuple[str, bytes]]] = {name: deque() for name in self._read}
 
-    def rows(self, ranges: Mapping[str, range]) -> Iterator[tuple[int, str, list[float]]]:
-        """Stamp [ns], name and row of the messages with these numbers by topic, in the order of time. Ends what was
-        read before. Raises InputError for one that can't be decoded.
+    def states(self, ranges: Mapping[str, range]) -> Iterator[tuple[int, str, list[float]]]:
+        """Stamp [ns], name and row of the messages with these numbers by state topic, in the order of time. Raises
+        InputError for one that can't be decoded.
         """
+        self._begin(ranges)
+        # Stable: of one time in the order of the topics.
+        return heapq.merge(*(self._states(name, len(own)) for name, own in ranges.items()), key=itemgetter(0))
+
+    def _states(self, name: str, count: int) -> Iterator[tuple[int, str, list[float]]]:
+        for topic, data in self._messages(name, count):
+            stamp_ns, row = read_state(name, data, topic)
+            yield stamp_ns, name, row
+
+    def events(self, numbers: range) -> Iterator[tuple[int, str]]:
+        """time_ns and line of the events with these numbers."""
+        self._begin({"events": numbers})
+        for number, (topic, data) in enumerate(self._messages("events", len(numbers)), 1):
+            line = read_string(data, topic)
+            yield decode_event(line, number)[0], line
+
+    def _begin(self, ranges: Mapping[str, range]) -> None:
+        """Come to the beginnings of these ranges; ends what was read before."""
         if any(own.start < self._read[name] - len(self._waiting[name]) for name, own in ranges.items()):
             self._rewind()
         for name, own in ranges.items():
@@ -326,20 +352,16 @@ class _StateReader:
             for _ in range(min(len(waiting), own.start - (self._read[name] - len(waiting)))):
                 waiting.popleft()
             self._wanted[name] = own.start
-        # Stable: of one time in the order of the topics.
-        return heapq.merge(*(self._topic_rows(name, len(own)) for name, own in ranges.items()), key=itemgetter(0))
 
-    def _topic_rows(self, name: str, count: int) -> Iterator[tuple[int, str, list[float]]]:
+    def _messages(self, name: str, count: int) -> Iterator[tuple[str, bytes]]:
         waiting = self._waiting[name]
         for _ in range(count):
             while not waiting:
                 self._read_on()
-            topic, data = waiting.popleft()
-            stamp_ns, row = read_state(name, data, topic)
-            yield stamp_ns, name, row
+            yield waiting.popleft()
 
     def _read_on(self) -> None:
-        """Come to the next message of a state topic."""
+        """Come to the next message of one of the topics."""
         for _, topic, message_type, record in self._records:
             name = self._names.get(topic)
             if name is None or not isinstance(record, records.Message) or READ[name] != message_type:
@@ -354,7 +376,7 @@ class _StateReader:
 class _RunStates:
     """The states of one run (``recorded_session.States``)."""
 
-    def __init__(self, reader: _StateReader, ranges: Mapping[str, range], spans: Mapping[str, list[_Span]]) -> None:
+    def __init__(self, reader: _Reader, ranges: Mapping[str, range], spans: Mapping[str, list[_Span]]) -> None:
         self._reader = reader
         self._ranges = {name: own for name, own in ranges.items() if own}
         self.topics = tuple(self._ranges)
@@ -365,7 +387,20 @@ class _RunStates:
         self.end_ns = max((span.end_ns for span in every), default=0)
 
     def __iter__(self) -> Iterator[tuple[int, str, list[float]]]:
-        return self._reader.rows(self._ranges)
+        return self._reader.states(self._ranges)
+
+
+class _RunEvents:
+    """The events of one run (``recorded_session.Events``). numbers: theirs, among all of the body."""
+
+    def __init__(self, reader: _Reader, numbers: range) -> None:
+        self._reader, self._numbers = reader, numbers
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __iter__(self) -> Iterator[tuple[int, str]]:
+        return self._reader.events(self._numbers)
 
 
 # Runs
@@ -384,16 +419,17 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
     content = _read(path)
     prefix = _prefix(content, str(path), node)
     body, ours = content.bodies[prefix], MADE_WITH in content.metadata
-    events, scenes = (sorted(found, key=itemgetter(0)) for found in (body.events, body.scenes))
-    decoded = [decode_event(line, number) for number, (_, line) in enumerate(events, 1)]
-    if not ours and any(kind == "clock" and told.get("offset_ns") for _, kind, told in decoded):
+    if body.undecodable:
+        raise body.undecodable
+    if not ours and body.offset:
         accepted = "a recording by the parameter record; the stamps of these topics are those of a followed /clock"
         raise InputError("session", str(path), accepted)
+    scenes = sorted(body.scenes, key=itemgetter(0))
     names = [name for name in PROJECTIONS if body.counts[name]]
     # A topic without messages may be whole: nobody did anything. A latched one is never without.
     there = {"scene": bool(scenes), "events": "events" in body.names, "pose": bool(names)}
-    resets = sorted(body.resets, key=lambda reset: reset.log)
-    if not events and names:
+    resets = body.resets
+    if not body.counts["events"] and names:
         resets = [span.back for span in body.spans[names[0]] if span.back]
     whole = RecordedSession(
         complete=content.complete,
@@ -401,32 +437,31 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
         missing=tuple(f"{prefix}/{name}" for name, is_there in there.items() if not is_there),
         attachments=content.attachments,
         made_with=content.metadata.get(MADE_WITH, {}),
+        logs_timeouts=body.timeouts,
         folder=path.absolute().parent,
     )
     # Our own recorder writes all topics in the order in which they were told; another one gets each topic by itself.
     cuts = {name: _cuts(name, body, [] if ours else body.spans[name], resets) for name in names}
-    reader = _StateReader(path, {f"{prefix}/{name}": name for name in names})
+    cuts["events"] = [0, *(reset.counts["events"] for reset in resets), body.counts["events"]]
+    state_reader = _Reader(path, {f"{prefix}/{name}": name for name in names})
+    event_reader = _Reader(path, {f"{prefix}/events": "events"})
     runs = []
-    edges = [None, *(reset.log for reset in resets), None]
-    for k, (begin, end) in enumerate(zip(edges, edges[1:], strict=False)):
+    for k, begin in enumerate([None, *(reset.log for reset in resets)]):
         # The scene in force at a reset; at the recording's own start the first one that it holds. Logged at simulated
         # time, a run's first scene comes before those that it is changed to at time 0.
         before = [text for log, text in scenes if begin is not None and log < begin]
         at_reset = [text for log, text in scenes if log == begin]
         in_force = [*at_reset[:1], *before[-1:], *(text for _, text in scenes[:1])]
+        numbers = {name: range(own[k], own[k + 1]) for name, own in cuts.items()}
         run = replace(
             whole,
             scene=in_force[0] if in_force else "",
             scenes=[text for log, text in scenes if begin is None or log >= begin],
             accuracy_floor=content.metadata.get(FLOOR.format(k), {}).get("floor", ""),
-            events=[
-                (time_ns, line)
-                for (log, line), (time_ns, _, _) in zip(events, decoded, strict=True)
-                if (begin is None or log >= begin) and (end is None or log < end)
-            ],
-            states=_RunStates(reader, {name: range(own[k], own[k + 1]) for name, own in cuts.items()}, body.spans),
+            events=_RunEvents(event_reader, numbers.pop("events")),
+            states=_RunStates(state_reader, numbers, body.spans),
         )
-        if run.events or run.states.topics:
+        if len(run.events) or run.states.topics:
             runs.append(run)
     return runs or [whole]
 

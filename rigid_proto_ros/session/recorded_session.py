@@ -8,8 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from array import array
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -36,6 +35,14 @@ from .messages import PROJECTIONS
 
 SAME = 1e-6
 """[m, and of a quaternion's parts] How near a computed state must be to a recorded one to be the same."""
+
+
+class Events(Protocol):
+    """The events of one run, read anew by each pass over them: (time [ns, simulated], line as logged), in order."""
+
+    def __len__(self) -> int: ...
+
+    def __iter__(self) -> Iterator[tuple[int, str]]: ...
 
 
 class States(Protocol):
@@ -113,12 +120,12 @@ class RecordedSession:
     states: those that were published. complete: the file was finished properly. scenes: the texts of the scene topic
     from the run's start on, in order. node_name: what stands before the topics' names. missing: topics that a check
     would need. attachments: (name, bytes) of files inside; made_with: the processor, and versions by package;
-    accuracy_floor: why the motion is held to less than its accuracy, as an .mcap of ours says it; folder: where the
-    session lies.
+    accuracy_floor: why the motion is held to less than its accuracy, as an .mcap of ours says it; logs_timeouts: the
+    events have timeouts among them, as those of earlier versions haven't; folder: where the session lies.
     """
 
     scene: str = ""
-    events: list[tuple[int, str]] = field(default_factory=list)
+    events: Events = field(default_factory=list)
     states: States = NO_STATES
     complete: bool = True
     scenes: list[str] = field(default_factory=list)
@@ -127,11 +134,12 @@ class RecordedSession:
     attachments: list[tuple[str, bytes]] = field(default_factory=list)
     made_with: dict[str, str] = field(default_factory=dict)
     accuracy_floor: str = ""
+    logs_timeouts: bool = True
     folder: Path | None = None
 
     @property
     def lines(self) -> list[str]:
-        """The event lines as logged."""
+        """The event lines as logged, in memory."""
         return [line for _, line in self.events]
 
     @property
@@ -288,47 +296,90 @@ def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
     return find
 
 
+_Waiting = tuple[int, str, dict[str, Any], Command | None, int]
+"""time_ns, kind, content, command (None for a mark) and number of an event."""
+
+
+def decoded_events(
+    event_lines: Iterable[str], frames: tuple[str, str]
+) -> Iterator[tuple[int, int, str, dict[str, Any], Command | None]]:
+    """Number from 1, time_ns, kind, content and command (None for a mark) of lines of the event log. frames: names of
+    the world's and the body's. Raises InputError for those that can't be decoded.
+    """
+    for number, line in enumerate(event_lines, 1):
+        time_ns, kind, content = decode_event(line, number)
+        try:
+            if kind == "set":
+                convert_all(content)
+            command = None if kind == "timeout" else of_event(kind, content, frames)
+        except InputError as error:
+            raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
+        yield number, time_ns, kind, content, command
+
+
+class _Upcoming:
+    """The items of an iterator as a queue, of which only the first one has been made."""
+
+    def __init__(self, items: Iterator[_Waiting]) -> None:
+        self._items = items
+        self._first = next(items, None)
+
+    def __bool__(self) -> bool:
+        return self._first is not None
+
+    def __getitem__(self, index: int) -> _Waiting:
+        assert index == 0 and self._first is not None
+        return self._first
+
+    def popleft(self) -> _Waiting:
+        first, self._first = self[0], next(self._items, None)
+        return first
+
+
 class Resimulation(ScenarioRun):
     """A session's simulation; its commands are submitted when their time has come, as they were then. Raises InputError
     for events that can't be decoded.
 
-    mesh_of(name) gives the mesh that a change names, or None to load it. end_ns: when all events have acted.
+    event_lines: in the order of time, read as the flight comes to them. mesh_of(name) gives the mesh that a change
+    names, or None to load it. logs_timeouts: the recording has events of timeouts, as those of earlier versions
+    haven't. end_ns: when all events that have been read have acted.
     """
 
     def __init__(
         self,
         scenario: Scenario,
-        event_lines: Sequence[str],
+        event_lines: Iterable[str],
         observer: Observer | None = None,
         mesh_of: Callable[[str], Mesh | None] = lambda _: None,
         node_name: str = "rigid_body",
+        logs_timeouts: bool = True,
     ) -> None:
         super().__init__(scenario, observer)
-        # Recordings from before there were such events have none.
-        self.simulation.logs_timeouts = False
+        self.simulation.logs_timeouts = logs_timeouts
         self.frames = frame_names(scenario.parameters, node_name)
         self._mesh_of = mesh_of
         self._changes_ns = -1
         self.end_ns = 0
-        waiting: list[tuple[int, str, dict[str, Any], Command | None, int]] = []
-        for number, line in enumerate(event_lines, 1):
-            time_ns, kind, content = decode_event(line, number)
-            if kind == "timeout":
-                # It comes by itself, where it belongs: one that a change brings about comes behind that.
-                self.simulation.logs_timeouts = True
-                self.end_ns = max(self.end_ns, time_ns + 1)
-                continue
-            try:
-                if kind == "set":
-                    convert_all(content)
-                command = of_event(kind, content, self.frames)
-            except InputError as error:
-                raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
+        self._waiting = _Upcoming(self._to_come(event_lines))
+
+    def _to_come(self, event_lines: Iterable[str]) -> Iterator[_Waiting]:
+        for number, time_ns, kind, content, command in decoded_events(event_lines, self.frames):
             # A mark is made before what acts at its time, which the recording may not have come to.
-            self.end_ns = max(self.end_ns, time_ns + (command is not None))
-            waiting.append((time_ns, kind, content, command, number))
-        # Stable: what happened at one instant keeps its order.
-        self._waiting = deque(sorted(waiting, key=itemgetter(0)))
+            self.end_ns = max(self.end_ns, time_ns + (command is not None or kind == "timeout"))
+            # A timeout comes by itself, where it belongs: one that a change brings about comes behind that.
+            if kind != "timeout":
+                yield time_ns, kind, content, command, number
+
+    @property
+    def all_read(self) -> bool:
+        """Whether no event waits any more."""
+        return not self._waiting
+
+    def finish(self) -> StateRow:
+        """Advance to where all events have acted, at least; returns the state row there."""
+        while not self.all_read:
+            self.advance(self.end_ns)
+        return self.advance(max(self.end_ns, self.simulation.time_ns))
 
     def advance(self, until_ns: int) -> StateRow:
         """Advance the body to ``until_ns``; returns its state row, before what acts at that very time.
@@ -366,10 +417,28 @@ class Resimulation(ScenarioRun):
         return self.replace(self.scenario.with_changes(command.content, mesh))
 
 
-def resimulation(session: RecordedSession, observer: Observer | None = None) -> Resimulation:
-    """The session's simulation at its start; raises InputError for events that can't be decoded."""
-    scenario = session_scenario(session)
-    return Resimulation(scenario, session.lines, observer, mesh_finder(session), session.node_name)
+def resimulation(
+    session: RecordedSession, observer: Observer | None = None, lines: Iterable[str] | None = None
+) -> Resimulation:
+    """The session's simulation at its start; raises InputError for events that can't be decoded, when it comes to them.
+    lines: the session's, where somebody else reads them, too.
+    """
+    lines = (line for _, line in session.events) if lines is None else lines
+    mesh_of, scenario = mesh_finder(session), session_scenario(session)
+    return Resimulation(scenario, lines, observer, mesh_of, session.node_name, session.logs_timeouts)
+
+
+def check_playable(session: RecordedSession, given: Scenario | None = None) -> None:
+    """Raise InputError for a session that can't be played: without a scene, unless one is given, or with events that
+    can't be decoded.
+    """
+    if given is not None:
+        return
+    if session.missing or not session.scene:
+        raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
+    frames = frame_names(session_scenario(session).parameters, session.node_name)
+    for _ in decoded_events((line for _, line in session.events), frames):
+        pass
 
 
 def _begins_at_start(session: RecordedSession) -> bool:
@@ -429,4 +498,4 @@ def play(
         again.publish(time_ns, computed if alike else row)
     if again is not None and all_events:
         with suppress(InputError):
-            again.advance(max(again.end_ns, again.simulation.time_ns))
+            again.finish()

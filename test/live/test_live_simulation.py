@@ -419,7 +419,7 @@ def test_a_recording_of_a_motion_that_failed_is_verified_with_what_was_asked_for
     live.stop()
     (run,) = read_runs(path)
     assert json.loads(run.lines[-1])["kind"] == "step"
-    assert run.events[-1][0] > run.end_ns
+    assert list(run.events)[-1][0] > run.end_ns
     assert verify(run) is None
 
 

@@ -393,6 +393,6 @@ def test_wrenches_and_thrusters_that_a_change_of_their_timeout_ends_are_verified
     )
     assert main(["simulate", str(scene), "--script", str(script), "--duration", "1", "--bag", str(session)]) == 0
     (run,) = read_runs(session)
-    kinds = [(time_ns, json.loads(line)["kind"]) for time_ns, line in run.events[2:]]
+    kinds = [(time_ns, json.loads(line)["kind"]) for time_ns, line in list(run.events)[2:]]
     assert kinds == [(SECOND // 2, "set"), (SECOND // 2, "timeout"), (SECOND // 2, "timeout")]
     assert verify(run) is None

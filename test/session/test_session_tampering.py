@@ -24,7 +24,7 @@ from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.bag import read_runs
-from rigid_proto_ros.session.check import broken_link, verify
+from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
 from rigid_proto_ros.session.messages import FIELDS
 from rigid_proto_ros.session.recorded_session import RecordedSession
@@ -105,12 +105,11 @@ def test_with_hashes_made_to_fit_the_motion_or_a_refusal_still_tells(session, fo
         if number == 0:
             event["content"]["force"][1] = force
         events.append((time_ns, log.append(event["time_ns"], event["kind"], event["content"])))
-    assert broken_link([line for _, line in events]) is None
     assert re.match(words, str(verify(replace(session, events=events))))
 
 
 def test_events_added_dropped_or_swapped_are_found(session):
-    lines = session.events
+    lines = list(session.events)
     for events in (lines[1:], [*lines[:3], *lines[4:]], [lines[1], lines[0], *lines[2:]], [lines[0], *lines]):
         assert verify(replace(session, events=events)) is not None
 
