@@ -33,6 +33,9 @@ from ..simulation.observer import BodyChanged, Observer, Published
 from ..simulation.setup import Setup
 from .messages import PROJECTIONS
 
+ROUNDING = 1e-12
+"""What the way of a velocity into a topic's axes and back changes, of it and of 1."""
+
 SAME = 1e-6
 """[m, and of a quaternion's parts] How near a computed state must be to a recorded one to be the same."""
 
@@ -455,6 +458,15 @@ def _begins_at_start(session: RecordedSession) -> bool:
     return bool(np.abs(computed[:7] - row[:7]).max() < SAME)
 
 
+def _alike(topics: list[str], one: list[float], other: list[float]) -> bool:
+    """Whether these topics would publish the same of both states, but for rounding."""
+    return all(
+        abs(a - b) <= ROUNDING * (1.0 + abs(b))
+        for topic in topics
+        for a, b in zip(PROJECTIONS[topic](one), PROJECTIONS[topic](other), strict=True)
+    )
+
+
 def play(
     session: RecordedSession,
     observer: Observer,
@@ -479,6 +491,7 @@ def play(
         again.announce()
         if again.scenario.ghost is not None and _begins_at_start(session):
             again.begin_ghost()
+    topics = [topic for topic in session.states.topics if topic]
     for count, (time_ns, row) in enumerate(session.state_rows()):
         progress(count, session.states.count)
         if again is None:
@@ -490,12 +503,7 @@ def play(
             # A command that is refused here: from now on only the recorded states are shown.
             computed = row
         # A recording holds of a state what was published of it, and no more.
-        topics = [topic for topic in session.states.topics if topic]
-        alike = bool(topics) and all(
-            np.allclose(PROJECTIONS[name](computed.tolist()), PROJECTIONS[name](row.tolist()), rtol=1e-12, atol=1e-12)
-            for name in topics
-        )
-        again.publish(time_ns, computed if alike else row)
+        again.publish(time_ns, computed if topics and _alike(topics, computed.tolist(), row.tolist()) else row)
     if again is not None and all_events:
         with suppress(InputError):
             again.finish()
