@@ -21,7 +21,7 @@ from typing import Any
 from ..base.errors import InputError, is_missing
 from ..base.files import is_same_file, output_file, whole_file
 from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_stamp, read_state, read_string
-from .recorded_session import RecordedSession, decode_event
+from .recorded_session import RecordedSession, States, decode_event
 
 try:
     import zstandard
@@ -158,12 +158,9 @@ def _files(path: Path) -> list[Path]:
     return files
 
 
-def _all_records(path: Path) -> Iterator[tuple[bool, str, str, records.McapRecord]]:
-    """The records of a recording's files in their order: (of the last file, topic and type of a message or channel,
-    record).
-    """
-    files = _files(path)
-    for file in files:
+def _all_records(path: Path) -> Iterator[tuple[str, str, records.McapRecord]]:
+    """The records of a recording's files in their order: topic and type of a message or channel, and the record."""
+    for file in _files(path):
         schemas: dict[int, str] = {}
         channels: dict[int, tuple[str, str]] = {}
         for record in _whole_records(file):
@@ -174,18 +171,18 @@ def _all_records(path: Path) -> Iterator[tuple[bool, str, str, records.McapRecor
                 schemas[record.id] = record.name
             elif isinstance(record, records.Channel):
                 topic, message_type = channels[record.id] = record.topic, schemas.get(record.schema_id, "")
-            yield file is files[-1], topic, message_type, record
+            yield topic, message_type, record
 
 
 def has_scene(path: Path) -> bool:
     """Whether a bag contains a scene, as those recorded by this package do; raises InputError."""
     return any(
         isinstance(record, records.Message) and topic.rpartition("/")[2] == "scene" and kind == READ["scene"]
-        for _, topic, kind, record in _all_records(path)
+        for topic, kind, record in _all_records(path)
     )
 
 
-# What a file holds of a body, but for its states
+# What a file holds of a body, but for its states and events
 
 
 @dataclass
@@ -277,7 +274,7 @@ class _Content:
 
 def _read(path: Path) -> _Content:
     content, footers = _Content(), 0
-    for _, topic, message_type, record in _all_records(path):
+    for topic, message_type, record in _all_records(path):
         prefix, slash, name = topic.rpartition("/")
         ours = slash and READ.get(name) == message_type
         if isinstance(record, records.Message):
@@ -362,7 +359,7 @@ class _Reader:
 
     def _read_on(self) -> None:
         """Come to the next message of one of the topics."""
-        for _, topic, message_type, record in self._records:
+        for topic, message_type, record in self._records:
             name = self._names.get(topic)
             if name is None or not isinstance(record, records.Message) or READ[name] != message_type:
                 continue
@@ -373,8 +370,8 @@ class _Reader:
         raise InputError("session", str(self._path), "a recording that stays as it is while it is read")
 
 
-class _RunStates:
-    """The states of one run (``recorded_session.States``)."""
+class _RunStates(States):
+    """The states of one run. ranges: the numbers of its messages, by topic; spans: of the whole body."""
 
     def __init__(self, reader: _Reader, ranges: Mapping[str, range], spans: Mapping[str, list[_Span]]) -> None:
         self._reader = reader

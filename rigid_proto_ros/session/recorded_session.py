@@ -48,71 +48,37 @@ class Events(Protocol):
     def __iter__(self) -> Iterator[tuple[int, str]]: ...
 
 
-class States(Protocol):
+class States:
     """The states of one run, read anew by each pass over them: time [ns, simulated], topic and row, in the order of
-    time.
+    time. These are none.
 
     Of a recording a row is what the topic published (``messages.PROJECTIONS``); of a run in memory the topic is "" and
-    the row the state's own, in ``simulation/observer.py``'s ``STATE_FIELDS`` order.
-
+    the row the state's own, in ``simulation/observer.py``'s ``STATE_FIELDS`` order. topics: those with any states;
+    count: how many times there are; first_ns, end_ns: the first and the last.
     """
 
-    @property
-    def topics(self) -> tuple[str, ...]:
-        """Those with any states."""
+    topics: tuple[str, ...] = ()
+    count = first_ns = end_ns = 0
 
-    @property
-    def count(self) -> int:
-        """How many times there are."""
-
-    @property
-    def first_ns(self) -> int:
-        """The first time [ns]; 0 without states."""
-
-    @property
-    def end_ns(self) -> int:
-        """The last time [ns]; 0 without states."""
-
-    def __iter__(self) -> Iterator[tuple[int, str, Sequence[float]]]: ...
+    def __iter__(self) -> Iterator[tuple[int, str, Sequence[float]]]:
+        return iter(())
 
 
-@dataclass(frozen=True)
-class StateRows:
-    """States, or what one topic published of them, in memory: times (n,) int64 [ns, simulated] and rows (n, k) float64.
-    Those of a run are in the order of time.
+class StateRows(States):
+    """States, or what one topic published of them, in memory: times (n,) int64 [ns, simulated], ascending, and rows
+    (n, k) float64.
     """
 
-    times: IntArray
-    rows: FloatArray
+    def __init__(self, times: IntArray, rows: FloatArray) -> None:
+        self.times, self.rows, self.count = times, rows, len(times)
+        if self.count:
+            self.topics, self.first_ns, self.end_ns = ("",), int(times[0]), int(times[-1])
 
     def __len__(self) -> int:
-        return len(self.times)
-
-    @property
-    def topics(self) -> tuple[str, ...]:
-        """See ``States``."""
-        return ("",) if len(self) else ()
-
-    @property
-    def count(self) -> int:
-        """See ``States``."""
-        return len(self)
-
-    @property
-    def first_ns(self) -> int:
-        """See ``States``."""
-        return int(self.times[0]) if len(self) else 0
-
-    @property
-    def end_ns(self) -> int:
-        """See ``States``."""
-        return int(self.times[-1]) if len(self) else 0
+        return self.count
 
     def __iter__(self) -> Iterator[tuple[int, str, Sequence[float]]]:
         return ((time_ns, "", row.tolist()) for time_ns, row in zip(self.times.tolist(), self.rows, strict=True))
-
-
-NO_STATES = StateRows(np.empty(0, np.int64), np.empty((0, 13)))
 
 
 @dataclass
@@ -129,7 +95,7 @@ class RecordedSession:
 
     scene: str = ""
     events: Events = field(default_factory=list)
-    states: States = NO_STATES
+    states: States = field(default_factory=States)
     complete: bool = True
     scenes: list[str] = field(default_factory=list)
     node_name: str = "rigid_body"
