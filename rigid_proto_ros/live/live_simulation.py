@@ -281,7 +281,7 @@ class LiveSimulation:
         try:
             finished = self.call(change)
         except InputError:
-            _close(recorders)
+            _close([recorder for recorder in recorders if recorder not in self._recorders])
             raise
         _close(finished)
         self.endpoints.parameters_changed()
@@ -318,13 +318,17 @@ class LiveSimulation:
     # The recording, which can be changed in flight
 
     def _open_recorders(self, scenario: Scenario) -> list[WritingObserver]:
-        """The recorders that ``record`` asks for; raises InputError when a file can't be written."""
-        names = scenario.parameters.record
-        if not names:
+        """The recorders that ``record`` asks for, of which those that record already go on; raises InputError when a
+        file can't be written.
+        """
+        if not scenario.parameters.record:
             return []
-        from ..rerun_view.recorders import make_recorders
+        from ..rerun_view.recorders import make_recorders, recording_names
 
-        return make_recorders(names, self.name, scenario.parameters, self._recording_failed)
+        names = recording_names(scenario.parameters.record)
+        going_on = [recorder for recorder in self._recorders if recorder.place in names]
+        new = ",".join(name for name in names if name not in (recorder.place for recorder in going_on))
+        return going_on + make_recorders(new, self.name, scenario.parameters, self._recording_failed)
 
     def _switch_recording(self, recorders: list[WritingObserver]) -> list[WritingObserver]:
         """On the physics thread: switch recorders; new ones are told what flies. Returns those that have finished; the

@@ -436,6 +436,20 @@ def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_
 
 
 @needs_rerun
+def test_a_view_comes_and_goes_beside_a_recording_that_goes_on(live, tmp_path):
+    from rerun_flight import drawn, verified
+
+    session, view = tmp_path / "flight.mcap", tmp_path / "flight.rrd"
+    for names in (f"{session}", f"{session},{view}", f"{session}", ""):
+        live.set_parameters({"record": names})
+        live.step(2)
+    (run,) = read_runs(session)
+    assert (np.asarray(run.times) // PERIOD_NS).tolist() == [1, 2, 3, 4, 5, 6]
+    assert run.complete and verify(run) is None
+    assert verified(view) and drawn(view) == [3 * PERIOD_NS, 4 * PERIOD_NS]
+
+
+@needs_rerun
 @pytest.mark.parametrize("lost", ["mcap", "rrd"])
 def test_of_recording_and_view_one_goes_on_where_the_other_is_lost(live, tmp_path, lost):
     from rerun_flight import drawn, verified
