@@ -30,7 +30,7 @@ kernels: setup ## build the kernels for this machine and for WebAssembly, and pa
 	@mkdir -p page/src
 	@$(PY) -m rigid_proto_ros.kernels native wasm --typescript page/src/kernels.ts
 
-run: $(FOR_RUN) ## simulate a bundled body, or MESH=path/to.obj, for 10 s; leaves out/session.rrd
+run: $(FOR_RUN) ## simulate a bundled body, or MESH=path/to.obj, for 10 s; leaves out/session.mcap (recording) and out/session.rrd (view)
 	@$(ROS) .venv/bin/rigid_proto demo $(if $(MESH),--mesh "$(MESH)")
 
 # 130 is how the two below end after Ctrl-C: for them no error, of which make would report.
@@ -56,7 +56,7 @@ lint: setup ## ruff and mypy
 	$(PY) -m mypy
 
 pictures: setup run ## draw the pictures of README and lessons anew (needs mesa-vulkan-drivers and chromium)
-	.venv/bin/rigid_proto snapshot out/session.rrd --at 4.05 -o docs/flight.png
+	.venv/bin/rigid_proto snapshot out/session.mcap --at 4.05 -o docs/flight.png
 	$(PY) docs/lessons/pictures.py
 	PYTHONPATH=test $(PY) docs/page_pictures.py docs
 

@@ -21,7 +21,7 @@ ARGUMENTS = (
     ("script", "", "poke script to send: a path, or the name of a bundled one; empty sends nothing"),
     ("reset", "true", "reset first, so that the script's times are simulated time itself"),
     ("viewer", "", "live view: none, web or native (Rerun), workbench (the interactive page); empty: the scene's"),
-    ("record", "", "record the session to this .rrd or .mcap file"),
+    ("record", "", "record to this .mcap file, or show it in this .rrd (Rerun), or both with a comma"),
     ("use_sim_time", "", "true: simulated time follows /clock; empty: as the scene has it"),
 )
 
@@ -43,7 +43,7 @@ def nodes(context: LaunchContext) -> list[Node]:
     from rigid_proto_ros.scene.scene_file import scene_file
 
     given = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
-    parameters = {name: given[name] for name in ("mesh", "viewer", "record") if given[name]}
+    parameters = {name: given[name] for name in ("mesh", "viewer") if given[name]}
     if given["use_sim_time"]:
         parameters["use_sim_time"] = given["use_sim_time"].lower() in ("true", "1", "yes")
     target = "/".join(["", *filter(None, [given["namespace"].strip("/"), given["name"]])])
@@ -53,6 +53,8 @@ def nodes(context: LaunchContext) -> list[Node]:
         name=given["name"],
         namespace=given["namespace"],
         parameters=[*_for_node(str(scene_file(given["scene"])), target), *filter(None, [parameters])],
+        # On its command line: a file of parameters records only below the working folder.
+        ros_arguments=["-p", f"record:={given['record']}"] if given["record"] else [],
         output="screen",
         # A client that waits for it would wait for ever.
         on_exit=Shutdown(),

@@ -27,7 +27,7 @@ needs_rerun = pytest.mark.skipif("rerun" in MISSING, reason="rerun-sdk is not in
 """For single tests that record to .rrd."""
 
 ENDINGS = [".mcap", pytest.param(".rrd", marks=needs_rerun)]
-"""Of the files that a session is recorded to."""
+"""Of the files that a flight is recorded to: the recording, and the view."""
 
 collect_ignore_glob = [file for files in MISSING.values() for file in files]
 

@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +119,7 @@ def wait_for(condition: Callable[[], Any]) -> Any:
 
 def flush(observer: Observer) -> None:
     """Wait until everything so far was handed to the file and the viewers."""
+    observer._write_at_s = 0.0
     own, passes = observer._write_what_waits, []
 
     def counted() -> None:
@@ -131,10 +132,39 @@ def flush(observer: Observer) -> None:
     observer._write_what_waits = own
 
 
+def record_batches(path: Path) -> Iterator[tuple[str, bool, Any]]:
+    """(entity, static, pyarrow record batch) of every chunk of an .rrd file, by Rerun's own reader."""
+    from rerun.chunk import RrdReader
+
+    reader = RrdReader(path)
+    (recording,) = reader.recordings()
+    for chunk in reader.stream(store=recording):
+        yield chunk.entity_path.lstrip("/"), chunk.is_static, chunk.to_record_batch()
+
+
+def verified(path: Path) -> bool:
+    """Whether Rerun's own program finds the file complete, index and all."""
+    from rigid_proto_ros.rerun_view.viewers import viewer_program
+
+    return subprocess.run([viewer_program(), "rrd", "verify", path], capture_output=True, check=False).returncode == 0
+
+
+def drawn(path: Path) -> list[int]:
+    """Times [ns] of the states that an .rrd file shows."""
+    from rigid_proto_ros.picture.style import BODY
+
+    return cells(path, BODY, "Transform3D:translation")[0]
+
+
+def texts(path: Path, entity: str) -> list[str]:
+    """Lines of a log, or documents, in an .rrd file."""
+    batches = (batch for name, _, batch in record_batches(path) if name == entity)
+    columns = [batch.column(name) for batch in batches for name in batch.schema.names if name.endswith(":text")]
+    return [cell[0] for column in columns for cell in column.to_pylist()]
+
+
 def cells(path: Path, entity: str, name: str, timeline: str = "sim_time") -> tuple[list[int], list]:
     """Times [ns] and values of a component over all chunks of an entity, what holds at all times left out."""
-    from rigid_proto_ros.rerun_view.rrd_reading import record_batches
-
     times, found = [], []
     for chunk_entity, static, batch in record_batches(path):
         if chunk_entity == entity and not static and name in batch.schema.names:
@@ -146,7 +176,6 @@ def cells(path: Path, entity: str, name: str, timeline: str = "sim_time") -> tup
 def meshes(path: Path) -> int:
     """How often the body's mesh was logged."""
     from rigid_proto_ros.picture.style import BODY_MESH
-    from rigid_proto_ros.rerun_view.rrd_reading import record_batches
 
     drawn = (batch for entity, _, batch in record_batches(path) if entity.startswith(BODY_MESH))
     return sum("Mesh3D:vertex_positions" in batch.schema.names for batch in drawn)

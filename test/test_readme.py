@@ -157,7 +157,7 @@ def test_rigid_proto_commands_run(
     for name in () if whole else ("snapshot", "lesson"):
         monkeypatch.setattr(f"rigid_proto_ros.cli.{name}.run", lambda args: 0)
     # As `make run` leaves one.
-    assert rigid_proto(["simulate", "t_handle", "--duration", "1", "--record", "out/session.rrd"]) == 0
+    assert rigid_proto(["simulate", "t_handle", "--duration", "1", "--record", "out/session.mcap"]) == 0
     # In the order of the page: a later one uses the recording of an earlier one.
     run = [c for c in commands() if words(c)[0].removeprefix(".venv/bin/") == "rigid_proto"]
     for command in dict.fromkeys(run):

@@ -29,7 +29,7 @@ def draw(page: Path) -> int:
     picture = str(page.with_suffix(".png"))
     snapshot = [
         "snapshot",
-        f"out/{page.stem}.rrd",
+        f"out/{page.stem}.mcap",
         "--at",
         moment[1],
         "--size",

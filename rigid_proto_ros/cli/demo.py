@@ -59,9 +59,10 @@ def run(args: argparse.Namespace) -> int:
 
     node_executable, client_executable = own_executable("rigid_body_node"), own_executable("poke_client")
     OUT.mkdir(exist_ok=True)
-    session = OUT / "session.rrd"
+    session, view = OUT / "session.mcap", OUT / "session.rrd"
     scene, script = write_demo(args.mesh) if args.mesh else (scene_path("t_handle"), example_path("flip_and_poke"))
-    session.unlink(missing_ok=True)
+    for file in (session, view):
+        file.unlink(missing_ok=True)
     # The last command has its time to act, and to be confirmed.
     until_s = max(args.duration, read_script(script)[-1].stamp_ns * 1e-9 + CONFIRM_S)
     print(f"rigid_body_node with {scene}, poke_client with {script}: {until_s:g} s", flush=True)
@@ -76,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
                 print(f"domain 0 is in use; this one is in ROS_DOMAIN_ID={held[0]}", flush=True)
         node = _start(
             [*node_executable, "--until", repr(until_s), "--ros-args", "--params-file", str(scene)]
-            + [*text_parameter("record", str(session.resolve())), "-p", "start_paused:=true"],
+            + [*text_parameter("record", f"{session.resolve()},{view.resolve()}"), "-p", "start_paused:=true"],
             environment,
             processes,
         )
@@ -87,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
             if process.poll():
                 print(f"rigid_proto demo: {name} ended with status {process.poll()}", file=sys.stderr)
                 return 1
-    return _report(session)
+    return _report(session, view)
 
 
 def _start(command: list[str], environment: dict[str, str], processes: contextlib.ExitStack) -> subprocess.Popen[bytes]:
@@ -145,16 +146,16 @@ def write_demo(mesh: str) -> tuple[Path, Path]:
     return scene_path, script_path
 
 
-def _report(session: Path) -> int:
+def _report(session: Path, view: Path) -> int:
     """Print a summary that is read from the recording."""
-    from ..rerun_view.rrd_reading import read_session
+    from ..session.bag import read_runs
     from .executables import as_typed
 
-    recorded = read_session(session)
-    if not len(recorded.times):
+    recorded = read_runs(session)[-1]
+    if not recorded.states.count:
         print(f"rigid_proto demo: {session} contains no states", file=sys.stderr)
         return 1
-    print(f"{len(recorded.times)} states and {len(recorded.events)} commands and services recorded")
-    print(f"Show it:              {as_typed('rerun')} {session}")
+    print(f"{recorded.states.count} states and {len(recorded.events)} commands and services recorded")
+    print(f"Show it:              {as_typed('rerun')} {view}")
     print(f"Check it bit for bit: {as_typed('rigid_proto')} replay {session} --verify")
     return 0

@@ -33,7 +33,7 @@ SENSORS = {"pose": "[@CHILD]", "imu": "", "wrench": "[@FRAME]"}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
-        "sessions", nargs="+", metavar="SESSION", help="recordings of this package (.rrd, .mcap), or bags of ROS 2 or 1"
+        "sessions", nargs="+", metavar="SESSION", help="recordings of this package (.mcap), or bags of ROS 2 or 1"
     )
     parser.add_argument("--mass", type=float, metavar="M", help="the mass [kg], if it is known")
     for sensor, frame in SENSORS.items():
@@ -101,15 +101,14 @@ def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], li
     """All flights of the sessions, and the scenarios of those recorded by this package."""
     from ..identify.bag_reading import bag_flight
     from ..identify.session_reading import session_flight
-    from ..rerun_view.session_files import is_bag, read_runs
+    from ..session.bag import check_session, read_runs
 
     flights, scenes = [], []
     for name in names:
         path = Path(name)
-        if not path.exists():
-            raise InputError("session", f"there is no file and no folder {name!r}")
+        check_session(path)
         runs = []
-        if not choice.topics and path.suffix != ".bag" and (not is_bag(path) or _has_scene(path)):
+        if not choice.topics and path.suffix != ".bag" and _has_scene(path):
             runs = [run for run in read_runs(path) if run.scene]
         if not runs:
             flights.append(bag_flight(path, choice))
@@ -125,9 +124,6 @@ def _flights(names: list[str], choice: Choice) -> tuple[list[MeasuredFlight], li
 
 def _has_scene(path: Path) -> bool:
     """Whether a bag contains a scene, as those recorded by this package do."""
-    from ..session.bag import read_bag
+    from ..session.bag import has_scene
 
-    if path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3"))):
-        return False
-    content = read_bag(path, lambda topic: topic.endswith("/scene"))
-    return any(topic.endswith("/scene") for topic in content.messages)
+    return path.suffix != ".db3" and not (path.is_dir() and any(path.glob("*.db3"))) and has_scene(path)

@@ -32,8 +32,8 @@ COMMANDS = {
 
 EXAMPLES = (
     ("rigid_proto inspect hammer", "mass, COM and inertia of a bundled mesh"),
-    ("rigid_proto simulate t_handle --record out/flight.rrd", "simulate a bundled scene, recorded for Rerun"),
-    ("rigid_proto replay out/flight.rrd --verify", "repeat the simulation, and compare every state bit for bit"),
+    ("rigid_proto simulate t_handle --record out/flight.mcap", "simulate a bundled scene, and record it"),
+    ("rigid_proto replay out/flight.mcap --verify", "repeat the simulation, and compare every state bit for bit"),
 )
 
 

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from ..session.recorded_session import RecordedSession
 
 EXAMPLES = (
-    ("rigid_proto replay out/flight.rrd --verify", "repeat the simulation, and compare every state bit for bit"),
-    ("rigid_proto replay out/flight.mcap --record out/seen.rrd", "a bag as a Rerun recording"),
+    ("rigid_proto replay out/flight.mcap --verify", "repeat the simulation, and compare every state bit for bit"),
+    ("rigid_proto replay out/flight.mcap --record out/seen.rrd", "draw it for Rerun"),
     (
-        "rigid_proto replay out/flight.rrd --at 4 --as-scene out/branch.yaml",
+        "rigid_proto replay out/flight.mcap --at 4 --as-scene out/branch.yaml",
         "the scene at 4 s, to continue with changes",
     ),
     ("rigid_proto replay out/flight.mcap --publish states --speed 20", "publish its states over ROS, 20 times as fast"),
@@ -35,7 +35,7 @@ EXAMPLES = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
-        "session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of ros2 bag record (file or folder)"
+        "session", metavar="SESSION", help="an .mcap recording, or a bag of ros2 bag record (file or folder)"
     )
     parser.add_argument("--scene", metavar="FILE", help="the scene, for a bag without one")
     parser.add_argument(
@@ -47,7 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--verify", action="store_true", help="repeat the simulation and compare; exit 1 at the first difference"
     )
-    parser.add_argument("--record", metavar="FILE", help="convert the session to .rrd (Rerun) or .mcap")
+    parser.add_argument(
+        "--record", metavar="FILE", help="draw the session into an .rrd (for Rerun), or write it anew as .mcap"
+    )
     parser.add_argument(
         "--repair", metavar="FILE", help="write a readable file with the complete part of a damaged session"
     )
@@ -66,23 +68,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print a summary of the session, and carry out the options."""
-    from ..rerun_view.session_files import read_runs, repair
-
     if (args.at is None) != (args.as_scene is None):
         raise InputError("--at", "needs --as-scene FILE.yaml, and --as-scene needs --at T")
     if args.speed is not None and args.publish != "states":
         raise InputError("--speed", "needs --publish states; a running node has real_time_factor")
-    _check_place("--record", args.record, args.session, check_writable)
+    for file in _recorded(args.record or ""):
+        _check_place("--record", file, args.session, check_writable)
     _check_place("--as-scene", args.as_scene, args.session, check_whole_file)
     check_exports(args)
+    from ..session.bag import read_runs, repair
+
     if args.repair:
-        repair(args.session, args.repair)
+        repair(Path(args.session), Path(args.repair))
     runs = read_runs(args.session, "" if args.publish == "commands" else args.node)
     given = _given_scene(args.scene, runs[-1])
     for number, session in enumerate(runs, 1):
         _print_session(args.session if len(runs) == 1 else f"{args.session}, run {number} of {len(runs)}", session)
     if args.record:
-        from ..rerun_view.session_files import record
+        from ..rerun_view.recorders import record
 
         with Progress(f"recording {args.record}") as progress:
             record(runs, args.record, given, progress.fraction)
@@ -104,19 +107,22 @@ def _check_place(option: str, file: str | None, session: str, check: Callable[[s
         check(option, file)
 
 
+def _recorded(names: str) -> list[str]:
+    from ..rerun_view.recorders import recording_names
+
+    return recording_names(names)
+
+
 def _print_session(name: str, session: RecordedSession) -> None:
-    times = session.times
-    span = f"{times.min() / 1e9:.9g} s to {times.max() / 1e9:.9g} s" if len(times) else "no time"
-    print(f"{name}: {len(times)} states, {span}; {len(session.events)} commands and services")
+    states = session.states
+    span = f"{states.first_ns / 1e9:.9g} s to {states.end_ns / 1e9:.9g} s" if states.count else "no time"
+    print(f"{name}: {states.count} states, {span}; {len(session.events)} commands and services")
     if not session.complete:
         print("  truncated: read up to where it was cut")
     if session.missing:
         print(printable(f"  without {', '.join(session.missing)}"))
     if session.accuracy_floor:
         print(printable(f"  the accuracy asked for is not held throughout: {session.accuracy_floor}"))
-    if session.refusals:
-        time_ns, line = session.refusals[-1]
-        print(printable(f"  commands refused: {len(session.refusals)}, the last at {time_ns / 1e9:.9g} s: {line}"))
 
 
 def _verify(runs: list[RecordedSession], args: argparse.Namespace) -> int:

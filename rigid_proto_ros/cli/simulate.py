@@ -18,7 +18,7 @@ from .exports import add_exports, asked, check_exports, write_exports
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
-    from ..rerun_view.session_files import Recorder
+    from ..scene.scenario import Scenario
 
 DURATION_NS = 10_000_000_000
 AFTER_SCRIPT_NS = 1_000_000_000
@@ -31,8 +31,8 @@ EXAMPLES = (
         "a scene with scripted pokes; prints one JSON object",
     ),
     (
-        'rigid_proto simulate hammer --set gravity="[0, 0, -9.81]" --duration 2 --record out/hammer.rrd',
-        "with gravity, recorded for Rerun",
+        'rigid_proto simulate hammer --set gravity="[0, 0, -9.81]" --record out/hammer.mcap,out/hammer.rrd',
+        "with gravity; a recording, and a view of it for Rerun",
     ),
 )
 
@@ -50,8 +50,12 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="change a parameter; may be repeated"
     )
-    parser.add_argument("--record", metavar="FILE.rrd", help="record the run for Rerun")
-    parser.add_argument("--bag", metavar="FILE.mcap", help="record the run as a bag of the node's topics")
+    parser.add_argument(
+        "--record",
+        metavar="FILE",
+        help="an .mcap: the recording, as a bag of the node's topics; an .rrd: a view for Rerun; or both with a comma",
+    )
+    parser.add_argument("--bag", metavar="FILE.mcap", help="the same as --record FILE.mcap, beside a --record FILE.rrd")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     add_exports(parser)
     parser.instead_of = _instead_of
@@ -67,14 +71,15 @@ def _instead_of(option: str) -> str:
 
 def run(args: argparse.Namespace) -> int:
     """Run the scene and print its end."""
-    from ..rerun_view.session_files import make_recorder
+    from ..rerun_view.recorders import make_recorders
     from ..scene.scenario import read_scene
     from ..scene.scenario_run import OfflineRun, run_with_progress, summary
     from ..scene.script import read_script
     from ..simulation.commands import nanoseconds
     from ..simulation.observer import Observers
 
-    scenario = read_scene(args.scene, dict(map(_setting, args.set)), _warn)
+    settings = dict(map(_setting, args.set))
+    scenario = read_scene(args.scene, settings, _warn)
     for warning in scenario.warnings:
         _warn(warning)
     script = read_script(args.script) if args.script else []
@@ -82,28 +87,26 @@ def run(args: argparse.Namespace) -> int:
     duration_ns = max(DURATION_NS, last_ns + AFTER_SCRIPT_NS) if args.duration is None else nanoseconds(args.duration)
     if beyond := sum(command.stamp_ns >= duration_ns for command in script):
         _warn(f"{beyond} of the script's {len(script)} commands act at or after the end, {duration_ns / 1e9:.9g} s")
-    files = [file for file in (args.record or scenario.parameters.record, args.bag) if file]
+    files = _recorded(scenario, args, "record" in settings)
     if files:
         # Check everything that can be refused now, before a recording of an earlier run is overwritten.
         OfflineRun(scenario, script)
-        _check_places(files, args)
     check_exports(args)
     record: FlightRecord | None = None
     if asked(args):
         from ..export.flight_record import FlightRecord
 
         record = FlightRecord()
-    recorders: dict[str, Recorder] = {}
     with ExitStack() as closing:
-        for file in files:
-            recorders[file] = make_recorder(file, parameters=scenario.parameters, on_error=_warn, simulated_log=True)
-            closing.callback(recorders[file].close)
-        watching = [*recorders.values(), *filter(None, [record])]
+        recorders = make_recorders(",".join(files), parameters=scenario.parameters, on_error=_warn, simulated_log=True)
+        for recorder in recorders:
+            closing.callback(recorder.close)
+        watching = [*recorders, *filter(None, [record])]
         # The ghost is simulated only if something is recorded.
         flight = OfflineRun(scenario, script, Observers(*watching) if watching else None)
         wall_time = run_with_progress(flight, duration_ns)
         result = summary(flight, wall_time)
-    recorded = [file for file, recorder in recorders.items() if not recorder.error]
+    recorded = [file for file, recorder in zip(files, recorders, strict=True) if not recorder.error]
     for reason, count in flight.simulation.refused.items():
         _warn(f"commands refused: {count}, {reason}: {flight.simulation.refusals[reason]}")
     if flight.ghost is not None and flight.ghost.refusal:
@@ -136,15 +139,19 @@ def _setting(text: str) -> tuple[str, object]:
     return name.strip(), scalar(value.strip())
 
 
-def _check_places(files: list[str], args: argparse.Namespace) -> None:
-    from ..rerun_view.session_files import is_mcap
+def _recorded(scenario: Scenario, args: argparse.Namespace, set_by_option: bool) -> list[str]:
+    """The files to record to, all of which can be written; raises InputError."""
+    from ..rerun_view.recorders import recording_names
+    from ..scene.scene_file import check_record
 
-    if args.bag and not is_mcap(args.bag):
+    if args.bag and Path(args.bag).suffix.lower() != ".mcap":
         raise InputError("--bag", args.bag, "a file that ends in .mcap")
+    if not args.record and not set_by_option:
+        check_record(scenario.parameters.record)
+    files = recording_names(",".join(filter(None, (args.record or scenario.parameters.record, args.bag))))
     for file in files:
         check_writable("--bag" if file == args.bag else "--record" if args.record else "record", file)
-    if len({Path(file).resolve() for file in files}) < len(files):
-        raise InputError("--bag", files[-1], "another file than that of --record")
+    return files
 
 
 def _warn(message: str) -> None:
@@ -152,8 +159,6 @@ def _warn(message: str) -> None:
 
 
 def _print_summary(result: dict[str, Any], recordings: list[str]) -> None:
-    from ..rerun_view.session_files import is_mcap
-
     def vector(name: str, unit: str = "") -> str:
         return f"{' '.join(f'{x: .9g}'.ljust(16) for x in result[name])} {unit}".rstrip()
 
@@ -172,9 +177,8 @@ def _print_summary(result: dict[str, Any], recordings: list[str]) -> None:
     for name, value in rows.items():
         print(f"{name:16s} {value}")
     for file in recordings:
-        show = ["rerun", file]
-        if is_mcap(file):
-            show = ["rigid_proto", "replay", file]
-            converted = str(Path(file).with_suffix(".rrd"))
-            show += ["--record", converted] if converted not in recordings else ["--verify"]
-        print(f"recorded {file}; show it with: {shlex.join(show)}")
+        view = str(Path(file).with_suffix(".rrd"))
+        show, check = ["rerun", file], ["rigid_proto", "replay", file, "--verify"]
+        if file != view:
+            show = check if view in recordings else ["rigid_proto", "replay", file, "--record", view]
+        print(f"recorded {file}; {'check' if show is check else 'show'} it with: {shlex.join(show)}")

@@ -7,11 +7,15 @@ import argparse
 import importlib.util
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..base.command_line import Progress
 from ..base.errors import InputError, is_missing
 
-EXAMPLES = (("rigid_proto snapshot out/flight.rrd --at 4 -o out/flight.png", "what the viewer shows at 4 s"),)
+if TYPE_CHECKING:
+    from ..session.recorded_session import States
+
+EXAMPLES = (("rigid_proto snapshot out/flight.mcap --at 4 -o out/flight.png", "what the viewer shows at 4 s"),)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Write a .png of a recording as the viewer shows it at one simulated time. This needs no display, but a Vulkan "
         "driver; the package mesa-vulkan-drivers has one that needs no GPU."
     )
-    parser.add_argument("session", metavar="SESSION", help="an .rrd or .mcap recording, or a bag of one body")
+    parser.add_argument("session", metavar="SESSION", help="an .mcap recording, or a bag of one body")
     parser.add_argument("--at", metavar="T", type=float, required=True, help="simulated time [s]")
     parser.add_argument("-o", "--output", metavar="X.png", required=True, help="the picture to write")
     parser.add_argument("--size", metavar="WxH", default="1600x900", help="pixels of the picture (default %(default)s)")
@@ -28,42 +32,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the picture; raises InputError for a request that is refused."""
-    from ..rerun_view.session_files import is_bag
-
     # Pillow comes with Rerun.
     for module, package in (("rerun", "rerun-sdk"), ("PIL", "pillow")):
         if importlib.util.find_spec(module) is None:
             raise InputError("snapshot", is_missing(package, "rerun"))
+    from ..rerun_view.recorders import record
+    from ..rerun_view.snapshot import check_picture, take_picture
+    from ..session.bag import read_runs
+
     size = _pixels(args.size, 200)
-    if not is_bag(Path(args.session)):
-        _draw(args, args.session, size)
-        return 0
+    session = read_runs(args.session)[-1]
+    # What is refused is refused before the long work.
+    _check_time(session.states, args.at)
+    check_picture(args.output)
     with tempfile.TemporaryDirectory() as folder:
-        _draw(args, _drawn(args, Path(folder)), size)
+        view = Path(folder) / "session.rrd"
+        with Progress("reading the session") as progress:
+            record([session], view, progress=progress.fraction)
+        with Progress("drawing") as progress:
+            take_picture(view, args.at, args.output, size, progress.fraction)
+    print(f"wrote {args.output}")
     return 0
 
 
-def _draw(args: argparse.Namespace, recording: str | Path, size: tuple[int, int]) -> None:
-    from ..rerun_view.snapshot import take_picture
-
-    with Progress("drawing") as progress:
-        take_picture(recording, args.at, args.output, size, progress.fraction)
-    print(f"wrote {args.output}")
-
-
-def _drawn(args: argparse.Namespace, folder: Path) -> Path:
-    """The last run of a bag, converted to a recording for the viewer."""
-    from ..rerun_view.session_files import read_runs, record
-    from ..rerun_view.snapshot import check_picture, check_time
-
-    session = read_runs(args.session)[-1]
-    # What is refused is refused before the long work.
-    check_time(session, args.at)
-    check_picture(args.output)
-    path = folder / "session.rrd"
-    with Progress("reading the bag") as progress:
-        record([session], path, progress=progress.fraction)
-    return path
+def _check_time(states: States, at_s: float) -> None:
+    """Raise InputError unless there are states around ``at_s``."""
+    if not states.count:
+        raise InputError("session", "the recording has no states")
+    begin, end = 1e-9 * states.first_ns, 1e-9 * states.end_ns
+    if not begin <= at_s <= end:
+        raise InputError("--at", at_s, f"a time within the recording, {begin:g} to {end:g} s")
 
 
 def _pixels(text: str, smallest: int) -> tuple[int, int]:

@@ -34,11 +34,12 @@ def run(args: argparse.Namespace) -> int:
     from ..parameters.declarations import Parameters
     from ..rerun_view.ports import LOOPBACK
     from ..scene.scenario import make_scenario
-    from ..scene.scene_file import scene_file, scene_values
+    from ..scene.scene_file import check_record, scene_file, scene_values
     from ..workbench.main import serve
 
     scene = args.scene or "t_handle"
     values = {**scene_values(scene_file(scene)), **({"mesh": args.mesh} if args.mesh else {})}
+    check_record(values.get("record"))
     port = args.port
     asked = Parameters().replaced(values).workbench_port
     if port is None and asked != Parameters().workbench_port:

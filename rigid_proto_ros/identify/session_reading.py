@@ -47,14 +47,13 @@ def session_flight(
 
 
 def _series(session: RecordedSession) -> list[Series]:
-    """The poses: of the recorded states, or as a bag's topics have them."""
-    poses = {"states": (session.times, session.rows)}
-    if session.published:
-        found = {topic: (one.times, one.rows) for topic, one in session.published.items() if topic in ("pose", "odom")}
-        poses = dict(list(found.items())[:1])
+    """The poses, as one topic published them."""
+    topic = next((topic for topic in ("pose", "odom", "") if topic in session.states.topics), None)
+    if topic is None:
+        return []
+    poses = session.published[topic]
     return [
-        Series(topic, kind, times, rows[:, columns])
-        for topic, (times, rows) in poses.items()
+        Series(topic or "states", kind, poses.times, poses.rows[:, columns])
         for kind, columns in ((POSITION, slice(0, 3)), (ATTITUDE, slice(3, 7)))
     ]
 

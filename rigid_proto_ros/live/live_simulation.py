@@ -23,6 +23,7 @@ from ..parameters.declarations import with_mass_of_density
 from ..scene.command_codec import frame_names
 from ..scene.scenario import Scenario
 from ..scene.scenario_run import notify_start
+from ..session.mailbox import WritingObserver
 from ..simulation.commands import Change, Command
 from ..simulation.observer import Observer, Observers, SceneChanged
 from .pacing import Stamps, ask_for_short_slices
@@ -61,7 +62,7 @@ class LiveSimulation:
         self._check_contacts(scenario)
         self._observers = tuple(observers)
         self._recording_error = ""
-        self._recorder: Observer | None = None
+        self._recorders: list[WritingObserver] = []
         self.loop = SimulationLoop(scenario, Observers(*observers), self.endpoints, self.stamps)
         self._requests: list[tuple[Callable[[], Any], Future[Any]]] = []
         self._wake = threading.Event()
@@ -86,7 +87,7 @@ class LiveSimulation:
         """
 
         def announce() -> None:
-            self._recorder = self._open_recorder(self.scenario)
+            self._recorders = self._open_recorders(self.scenario)
             self._watch()
             self._introduce(self.loop.observer)
 
@@ -265,32 +266,30 @@ class LiveSimulation:
                 raise
             return scenario
 
-        def change() -> Observer | None:
+        def change() -> list[WritingObserver]:
             scenario = check()
             # A recording begins in the scene before the change that begins it, and has that as its first event.
-            finished = self._switch_recording(recorder) if "record" in changes else None
+            finished = self._switch_recording(recorders) if "record" in changes else []
             loop.expect(scenario, Change(dict(changes)))
             return finished
 
-        recorder = None
+        recorders: list[WritingObserver] = []
         if "record" in changes:
             # Opened last: a refused change must leave the file of that name as it is.
             self.call(check)
-            recorder = self._open_recorder(planned)
+            recorders = self._open_recorders(planned)
         try:
             finished = self.call(change)
         except InputError:
-            if recorder is not None:
-                recorder.close()
+            _close([recorder for recorder in recorders if recorder not in self._recorders])
             raise
-        if finished is not None:
-            finished.close()
+        _close(finished)
         self.endpoints.parameters_changed()
 
     # Observers
 
     def _watch(self) -> None:
-        self.loop.watch(Observers(*self._observers, *filter(None, (self._recorder,))))
+        self.loop.watch(Observers(*self._observers, *self._recorders))
 
     def _introduce(self, observer: Observer) -> None:
         notify_start(observer, self.scenario)
@@ -318,47 +317,60 @@ class LiveSimulation:
 
     # The recording, which can be changed in flight
 
-    def _open_recorder(self, scenario: Scenario) -> Observer | None:
-        """The recorder that ``record`` asks for; raises InputError when its file can't be written."""
-        path = scenario.parameters.record
-        if not path:
-            return None
-        from ..rerun_view.session_files import make_recorder
-
-        return make_recorder(path, self.name, scenario.parameters, self._recording_failed)
-
-    def _switch_recording(self, recorder: Observer | None) -> Observer | None:
-        """On the physics thread: the new recorder is told what flies. Returns the old one, to be closed by whom nobody
-        waits for.
+    def _open_recorders(self, scenario: Scenario) -> list[WritingObserver]:
+        """The recorders that ``record`` asks for, of which those that record already go on; raises InputError when a
+        file can't be written.
         """
-        finished = self._recorder
+        if not scenario.parameters.record:
+            return []
+        from ..rerun_view.recorders import make_recorders, recording_names
+
+        names = recording_names(scenario.parameters.record)
+        going_on = [recorder for recorder in self._recorders if recorder.place in names]
+        new = ",".join(name for name in names if name not in (recorder.place for recorder in going_on))
+        return going_on + make_recorders(new, self.name, scenario.parameters, self._recording_failed)
+
+    def _switch_recording(self, recorders: list[WritingObserver]) -> list[WritingObserver]:
+        """On the physics thread: switch recorders; new ones are told what flies. Returns those that have finished; the
+        caller closes them outside the physics thread.
+        """
+        before, self._recorders = self._recorders, recorders
         self.loop.simulation.notify_floor(at_end=True)
-        self._recording_error = getattr(finished, "error", "") if recorder is None else ""
-        self._recorder = recorder
+        finished = [recorder for recorder in before if recorder not in recorders]
+        errors = [recorder.error for recorder in finished if recorder.error]
+        self._recording_error = errors[0] if errors and set(recorders) <= set(before) else ""
         self._watch()
-        if recorder is not None:
-            self._introduce(recorder)
+        for recorder in recorders:
+            if recorder not in before:
+                self._introduce(recorder)
         return finished
 
     @property
     def recording_trouble(self) -> str:
         """Why the last recording has stopped, or that the present one takes nothing; empty when all is well."""
-        return self._recording_error or getattr(self._recorder, "stalled", "")
+        return self._recording_error or next(filter(None, (recorder.stalled for recorder in self._recorders)), "")
 
     def _recording_failed(self, message: str) -> None:
         self.endpoints.warn(message)
         self.endpoints.parameters_changed()
 
     def give_up_failed_recording(self) -> None:
-        """Where a recording has stopped by itself: close it, and ``record`` is empty from now on."""
-        failed = self._recorder
-        if failed is None or not getattr(failed, "error", ""):
+        """Where a recording has stopped by itself: close it, and ``record`` names only those that go on."""
+        recorders = self._recorders
+        if not any(recorder.error for recorder in recorders):
             return
 
-        def give_up() -> None:
-            if self._recorder is failed:  # and no other one has taken its place
-                self._switch_recording(None)
-                self.loop.stop_recording()
+        def give_up() -> list[WritingObserver]:
+            if self._recorders is not recorders:  # others have taken their place
+                return []
+            going_on = [recorder for recorder in recorders if not recorder.error]
+            finished = self._switch_recording(going_on)
+            self.loop.stop_recording(",".join(recorder.place for recorder in going_on))
+            return finished
 
-        self.call(give_up)
-        failed.close()
+        _close(self.call(give_up))
+
+
+def _close(recorders: list[WritingObserver]) -> None:
+    for recorder in recorders:
+        recorder.close()

@@ -14,7 +14,7 @@ from typing import NoReturn
 
 from ..base.interrupts import leave
 
-CLOSING_S = 30.0
+CLOSING_S = 40.0
 """Longer than every wait for the physics thread and for recordings, added up."""
 
 TEARDOWN_S = 3.0

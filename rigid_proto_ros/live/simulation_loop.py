@@ -162,11 +162,11 @@ class SimulationLoop(ScenarioRun):
                 self.endpoints.parameters_changed()
         return acting.setup
 
-    def stop_recording(self) -> None:
-        """``record`` is empty from now on, which is no event and doesn't touch the motion; behind changes that wait, of
-        which one may have begun the recording, it is one of them.
+    def stop_recording(self, going_on: str = "") -> None:
+        """``record`` names no more than this from now on, which is no event and doesn't touch the motion; behind
+        changes that wait, of which one may have begun the recording, it is one of them.
         """
-        change = Change({"record": ""})
+        change = Change({"record": going_on})
         if self._waiting:
             self.expect(after_change(self.scenario, change), change)
         else:

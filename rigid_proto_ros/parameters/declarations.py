@@ -377,7 +377,11 @@ class Parameters:
     body_frame: str = declare(
         "", "Name of the body's frame in published messages; empty means the node's name.", changes=READ_ONLY
     )
-    record: str = declare("", "Record the session to this .rrd (Rerun) or .mcap (bag) file; empty means no recording.")
+    record: str = declare(
+        "",
+        "Record to this .mcap file (the recording, a bag of the topics) or .rrd file (a view for Rerun), or both with "
+        "a comma; empty means no recording.",
+    )
     viewer: str = declare(
         "none",
         "Live view of the motion: web for Rerun in the browser, native for Rerun's own window, workbench for the "

@@ -1,25 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""The observers that show and record a flight with Rerun: the picture, the exact states, and what happened as text.
+"""The observers that show and record a flight with Rerun: the picture, the plots, and what happened as text.
 
-The stepping thread only copies a row into a mailbox. One thread of our own empties it every half second and sends
-columns to one stream, which is a file's or the viewers' (live_view.py): replacing a stream's sinks shuts its server
-down, so no file could be begun anew at a reset while somebody watches.
+The stepping thread only copies a row into a mailbox. One thread of our own empties it and sends columns to one stream,
+which is a file's or the viewers' (live_view.py): replacing a stream's sinks shuts its server down, so no file could be
+begun anew at a reset while somebody watches.
 
 Runs. A reset starts simulated time again at 0, and rows of two runs on one timeline could not be told apart, so every
 run is a recording of its own. Viewers show them side by side. In files, FILE.rrd always holds the newest run; at a
 reset the one before is kept beside it as FILE.run1.rrd, FILE.run2.rrd and so on, unless its time never left 0.
 
-An .rrd is a 12-byte header (``RRF2``, version, options), then frames of two little-endian uint64 (kind, length) and
-``length`` bytes; kind 0 ends the stream, an index may stand behind it.
+An .rrd is for people's eyes and is never read back: the .mcap of the same flight is its recording.
 """
 
 from __future__ import annotations
 
 import shutil
-import struct
 import time
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
 from typing import get_args
@@ -33,8 +31,7 @@ from ..base.rotation import matrix_from_quaternion
 from ..base.vectors import StateRow
 from ..picture import style
 from ..picture.picture import Picture
-from ..scene.scenario import mesh_file, mesh_sha256_of
-from ..session.mailbox import Noted, WritingObserver
+from ..session.mailbox import BATCH, Noted, WritingObserver
 from ..simulation.observer import (
     AccuracyFloor,
     Applied,
@@ -52,22 +49,28 @@ from ..simulation.observer import (
 )
 from ..simulation.setup import Setup
 from . import backend as e
-from .backend import RerunBackend, Stream, forget_closed_recordings, last_line, scalar_columns
+from .backend import RerunBackend, Stream, forget_closed_recordings, last_line
 from .layout import Finished, Subject, blueprint
 
 FLUSH_TIMEOUT_S = 5.0
 """A disk that takes longer than this to take half a second of data counts as lost."""
 
+FULL_BYTES = 1_000_000
+"""A disk with less than this free counts as full."""
+
 REACH_PER_TIP = 1.7
 """A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
 
-FRAME_HEAD = struct.Struct("<QQ")
+WRITE_S = 5.0
+"""Between two writes to a file [s]. Each makes about 23 pieces, of each of which the library keeps 1.8 kB in memory for
+the file's index: 30 MB an hour, where half a second would take 300.
+"""
 
 
 class RerunObserver(WritingObserver):
     """Sends what it is told to a stream, which FileRecorder and LiveView open."""
 
-    # What a kill -9 loses at most, and how far viewers lag; every flush costs about 5 ms and 20 kB of overhead.
+    # How far viewers lag; every flush costs about 5 ms and 20 kB of overhead.
     period_s = 0.5
     takes = frozenset(get_args(Event)) - {Applied}
 
@@ -249,8 +252,7 @@ class RerunObserver(WritingObserver):
                 self._backend.place(frame, row[np.newaxis, 0:3], attitudes)
 
     def _write_states(self, states: list[Noted]) -> None:
-        """Exact states and picture, which all belong to the present body, and what happened."""
-        # What happened comes first: a file that is cut behind it has every line that acted on its states.
+        """The picture of states, which all belong to the present body, and what happened."""
         self._commanded |= bool(self._lines)
         for entity, lines in self._lines.items():
             times_ns, walls_ns, texts = zip(*lines, strict=True)
@@ -269,7 +271,6 @@ class RerunObserver(WritingObserver):
             if kind is GhostPublished:
                 self._picture.draw_ghost(times, rows)
             else:
-                self._backend.send(e.STATE, scalar_columns(rows))
                 self._picture.draw(times, rows)
         if states and self._backend.stream is not None:
             self._arrange(self._backend.stream)
@@ -279,21 +280,11 @@ class RerunObserver(WritingObserver):
 
 
 class FileRecorder(RerunObserver):
-    """Records to a file. files (name, bytes): meshes at hand, whose own files may be gone. Raises InputError for a file
-    that can't be written.
-    """
+    """Records to a file. Raises InputError for a file that can't be written."""
 
-    def __init__(
-        self,
-        path: str,
-        name: str = "rigid_body",
-        on_error: Callable[[str], None] | None = None,
-        files: Sequence[tuple[str, bytes]] = (),
-    ) -> None:
+    def __init__(self, path: str, name: str = "rigid_body", on_error: Callable[[str], None] | None = None) -> None:
         self.path = Path(path)
-        self._files = files
-        self._mesh: tuple[str, tuple[str, bytes] | None] = "", None
-        self._meshes_sent: set[str] = set()
+        self._write_at_s = 0.0
         super().__init__(name, path, on_error)
 
     def _open(self, run_id: str, name: str) -> Stream:
@@ -301,7 +292,6 @@ class FileRecorder(RerunObserver):
 
     def _open_next(self, before: Stream, run_id: str, name: str) -> Stream:
         self._end(before)
-        self._meshes_sent.clear()
         if self._last_time_ns > 0:
             self.path.rename(self.path.with_name(f"{self.path.stem}.run{self._run - 1}{self.path.suffix}"))
         return FileStream(self.path, run_id, name)
@@ -315,25 +305,19 @@ class FileRecorder(RerunObserver):
         self._mailbox.moved()
         self._stream = None
 
-    def _send_scene(self) -> None:
-        """With the mesh's file, which may be gone at the next reset."""
-        super()._send_scene()
-        sha256 = mesh_sha256_of(self._scene)
-        if not sha256 or sha256 in self._meshes_sent or self._backend.stream is None:
-            return
-        if self._mesh[0] != sha256:
-            self._mesh = sha256, mesh_file(self._scene, self._files)
-        if (file := self._mesh[1]) is not None:
-            numbers = np.frombuffer(file[1], np.uint8)
-            entity = f"{e.SESSION_MESH}/{len(self._meshes_sent)}"
-            self._backend.stream.log_static(entity, rr.AnyValues(name=file[0], data=numbers))
-        self._meshes_sent.add(sha256)
+    def _write_what_waits(self) -> None:
+        """Every WRITE_S, when much waits, and at the end; in between only look whether the file can be written."""
+        now_s, mailbox = time.monotonic(), self._mailbox
+        if now_s >= self._write_at_s or mailbox.closed or mailbox.waiting >= BATCH:
+            self._write_at_s = now_s + WRITE_S
+            super()._write_what_waits()
+        elif isinstance(self._stream, FileStream):
+            self._stream.check()
 
 
 class FileStream(Stream):
-    """One run in one .rrd file, complete on disk (in the system's cache) after each ``flush``.
-
-    It has no index: the library would gather that in memory, 3 kB for each piece that it writes, 200 MB an hour.
+    """One run in one .rrd file, on disk (in the system's cache) after each ``flush``, and complete after ``close``: the
+    library writes its index at the end.
     """
 
     def __init__(self, path: Path, recording_id: str, name: str) -> None:
@@ -344,7 +328,7 @@ class FileStream(Stream):
             self._held = file_for_one_writer("record", path)
             # An application of its own: in a viewer that shows another recording, too, it has its own layout.
             application_id = f"{e.APPLICATION_ID}_{recording_id[:8]}"
-            super().__init__(rr.FileSink(path, write_footer=False), recording_id, name, application_id)
+            super().__init__(rr.FileSink(path), recording_id, name, application_id)
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
             self._inode = path.stat().st_ino
         except (RuntimeError, OSError) as error:
@@ -354,28 +338,25 @@ class FileStream(Stream):
         """Write out; raises OSError where the data would not arrive in the file of this name."""
         try:
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
-            if self._path.stat().st_ino == self._inode:
-                return
-            reason = "another file took its place"
         except RuntimeError as error:
-            full = shutil.disk_usage(self._path.parent).free < 1_000_000
-            reason = "no space left on the disk" if full else last_line(error)
-        raise OSError(reason)
+            self.check()
+            raise OSError(last_line(error)) from None
+        self.check()
+
+    def check(self) -> None:
+        """Raise OSError where what is written next would not arrive in the file of this name."""
+        if self._path.stat().st_ino != self._inode:
+            raise OSError("another file took its place")
+        if shutil.disk_usage(self._path.parent).free < FULL_BYTES:
+            raise OSError("no space left on the disk")
 
     def close(self) -> None:
-        """Write the rest and mark the end; raises OSError as ``flush`` does."""
+        """Write the rest and the index; raises OSError as ``flush`` does."""
         self.flush()
         self.recording.disconnect()
-        mark_end(self._path)
         self._held.close()
 
     def leave(self) -> Thread:
         """Close it as it is."""
         self._held.close()
         return super().leave()
-
-
-def mark_end(path: Path) -> None:
-    """Mark a stream as ended: the library doesn't, where it writes no index."""
-    with open(path, "ab") as file:
-        file.write(FRAME_HEAD.pack(0, 0))

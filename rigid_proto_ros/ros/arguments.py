@@ -16,7 +16,7 @@ from rclpy.utilities import remove_ros_args
 from ..base.command_line import Parser, number_from
 from ..base.errors import InputError
 from ..parameters.declarations import PARAMETERS, PATTERNS, is_ros_parameter, parameter_named, with_mass_of_density
-from ..scene.scene_file import scene_values, typed_value
+from ..scene.scene_file import check_record, scene_values, typed_value
 from ..scene.script import MAX_TIME_S
 
 NODE_NAME = "rigid_body"
@@ -83,16 +83,23 @@ def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]
     """The parameters that files and ``-p name:=value`` in ``argv`` give this node, later ones winning; raises
     InputError.
 
-    rcl reads the same arguments, but if a later value has another type than an earlier one, rcl keeps the earlier one.
+    A file records only below the working folder. rcl reads the same arguments, but if a later value has another type
+    than an earlier one, rcl keeps the earlier one.
     An unknown name is an error that gives the nearest known name; in a ``/**`` section, which other nodes share, it is
     a warning.
     """
     given: dict[str, object] = {}
+    recorded: object = ""
     for option, text in _ros_options(argv):
         if option == "--params-file":
-            given.update(scene_values(text, warn, node_name))
+            in_file = scene_values(text, warn, node_name)
+            recorded = in_file.get("record", recorded)
+            given.update(in_file)
         elif option in ("-p", "--param"):
-            given.update(with_mass_of_density(_assignment(text, node_name)))
+            assigned = _assignment(text, node_name)
+            recorded = "" if "record" in assigned else recorded
+            given.update(with_mass_of_density(assigned))
+    check_record(recorded)
     return given
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
 import rclpy
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Odometry
@@ -18,8 +17,7 @@ from ..scene import cdr
 from ..scene.command_codec import frame_names
 from ..scene.script import parse_script
 from ..session.as_script import script_of_session
-from ..session.messages import PROJECTIONS
-from ..session.recorded_session import RecordedSession, StampedRows, recorded_parameters
+from ..session.recorded_session import RecordedSession, recorded_parameters
 from . import qos
 from .script_sender import ros_context, send_script
 
@@ -45,7 +43,7 @@ def publish_commands(session: RecordedSession, node_name: str) -> int:
 
 def publish_states(session: RecordedSession, speed: float) -> int:
     """Publish the recorded states on their topics, with their stamps, which go out on /clock, too; the exit status."""
-    if not len(session.times):
+    if not session.states.topics:
         raise InputError("session", "the session has no states to publish")
     with ros_context():
         node = rclpy.create_node("replay", start_parameter_services=False, enable_rosout=False)
@@ -60,24 +58,16 @@ def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
     types = {"pose": PoseStamped, "twist": TwistStamped, "odom": Odometry}
     # The frames' names that the session flew with.
     frames = frame_names(recorded_parameters(session), session.node_name)
-    streams = {name: rows for name, rows in session.published.items() if len(rows)}
-    if not streams:
-        # No bag: what the node makes of a state.
-        streams = {
-            name: StampedRows(session.times, np.array([project(row) for row in session.rows.tolist()]))
-            for name, project in PROJECTIONS.items()
-        }
-    senders = {name: node.create_publisher(types[name], f"/{session.node_name}/{name}", qos.STATE) for name in streams}
+    topics = session.states.topics
+    senders = {name: node.create_publisher(types[name], f"/{session.node_name}/{name}", qos.STATE) for name in topics}
     clock = node.create_publisher(Clock, "/clock", qos.CLOCK)
     _wait_for_subscribers(node, [*senders.values(), clock])
-    merged = sorted((t, name, k) for name, rows in streams.items() for k, t in enumerate(rows.times.tolist()))
-    first_ns, begin, told_ns = merged[0][0], time.monotonic(), -1
-    for time_ns, name, k in merged:
+    first_ns, begin, told_ns = session.states.first_ns, time.monotonic(), -1
+    for time_ns, name, row in session.states:
         time.sleep(max(0.0, begin + 1e-9 * (time_ns - first_ns) / speed - time.monotonic()))
         if time_ns != told_ns:
             told_ns = time_ns
             clock.publish(cdr.time(time_ns))
-        row = streams[name].rows[k].tolist()
         if name == "odom":
             senders[name].publish(cdr.odometry(time_ns, frames, row))
         else:

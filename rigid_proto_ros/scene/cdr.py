@@ -57,6 +57,14 @@ def wrench_stamped(stamp_ns: int, frame_id: str, force: Iterable[float], torque:
     return stamped_doubles(stamp_ns, frame_id, (*force, *torque))
 
 
+def read_stamp(data: bytes) -> tuple[int, int]:
+    """Seconds and nanoseconds of a message that begins with a header; raises ValueError for other bytes."""
+    if data[:2] == _HEADER[:2] and len(data) >= 16:
+        seconds, nanoseconds, _ = _STAMP_AND_LENGTH.unpack_from(data, 4)
+        return seconds, nanoseconds
+    raise ValueError("no header as little-endian CDR")
+
+
 def read_stamped_doubles(
     data: bytes, count: int, has_child_frame: bool = False
 ) -> tuple[int, int, str, tuple[float, ...]]:

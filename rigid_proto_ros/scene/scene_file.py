@@ -120,6 +120,16 @@ def scene_values(
     return values
 
 
+def check_record(names: object) -> None:
+    """A scene, which a stranger may have written, records only below the working folder. Raises InputError for what its
+    parameter ``record`` names elsewhere.
+    """
+    for name in str(names or "").split(","):
+        if not Path(name.strip()).resolve().is_relative_to(Path.cwd()):
+            accepted = "a file below the working folder, as a scene names it; the command line names any other one"
+            raise InputError("record", name.strip(), accepted)
+
+
 def mesh_found_from(mesh: str, folder: Path) -> str:
     """The mesh by the name that a scene file in ``folder`` gives it, or beside that file if it's only there."""
     for name in (mesh, str(folder / mesh)):

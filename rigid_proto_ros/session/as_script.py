@@ -63,9 +63,9 @@ def script_of_session(session: RecordedSession) -> SceneAndScript:
     writer = _Writer()
     again = writer.again = resimulation(session, writer)
     scenario = writer.last = again.scenario
-    again.advance(again.end_ns)
+    again.finish()
     if writer.lines != session.lines:
-        raise InputError("events", f"{len(session.lines)} lines", "all lines of the log since the start or a reset")
+        raise InputError("events", f"{len(session.events)} lines", "all lines of the log since the start or a reset")
     # What differs from the defaults, without what belongs to the running node.
     values = {
         name: value
@@ -169,7 +169,8 @@ def recorded_branch(session: RecordedSession, scenario: Scenario, time_ns: int) 
     """
     before = np.flatnonzero(session.times <= time_ns)
     if not len(before) or time_ns > session.end_ns:
-        span = f"{session.times.min() / 1e9:.9g} to {session.end_ns / 1e9:.9g} s" if len(session.times) else "none"
+        states = session.states
+        span = f"{states.first_ns / 1e9:.9g} to {states.end_ns / 1e9:.9g} s" if states.count else "none"
         raise InputError("--at", time_ns / 1e9, f"a time of the recorded states, {span}")
     return SceneAndScript(_scene(scenario, session.rows[before[-1]], {}).text, []), int(session.times[before[-1]])
 

@@ -1,28 +1,35 @@
 # SPDX-License-Identifier: MIT
-"""Bags: the MCAP files that we record and that ``ros2 bag record`` writes, alone or in a folder, read up to where they
-were cut, and the runs in them: a reset starts simulated time again, and a bag holds it all in one. What is whole of a
-cut file is written anew.
+"""Recordings: the MCAP files that we write and that ``ros2 bag record`` writes, alone or in a folder, read up to where
+they were cut, and the runs in them: a reset starts simulated time again, and a recording holds it all in one. What is
+whole of a cut file is written anew.
+
+A file is read once for all but states and events, which may be many: they are read again where they are needed.
 """
 
 from __future__ import annotations
 
+import heapq
 import struct
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-import zstandard
-from mcap import records
-from mcap.stream_reader import StreamReader, breakup_chunk
-from mcap.writer import MCAP0_MAGIC, Writer
+from ..base.errors import InputError, is_missing
+from ..base.files import is_same_file, output_file, whole_file
+from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_stamp, read_state, read_string
+from .recorded_session import RecordedSession, States, decode_event
 
-from ..base.errors import InputError
-from ..base.files import whole_file
-from ..base.rotation import rotate, rotate_inverse
-from ..base.vectors import FloatArray, IntArray
-from .messages import FLOOR, MADE_WITH, PROJECTIONS, READ, read_state, read_string
-from .recorded_session import RecordedSession, StampedRows, decode_event
+try:
+    import zstandard
+    from mcap import records
+    from mcap.stream_reader import StreamReader, breakup_chunk
+    from mcap.writer import MCAP0_MAGIC, Writer
+except ImportError:
+    raise InputError("session", is_missing("mcap", "mcap")) from None
 
 ROS_PROFILE = "ros2"
 
@@ -31,57 +38,38 @@ MAX_RATIO, SPARE = 200, 64_000_000
 made to fill the memory to a thirty thousandth.
 """
 
+RRD_MAGIC = b"RRF2"
+
 _RECORD_HEAD = struct.Struct("<BQ")
 """Opcode and length of what follows."""
 
 
-@dataclass
-class BagContent:
-    """What is whole in a bag: messages by topic as (log_time, bytes) in the file's order, types by topic, attachments
-    (name, bytes), metadata by name. complete: it was finished properly.
+def check_session(path: Path) -> None:
+    """Raise InputError for a session that isn't there, or is an .rrd file, which is never read back."""
+    if not path.exists():
+        raise InputError("session", f"there is no file and no folder {str(path)!r}")
+    head = b""
+    # A folder, or what is refused when it is read.
+    with suppress(OSError), open(path, "rb") as stream:
+        head = stream.read(len(RRD_MAGIC))
+    if head == RRD_MAGIC or path.suffix == ".rrd":
+        beside = path.with_suffix(".mcap")
+        given = str(beside) if beside.exists() else "the .mcap of the same flight (record and --record take both names)"
+        raise InputError("session", f"{path} is a view for Rerun, shown by `rerun {path}`; accepted: {given}")
+
+
+def repair(path: Path, repaired: Path) -> None:
+    """Write a finished file with all that is whole in a recording that was cut. Raises InputError for a place that
+    can't be written to, and for what is no recording or was damaged inside.
     """
-
-    messages: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
-    types: dict[str, str] = field(default_factory=dict)
-    attachments: list[tuple[str, bytes]] = field(default_factory=list)
-    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
-    complete: bool = True
-
-
-def read_bag(path: Path, wanted: Callable[[str], bool]) -> BagContent:
-    """All that is whole in a bag, of the topics that are ``wanted(topic)``; raises InputError."""
-    content, files = BagContent(), _files(path)
-    for file in files:
-        finished = False
-        schemas: dict[int, str] = {}
-        topics: dict[int, str] = {}
-        for record in _whole_records(file):
-            if isinstance(record, records.Message):
-                topic = topics[record.channel_id]
-                if wanted(topic):
-                    content.messages.setdefault(topic, []).append((record.log_time, record.data))
-            elif isinstance(record, records.Schema):
-                schemas[record.id] = record.name
-            elif isinstance(record, records.Channel):
-                topics[record.id] = record.topic
-                content.types[record.topic] = schemas.get(record.schema_id, "")
-            elif isinstance(record, records.Attachment):
-                content.attachments.append((record.name, record.data))
-            elif isinstance(record, records.Metadata):
-                content.metadata[record.name] = dict(record.metadata)
-            else:
-                finished = isinstance(record, records.Footer)
-        content.complete &= finished
-    if MADE_WITH in content.metadata and len(files) > 1:
-        # Ours are never split: these would be taken for one flight.
-        raise InputError("session", str(path), f"one of the {len(files)} recordings in this folder")
-    if not (content.types or content.attachments or content.metadata):
-        raise InputError("session", str(path), "a recording with data; this one ends before its first chunk")
-    return content
-
-
-def repair_mcap(path: Path, repaired: Path) -> None:
-    """Write a finished file with all that is whole in a cut one; raises InputError where that can't be."""
+    check_session(path)
+    if path.is_dir():
+        raise InputError("--repair", str(path), "one .mcap file of the folder")
+    if repaired.suffix != ".mcap":
+        raise InputError("--repair", str(repaired), "a file that ends in .mcap")
+    if is_same_file(repaired, path):
+        raise InputError("--repair", str(repaired), "another file than the one that is repaired")
+    output_file("--repair", repaired)
     schemas: dict[int, int] = {0: 0}
     channels: dict[int, int] = {}
     with whole_file("--repair", repaired) as beside, open(beside, "wb") as stream:
@@ -170,86 +158,320 @@ def _files(path: Path) -> list[Path]:
     return files
 
 
+def _all_records(path: Path) -> Iterator[tuple[str, str, records.McapRecord]]:
+    """The records of a recording's files in their order: topic and type of a message or channel, and the record."""
+    for file in _files(path):
+        schemas: dict[int, str] = {}
+        channels: dict[int, tuple[str, str]] = {}
+        for record in _whole_records(file):
+            topic = message_type = ""
+            if isinstance(record, records.Message):
+                topic, message_type = channels[record.channel_id]
+            elif isinstance(record, records.Schema):
+                schemas[record.id] = record.name
+            elif isinstance(record, records.Channel):
+                topic, message_type = channels[record.id] = record.topic, schemas.get(record.schema_id, "")
+            yield topic, message_type, record
+
+
+def has_scene(path: Path) -> bool:
+    """Whether a bag contains a scene, as those recorded by this package do; raises InputError."""
+    return any(
+        isinstance(record, records.Message) and topic.rpartition("/")[2] == "scene" and kind == READ["scene"]
+        for topic, kind, record in _all_records(path)
+    )
+
+
+# What a file holds of a body, but for its states and events
+
+
+@dataclass
+class _Span:
+    """Messages of a state topic in a row whose stamps don't go back. begin: the number of the first, from 0; back: the
+    stamp went back there. first_ns, end_ns: first and last stamp; states: how many different ones.
+    """
+
+    begin: int
+    back: _Cut | None
+    first_ns: int
+    end_ns: int
+    states: int = 1
+
+
+@dataclass
+class _Cut:
+    """Where a run may begin: log [ns], and how many messages of each state topic and how many events lie before it in
+    the file.
+    """
+
+    log: int
+    counts: dict[str, int]
+
+
+@dataclass
+class _Body:
+    """Topics below one prefix. names: those declared, without the prefix. scenes: (log [ns], text). spans: by state
+    topic; counts: of messages, by topic; cut: state topics since whose last message a reset has come. undecodable: what
+    is wrong with the first event that can't be decoded; timeouts: there are such events; offset: a clock was followed.
+    """
+
+    names: set[str] = field(default_factory=set)
+    scenes: list[tuple[int, str]] = field(default_factory=list)
+    resets: list[_Cut] = field(default_factory=list)
+    spans: dict[str, list[_Span]] = field(default_factory=lambda: {name: [] for name in PROJECTIONS})
+    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys((*PROJECTIONS, "events"), 0))
+    cut: set[str] = field(default_factory=set)
+    undecodable: InputError | None = None
+    timeouts: bool = False
+    offset: bool = False
+
+    def take(self, name: str, topic: str, log: int, data: bytes) -> None:
+        """A message; raises InputError for one that can't be decoded."""
+        if name == "scene":
+            self.scenes.append((log, read_string(data, topic)))
+        elif name == "events":
+            self._take_event(log, read_string(data, topic))
+        else:
+            self._take_state(name, log, read_stamp(data, topic))
+
+    def _take_event(self, log: int, line: str) -> None:
+        kind, content = "", dict[str, Any]()
+        try:
+            _, kind, content = decode_event(line, self.counts["events"] + 1)
+        except InputError as error:  # said where this body is the one that counts
+            self.undecodable = self.undecodable or error
+        self.timeouts |= kind == "timeout"
+        self.offset |= kind == "clock" and bool(content.get("offset_ns"))
+        if kind == "reset":
+            self.resets.append(_Cut(log, dict(self.counts)))
+            self.cut = set(PROJECTIONS)
+        self.counts["events"] += 1
+
+    def _take_state(self, name: str, log: int, stamp_ns: int) -> None:
+        spans = self.spans[name]
+        back = _Cut(log, dict(self.counts)) if spans and stamp_ns < spans[-1].end_ns else None
+        if back or not spans or name in self.cut:
+            spans.append(_Span(self.counts[name], back, stamp_ns, stamp_ns))
+            self.cut.discard(name)
+        elif stamp_ns != spans[-1].end_ns:
+            spans[-1].end_ns = stamp_ns
+            spans[-1].states += 1
+        self.counts[name] += 1
+
+
+@dataclass
+class _Content:
+    """What is whole in a recording: bodies by prefix, types by topic, attachments (name, bytes), metadata by name.
+    complete: it was finished properly.
+    """
+
+    bodies: dict[str, _Body] = field(default_factory=dict)
+    types: dict[str, str] = field(default_factory=dict)
+    attachments: list[tuple[str, bytes]] = field(default_factory=list)
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    complete: bool = False
+
+
+def _read(path: Path) -> _Content:
+    content, footers = _Content(), 0
+    for topic, message_type, record in _all_records(path):
+        prefix, slash, name = topic.rpartition("/")
+        ours = slash and READ.get(name) == message_type
+        if isinstance(record, records.Message):
+            if ours:
+                content.bodies[prefix].take(name, topic, record.log_time, record.data)
+        elif isinstance(record, records.Channel):
+            content.types[topic] = message_type
+            if ours:
+                content.bodies.setdefault(prefix, _Body()).names.add(name)
+        elif isinstance(record, records.Attachment):
+            content.attachments.append((record.name, record.data))
+        elif isinstance(record, records.Metadata):
+            content.metadata[record.name] = dict(record.metadata)
+        else:
+            footers += isinstance(record, records.Footer)
+    files = len(_files(path))
+    content.complete = footers == files
+    if MADE_WITH in content.metadata and files > 1:
+        # Ours are never split: these would be taken for one flight.
+        raise InputError("session", str(path), f"one of the {files} recordings in this folder")
+    if not (content.types or content.attachments or content.metadata):
+        raise InputError("session", str(path), "a recording with data; this one ends before its first chunk")
+    return content
+
+
+# States and events, read again
+
+
+class _Reader:
+    """Messages of one body in a recording, by run. Runs that are read in their order take one pass over the file; what
+    is kept in memory is by how much one topic is ahead of another in it.
+
+    names: topics without their prefix, by topic.
+    """
+
+    def __init__(self, path: Path, names: Mapping[str, str]) -> None:
+        self._path, self._names = path, names
+        self._rewind()
+
+    def _rewind(self) -> None:
+        self._records = _all_records(self._path)
+        self._read = dict.fromkeys(self._names.values(), 0)
+        self._wanted = dict(self._read)
+        self._waiting: dict[str, deque[tuple[str, bytes]]] = {name: deque() for name in self._read}
+
+    def states(self, ranges: Mapping[str, range]) -> Iterator[tuple[int, str, list[float]]]:
+        """Stamp [ns], name and row of the messages with these numbers by state topic, in the order of time. Raises
+        InputError for one that can't be decoded.
+        """
+        self._begin(ranges)
+        # Stable: of one time in the order of the topics.
+        return heapq.merge(*(self._states(name, len(own)) for name, own in ranges.items()), key=itemgetter(0))
+
+    def _states(self, name: str, count: int) -> Iterator[tuple[int, str, list[float]]]:
+        for topic, data in self._messages(name, count):
+            stamp_ns, row = read_state(name, data, topic)
+            yield stamp_ns, name, row
+
+    def events(self, numbers: range) -> Iterator[tuple[int, str]]:
+        """time_ns and line of the events with these numbers."""
+        self._begin({"events": numbers})
+        for number, (topic, data) in enumerate(self._messages("events", len(numbers)), 1):
+            line = read_string(data, topic)
+            yield decode_event(line, number)[0], line
+
+    def _begin(self, ranges: Mapping[str, range]) -> None:
+        """Come to the beginnings of these ranges; ends what was read before."""
+        if any(own.start < self._read[name] - len(self._waiting[name]) for name, own in ranges.items()):
+            self._rewind()
+        for name, own in ranges.items():
+            waiting = self._waiting[name]
+            for _ in range(min(len(waiting), own.start - (self._read[name] - len(waiting)))):
+                waiting.popleft()
+            self._wanted[name] = own.start
+
+    def _messages(self, name: str, count: int) -> Iterator[tuple[str, bytes]]:
+        waiting = self._waiting[name]
+        for _ in range(count):
+            while not waiting:
+                self._read_on()
+            yield waiting.popleft()
+
+    def _read_on(self) -> None:
+        """Come to the next message of one of the topics."""
+        for topic, message_type, record in self._records:
+            name = self._names.get(topic)
+            if name is None or not isinstance(record, records.Message) or READ[name] != message_type:
+                continue
+            if self._read[name] >= self._wanted[name]:
+                self._waiting[name].append((topic, record.data))
+            self._read[name] += 1
+            return
+        raise InputError("session", str(self._path), "a recording that stays as it is while it is read")
+
+
+class _RunStates(States):
+    """The states of one run. ranges: the numbers of its messages, by topic; spans: of the whole body."""
+
+    def __init__(self, reader: _Reader, ranges: Mapping[str, range], spans: Mapping[str, list[_Span]]) -> None:
+        self._reader = reader
+        self._ranges = {name: own for name, own in ranges.items() if own}
+        self.topics = tuple(self._ranges)
+        found = {name: [span for span in spans[name] if span.begin in own] for name, own in self._ranges.items()}
+        self.count = max((sum(span.states for span in own) for own in found.values()), default=0)
+        every = [span for own in found.values() for span in own]
+        self.first_ns = min((span.first_ns for span in every), default=0)
+        self.end_ns = max((span.end_ns for span in every), default=0)
+
+    def __iter__(self) -> Iterator[tuple[int, str, list[float]]]:
+        return self._reader.states(self._ranges)
+
+
+class _RunEvents:
+    """The events of one run (``recorded_session.Events``). numbers: theirs, among all of the body."""
+
+    def __init__(self, reader: _Reader, numbers: range) -> None:
+        self._reader, self._numbers = reader, numbers
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __iter__(self) -> Iterator[tuple[int, str]]:
+        return self._reader.events(self._numbers)
+
+
 # Runs
 
 RESET_WINDOW_NS = 1_000_000_000
 """Topics reach a recorder one by one: a reset's line and the first state after it lie this close in its log."""
 
 
-def session_runs(path: Path, node: str = "") -> list[RecordedSession]:
-    """The runs of one body in a bag, in their order; ``node`` chooses the body where there are several.
+def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
+    """The runs of one body in a recording, in their order; ``node`` chooses the body where there are several.
 
-    Raises InputError for a bag without states, and for messages that can't be decoded.
+    Raises InputError for what isn't there, is no recording or holds no body, and for messages that can't be decoded.
     """
-    content = read_bag(path, lambda topic: topic.rpartition("/")[2] in READ)
+    path = Path(path)
+    check_session(path)
+    content = _read(path)
     prefix = _prefix(content, str(path), node)
-    events = [(log, read_string(data, f"{prefix}/events")) for log, data in _messages(content, prefix, "events")]
-    scenes = [(log, read_string(data, f"{prefix}/scene")) for log, data in _messages(content, prefix, "scene")]
-    decoded = [decode_event(line, number) for number, (_, line) in enumerate(events, 1)]
-    if MADE_WITH not in content.metadata and any(
-        kind == "clock" and told.get("offset_ns") for _, kind, told in decoded
-    ):
+    body, ours = content.bodies[prefix], MADE_WITH in content.metadata
+    if body.undecodable:
+        raise body.undecodable
+    if not ours and body.offset:
         accepted = "a recording by the parameter record; the stamps of these topics are those of a followed /clock"
         raise InputError("session", str(path), accepted)
-    states = {name: _states(content, prefix, name) for name in PROJECTIONS}
-    states = {name: found for name, found in states.items() if len(found[0])}
+    scenes = sorted(body.scenes, key=itemgetter(0))
+    names = [name for name in PROJECTIONS if body.counts[name]]
     # A topic without messages may be whole: nobody did anything. A latched one is never without.
-    there = {"scene": bool(scenes), "events": f"{prefix}/events" in content.types, "pose": bool(states)}
-    missing = [f"{prefix}/{name}" for name, is_there in there.items() if not is_there]
-    resets = [log for (log, _), (_, kind, _) in zip(events, decoded, strict=True) if kind == "reset"]
-    if not events and states:
-        logs, rows = next(iter(states.values()))
-        resets = logs[1:][np.diff(rows.times) < 0].tolist()
+    there = {"scene": bool(scenes), "events": "events" in body.names, "pose": bool(names)}
+    resets = body.resets
+    if not body.counts["events"] and names:
+        resets = [span.back for span in body.spans[names[0]] if span.back]
     whole = RecordedSession(
         complete=content.complete,
         node_name=prefix.strip("/"),
-        missing=tuple(missing),
+        missing=tuple(f"{prefix}/{name}" for name, is_there in there.items() if not is_there),
         attachments=content.attachments,
         made_with=content.metadata.get(MADE_WITH, {}),
+        logs_timeouts=body.timeouts,
         folder=path.absolute().parent,
     )
-    # Our own recorder logs all topics in the order in which they were told; another one gets each topic by itself.
-    cut = _cuts_by_log if MADE_WITH in content.metadata else _cuts
-    cuts = {name: cut(logs, rows.times, resets) for name, (logs, rows) in states.items()}
+    # Our own recorder writes all topics in the order in which they were told; another one gets each topic by itself.
+    cuts = {name: _cuts(name, body, [] if ours else body.spans[name], resets) for name in names}
+    cuts["events"] = [0, *(reset.counts["events"] for reset in resets), body.counts["events"]]
+    state_reader = _Reader(path, {f"{prefix}/{name}": name for name in names})
+    event_reader = _Reader(path, {f"{prefix}/events": "events"})
     runs = []
-    for k, (begin, end) in enumerate(zip([None, *resets], [*resets, None], strict=True)):
+    for k, begin in enumerate([None, *(reset.log for reset in resets)]):
         # The scene in force at a reset; at the recording's own start the first one that it holds. Logged at simulated
         # time, a run's first scene comes before those that it is changed to at time 0.
         before = [text for log, text in scenes if begin is not None and log < begin]
         at_reset = [text for log, text in scenes if log == begin]
         in_force = [*at_reset[:1], *before[-1:], *(text for _, text in scenes[:1])]
-        later = [text for log, text in scenes if begin is None or log >= begin]
-        run = replace(whole, scene=in_force[0] if in_force else "", scenes=later)
-        run.accuracy_floor = content.metadata.get(FLOOR.format(k), {}).get("floor", "")
-        run.events = [
-            (time_ns, line)
-            for (log, line), (time_ns, _, _) in zip(events, decoded, strict=True)
-            if (begin is None or log >= begin) and (end is None or log < end)
-        ]
-        run.published = {
-            name: StampedRows(
-                rows.times[cuts[name][k] : cuts[name][k + 1]], rows.rows[cuts[name][k] : cuts[name][k + 1]]
-            )
-            for name, (_, rows) in states.items()
-        }
-        run.times, run.rows = _shown_rows(run.published)
-        if run.events or len(run.times):
+        numbers = {name: range(own[k], own[k + 1]) for name, own in cuts.items()}
+        run = replace(
+            whole,
+            scene=in_force[0] if in_force else "",
+            scenes=[text for log, text in scenes if begin is None or log >= begin],
+            accuracy_floor=content.metadata.get(FLOOR.format(k), {}).get("floor", ""),
+            events=_RunEvents(event_reader, numbers.pop("events")),
+            states=_RunStates(state_reader, numbers, body.spans),
+        )
+        if len(run.events) or run.states.topics:
             runs.append(run)
     return runs or [whole]
 
 
-def _prefix(content: BagContent, path: str, node: str) -> str:
+def _prefix(content: _Content, path: str, node: str) -> str:
     """The prefix of the topics' names: the node's name after a slash."""
-    kinds: dict[str, set[str]] = {}
-    for topic, message_type in content.types.items():
-        before, slash, name = topic.rpartition("/")
-        if slash and READ.get(name) == message_type:
-            kinds.setdefault(before, set()).add(name)
-    flown = sorted(p for p, names in kinds.items() if names & {"scene", "events"}) or sorted(kinds)
+    flown = sorted(p for p, body in content.bodies.items() if body.names & {"scene", "events"})
+    flown = flown or sorted(content.bodies)
     if node:
-        flown = [p for p in kinds if p.strip("/") == node.strip("/")]
+        flown = [p for p in content.bodies if p.strip("/") == node.strip("/")]
         if not flown:
-            raise InputError("--node", node, f"one of the bag's: {', '.join(sorted(kinds)) or 'it has none'}")
+            known = ", ".join(sorted(content.bodies)) or "it has none"
+            raise InputError("--node", node, f"one of the recording's: {known}")
     if not flown:
         topics = ", ".join(sorted(content.types)[:5]) or "no topics"
         raise InputError("session", f"{path} has {topics}, and no pose, twist or odom topic of a node")
@@ -258,53 +480,18 @@ def _prefix(content: BagContent, path: str, node: str) -> str:
     return flown[0]
 
 
-def _messages(content: BagContent, prefix: str, name: str) -> list[tuple[int, bytes]]:
-    """A topic's messages in the order they were logged."""
-    return sorted(content.messages.get(f"{prefix}/{name}", []), key=lambda message: message[0])
-
-
-def _states(content: BagContent, prefix: str, name: str) -> tuple[IntArray, StampedRows]:
-    """When a topic's states were logged, and they."""
-    messages = _messages(content, prefix, name)
-    read = [read_state(name, data, f"{prefix}/{name}") for _, data in messages]
-    logs = np.array([log for log, _ in messages], dtype=np.int64)
-    times = np.array([stamp for stamp, _ in read], dtype=np.int64)
-    return logs, StampedRows(times, np.array([row for _, row in read], dtype=float))
-
-
-def _cuts_by_log(logs: IntArray, stamps: IntArray, resets: list[int]) -> list[int]:
-    """Where a topic's messages of each run begin, and the end: at the resets' places in the log."""
-    return [0, *np.searchsorted(logs, np.array(resets, np.int64)).tolist(), len(stamps)]
-
-
-def _cuts(logs: IntArray, stamps: IntArray, resets: list[int]) -> list[int]:
-    """Where a topic's messages of each run begin, and the end: at the restarts of its stamps."""
-    restarts = (np.flatnonzero(np.diff(stamps) < 0) + 1).tolist()
+def _cuts(name: str, body: _Body, spans: list[_Span], resets: list[_Cut]) -> list[int]:
+    """Where a topic's messages of each run begin, and the end: at the resets' places in the file, or at the restarts of
+    the stamps among ``spans``.
+    """
+    restarts = [(span.begin, span.back.log) for span in spans if span.back]
     # One each, however late the topic was logged.
-    if len(restarts) == len(resets):
-        return [0, *restarts, len(stamps)]
+    if resets and len(restarts) == len(resets):
+        return [0, *(begin for begin, _ in restarts), body.counts[name]]
     cuts = [0]
     for reset in resets:
         # A reset of a body at time 0 shows in no stamp: there the log decides, where no restart is near.
-        cut = int(np.searchsorted(logs, reset, side="right"))
-        near = [k for k in restarts if abs(int(logs[k]) - reset) < RESET_WINDOW_NS and k >= cuts[-1]]
-        cuts.append(max(cuts[-1], min(near, key=lambda k: abs(int(logs[k]) - reset)) if near else cut))
-    return [*cuts, len(stamps)]
-
-
-def _shown_rows(published: dict[str, StampedRows]) -> tuple[IntArray, FloatArray]:
-    """Times, one per stamp, and state rows (n, 13) from what was published; velocities that weren't are 0."""
-    merged: dict[int, list[float]] = {}
-    listed = {name: list(zip(r.times.tolist(), r.rows.tolist(), strict=True)) for name, r in published.items()}
-    for name in ("odom", "pose"):
-        for time_ns, row in listed.get(name, []):
-            state = merged.setdefault(time_ns, [0.0] * 6 + [1.0] + [0.0] * 6)
-            state[:7] = row[:7]
-            if name == "odom":
-                state[7:10], state[10:13] = rotate(*row[3:7], *row[7:10]), row[10:13]
-    for time_ns, row in listed.get("twist", []):
-        if time_ns in merged:
-            state = merged[time_ns]
-            state[7:10], state[10:13] = row[:3], rotate_inverse(*state[3:7], *row[3:6])
-    times = sorted(merged)
-    return np.array(times, dtype=np.int64), np.array([merged[t] for t in times]).reshape(-1, 13)
+        near = [(abs(log - reset.log), begin) for begin, log in restarts if begin >= cuts[-1]]
+        away, begin = min(near, default=(RESET_WINDOW_NS, 0))
+        cuts.append(max(cuts[-1], begin if away < RESET_WINDOW_NS else reset.counts[name]))
+    return [*cuts, body.counts[name]]

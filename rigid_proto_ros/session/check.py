@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Verify a recording: check its chain of events, recompute every state bit for bit, and find the first difference."""
+"""Verify a recording: check its chain of events, recompute every state bit for bit, and find the first difference. It
+is read as the new computation comes to it, so that memory doesn't grow with it.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 
@@ -14,7 +19,7 @@ from ..base.provenance import cpu, versions
 from ..base.vectors import FloatArray
 from ..simulation.observer import Event, EventLog, Logged, Observer
 from .messages import FIELDS, PROJECTIONS
-from .recorded_session import RecordedSession, Resimulation, decode_event, resimulation
+from .recorded_session import Events, RecordedSession, Resimulation, decode_event, resimulation
 
 
 class NotVerifiableError(InputError):
@@ -37,11 +42,63 @@ class Difference:
         return f"at {self.time_ns / 1e9:.9g} s: {self.what}"
 
 
-class _Lines(Observer):
+class _BrokenChainError(Exception):
+    """A recorded line doesn't fit its hash: its number, time [ns] and text."""
+
+    def __init__(self, number: int, time_ns: int, line: str) -> None:
+        super().__init__()
+        self.number, self.time_ns, self.line = number, time_ns, line
+
+
+class _Recorded:
+    """The recorded lines as the new computation reads them, each checked against the chain.
+
+    waiting: (number from 1, time_ns, line) of those that were read and haven't been computed yet. compared: how many
+    were alike.
+    """
+
+    def __init__(self, events: Events) -> None:
+        self.waiting: deque[tuple[int, int, str]] = deque()
+        self.compared = 0
+        self._events = events
+        self._acted: deque[tuple[int, int, str]] = deque()
+        self._last_before = ""
+
+    def __iter__(self) -> Iterator[str]:
+        log = EventLog()
+        for number, (_, line) in enumerate(self._events, 1):
+            time_ns, kind, content = decode_event(line, number)
+            if log.append(time_ns, kind, content) != line:
+                raise _BrokenChainError(number, time_ns, line)
+            self.waiting.append((number, time_ns, line))
+            yield line
+
+    def compare(self, line: str) -> Difference | None:
+        """Compare the next line with a computed one."""
+        if not self.waiting:
+            return Difference(json.loads(line)["time_ns"], f"a command that wasn't recorded: {line}")
+        number, time_ns, recorded = self.waiting.popleft()
+        if line != recorded:
+            return Difference(time_ns, f"command {number} differs: {recorded} recorded, {line} computed")
+        self.compared = number
+        self._acted.append((number, time_ns, line))
+        return None
+
+    def last_before(self, time_ns: int) -> str:
+        """The last command that acted before a time, later ones each time, with its number."""
+        while self._acted and self._acted[0][1] < time_ns:
+            number, _, line = self._acted.popleft()
+            self._last_before = f"command {number}: {line}"
+        return self._last_before
+
+
+class _Computed(Observer):
+    """Lines that the new computation has told, until they are compared."""
+
     takes = frozenset({Logged})
 
     def __init__(self) -> None:
-        self.lines: list[str] = []
+        self.lines: deque[str] = deque()
 
     def on(self, event: Event) -> None:
         if isinstance(event, Logged):
@@ -49,57 +106,77 @@ class _Lines(Observer):
 
 
 def verify(session: RecordedSession, progress: Callable[[float], None] = lambda _: None) -> Difference | None:
-    """Compare the chain of events, then every event and every state with a new computation, bit for bit.
+    """Compare the chain of events, every event and every state with a new computation, bit for bit; of one instant the
+    last state of each topic.
 
     Returns the first difference, or None. Raises InputError for a session that can't be decoded, or lacks what a check
     needs: the topics named, or its beginning.
     """
-    states = _states_in_order(session)
-    if not states:
+    states = session.states
+    if not states.topics:
         lacks = ", ".join(session.missing) or "states"
         accepted = "states from a start or reset on; without them there is nothing to verify"
         raise NotVerifiableError("--verify", f"a recording without {lacks}", accepted)
     if session.missing:
         accepted = "a recording that holds them from a start or reset on"
         raise InputError("--verify", f"a recording without {', '.join(session.missing)}", accepted)
-    first_ns, recorded = states[0][0], session.lines
-    began_later = NotVerifiableError(
+    try:
+        return _first_difference(session, _Recorded(session.events), progress)
+    except _BrokenChainError as broken:
+        if broken.number == 1 and (states.first_ns > 0 or _switched_on_at_0(session)):
+            raise _began_later(session) from None
+        what = f"command {broken.number} doesn't match its hash: {broken.line}"
+        return Difference(broken.time_ns, what, tampered=True)
+
+
+def _switched_on_at_0(session: RecordedSession) -> bool:
+    """The change that begins a recording is told in it: at time 0 too, behind what was done before."""
+    for number, (_, line) in enumerate(session.events, 1):
+        time_ns, kind, content = decode_event(line, number)
+        if time_ns:
+            break
+        if kind == "set" and content.get("record"):
+            return True
+    return False
+
+
+def _began_later(session: RecordedSession) -> NotVerifiableError:
+    return NotVerifiableError(
         "--verify",
-        f"a recording that begins at {first_ns / 1e9:.9g} s, in the middle of a run",
+        f"a recording that begins at {session.states.first_ns / 1e9:.9g} s, in the middle of a run",
         "one that begins at a start or a reset",
     )
-    decoded = [decode_event(line, number) for number, line in enumerate(recorded, 1)]
-    times_ns = [time_ns for time_ns, _, _ in decoded]
-    if (broken := broken_link(recorded)) is not None:
-        # The change that begins a recording is told in it: at time 0 too, behind what was done before.
-        switched_on = any(kind == "set" and told.get("record") and not time_ns for time_ns, kind, told in decoded)
-        if broken == 1 and (first_ns > 0 or switched_on):
-            raise began_later
-        what = f"command {broken} doesn't match its hash: {recorded[broken - 1]}"
-        return Difference(times_ns[broken - 1], what, tampered=True)
-    computed = _Lines()
-    again = resimulation(session, computed)
-    compared = 0
-    for count, (time_ns, name, row) in enumerate(states):
-        difference, state = _advance(again, time_ns, computed.lines, recorded, compared)
+
+
+def _first_difference(
+    session: RecordedSession, recorded: _Recorded, progress: Callable[[float], None]
+) -> Difference | None:
+    states, computed = session.states, _Computed()
+    again = resimulation(session, computed, recorded)
+    number, number_of_states = 0, states.count * len(states.topics)
+    for time_ns, published in groupby(states, key=itemgetter(0)):
+        difference, state = _advance(again, time_ns, computed, recorded)
         if difference is not None:
             return difference
-        compared = len(computed.lines)
         if again.simulation.failure and again.simulation.time_ns != time_ns:
             return Difference(time_ns, again.simulation.failure)
-        if what := _row_difference(count + 1, name, row, state):
-            if count == 0 and not recorded and first_ns > 0:
-                raise began_later
-            # At its own time a command acts after the state.
-            before = sum(acted_ns < time_ns for acted_ns in times_ns)
-            return Difference(time_ns, what, f"command {before}: {recorded[before - 1]}" if before else "")
-        if count % 1000 == 0:
-            progress(count / len(states))
-    end_ns = max(again.simulation.time_ns, again.end_ns)
-    difference, _ = _advance(again, end_ns, computed.lines, recorded, compared)
-    missing = len(computed.lines)
-    if difference is None and missing < len(recorded):
-        return Difference(times_ns[missing], f"command {missing + 1} did not act: {recorded[missing]}")
+        # At its own time a command acts after the state.
+        command = recorded.last_before(time_ns)
+        for name, row in {name: row for _, name, row in published}.items():
+            number += 1
+            if what := _row_difference(number, name, np.asarray(row), state):
+                if number == 1 and not len(session.events) and states.first_ns > 0:
+                    raise _began_later(session)
+                return Difference(time_ns, what, command)
+            if number % 1000 == 0:
+                progress(number / number_of_states)
+    difference, done = None, False
+    while difference is None and not done:
+        done = again.all_read
+        difference, _ = _advance(again, max(again.simulation.time_ns, again.end_ns), computed, recorded)
+    if difference is None and recorded.waiting:
+        number, time_ns, line = recorded.waiting[0]
+        return Difference(time_ns, f"command {number} did not act: {line}")
     return difference
 
 
@@ -111,48 +188,22 @@ def made_with_table(session: RecordedSession) -> list[tuple[str, str, str]]:
     return [(name, was, here.get(name, "none")) for name, was in session.made_with.items() if name != "began"]
 
 
-def broken_link(lines: Sequence[str]) -> int | None:
-    """Number of the first event line, from 1, that doesn't fit the hashes of the chain, or None."""
-    log = EventLog()
-    for number, line in enumerate(lines, 1):
-        time_ns, kind, content = decode_event(line, number)
-        if log.append(time_ns, kind, content) != line:
-            return number
-    return None
-
-
 def _advance(
-    again: Resimulation, time_ns: int, computed: Sequence[str], recorded: Sequence[str], compared: int
+    again: Resimulation, time_ns: int, computed: _Computed, recorded: _Recorded
 ) -> tuple[Difference | None, FloatArray]:
-    """The state computed at ``time_ns``, or the first difference in the commands up to there, of which ``compared``
-    were alike.
-    """
+    """The state computed at ``time_ns``, or the first difference in the commands up to there."""
     refused = None
     try:
         row = again.advance(time_ns)
     except CommandRefused as refusal:
         row, refused = np.empty(0), refusal
-    for number, line in enumerate(computed[compared:], compared + 1):
-        if number > len(recorded):
-            return Difference(json.loads(line)["time_ns"], f"a command that wasn't recorded: {line}"), row
-        if line != recorded[number - 1]:
-            what = f"command {number} differs: {recorded[number - 1]} recorded, {line} computed"
-            return Difference(json.loads(recorded[number - 1])["time_ns"], what), row
+    while computed.lines:
+        if difference := recorded.compare(computed.lines.popleft()):
+            return difference, row
     if refused is not None:
-        what = f"command {len(computed) + 1} was applied in the recording, but is refused here: {refused}"
+        what = f"command {recorded.compared + 1} was applied in the recording, but is refused here: {refused}"
         return Difference(again.simulation.time_ns, what), row
     return None, row
-
-
-def _states_in_order(session: RecordedSession) -> list[tuple[int, str, FloatArray]]:
-    """Time, topic ("" for the state itself) and row of everything to compare, in the order of time."""
-    streams = {"": (session.times, session.rows)}
-    if session.published:
-        streams = {name: (published.times, published.rows) for name, published in session.published.items()}
-    merged = [
-        (int(t), name, row) for name, (times, rows) in streams.items() for t, row in zip(times, rows, strict=True)
-    ]
-    return sorted(merged, key=lambda state: state[0])
 
 
 def _row_difference(number: int, name: str, recorded: FloatArray, computed: FloatArray) -> str:

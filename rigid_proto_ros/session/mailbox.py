@@ -79,6 +79,11 @@ class Mailbox:
             time.sleep(LOOK_AGAIN_S)
         return not full
 
+    @property
+    def waiting(self) -> int:
+        """How many events wait."""
+        return len(self._waiting)
+
     def take(self) -> Iterator[list[Noted]]:
         """What waits now, not what arrives meanwhile, BATCH events at most a time."""
         rest = len(self._waiting)
@@ -137,7 +142,7 @@ class WritingObserver(Observer):
 
     def __init__(self, place: str, on_error: Callable[[str], None] | None) -> None:
         self.error = ""
-        self._place, self._on_error = place, on_error or _logger.error
+        self.place, self._on_error = place, on_error or _logger.error
         self._mailbox = Mailbox(lambda: self._tell_end("nothing can be written to the disk any more"))
         self._thread = threading.Thread(target=self._write_until_closed, name=self.purpose, daemon=True)
 
@@ -158,10 +163,10 @@ class WritingObserver(Observer):
     def stalled(self) -> str:
         """Says that what is written isn't taken; empty while it is."""
         stalled = "" if self.error or not self._thread.is_alive() else self._mailbox.stalled
-        return stalled and f"{self.purpose} {self._place}: {stalled}"
+        return stalled and f"{self.purpose} {self.place}: {stalled}"
 
     def _tell_end(self, reason: str) -> None:
-        self.error = ": ".join(filter(None, (f"{self.purpose} stopped", self._place, reason)))
+        self.error = ": ".join(filter(None, (f"{self.purpose} stopped", self.place, reason)))
         self._on_error(self.error)
 
     # The writing thread

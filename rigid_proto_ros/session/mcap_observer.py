@@ -34,7 +34,7 @@ from ..simulation.observer import (
     Started,
 )
 from .mailbox import WritingObserver
-from .messages import DEFINITIONS, FLOOR, MADE_WITH, PROJECTIONS, TOPICS, applied_bytes, inertia_bytes
+from .messages import DEFINITIONS, FLOOR, MADE_WITH, PROJECTIONS, TOPICS, applied_bytes, inertia_bytes, offered_qos
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -93,7 +93,12 @@ class McapObserver(WritingObserver):
             for message_type, definition in DEFINITIONS.items()
         }
         self._channels = {
-            name: writer.register_channel(f"/{node_name.strip('/')}/{name}", "cdr", schemas[message_type])
+            name: writer.register_channel(
+                f"/{node_name.strip('/')}/{name}",
+                "cdr",
+                schemas[message_type],
+                {"offered_qos_profiles": offered_qos(name)},
+            )
             for name, message_type in TOPICS.items()
         }
         self._stream.flush()

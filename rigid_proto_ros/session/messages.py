@@ -67,6 +67,34 @@ TOPICS = {
 }
 """Topics of a session that we write, below the node's name, and their types."""
 
+STATE_DEPTH, EVENT_DEPTH = 10, 1000
+"""Messages that the node's publishers of states and of events keep for a slow reader."""
+
+LATCHED = frozenset({"scene", "inertia"})
+"""Topics whose last message waits for subscribers that come later."""
+
+
+def offered_qos(name: str) -> str:
+    """Quality of service of a topic's publisher in the node, as rosbag2 writes it into a channel's metadata
+    (``offered_qos_profiles``, format 9, of Jazzy): with it a replay of the bag latches what was latched.
+    """
+    depth = 1 if name in LATCHED else STATE_DEPTH if name in PROJECTIONS else EVENT_DEPTH
+    durability = "transient_local" if name in LATCHED else "volatile"
+    for_ever = "\n    sec: 9223372036\n    nsec: 854775807"
+    policies = {
+        "history": " keep_last",
+        "depth": f" {depth}",
+        "reliability": " reliable",
+        "durability": f" {durability}",
+        "deadline": for_ever,
+        "lifespan": for_ever,
+        "liveliness": " automatic",
+        "liveliness_lease_duration": for_ever,
+        "avoid_ros_namespace_conventions": " false",
+    }
+    return "- " + "\n  ".join(f"{name}:{value}" for name, value in policies.items())
+
+
 READ = {name: TOPICS[name] for name in ("scene", "events", "pose", "twist")} | {"odom": "nav_msgs/msg/Odometry"}
 """Topics that a session is read from."""
 
@@ -116,6 +144,15 @@ def read_string(data: bytes, topic: str) -> str:
         return cdr.read_string(data)
     except ValueError:
         raise _undecodable(topic, "std_msgs/msg/String") from None
+
+
+def read_stamp(data: bytes, topic: str) -> int:
+    """Stamp [ns] of a message of a state topic; raises InputError."""
+    try:
+        seconds, nanoseconds = cdr.read_stamp(data)
+    except ValueError:
+        raise _undecodable(topic, READ[topic.rpartition("/")[2]]) from None
+    return seconds * 1_000_000_000 + nanoseconds
 
 
 def read_state(name: str, data: bytes, topic: str) -> tuple[int, list[float]]:

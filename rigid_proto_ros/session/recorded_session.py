@@ -1,23 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""A recorded flight as plain arrays and text, whatever file it was read from; the mesh that it flew, found by its hash;
-and the flight computed anew from its scene and its events, and told to an observer once more.
+"""A recorded flight, in memory or in a file; the mesh that it flew, found by its hash; and the flight computed anew
+from its scene and its events, and told to an observer once more.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections import deque
-from collections.abc import Callable, Sequence
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..base.errors import InputError, MeshError
+from ..base.rotation import rotate, rotate_inverse
 from ..base.vectors import FloatArray, IntArray, StateRow
 from ..mesh.reading import Mesh, load_mesh, read_mesh
 from ..parameters.declarations import Parameters, convert_all
@@ -30,19 +33,52 @@ from ..simulation.observer import BodyChanged, Observer, Published
 from ..simulation.setup import Setup
 from .messages import PROJECTIONS
 
+ROUNDING = 1e-12
+"""What the way of a velocity into a topic's axes and back changes, of it and of 1."""
+
 SAME = 1e-6
 """[m, and of a quaternion's parts] How near a computed state must be to a recorded one to be the same."""
 
 
-@dataclass(frozen=True)
-class StampedRows:
-    """What one topic published: times (n,) int64 [ns, simulated] and rows (n, k) float64."""
+class Events(Protocol):
+    """The events of one run, read anew by each pass over them: (time [ns, simulated], line as logged), in order."""
 
-    times: IntArray
-    rows: FloatArray
+    def __len__(self) -> int: ...
+
+    def __iter__(self) -> Iterator[tuple[int, str]]: ...
+
+
+class States:
+    """The states of one run, read anew by each pass over them: time [ns, simulated], topic and row, in the order of
+    time. These are none.
+
+    Of a recording a row is what the topic published (``messages.PROJECTIONS``); of a run in memory the topic is "" and
+    the row the state's own, in ``simulation/observer.py``'s ``STATE_FIELDS`` order. topics: those with any states;
+    count: how many times there are; first_ns, end_ns: the first and the last.
+    """
+
+    topics: tuple[str, ...] = ()
+    count = first_ns = end_ns = 0
+
+    def __iter__(self) -> Iterator[tuple[int, str, Sequence[float]]]:
+        return iter(())
+
+
+class StateRows(States):
+    """States, or what one topic published of them, in memory: times (n,) int64 [ns, simulated], ascending, and rows
+    (n, k) float64.
+    """
+
+    def __init__(self, times: IntArray, rows: FloatArray) -> None:
+        self.times, self.rows, self.count = times, rows, len(times)
+        if self.count:
+            self.topics, self.first_ns, self.end_ns = ("",), int(times[0]), int(times[-1])
 
     def __len__(self) -> int:
-        return len(self.times)
+        return self.count
+
+    def __iter__(self) -> Iterator[tuple[int, str, Sequence[float]]]:
+        return ((time_ns, "", row.tolist()) for time_ns, row in zip(self.times.tolist(), self.rows, strict=True))
 
 
 @dataclass
@@ -50,34 +86,29 @@ class RecordedSession:
     """One run, as its recording holds it.
 
     scene: the parameters at the run's start as a params file. events: (time_ns, JSON line) in order, lines as logged.
-    refusals: (time_ns, text). times (n,) int64 [ns, simulated] and rows (n, 13) float64, exactly the published states
-    in ``simulation/observer.py``'s ``STATE_FIELDS`` order. complete: the file was finished properly.
-
-    A bag holds no state rows but what the node published of them: ``published``, by topic; ``rows`` are then found from
-    those, for the eye. scenes: the texts of the scene topic from the run's start on, in order. node_name: what stands
-    before the topics' names. missing: topics that a check would need. attachments: (name, bytes) of files inside;
-    made_with: the processor, and versions by package; accuracy_floor: why the motion is held to less than its accuracy,
-    as an .mcap of ours says it; folder: where the session lies.
+    states: those that were published. complete: the file was finished properly. scenes: the texts of the scene topic
+    from the run's start on, in order. node_name: what stands before the topics' names. missing: topics that a check
+    would need. attachments: (name, bytes) of files inside; made_with: the processor, and versions by package;
+    accuracy_floor: why the motion is held to less than its accuracy, as an .mcap of ours says it; logs_timeouts: the
+    events have timeouts among them, as those of earlier versions haven't; folder: where the session lies.
     """
 
     scene: str = ""
-    events: list[tuple[int, str]] = field(default_factory=list)
-    refusals: list[tuple[int, str]] = field(default_factory=list)
-    times: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
-    rows: FloatArray = field(default_factory=lambda: np.empty((0, 13)))
+    events: Events = field(default_factory=list)
+    states: States = field(default_factory=States)
     complete: bool = True
-    published: dict[str, StampedRows] = field(default_factory=dict)
     scenes: list[str] = field(default_factory=list)
     node_name: str = "rigid_body"
     missing: tuple[str, ...] = ()
     attachments: list[tuple[str, bytes]] = field(default_factory=list)
     made_with: dict[str, str] = field(default_factory=dict)
     accuracy_floor: str = ""
+    logs_timeouts: bool = True
     folder: Path | None = None
 
     @property
     def lines(self) -> list[str]:
-        """The event lines as logged."""
+        """The event lines as logged, in memory."""
         return [line for _, line in self.events]
 
     @property
@@ -88,7 +119,68 @@ class RecordedSession:
     @property
     def end_ns(self) -> int:
         """Simulated time [ns] of the last state; 0 without states."""
-        return int(self.times[-1]) if len(self.times) else 0
+        return self.states.end_ns
+
+    def state_rows(self) -> Iterator[tuple[int, FloatArray]]:
+        """Time [ns] and state row (13,) of every state, one after another; of a recording one a time, put together from
+        what was published, in which velocities that weren't are 0.
+        """
+        for time_ns, published in groupby(self.states, key=itemgetter(0)):
+            shown = {}
+            for _, topic, row in published:
+                if topic:
+                    shown[topic] = row
+                else:
+                    yield time_ns, np.asarray(row)
+            if "pose" in shown or "odom" in shown:
+                yield time_ns, _put_together(shown)
+
+    @cached_property
+    def _rows(self) -> StateRows:
+        if isinstance(self.states, StateRows):
+            return self.states
+        times, numbers = array("q"), array("d")
+        for time_ns, row in self.state_rows():
+            times.append(time_ns)
+            numbers.extend(row)
+        return StateRows(np.frombuffer(times, np.int64), np.frombuffer(numbers).reshape(-1, 13))
+
+    @property
+    def times(self) -> IntArray:
+        """Times (n,) [ns] of ``state_rows``, in memory from then on, as are ``rows``."""
+        return self._rows.times
+
+    @property
+    def rows(self) -> FloatArray:
+        """State rows (n, 13) of ``state_rows``."""
+        return self._rows.rows
+
+    @cached_property
+    def published(self) -> dict[str, StateRows]:
+        """What each topic published, in memory from then on."""
+        found = {topic: (array("q"), array("d")) for topic in self.states.topics}
+        for time_ns, topic, row in self.states:
+            found[topic][0].append(time_ns)
+            found[topic][1].extend(row)
+        return {
+            topic: StateRows(np.frombuffer(times, np.int64), np.frombuffer(numbers).reshape(len(times), -1))
+            for topic, (times, numbers) in found.items()
+        }
+
+
+def _put_together(shown: dict[str, Sequence[float]]) -> FloatArray:
+    """A state row (13,) from what the topics published of one state."""
+    state = np.zeros(13)
+    if "odom" in shown:
+        odom = shown["odom"]
+        state[:7] = odom[:7]
+        state[7:10], state[10:13] = rotate(*odom[3:7], *odom[7:10]), odom[10:13]
+    if "pose" in shown:
+        state[:7] = shown["pose"]
+    if "twist" in shown:
+        twist = shown["twist"]
+        state[7:10], state[10:13] = twist[:3], rotate_inverse(*state[3:7].tolist(), *twist[3:6])
+    return state
 
 
 def decode_event(line: str, number: int) -> tuple[int, str, dict[str, Any]]:
@@ -173,47 +265,90 @@ def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
     return find
 
 
+_Waiting = tuple[int, str, dict[str, Any], Command | None, int]
+"""time_ns, kind, content, command (None for a mark) and number of an event."""
+
+
+def decoded_events(
+    event_lines: Iterable[str], frames: tuple[str, str]
+) -> Iterator[tuple[int, int, str, dict[str, Any], Command | None]]:
+    """Number from 1, time_ns, kind, content and command (None for a mark) of lines of the event log. frames: names of
+    the world's and the body's. Raises InputError for those that can't be decoded.
+    """
+    for number, line in enumerate(event_lines, 1):
+        time_ns, kind, content = decode_event(line, number)
+        try:
+            if kind == "set":
+                convert_all(content)
+            command = None if kind == "timeout" else of_event(kind, content, frames)
+        except InputError as error:
+            raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
+        yield number, time_ns, kind, content, command
+
+
+class _Upcoming:
+    """The items of an iterator as a queue, of which only the first one has been made."""
+
+    def __init__(self, items: Iterator[_Waiting]) -> None:
+        self._items = items
+        self._first = next(items, None)
+
+    def __bool__(self) -> bool:
+        return self._first is not None
+
+    def __getitem__(self, index: int) -> _Waiting:
+        assert index == 0 and self._first is not None
+        return self._first
+
+    def popleft(self) -> _Waiting:
+        first, self._first = self[0], next(self._items, None)
+        return first
+
+
 class Resimulation(ScenarioRun):
     """A session's simulation; its commands are submitted when their time has come, as they were then. Raises InputError
     for events that can't be decoded.
 
-    mesh_of(name) gives the mesh that a change names, or None to load it. end_ns: when all events have acted.
+    event_lines: in the order of time, read as the flight comes to them. mesh_of(name) gives the mesh that a change
+    names, or None to load it. logs_timeouts: the recording has events of timeouts, as those of earlier versions
+    haven't. end_ns: when all events that have been read have acted.
     """
 
     def __init__(
         self,
         scenario: Scenario,
-        event_lines: Sequence[str],
+        event_lines: Iterable[str],
         observer: Observer | None = None,
         mesh_of: Callable[[str], Mesh | None] = lambda _: None,
         node_name: str = "rigid_body",
+        logs_timeouts: bool = True,
     ) -> None:
         super().__init__(scenario, observer)
-        # Recordings from before there were such events have none.
-        self.simulation.logs_timeouts = False
+        self.simulation.logs_timeouts = logs_timeouts
         self.frames = frame_names(scenario.parameters, node_name)
         self._mesh_of = mesh_of
         self._changes_ns = -1
         self.end_ns = 0
-        waiting: list[tuple[int, str, dict[str, Any], Command | None, int]] = []
-        for number, line in enumerate(event_lines, 1):
-            time_ns, kind, content = decode_event(line, number)
-            if kind == "timeout":
-                # It comes by itself, where it belongs: one that a change brings about comes behind that.
-                self.simulation.logs_timeouts = True
-                self.end_ns = max(self.end_ns, time_ns + 1)
-                continue
-            try:
-                if kind == "set":
-                    convert_all(content)
-                command = of_event(kind, content, self.frames)
-            except InputError as error:
-                raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
+        self._waiting = _Upcoming(self._to_come(event_lines))
+
+    def _to_come(self, event_lines: Iterable[str]) -> Iterator[_Waiting]:
+        for number, time_ns, kind, content, command in decoded_events(event_lines, self.frames):
             # A mark is made before what acts at its time, which the recording may not have come to.
-            self.end_ns = max(self.end_ns, time_ns + (command is not None))
-            waiting.append((time_ns, kind, content, command, number))
-        # Stable: what happened at one instant keeps its order.
-        self._waiting = deque(sorted(waiting, key=itemgetter(0)))
+            self.end_ns = max(self.end_ns, time_ns + (command is not None or kind == "timeout"))
+            # A timeout comes by itself, where it belongs: one that a change brings about comes behind that.
+            if kind != "timeout":
+                yield time_ns, kind, content, command, number
+
+    @property
+    def all_read(self) -> bool:
+        """Whether no event waits any more."""
+        return not self._waiting
+
+    def finish(self) -> StateRow:
+        """Advance to where all events have acted, at least; returns the state row there."""
+        while not self.all_read:
+            self.advance(self.end_ns)
+        return self.advance(max(self.end_ns, self.simulation.time_ns))
 
     def advance(self, until_ns: int) -> StateRow:
         """Advance the body to ``until_ns``; returns its state row, before what acts at that very time.
@@ -251,24 +386,51 @@ class Resimulation(ScenarioRun):
         return self.replace(self.scenario.with_changes(command.content, mesh))
 
 
-def resimulation(session: RecordedSession, observer: Observer | None = None) -> Resimulation:
-    """The session's simulation at its start; raises InputError for events that can't be decoded."""
-    scenario = session_scenario(session)
-    return Resimulation(scenario, session.lines, observer, mesh_finder(session), session.node_name)
+def resimulation(
+    session: RecordedSession, observer: Observer | None = None, lines: Iterable[str] | None = None
+) -> Resimulation:
+    """The session's simulation at its start; raises InputError for events that can't be decoded, when it comes to them.
+    lines: the session's, where somebody else reads them, too.
+    """
+    lines = (line for _, line in session.events) if lines is None else lines
+    mesh_of, scenario = mesh_finder(session), session_scenario(session)
+    return Resimulation(scenario, lines, observer, mesh_of, session.node_name, session.logs_timeouts)
+
+
+def check_playable(session: RecordedSession, given: Scenario | None = None) -> None:
+    """Raise InputError for a session that can't be played: without a scene, unless one is given, or with events that
+    can't be decoded.
+    """
+    if given is not None:
+        return
+    if session.missing or not session.scene:
+        raise InputError("session", ", ".join(session.missing) or "no scene", "--scene FILE, to draw it")
+    frames = frame_names(session_scenario(session).parameters, session.node_name)
+    for _ in decoded_events((line for _, line in session.events), frames):
+        pass
 
 
 def _begins_at_start(session: RecordedSession) -> bool:
     """Whether the flight computed from the start comes to the first recorded state. Of a recording that was begun later
     it isn't known what a ghost did before.
     """
-    if not len(session.times) or session.times.min() == 0:
+    time_ns, row = next(session.state_rows(), (0, None))
+    if row is None or time_ns == 0:
         return True
-    first = int(session.times.argmin())
     try:
-        computed = resimulation(session).advance(int(session.times[first]))
+        computed = resimulation(session).advance(time_ns)
     except InputError:
         return False
-    return bool(np.abs(computed[:7] - session.rows[first, :7]).max() < SAME)
+    return bool(np.abs(computed[:7] - row[:7]).max() < SAME)
+
+
+def _alike(topics: list[str], one: list[float], other: list[float]) -> bool:
+    """Whether these topics would publish the same of both states, but for rounding."""
+    return all(
+        abs(a - b) <= ROUNDING * (1.0 + abs(b))
+        for topic in topics
+        for a, b in zip(PROJECTIONS[topic](one), PROJECTIONS[topic](other), strict=True)
+    )
 
 
 def play(
@@ -295,9 +457,9 @@ def play(
         again.announce()
         if again.scenario.ghost is not None and _begins_at_start(session):
             again.begin_ghost()
-    for count, k in enumerate(np.argsort(session.times, kind="stable").tolist()):
-        progress(count, len(session.times))
-        time_ns, row = int(session.times[k]), session.rows[k]
+    topics = [topic for topic in session.states.topics if topic]
+    for count, (time_ns, row) in enumerate(session.state_rows()):
+        progress(count, session.states.count)
         if again is None:
             observer.on(Published(time_ns, row))
             continue
@@ -306,12 +468,8 @@ def play(
         except InputError:
             # A command that is refused here: from now on only the recorded states are shown.
             computed = row
-        # A bag holds of a state what was published of it, and no more.
-        alike = bool(session.published) and all(
-            np.allclose(PROJECTIONS[name](computed.tolist()), PROJECTIONS[name](row.tolist()), rtol=1e-12, atol=1e-12)
-            for name in session.published
-        )
-        again.publish(time_ns, computed if alike else row)
+        # A recording holds of a state what was published of it, and no more.
+        again.publish(time_ns, computed if topics and _alike(topics, computed.tolist(), row.tolist()) else row)
     if again is not None and all_events:
         with suppress(InputError):
-            again.advance(max(again.end_ns, again.simulation.time_ns))
+            again.finish()

@@ -27,7 +27,7 @@ from ..parameters.declarations import parameter_named
 from ..scene.scenario import Scenario, make_scenario, mesh_sha256_of
 from ..scene.scene_file import read_scene_text
 from ..session.as_script import branch_at
-from ..session.recorded_session import RecordedSession
+from ..session.recorded_session import RecordedSession, StateRows
 from ..simulation.observer import BodyChanged, Event, Logged, Observer, Published, Reset, SceneChanged
 from ..simulation.setup import Setup
 
@@ -119,8 +119,10 @@ class RunMemory(Observer):
             return RecordedSession(
                 scene=self._scene,
                 events=list(self._events),
-                times=np.array([time_ns for time_ns, _ in states], np.int64),
-                rows=np.array([row for _, row in states]).reshape(-1, 13),
+                states=StateRows(
+                    np.array([time_ns for time_ns, _ in states], np.int64),
+                    np.array([row for _, row in states]).reshape(-1, 13),
+                ),
                 node_name=self._name,
                 scenes=list(self._scenes),
             )

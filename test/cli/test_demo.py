@@ -9,15 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rerun_flight import verified
 
 pytest.importorskip("rclpy")
 pytest.importorskip("rerun")
 
-from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.rrd_reading import read_session
-from rigid_proto_ros.ros.domain import hold_domain
 
-SESSION = Path("out/session.rrd")
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.ros.domain import hold_domain
+from rigid_proto_ros.session.bag import read_runs
+
+SESSION, VIEW = Path("out/session.mcap"), Path("out/session.rrd")
 
 
 def check_flown(capfd, monkeypatch, folder: Path, *arguments: str) -> None:
@@ -25,10 +27,10 @@ def check_flown(capfd, monkeypatch, folder: Path, *arguments: str) -> None:
     monkeypatch.chdir(folder)
     assert main(["demo", *arguments]) == 0, capfd.readouterr().err
     told = capfd.readouterr().out
-    assert str(SESSION) in told
+    assert f"rerun {VIEW}" in told and f"replay {SESSION} --verify" in told
     assert ("domain 0 is in use; this one is in ROS_DOMAIN_ID=" in told) == ("ROS_DOMAIN_ID" not in os.environ)
-    recorded = read_session(SESSION)
-    assert recorded.complete
+    recorded = read_runs(SESSION)[-1]
+    assert recorded.complete and verified(VIEW)
     assert np.sort(recorded.times).tolist() == list(range(0, recorded.end_ns + 1, 10_000_000))
     assert recorded.end_ns == 10_000_000_000
     kinds = [json.loads(line)["kind"] for _, line in recorded.events]
@@ -56,4 +58,4 @@ def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies_besi
 def test_a_real_mesh_flies_too_and_hangs_where_the_state_says(ros_environment, tmp_path, meshes, monkeypatch, capfd):
     monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
     check_flown(capfd, monkeypatch, tmp_path, "--duration", "10", "--mesh", str(meshes / "spot.obj"))
-    assert [name for name, _ in read_session(SESSION).attachments] == ["spot.obj"]
+    assert [name for name, _ in read_runs(SESSION)[-1].attachments] == ["spot.obj"]

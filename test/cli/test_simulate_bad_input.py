@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.parameters.declarations import PARAMETERS
 from rigid_proto_ros.ros.arguments import given_arguments, own_arguments
@@ -213,17 +214,62 @@ def test_what_is_refused_overwrites_no_recording(option, tmp_path, capfd):
 
 def test_a_demo_of_an_open_mesh_names_what_helps_and_keeps_the_session_before_it(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
-    session = Path("out/session.rrd")
+    session = Path("out/session.mcap")
     session.parent.mkdir()
-    session.write_bytes(b"RRF2 of an earlier flight")
+    session.write_bytes(b"\x89MCAP of an earlier flight")
     Path("open.obj").write_text(MESHES["open.obj"][0])
     assert "mesh_repair" in one_line(capfd, rigid_proto, ["demo", "--mesh", "open.obj"])
-    assert session.read_bytes() == b"RRF2 of an earlier flight"
+    assert session.read_bytes() == b"\x89MCAP of an earlier flight"
 
 
 def test_two_recordings_of_one_flight_are_two_files(tmp_path, capfd):
     file = str(tmp_path / "x.mcap")
-    assert "another file" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--record", file, "--bag", file])
+    for other in (file, str(tmp_path / "y.mcap")):
+        assert "one of each" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--record", file, "--bag", other])
+    for wrong in (f"{file},x.bag", "x.txt", f"{file},{file}"):
+        assert ".rrd (a view for Rerun)" in one_line(capfd, rigid_proto, ["simulate", "t_handle", "--record", wrong])
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("beside", [True, False])
+def test_a_view_given_for_a_session_is_answered_with_what_to_give(beside, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    Path("flight.rrd").write_bytes(b"RRF2 as Rerun writes it")
+    if beside:
+        Path("flight.mcap").touch()
+    for words in (
+        ["replay", "flight.rrd", "--verify"],
+        ["snapshot", "flight.rrd", "--at", "1", "-o", "x.png"],
+        ["identify", "flight.rrd"],
+        ["replay", "flight.rrd", "--repair", "x.mcap"],
+    ):
+        told = one_line(capfd, rigid_proto, words)
+        assert "flight.rrd is a view for Rerun" in told and "rerun flight.rrd" in told
+        assert told.rstrip().endswith("accepted: flight.mcap") if beside else "the .mcap of the same flight" in told
+
+
+def test_a_scene_records_only_below_the_working_folder_unless_the_command_line_names_the_file(
+    tmp_path, monkeypatch, capfd
+):
+    folder, elsewhere = tmp_path / "here", str(tmp_path / "x.mcap")
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    scene = folder / "scene.yaml"
+    for place in (elsewhere, "../x.mcap", f"out/x.rrd,{elsewhere}"):
+        scene.write_text(f"rigid_body: {{ros__parameters: {{mesh: book, record: '{place}'}}}}\n")
+        said = one_line(capfd, rigid_proto, ["simulate", str(scene), "--duration", "0.1"])
+        assert "x.mcap" in said and "below the working folder" in said
+        with pytest.raises(InputError, match="below the working folder"):
+            given_arguments(["node", "--ros-args", "--params-file", str(scene)], "rigid_body", print)
+    assert [file.name for file in tmp_path.iterdir()] == ["here"]
+    for named in (["--record", elsewhere], ["--set", f"record={elsewhere}"]):
+        assert rigid_proto(["simulate", str(scene), "--duration", "0.1", *named]) == 0
+        Path(elsewhere).unlink()
+    named = ["node", "--ros-args", "--params-file", str(scene), "-p", f"record:={elsewhere}"]
+    assert given_arguments(named, "rigid_body", print)["record"] == elsewhere
+    scene.write_text("rigid_body: {ros__parameters: {mesh: book, record: out/x.mcap}}\n")
+    assert rigid_proto(["simulate", str(scene), "--duration", "0.1"]) == 0
+    assert (folder / "out" / "x.mcap").exists()
 
 
 def test_a_binary_file_is_no_scene_script_or_session(tmp_path, capfd):

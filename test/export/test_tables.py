@@ -14,7 +14,7 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.export.table import STATE_COLUMNS, UNITS, state_columns, write_csv
-from rigid_proto_ros.rerun_view.session_files import read_runs
+from rigid_proto_ros.session.bag import read_runs
 
 ENDING = ["--duration", "0.5", "--set", "gravity=[0, 0, -9.81]"]
 

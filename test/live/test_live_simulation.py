@@ -20,11 +20,12 @@ from rigid_proto_ros.live.live_simulation import LiveSimulation
 from rigid_proto_ros.live.pacing import SLICE_NS
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.parameters.declarations import ZERO
-from rigid_proto_ros.rerun_view.session_files import read_runs, record
+from rigid_proto_ros.rerun_view.recorders import record
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.session.as_script import script_of_session
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.session.check import NotVerifiableError, verify
 from rigid_proto_ros.simulation.commands import ThrusterCommand, WrenchCommand
 from rigid_proto_ros.simulation.observer import BodyChanged, Logged, Observer, Published
@@ -309,7 +310,7 @@ def test_a_reset_between_the_requests_that_begin_a_recording_leaves_it_verifiabl
 
 def test_a_recording_that_takes_the_place_of_a_lost_one_is_not_given_up_for_it(live, tmp_path, monkeypatch):
     live.set_parameters({"record": str(tmp_path / "lost.mcap")})
-    live._recorder.error, call = "lost", live.call
+    live._recorders[0].error, call = "lost", live.call
 
     def call_later(function):
         monkeypatch.undo()
@@ -343,7 +344,7 @@ def test_a_recording_that_is_lost_while_time_stands_can_be_begun_again_and_ended
 def test_a_lost_recording_is_begun_again_by_its_own_name(live, tmp_path):
     path = tmp_path / "flight.mcap"
     live.set_parameters({"record": str(path)})
-    live._recorder.error = "lost"
+    live._recorders[0].error = "lost"
     live.set_parameters({"record": str(path)})
     live.step()
     live.set_parameters({"record": ""})
@@ -351,10 +352,8 @@ def test_a_lost_recording_is_begun_again_by_its_own_name(live, tmp_path):
     assert not live.recording_trouble
 
 
-@needs_rerun
-@pytest.mark.parametrize("ending", ["rrd", "mcap"])
-def test_what_was_done_behind_the_last_state_is_in_a_converted_session_too(live, tmp_path, ending):
-    path, converted = tmp_path / f"flight.{ending}", tmp_path / f"converted.{ending}"
+def test_what_was_done_behind_the_last_state_is_in_a_converted_session_too(live, tmp_path):
+    path, converted = tmp_path / "flight.mcap", tmp_path / "converted.mcap"
     live.set_parameters({"record": str(path), "wrench_timeout": 0.05})
     live.schedule("{t: 0, wrench: {force: [1, 0, 0]}}")
     live.step(4)
@@ -386,8 +385,9 @@ def test_the_file_that_is_being_recorded_is_refused_for_a_second_recording_by_an
             begin()
     live.step(2)
     live.set_parameters({"record": ""})
-    (run,) = read_runs(path)
-    assert (np.asarray(run.times) // PERIOD_NS).tolist() == [1, 2, 3, 4, 5]
+    if ending == ".mcap":
+        (run,) = read_runs(path)
+        assert (np.asarray(run.times) // PERIOD_NS).tolist() == [1, 2, 3, 4, 5]
     other.announce()
     other.stop()
 
@@ -419,14 +419,12 @@ def test_a_recording_of_a_motion_that_failed_is_verified_with_what_was_asked_for
     live.stop()
     (run,) = read_runs(path)
     assert json.loads(run.lines[-1])["kind"] == "step"
-    assert run.events[-1][0] > run.end_ns
+    assert list(run.events)[-1][0] > run.end_ns
     assert verify(run) is None
 
 
-@needs_rerun
-@pytest.mark.parametrize("ending", ["rrd", "mcap"])
-def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_verified(live, tmp_path, ending):
-    path = tmp_path / f"flight.{ending}"
+def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_verified(live, tmp_path):
+    path = tmp_path / "flight.mcap"
     live.set_parameters({"record": str(path)})
     live.step(2)
     live.set_parameters({"mesh": "hammer"})
@@ -435,6 +433,48 @@ def test_a_run_after_a_reset_that_takes_a_waiting_change_of_the_mesh_with_it_is_
     live.step(2)
     live.set_parameters({"record": ""})
     assert verify(read_runs(path)[-1]) is None
+
+
+@needs_rerun
+def test_a_view_comes_and_goes_beside_a_recording_that_goes_on(live, tmp_path):
+    from rerun_flight import drawn, verified
+
+    session, view = tmp_path / "flight.mcap", tmp_path / "flight.rrd"
+    for names in (f"{session}", f"{session},{view}", f"{session}", ""):
+        live.set_parameters({"record": names})
+        live.step(2)
+    (run,) = read_runs(session)
+    assert (np.asarray(run.times) // PERIOD_NS).tolist() == [1, 2, 3, 4, 5, 6]
+    assert run.complete and verify(run) is None
+    assert verified(view) and drawn(view) == [3 * PERIOD_NS, 4 * PERIOD_NS]
+
+
+@needs_rerun
+@pytest.mark.parametrize("lost", ["mcap", "rrd"])
+def test_of_recording_and_view_one_goes_on_where_the_other_is_lost(live, tmp_path, lost):
+    from rerun_flight import drawn, verified
+
+    files = {ending: tmp_path / f"flight.{ending}" for ending in ("mcap", "rrd")}
+    live.set_parameters({"record": f"{files['mcap']}, {files['rrd']}"})
+    live.step(2)
+    files[lost].unlink()
+    deadline = time.monotonic() + 60.0
+    while "," in live.scenario.parameters.record:
+        assert time.monotonic() < deadline, "nobody has noticed"
+        time.sleep(0.05)
+        live.give_up_failed_recording()
+    (left,) = (file for ending, file in files.items() if ending != lost)
+    assert live.scenario.parameters.record == str(left)
+    assert str(files[lost]) in live.recording_trouble
+    live.step(2)
+    live.set_parameters({"record": ""})
+    assert not live.recording_trouble
+    if lost == "rrd":
+        (run,) = read_runs(left)
+        assert run.complete and verify(run) is None
+        assert (np.asarray(run.times) // PERIOD_NS).tolist() == [1, 2, 3, 4]
+    else:
+        assert verified(left) and drawn(left) == [k * PERIOD_NS for k in (1, 2, 3, 4)]
 
 
 def test_a_recording_is_begun_when_nothing_else_can_be_refused_any_more(tmp_path):

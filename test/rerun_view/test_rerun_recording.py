@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What a recording holds is what the run published: states and scalars exactly, poses to float32."""
+"""What a view shows is what the run published: scalars exactly, poses to float32; and Rerun finds it complete."""
 
 from __future__ import annotations
 
-import hashlib
 import resource
 import threading
 import time
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 import rerun as rr
 import rerun_flight as flight
-from rerun_flight import cells
+from rerun_flight import cells, drawn, record_batches, texts, verified
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
@@ -22,8 +21,7 @@ from rigid_proto_ros.rerun_view import backend
 from rigid_proto_ros.rerun_view.backend import ROS_TIME
 from rigid_proto_ros.rerun_view.layout import Subject, blueprint
 from rigid_proto_ros.rerun_view.observer import FileRecorder
-from rigid_proto_ros.rerun_view.rrd_reading import FRAME_HEAD, read_session, record_batches, whole_bytes
-from rigid_proto_ros.rerun_view.session_files import read_runs, record
+from rigid_proto_ros.rerun_view.recorders import record
 from rigid_proto_ros.session.mailbox import STALLED_S
 from rigid_proto_ros.session.recorded_session import RecordedSession
 from rigid_proto_ros.simulation.observer import (
@@ -46,27 +44,24 @@ def states() -> np.ndarray:
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory, states) -> Path:
     path = tmp_path_factory.mktemp("recording") / "session.rrd"
-    observer = FileRecorder(str(path), files=[flight.FILE])
+    observer = FileRecorder(str(path))
     flight.fly(observer, states)
     observer.close()
     assert observer.error == ""
     return path
 
 
-def test_states_scene_mesh_and_event_lines_come_back_bit_for_bit(recording, states):
-    session = read_session(recording)
-    assert session.complete
-    assert np.array_equal(session.times, flight.PERIOD_NS * np.arange(COUNT))
-    assert session.rows.tobytes() == states.tobytes()
-    assert (session.scene, session.mesh_sha256, flight.meshes(recording)) == (flight.SCENE, flight.SHA256, 1)
-    assert session.attachments == [flight.FILE]
-    assert session.events == [
-        (200_000_000, flight.event_line(200_000_000, "poke")),
-        (305_000_000, flight.event_line(305_000_000, "wrench")),
+def test_scene_mesh_event_lines_and_refusals_are_shown_in_a_file_that_rerun_finds_complete(recording):
+    assert drawn(recording) == [k * flight.PERIOD_NS for k in range(COUNT)]
+    assert flight.meshes(recording) == 1
+    assert texts(recording, backend.SCENE) == [flight.SCENE]
+    assert texts(recording, backend.EVENTS) == [
+        flight.event_line(200_000_000, "poke"),
+        flight.event_line(305_000_000, "wrench"),
     ]
-    assert [time_ns for time_ns, _ in session.refusals] == [500_000_000]
-    # No index, which would grow in memory; the end is marked.
-    assert recording.stat().st_size - whole_bytes(recording)[0] == FRAME_HEAD.size
+    (refusal,) = texts(recording, backend.REFUSALS)
+    assert "refused (frame)" in refusal
+    assert verified(recording)
 
 
 def test_every_published_state_has_its_pose_to_float32(recording, states):
@@ -134,9 +129,8 @@ def test_a_change_of_the_body_moves_the_mesh_from_that_time_on(tmp_path, states)
 
 def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
     path = tmp_path / "meshes.rrd"
-    other = "other.obj", b"a larger brick"
-    changed = flight.SCENE.replace(flight.SHA256, hashlib.sha256(other[1]).hexdigest())
-    observer = FileRecorder(str(path), files=[flight.FILE, other])
+    changed = flight.SCENE.replace(flight.SHA256, "ab" * 32)
+    observer = FileRecorder(str(path))
     flight.fly(observer, states[:20])
     observer.on(SceneChanged(200_000_000, changed))
     observer.on(MeshChanged(200_000_000, 2.0 * flight.VERTICES, flight.TRIANGLES, "ab" * 32))
@@ -145,10 +139,9 @@ def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
     observer.on(Reset())
     observer.on(Published(0, states[21]))
     observer.close()
-    before, after = read_session(tmp_path / "meshes.run1.rrd"), read_session(path)
     assert (flight.meshes(tmp_path / "meshes.run1.rrd"), flight.meshes(path)) == (2, 1)
-    assert (before.scenes, before.attachments) == ([flight.SCENE, changed], [flight.FILE, other])
-    assert (after.scenes, after.attachments) == ([changed], [other])
+    assert texts(tmp_path / "meshes.run1.rrd", backend.SCENE) == [flight.SCENE, changed]
+    assert texts(path, backend.SCENE) == [changed]
     first = cells(tmp_path / "meshes.run1.rrd", style.BODY_MESH, "Transform3D:scale")
     second = cells(tmp_path / "meshes.run1.rrd", style.BODY_MESH + "_2", "Transform3D:scale")
     scale = flight.SCALE.tolist()
@@ -185,12 +178,12 @@ def test_a_reset_keeps_the_run_before_beside_the_new_one_which_begins_with_what_
         observer.on(Published(k * flight.PERIOD_NS, row))
     observer.close()
     assert sorted(file.name for file in tmp_path.iterdir()) == ["session.rrd", "session.run1.rrd"]
-    newest, before = read_session(path), read_session(tmp_path / "session.run1.rrd")
-    assert newest.rows.tobytes() == states[50:60].tobytes()
-    assert before.rows.tobytes() == states[:50].tobytes()
-    assert flight.meshes(path) == flight.meshes(tmp_path / "session.run1.rrd") == 1
-    assert (before.scene, newest.scene) == (flight.SCENE, changed)
-    assert newest.events == []
+    before = tmp_path / "session.run1.rrd"
+    assert len(drawn(path)) == 10 and len(drawn(before)) == 50
+    assert flight.meshes(path) == flight.meshes(before) == 1
+    assert texts(before, backend.SCENE)[0] == flight.SCENE and texts(path, backend.SCENE) == [changed]
+    assert texts(path, backend.EVENTS) == []
+    assert verified(path) and verified(before)
 
 
 def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path):
@@ -217,12 +210,6 @@ def test_a_session_that_cannot_be_played_leaves_an_earlier_recording_as_it_was(t
         assert path.read_bytes() == b"RRF2 earlier"
 
 
-def test_a_recording_made_of_a_bag_and_named_after_it_is_read(recording, tmp_path):
-    path = tmp_path / "flight.mcap.rrd"
-    path.write_bytes(recording.read_bytes())
-    assert len(read_runs(path)[0].times) == COUNT
-
-
 @pytest.mark.parametrize("lost", [False, True], ids=["file there", "file lost too"])
 def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_run(tmp_path, states, monkeypatch, lost):
     uncaught, errors, path = [], [], tmp_path / "session.rrd"
@@ -238,8 +225,7 @@ def test_an_error_in_the_recorder_itself_ends_the_recording_whole_and_not_the_ru
     observer.close()
     assert errors == [observer.error] and not uncaught
     if not lost:
-        session = read_session(path)
-        assert session.complete and session.rows.tobytes() == states[:20].tobytes()
+        assert verified(path) and len(drawn(path)) == 20
 
 
 def test_a_recorder_gets_something_done_with_every_piece_that_it_sends(tmp_path, states, monkeypatch):
@@ -264,8 +250,7 @@ def test_a_file_that_cannot_grow_in_flight_stops_the_recording_and_keeps_what_is
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert errors == [observer.error] and str(path) in observer.error
-    session = read_session(path)
-    assert not session.complete and 0 < len(session.times) < 12_000
+    assert not verified(path) and path.stat().st_size
 
 
 @pytest.mark.parametrize("hangs", ["flush", "disconnect"])

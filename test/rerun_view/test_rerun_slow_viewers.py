@@ -14,7 +14,7 @@ from rerun.chunk import RrdReader
 
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.rerun_view import live_view, viewers
-from rigid_proto_ros.rerun_view.backend import SIM_TIME, STATE
+from rigid_proto_ros.rerun_view.backend import SIM_TIME
 from rigid_proto_ros.rerun_view.observer import FileRecorder
 from rigid_proto_ros.simulation.observer import BodyChanged, Published, Reset, Started
 
@@ -119,10 +119,10 @@ def test_a_viewer_that_comes_after_the_oldest_was_dropped_still_sees_the_whole_b
         def complete() -> dict[str, list[int]]:
             """What was saved, once it has all parts; of one that moves its place is temporal, and shows it alone."""
             found = _entities(saved)
-            return found if all(max(found.get(name, [-1])) >= 0 for name in {STATE, *shapes}) else {}
+            return found if all(max(found.get(name, [-1])) >= 0 for name in {style.BODY, *shapes}) else {}
 
         # The file grows: one reading of it is enough.
-        assert min(flight.wait_for(complete)[STATE]) > 0, "nothing was dropped, so nothing is shown"
+        assert min(flight.wait_for(complete)[style.BODY]) > 0, "nothing was dropped, so nothing is shown"
     finally:
         if watcher is not None:
             watcher.stop()

@@ -21,19 +21,16 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli import snapshot as command
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.rerun_view import snapshot
-from rigid_proto_ros.rerun_view.observer import FileRecorder
-from rigid_proto_ros.rerun_view.rrd_reading import read_session
 from rigid_proto_ros.rerun_view.snapshot import DRIVERS, is_one_colour
+from rigid_proto_ros.session.bag import read_runs
 
 pytestmark = pytest.mark.drawn
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    path = tmp_path_factory.mktemp("snapshot") / "session.rrd"
-    observer = FileRecorder(str(path))
-    flight.fly(observer, flight.rows(60))
-    observer.close()
+    path = tmp_path_factory.mktemp("snapshot") / "session.mcap"
+    assert main(["simulate", "hollow_box", "--duration", "0.59", "--record", str(path)]) == 0
     return path
 
 
@@ -98,28 +95,28 @@ def test_what_cannot_be_drawn_is_refused_with_what_would_be_accepted(recording, 
 
 @pytest.fixture
 def opened(monkeypatch):
-    """Recordings that a viewer was given, in which nothing is drawn."""
-    sessions = []
+    """Times of the states in what a viewer was given, in which nothing is drawn."""
+    shown = []
     client = nullcontext(SimpleNamespace(set_time=lambda *_, **__: None))
     stand_in = {
         "headless_viewer": lambda *_: client,
-        "show": lambda _, path: sessions.append(read_session(path)),
+        "show": lambda _, path: shown.append(flight.drawn(path)),
         "_stable_picture": lambda _: b"",
         "NOTICE_GONE_S": 0,
         "is_one_colour": lambda _: False,
     }
     for name, value in stand_in.items():
         monkeypatch.setattr(snapshot, name, value)
-    return sessions
+    return shown
 
 
 def test_the_viewer_is_given_what_is_whole_of_a_cut_file(recording, tmp_path, opened):
-    cut = tmp_path / "cut.rrd"
+    cut = tmp_path / "cut.mcap"
     cut.write_bytes(recording.read_bytes()[:-2000])
     take(str(cut), "--at", "0.3", "-o", str(tmp_path / "x.png"))
-    (session,) = opened
-    assert session.complete and not read_session(cut).complete
-    assert session.times.tolist() == read_session(cut).times.tolist()
+    (times,) = opened
+    (run,) = read_runs(cut)
+    assert times == run.times.tolist() and not run.complete
 
 
 def test_a_picture_that_a_full_disk_takes_half_of_leaves_the_earlier_one_as_it_is(
@@ -133,13 +130,13 @@ def test_a_picture_that_a_full_disk_takes_half_of_leaves_the_earlier_one_as_it_i
     picture.write_bytes(b"earlier")
     monkeypatch.setattr(Path, "write_bytes", half)
     with pytest.raises(InputError, match="^-o: .*No space left"):
-        snapshot.take_picture(recording, 0.3, picture)
+        run(str(recording), "--at", "0.3", "-o", str(picture))
     assert picture.read_bytes() == b"earlier" and list(tmp_path.iterdir()) == [picture]
 
 
 def test_a_recording_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(InputError, match="No such file"):
-        run(str(tmp_path / "none.rrd"), "--at", "0", "-o", str(tmp_path / "x.png"))
+    with pytest.raises(InputError, match="there is no file"):
+        run(str(tmp_path / "none.mcap"), "--at", "0", "-o", str(tmp_path / "x.png"))
 
 
 @pytest.mark.parametrize("without", ["any adapter", "Vulkan"])

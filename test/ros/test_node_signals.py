@@ -10,10 +10,11 @@ import time
 
 import pytest
 from conftest import needs_rerun
+from rerun_flight import verified
 from ros_process import READY_S, RosProcess, alive, catches, descendants, start_node
 
 from rigid_proto_ros.base.bundled import scene_path
-from rigid_proto_ros.rerun_view.rrd_reading import read_session
+from rigid_proto_ros.session.bag import read_runs
 
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.stress)])
 """One handler serves both."""
@@ -24,18 +25,20 @@ BOTH = pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIG
 def test_a_recording_node_a_waiting_client_and_an_offline_run_end(ros_environment, tmp_path, number):
     script = tmp_path / "late.yaml"
     script.write_text("- {t: 1000, at: com, force: [0, 0, 1]}\n")
-    run, flown = tmp_path / "run.rrd", tmp_path / "flown.rrd"
+    run, flown = tmp_path / "run", tmp_path / "flown"
+    names = {place: f"{place}.mcap,{place}.rrd" for place in (run, flown)}
     scene = ("--params-file", scene_path("hammer"))
-    node = start_node(ros_environment, tmp_path / "node", {"record": str(flown)}, *scene)
+    node = start_node(ros_environment, tmp_path / "node", {"record": names[flown]}, *scene)
     node.wait_for("is simulating")
     # The command lies too far ahead to be sent: it waits, beside a long offline run.
     client = RosProcess("poke_client", script, environment=ros_environment, log=tmp_path / "client")
     offline = RosProcess(
-        *("rigid_proto", "simulate", "t_handle", "--duration", 1e6, "--record", run),
+        *("rigid_proto", "simulate", "t_handle", "--duration", 1e6, "--record", names[run]),
         environment=ros_environment,
         log=tmp_path / "offline",
     )
-    for ready in (lambda: run.exists() and run.stat().st_size > 10_000, lambda: catches(client.pid, number)):
+    view = run.with_suffix(".rrd")
+    for ready in (lambda: view.exists() and view.stat().st_size > 10_000, lambda: catches(client.pid, number)):
         while not ready():
             assert offline.process.poll() is None and client.process.poll() is None, offline.errors + client.errors
             time.sleep(0.02)
@@ -43,8 +46,9 @@ def test_a_recording_node_a_waiting_client_and_an_offline_run_end(ros_environmen
     assert client.end(number) == 128 + number, client.errors
     assert node.end(signal.SIGTERM if number == signal.SIGINT else signal.SIGINT) == 0, node.errors
     assert offline.errors == client.errors == ""
-    assert read_session(run).complete
-    assert read_session(flown).complete
+    for place in (run, flown):
+        assert read_runs(f"{place}.mcap")[0].complete
+        assert verified(place.with_suffix(".rrd"))
 
 
 @pytest.mark.stress
@@ -52,7 +56,7 @@ def test_a_recording_node_a_waiting_client_and_an_offline_run_end(ros_environmen
 @BOTH
 def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environment, tmp_path, number):
     demo = RosProcess("rigid_proto", "demo", "--duration", 60, environment=ros_environment, log=tmp_path / "demo")
-    session = tmp_path / "out" / "session.rrd"
+    session = tmp_path / "out" / "session.mcap"
     while not (session.exists() and session.stat().st_size > 10_000):
         assert demo.process.poll() is None, demo.errors
         time.sleep(0.02)
@@ -61,7 +65,7 @@ def test_a_demo_ended_in_flight_leaves_its_recording_and_no_process(ros_environm
     assert demo.end(number) == 128 + number, demo.errors
     assert "Traceback" not in demo.errors
     assert not [pid for pid in children if alive(pid)]
-    assert read_session(session).complete
+    assert read_runs(session)[-1].complete and verified(session.with_suffix(".rrd"))
 
 
 @needs_rerun

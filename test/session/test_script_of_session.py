@@ -33,7 +33,7 @@ from rigid_proto_ros.scene.scenario_run import OfflineRun, ScenarioRun
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule, schedules
 from rigid_proto_ros.session.as_script import SceneAndScript, script_of_session
-from rigid_proto_ros.session.recorded_session import RecordedSession
+from rigid_proto_ros.session.recorded_session import RecordedSession, StateRows
 from rigid_proto_ros.simulation.commands import Change
 
 
@@ -81,8 +81,7 @@ class HandSession:
         return RecordedSession(
             scene=self.first.text,
             events=list(self.log.timed),
-            times=np.array([self.now_ns]),
-            rows=self.simulation.state.row[None].copy(),
+            states=StateRows(np.array([self.now_ns]), self.simulation.state.row[None].copy()),
         )
 
 

@@ -24,10 +24,10 @@ from ros_process import running_node
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mesh.locate import resolve_mesh
-from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene import cdr
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.scene.script import read_script
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.messages import DEFINITIONS, PROJECTIONS, read_state
 from rigid_proto_ros.session.messages import TOPICS as WRITTEN

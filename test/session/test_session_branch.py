@@ -11,14 +11,14 @@ pytest.importorskip("mcap")
 from flights import SECOND, EventLines
 
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import parse_script, read_script
 from rigid_proto_ros.session.as_script import branch_at
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.session.messages import PROJECTIONS
-from rigid_proto_ros.session.recorded_session import RecordedSession, resimulation
+from rigid_proto_ros.session.recorded_session import RecordedSession, StateRows, resimulation
 
 SCRIPT = """
 - {t: 0.2, wrench: {at: tip, force: [0.0, 0.02, 0.0], torque: [0.0, 1.0e-4, 0.0], axes: body}}
@@ -118,8 +118,7 @@ def flown(changes: dict, until_ns: int, script: str = ALL_KINDS) -> RecordedSess
     return RecordedSession(
         scene=scenario.text,
         events=told.timed,
-        times=np.array([until_ns]),
-        rows=run.simulation.state.row[None].copy(),
+        states=StateRows(np.array([until_ns]), run.simulation.state.row[None].copy()),
     )
 
 

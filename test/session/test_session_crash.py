@@ -6,14 +6,12 @@ from __future__ import annotations
 import random
 import signal
 import struct
-import subprocess
 import time
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 import zstandard
-from conftest import needs_rerun
 
 pytest.importorskip("mcap")
 
@@ -22,10 +20,10 @@ from mcap.reader import make_reader
 from rigid_proto_ros.base.bundled import example_path, scene_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import read_script
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.mcap_observer import McapObserver
 
@@ -206,13 +204,13 @@ def states_end_ns(path: Path) -> int:
     return session.end_ns if len(session.times) else -1
 
 
-def kill_while_recording(environment: dict[str, str], folder: Path, ending: str, after_s: float) -> None:
+def kill_while_recording(environment: dict[str, str], folder: Path, after_s: float) -> None:
     from command_rig import wrench_message
     from ros_client import RosClient, stamp_ns
     from ros_process import start_node
 
     pytest.importorskip("rclpy")
-    path = folder / f"session{ending}"
+    path = folder / "session.mcap"
     values = {"record": str(path), "publish_rate": 200}
     node = start_node(environment, folder / "node", values, "--params-file", scene_path("t_handle"))
     # How long the node had waited for a core, and then where the file ended.
@@ -249,29 +247,17 @@ def kill_while_recording(environment: dict[str, str], folder: Path, ending: str,
     starved = min(starved_ns(before, waited) for before, end_ns in seen if end_ns < session.end_ns)
     assert last - session.end_ns <= SECOND + starved
     assert verify(session) is None
-    repaired = folder / f"repaired{ending}"
+    repaired = folder / "repaired.mcap"
     assert main(["replay", str(path), "--repair", str(repaired)]) == 0
     (again,) = read_runs(repaired)
     assert again.complete and again.rows.tobytes() == session.rows.tobytes() and again.lines == session.lines
-    if ending == ".rrd":
-        from rigid_proto_ros.rerun_view.viewers import viewer_program
-
-        # Recordings have no index; Rerun's own program reads this one to give it one.
-        indexed = [viewer_program(), "rrd", "optimize", str(repaired), "-o", str(folder / "indexed.rrd")]
-        subprocess.run(indexed, capture_output=True, check=True)
 
 
 MOMENTS = random.Random(0)
 
 
 @pytest.mark.parametrize(
-    ("ending", "after_s"),
-    [
-        (".mcap", 1.0),
-        *(pytest.param(".mcap", MOMENTS.uniform(0.0, 6.0), marks=pytest.mark.stress) for _ in range(20)),
-        *(pytest.param(".rrd", MOMENTS.uniform(0.0, 6.0), marks=[pytest.mark.stress, needs_rerun]) for _ in range(20)),
-    ],
+    "after_s", [1.0, *(pytest.param(MOMENTS.uniform(0.0, 6.0), marks=pytest.mark.stress) for _ in range(20))]
 )
-def test_a_node_killed_at_a_random_moment_loses_at_most_a_second(ros_environment, tmp_path, ending, after_s):
-    """Of an .rrd see also kill_9 in test_rerun_crash.py."""
-    kill_while_recording(ros_environment, tmp_path, ending, after_s)
+def test_a_node_killed_at_a_random_moment_loses_at_most_a_second(ros_environment, tmp_path, after_s):
+    kill_while_recording(ros_environment, tmp_path, after_s)

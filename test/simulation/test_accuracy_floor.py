@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.motion.body import make_body
-from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.simulation.commands import ReleaseString
 
 BOX = make_body(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.04]))

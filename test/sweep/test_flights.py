@@ -23,7 +23,7 @@ SCRIPT = [
 
 def test_commands_by_hand_fly_as_a_script_does_and_the_recording_verifies(tmp_path) -> None:
     pytest.importorskip("mcap")
-    from rigid_proto_ros.rerun_view.session_files import read_runs
+    from rigid_proto_ros.session.bag import read_runs
     from rigid_proto_ros.session.check import verify
 
     scene = load_scene("t_handle")
@@ -54,7 +54,7 @@ def test_what_cant_be_taken_is_said_at_once_and_what_is_refused_later_at_its_ste
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
 def test_numbers_and_arrays_of_numpy_are_numbers_and_lists(tmp_path, kind) -> None:
     pytest.importorskip("mcap")
-    from rigid_proto_ros.rerun_view.session_files import read_runs
+    from rigid_proto_ros.session.bag import read_runs
     from rigid_proto_ros.session.check import verify
 
     vector = np.array([0.125, -0.25, 0.5], kind)
