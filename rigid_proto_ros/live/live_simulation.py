@@ -95,7 +95,7 @@ class LiveSimulation:
 
     def start(self, on_crash: Callable[[], None] = lambda: None) -> None:
         """Simulated time begins. on_crash() is called should the thread end by a fault of the program."""
-        # What start-up has made stays: the garbage collector going through it again would hold up the motion for 10 to 30 ms.
+        # What start-up has made stays: the garbage collector going through it again would hold up the motion (30 ms).
         gc.freeze()
         with self._handing_over:
             self._thread = threading.Thread(target=self._run, args=(on_crash,), name="physics", daemon=True)

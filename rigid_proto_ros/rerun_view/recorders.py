@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError, is_missing
-from ..scene.parameters import Parameters
+from ..parameters.declarations import Parameters
 from ..scene.scenario import Scenario
 from ..session.mailbox import WritingObserver
 from ..simulation.observer import Observers, Reset
