@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..base.errors import CommandRefused, InputError
+from ..scene.scenario import Scenario
 from ..scene.script import expand_schedule, read_schedule
 from ..simulation.commands import Change, Command, Listed, nanoseconds
-from ..simulation.setup import Setup
 
 if TYPE_CHECKING:
     from .simulation_loop import SimulationLoop
@@ -20,8 +19,8 @@ if TYPE_CHECKING:
 TOPICS = ("wrench", "thrusters", "poke", "string", "inertia", "schedule")
 """What received messages are counted by."""
 
-Submission = tuple[Command, int, Listed | None, tuple[bytes, Setup]]
-"""What ``Simulation.submit`` takes."""
+Submission = tuple[Command, int, Listed | None, Scenario]
+"""What ``ScenarioRun.take`` takes."""
 
 DAY_NS = 24 * 3600 * 1_000_000_000
 
@@ -40,23 +39,29 @@ class CommandReceiver:
         self._loop = loop
         self._schedules = 0
 
+    @property
+    def step_requested(self) -> bool:
+        """Whether a step is to follow before another command is taken."""
+        return self._loop.step_requested
+
     def receive(self, topic: str, command: Callable[[], Command]) -> None:
         """Count a command and submit it, to act at its stamp read as that of a message; raises CommandRefused, counted,
         for what can be checked now.
 
-        The loop catches up first, so that now is the tick's own time. topic: one of TOPICS. command() gives it, or
+        The loop catches up first, so that now is the tick's own time; while time stands, a command of now acts at once.
+        topic: one of TOPICS. command() gives it, or
         raises CommandRefused.
         """
         loop = self._loop
         loop.catch_up()
         try:
             sent = command()
-            if isinstance(sent, Change):
-                sent = loop.bound(sent)
             when_ns, counter = self._effective(sent.stamp_ns, loop.stamps.offset_ns)
             self._count(counter, 1)
-            checked = loop.accepted(lambda waiting: self._checked(sent, when_ns, waiting))
-            loop.simulation.submit(sent, when_ns, checked=checked)
+            scenario = None
+            if isinstance(sent, Change):
+                ((_, scenario),) = loop.check([sent])
+            loop.take(sent, when_ns, at_hand=scenario)
         except CommandRefused as refusal:
             loop.simulation.refuse(refusal)
             raise
@@ -77,7 +82,7 @@ class CommandReceiver:
             listed = read_schedule(text())
             count = len(listed) if isinstance(listed, list) else 1
             commands = expand_schedule(listed)
-            taken, counted = loop.accepted(lambda ahead: self._planned(commands, isinstance(listed, list), ahead))
+            taken, counted = self._planned(commands, isinstance(listed, list))
         except InputError as error:
             reason = error.reason if isinstance(error, CommandRefused) else "schedule"
             refusal = CommandRefused(reason, error.field, error.received, error.accepted)
@@ -87,32 +92,22 @@ class CommandReceiver:
             for counter, entries in counted.items():
                 self._count(counter, len(entries))
             for submission in taken:
-                loop.simulation.submit(*submission)
+                loop.take(*submission)
         finally:
             self.received["schedule"] += count
 
-    def _checked(self, command: Command, when_ns: int, waiting: Sequence[tuple[int, Change]]) -> tuple[bytes, Setup]:
-        """The command's load and the setup for which it holds; raises InputError."""
-        # Its own stamp stays: it is logged as sent. Only changes that wait ask when it acts.
-        timed = replace(command, stamp_ns=when_ns) if waiting else command
-        ((_, checked),) = self._loop.checked([timed], waiting)
-        return checked
-
-    def _planned(
-        self, commands: list[Command], is_list: bool, waiting: Sequence[tuple[int, Change]]
-    ) -> tuple[list[Submission], dict[str, set[int]]]:
-        """The commands in order of time, those of one time in the order of the list, each checked in the scene that
-        those before it, and changes that wait, have made of the present one; and the entries to be counted by each
-        counter, once though they stand for several commands. Raises InputError.
+    def _planned(self, commands: list[Command], is_list: bool) -> tuple[list[Submission], dict[str, set[int]]]:
+        """The commands in order of time, those of one time in the order of the list, checked; and the entries to be
+        counted by each counter, once though they stand for several commands. Raises InputError.
         """
         taken: list[Submission] = []
         counted: dict[str, set[int]] = {}
         order = sorted(range(len(commands)), key=lambda k: commands[k].stamp_ns)
-        in_order = self._loop.checked([commands[k] for k in order], waiting)
-        for k, (command, checked) in zip(order, in_order, strict=True):
+        in_order = self._loop.check(commands[k] for k in order)
+        for k, (command, scenario) in zip(order, in_order, strict=True):
             when_ns, counter = self._effective(command.stamp_ns, 0)
             counted.setdefault(counter, set()).add(command.entry)
-            taken.append((command, when_ns, (self._schedules, k) if is_list else None, checked))
+            taken.append((command, when_ns, (self._schedules, k) if is_list else None, scenario))
         return taken, counted
 
     def _effective(self, stamp_ns: int, offset_ns: int) -> tuple[int, str]:

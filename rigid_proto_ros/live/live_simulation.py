@@ -193,7 +193,12 @@ class LiveSimulation:
 
     def submit(self, command: Command) -> None:
         """Take a command of a service, which acts now and is counted by no topic."""
-        self.call(lambda: self.loop.simulation.submit(command))
+
+        def submit() -> None:
+            self.loop.settle()
+            self.loop.take(command)
+
+        self.call(submit)
 
     def schedule(self, text: str) -> None:
         """Take an entry of a script, or a list of entries, as YAML, ``t`` in simulated seconds; a list is taken or
@@ -209,7 +214,12 @@ class LiveSimulation:
 
     def reset(self) -> None:
         """Time 0 and the initial state; paused or running stays."""
-        self.call(self.loop.reset)
+
+        def reset() -> None:
+            self.loop.settle()  # what was sent before goes with what it did
+            self.loop.reset()
+
+        self.call(reset)
 
     def begin(self, scenario: Scenario) -> None:
         """Another scene, from its time 0; paused or running stays. Raises InputError, and then the present one begins
@@ -224,7 +234,6 @@ class LiveSimulation:
 
         self._check_contacts(scenario)
         self.call(begin)
-        self.endpoints.parameters_changed()
 
     def step(self, periods: int = 1) -> int:
         """While paused, advance over so many publications; returns the simulated time reached [ns]. Raises InputError
@@ -236,6 +245,17 @@ class LiveSimulation:
         return self.loop.simulation.time_ns
 
     # Parameters
+
+    @property
+    def parameters_now(self) -> dict[str, Any]:
+        """The parameters in force by name, behind everything sent before."""
+
+        def now() -> dict[str, Any]:
+            self.loop.settle()
+            return self.scenario.parameters.named()
+
+        named: dict[str, Any] = self.call(now)
+        return named
 
     def set_parameters(self, changes: Mapping[str, object]) -> None:
         """Change parameters all at once, or none: raises InputError, and then all stays as it was. Setting density sets
@@ -256,26 +276,17 @@ class LiveSimulation:
         if not changes:
             return
 
-        def check() -> Scenario:
-            try:
-                scenario = loop.scenario.with_changes(changes, at_hand=planned)
-                loop.check_change(scenario)
-            except CommandRefused as refusal:
-                loop.simulation.refuse(refusal)
-                raise
-            return scenario
-
         def change() -> Observer | None:
-            scenario = check()
+            scenario = loop.planned(changes, planned)
             # A recording begins in the scene before the change that begins it, and has that as its first event.
             finished = self._switch_recording(recorder) if "record" in changes else None
-            loop.expect(scenario, Change(dict(changes)))
+            loop.change(changes, scenario)
             return finished
 
         recorder = None
         if "record" in changes:
             # Opened last: a refused change must leave the file of that name as it is.
-            self.call(check)
+            self.call(partial(loop.planned, changes, planned))
             recorder = self._open_recorder(planned)
         try:
             finished = self.call(change)
@@ -285,7 +296,6 @@ class LiveSimulation:
             raise
         if finished is not None:
             finished.close()
-        self.endpoints.parameters_changed()
 
     # Observers
 
@@ -358,7 +368,7 @@ class LiveSimulation:
         def give_up() -> None:
             if self._recorder is failed:  # and no other one has taken its place
                 self._switch_recording(None)
-                self.loop.stop_recording()
+                self.loop.setup_of(Change({"record": ""}))  # no event, since the motion stays
 
         self.call(give_up)
         failed.close()

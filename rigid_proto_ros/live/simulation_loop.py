@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 
-from ..base.errors import InputError
+from ..base.errors import CommandRefused, InputError
 from ..motion.state import State
 from ..scene.scenario import Scenario
-from ..scene.scenario_run import ScenarioRun, after_change
-from ..simulation.commands import Change
+from ..scene.scenario_run import ScenarioRun
+from ..simulation.commands import Change, Command, Listed
 from ..simulation.observer import Observer, Published
 from ..simulation.setup import Setup
 from .command_receiver import CommandReceiver
@@ -66,6 +65,7 @@ class SimulationLoop(ScenarioRun):
     """observer: gets every publication, in bundles where nobody subscribes to the endpoints; without subscribers and an
     observer that takes states none is made, and the body crosses the time between two moments at which commands are
     taken at once. stamps: those of a clock that is followed from the start, a reset and the end of a pause on.
+    step_requested: whether a step is to follow the command taken last, before the next one is taken.
     """
 
     def __init__(
@@ -84,7 +84,9 @@ class SimulationLoop(ScenarioRun):
         self._budget = WorkBudget()
         self.pace = Pace(scenario.parameters.real_time_factor, self.stamps.clock)
         self.resets = 0
-        self._steps_left = self._steps_requested = 0
+        self.step_requested = False
+        self._steps_left = 0
+        self._in_step = False
         self._steps_begun = self._given_up = 0
         self._commands_come = self._steps_expected = False
         self._present_ns = 0
@@ -94,8 +96,6 @@ class SimulationLoop(ScenarioRun):
         self._caught_up = True
         self._end_ns = LAST_STAMP_NS + 1
         self._on_end: Callable[[], None] = lambda: None
-        self._waiting: list[Change] = []
-        self._acting = scenario
         self._anchor(stamps_stay=True)
 
     def end_at(self, time_ns: int, on_end: Callable[[], None]) -> None:
@@ -115,62 +115,58 @@ class SimulationLoop(ScenarioRun):
     def replace(self, scenario: Scenario) -> Setup:
         """Put another scenario in force; its real time factor takes effect at once, too."""
         setup = super().replace(scenario)
-        if not self._waiting:
-            self._acting = scenario
+        self.endpoints.parameters_changed()
         if scenario.parameters.real_time_factor != self.pace.factor:
             self.pace.factor = scenario.parameters.real_time_factor
             if not self.pace.followed:
                 self._anchor()
         return setup
 
-    def expect(self, scenario: Scenario, change: Change) -> None:
-        """Put a checked scenario in force that a change has made of the present one; it acts when its time comes, on
-        what acts by then, and is taken back when it is refused then.
-        """
-        acting = self._acting
-        self.replace(scenario)
-        self._acting = acting
-        self._waiting.append(change)
+    def take(
+        self,
+        command: Command,
+        at_ns: int | None = None,
+        listed: Listed | None = None,
+        at_hand: Scenario | None = None,
+    ) -> int:
+        """See ScenarioRun; while time stands, a command of now has acted when this returns."""
+        when_ns = super().take(command, at_ns, listed, at_hand)
+        if self.paused:
+            self.act()
+        return when_ns
 
-        def apply() -> Setup:
-            # Changes made by hand act in the order in which they came.
-            self._waiting.pop(0)
-            return self.setup_of(change, scenario)
+    def act(self) -> None:
+        """Let the commands that are due now act."""
+        if self.simulation.act():
+            # What is published of this time was published before they acted.
+            self.publications.pass_over(self.simulation.time_ns)
+            if self.ghost is not None:
+                self.ghost.act(self.simulation.time_ns)
 
-        self.simulation.submit(replace(change, apply=apply))
+    def settle(self) -> None:
+        """Let act what is due now and, where time stands, what was sent before."""
+        if self.paused:
+            self.take_commands()
+        self.act()
 
-    def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
-        """Put in force what a change says that acts now; returns the setup, without changes that still wait. Raises
-        InputError. at_hand: a scenario whose mesh may be its.
-        """
-        acting = self._acting
+    def planned(self, changes: Mapping[str, object], at_hand: Scenario) -> Scenario:
+        """The scenario that these parameters would make now. Raises InputError, counted; at_hand: see ``take``."""
+        self.settle()
         try:
-            acting = after_change(acting, command, at_hand)
-            self.check_change(acting)
-            self._acting = acting
-        finally:
-            planned = self._acting
-            for change in self._waiting:
-                with suppress(InputError):  # refused when it acts
-                    changed = after_change(planned, change)
-                    self.check_change(changed)
-                    planned = changed
-            if planned.parameters == self.scenario.parameters:
-                self.scenario = planned
-            else:
-                self.replace(planned)
-                self.endpoints.parameters_changed()
-        return acting.setup
+            scenario = self.scenario.with_changes(changes, at_hand=at_hand)
+            self.check_change(scenario)
+        except CommandRefused as refusal:
+            self.simulation.refuse(refusal)
+            raise
+        return scenario
 
-    def stop_recording(self) -> None:
-        """``record`` is empty from now on, which is no event and doesn't touch the motion; behind changes that wait, of
-        which one may have begun the recording, it is one of them.
-        """
-        change = Change({"record": ""})
-        if self._waiting:
-            self.expect(after_change(self.scenario, change), change)
+    def change(self, changes: Mapping[str, object], scenario: Scenario) -> None:
+        """Change parameters now, to what ``planned`` gave."""
+        if self.simulation.failure:
+            self.replace(scenario)  # for the run after the reset: nothing acts any more in this one
         else:
-            self.setup_of(change)
+            self.take(Change(dict(changes)), at_hand=scenario)
+            self.act()
 
     def watch(self, observer: Observer) -> None:
         """Tell another observer from now on."""
@@ -199,9 +195,11 @@ class SimulationLoop(ScenarioRun):
 
     def catch_up(self) -> None:
         """Advance to this tick's present, or as far towards it as the tick's time allows: what a command means by now.
-        Without commands nobody needs it.
+        Without commands nobody needs it. While time stands, what is due acts.
         """
-        if not self.paused and self._present_ns > self.simulation.time_ns:
+        if self.paused:
+            self.act()
+        elif self._present_ns > self.simulation.time_ns:
             self._caught_up = self._budget.advance(self.simulation, self._present_ns)
             self._check_failure()
 
@@ -209,10 +207,13 @@ class SimulationLoop(ScenarioRun):
         """While paused, take all commands that have arrived and begin to advance over so many publications; whether
         they are made already, else ``stepping`` says.
         """
-        requested = self._steps_requested
+        # This very step follows what is taken now, also where each command would have one of its own.
+        self._in_step = True
         self.take_commands()
-        # This very step follows what was taken now.
-        self._steps_requested = requested
+        self._in_step = False
+        return self._begin_step(periods)
+
+    def _begin_step(self, periods: int) -> bool:
         self.simulation.log("step", {"periods": periods} if periods > 1 else {})
         # Who has subscribed since the last publication waits for these.
         self._check_listeners()
@@ -252,7 +253,7 @@ class SimulationLoop(ScenarioRun):
         """Of the step under way, and of those requested, no more publications are made."""
         if self.stepping:
             self._given_up = self._steps_begun
-        self._steps_left = self._steps_requested = 0
+        self._steps_left, self.step_requested = 0, False
 
     def _refuse_failed(self, asked: str) -> None:
         if self.simulation.failure:
@@ -260,8 +261,8 @@ class SimulationLoop(ScenarioRun):
 
     def request_step(self) -> None:
         """A wrench or thruster command has come: paused and in lockstep it is followed by a step."""
-        if self.paused and self.scenario.parameters.lockstep:
-            self._steps_requested += 1
+        if self.paused and self.scenario.parameters.lockstep and not self._in_step:
+            self.step_requested = True
 
     @property
     def stepping(self) -> bool:
@@ -271,9 +272,6 @@ class SimulationLoop(ScenarioRun):
     def reset(self) -> None:
         """Time 0 and the initial state; paused or running stays."""
         self.resets += 1
-        # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
-        self._waiting.clear()
-        self._acting = self.scenario
         self.simulation.reset(self.scenario.setup)
         if self.ghost is not None or Published in self.observer.takes:
             self.begin_ghost()
@@ -361,9 +359,9 @@ class SimulationLoop(ScenarioRun):
         now_ns = time.monotonic_ns()
         self._last_drain_ns = now_ns
         self._commands_come = self.endpoints.take_commands(now_ns, False)
-        if self._steps_requested and not self.stepping:
-            self._steps_requested -= 1
-            self.step()
+        if self.step_requested and not self.stepping:
+            self.step_requested = False
+            self._begin_step(1)
         self._steps_expected = self.endpoints.serve_steps(now_ns)
         if now_ns >= self._paused_publication_ns and not self.stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS
@@ -430,7 +428,7 @@ class SimulationLoop(ScenarioRun):
         """When ``tick`` is due next [ns of wall time]."""
         latest_ns = self._last_drain_ns + TICK_NS
         factor = self.pace.factor
-        if self.stepping or self._steps_requested or not self._caught_up:
+        if self.stepping or self.step_requested or not self._caught_up:
             return 0
         if self.pace.followed:
             return min(latest_ns, self._last_drain_ns + FOLLOW_NS)

@@ -140,8 +140,8 @@ class CommandSubscriber:
 
     def take(self, wall_ns: int, at_once: bool) -> bool:
         """Take every message that has arrived, convert it, and submit its command; what is refused is counted and
-        notified of, and the rest goes on. Returns whether something has arrived within the last ACTIVE_NS. Quiet topics
-        are read every QUIET_NS, or now if ``at_once``.
+        notified of, and the rest goes on; in lockstep only up to one that is followed by a step. Returns whether
+        something has arrived within the last ACTIVE_NS. Quiet topics are read every QUIET_NS, or now if ``at_once``.
         """
         if at_once or wall_ns >= self._next_quiet_ns or wall_ns < self._active_until_ns:
             self._next_quiet_ns = wall_ns + QUIET_NS
@@ -154,6 +154,8 @@ class CommandSubscriber:
                         else:
                             convert = partial(read_command, queue.topic, data, self._frames)
                             self._commands.receive(queue.topic.partition("/")[0], convert)
+                    if self._commands.step_requested:
+                        return True
         return wall_ns < self._active_until_ns
 
 

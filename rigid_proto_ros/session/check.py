@@ -87,7 +87,7 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
         compared = len(computed.lines)
         if again.simulation.failure and again.simulation.time_ns != time_ns:
             return Difference(time_ns, again.simulation.failure)
-        if what := _row_difference(count + 1, name, row, state):
+        if what := _difference_now(again, count + 1, name, row, state):
             if count == 0 and not recorded and first_ns > 0:
                 raise began_later
             # At its own time a command acts after the state.
@@ -145,14 +145,25 @@ def _advance(
 
 
 def _states_in_order(session: RecordedSession) -> list[tuple[int, str, FloatArray]]:
-    """Time, topic ("" for the state itself) and row of everything to compare, in the order of time."""
+    """Time, topic ("" for the state itself) and row of everything to compare, in the order of time; of one instant the
+    last of each topic.
+    """
     streams = {"": (session.times, session.rows)}
     if session.published:
         streams = {name: (published.times, published.rows) for name, published in session.published.items()}
     merged = [
         (int(t), name, row) for name, (times, rows) in streams.items() for t, row in zip(times, rows, strict=True)
     ]
-    return sorted(merged, key=lambda state: state[0])
+    last = {(time_ns, name): (time_ns, name, row) for time_ns, name, row in merged}
+    return sorted(last.values(), key=lambda state: state[0])
+
+
+def _difference_now(again: Resimulation, number: int, name: str, recorded: FloatArray, computed: FloatArray) -> str:
+    """See ``_row_difference``. While time stands, states are published behind commands of that instant, too."""
+    found = difference = _row_difference(number, name, recorded, computed)
+    while difference and again.act_next():
+        difference = _row_difference(number, name, recorded, again.simulation.state.row)
+    return difference and found
 
 
 def _row_difference(number: int, name: str, recorded: FloatArray, computed: FloatArray) -> str:

@@ -193,7 +193,6 @@ class Resimulation(ScenarioRun):
         self.simulation.logs_timeouts = False
         self.frames = frame_names(scenario.parameters, node_name)
         self._mesh_of = mesh_of
-        self._changes_ns = -1
         self.end_ns = 0
         waiting: list[tuple[int, str, dict[str, Any], Command | None, int]] = []
         for number, line in enumerate(event_lines, 1):
@@ -220,28 +219,30 @@ class Resimulation(ScenarioRun):
 
         Raises CommandRefused for a recorded command that can't be taken.
         """
-        acted_ns = -1
         # Marks at the time asked for were made before anything else could act there.
         while self._waiting and (
             self._waiting[0][0] < until_ns or (self._waiting[0][0] == until_ns and self._waiting[0][3] is None)
         ):
-            time_ns, kind, content, command, number = self._waiting.popleft()
-            self.simulation.advance(max(time_ns, self.simulation.time_ns))
-            if command is None:
-                if acted_ns == time_ns:
-                    # Nothing but the end of the motion, in its next step, keeps time where a command has acted.
-                    self.simulation.advance(time_ns + int(self.simulation.flight.step_ns))
-                self.simulation.log(kind, content)
-                continue
-            acted_ns = time_ns
-            if isinstance(command, Change):
-                self._changes_ns = time_ns
-                command = self.bound(command)
-            # What acts under a change of its own instant can't be checked before that acts.
-            checked = (b"", self.simulation.setup) if self._changes_ns == time_ns else None
-            # What acted at one instant acts in the order of the log, whatever rule made it.
-            self.simulation.submit(command, time_ns, (0, number), checked)
+            self._take_next()
         return self.simulation.advance(until_ns).row
+
+    def _take_next(self) -> None:
+        time_ns, kind, content, command, number = self._waiting.popleft()
+        self.simulation.advance(max(time_ns, self.simulation.time_ns))
+        if command is None:
+            self.simulation.act()  # the commands before it
+            self.simulation.log(kind, content)
+        else:
+            # What acted at one instant acts in the order of the log, whatever rule made it.
+            self.take(command, time_ns, (0, number))
+
+    def act_next(self) -> bool:
+        """Let the next event of the present instant happen, as it did while time stood; False when there is none."""
+        if not self._waiting or self._waiting[0][0] > self.simulation.time_ns:
+            return False
+        self._take_next()
+        self.simulation.act()
+        return True
 
     def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
         """Put in force what a change says, with the mesh that was flown then."""

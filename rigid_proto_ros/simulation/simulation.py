@@ -8,7 +8,7 @@ segment loads are constant and an integrator advances the body. ``advance`` is t
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from heapq import heappop, heappush
 from typing import Any
 
@@ -80,10 +80,10 @@ class Simulation:
 
     time_ns: int
     state: State
+    _acted_ns: int
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
         self.setup = setup
-        self.follower: Callable[[Command, int, Listed | None], None] | None = None
         self.events = EventLog()
         self.refused: dict[str, int] = defaultdict(int)
         self.refusals: dict[str, str] = {}
@@ -157,24 +157,32 @@ class Simulation:
         command: Command,
         at_ns: int | None = None,
         listed: Listed | None = None,
-        checked: tuple[bytes, Setup] | None = None,
+        check: bool = True,
     ) -> int:
         """Schedule a command for ``at_ns``, or for now if that is None or past; returns the time at which it will act.
 
-        listed: its place, if it is an entry of a list. checked: result of ``check_command`` and the setup it was
-        checked for, if not the current one: an earlier change in its list may permit what this one doesn't. Raises
-        CommandRefused for what can be checked now; the rest (a ray) is checked when it acts, and a refusal counted.
+        listed: its place, if it is an entry of a list. Raises CommandRefused for what the present body and integrator
+        can't take. Checked when it acts, and a refusal counted then: a ray, a command behind a change of parameters
+        that may permit it, and one without ``check``.
         """
         when_ns = self.time_ns if at_ns is None or at_ns < self.time_ns else at_ns
-        row, setup = (check_command(command, self.setup), self.setup) if checked is None else checked
+        row = b""
+        if check:
+            try:
+                row = check_command(command, self.setup)
+            except CommandRefused:
+                if not self.change_waits(when_ns):
+                    raise
         self._arrivals += 1
         pending = Pending(when_ns, command, order_of(command, listed, self._arrivals), listed)
         if row:
-            pending.row, pending.surface = row, setup.surface
+            pending.row, pending.surface = row, self.setup.surface
         self._push(pending)
-        if self.follower is not None:
-            self.follower(command, when_ns, listed)
         return when_ns
+
+    def change_waits(self, until_ns: int) -> bool:
+        """Whether a change of parameters is scheduled for ``until_ns`` or before."""
+        return any(time_ns <= until_ns and isinstance(p.command, Change) for time_ns, _, p in self._pending)
 
     def _push(self, pending: Pending) -> None:
         heappush(self._pending, (pending.time_ns, pending.order, pending))
@@ -314,18 +322,26 @@ class Simulation:
 
     # Events that need Python code
 
+    def act(self) -> bool:
+        """Apply the commands that are due now, without waiting for time to go on; returns whether there were any."""
+        due = not self.failure and self._is_due
+        if due:
+            self._act()
+        return due
+
+    @property
+    def _is_due(self) -> bool:
+        """Whether a command is to act now."""
+        return bool(self._pending) and self._pending[0][0] == self.time_ns
+
     def _act(self) -> None:
         """Apply everything that ends or begins now, and begin a new segment if anything did."""
-        arrays, now_ns = self._arrays, self.time_ns
-        changed = bool(arrays.call(END_DUE, 0))
-        self._notify([])
-        if self.thrusters.due_ns <= now_ns:
-            loads, timed_out = self.thrusters.end_due(now_ns, self._timeout_ns)
-            if timed_out and self.logs_timeouts:
-                self.log("timeout", {"thrusters": True})
-            self._thrust(loads)
-            changed = True
-        while self._pending and self._pending[0][0] == now_ns:
+        arrays, now_ns, changed = self._arrays, self.time_ns, False
+        # Commands of one instant act one behind the other, however they come: what they let end ends behind them.
+        if not (self._acted_ns == now_ns and self._is_due):
+            changed = self._end_due()
+        self._acted_ns = now_ns
+        while self._is_due:
             pending = heappop(self._pending)[-1]
             self.listed = pending.listed
             try:
@@ -339,6 +355,18 @@ class Simulation:
         if changed:
             arrays.call(CUT, 0)
             self._notify_string()
+
+    def _end_due(self) -> bool:
+        """End the loads that end now, by their duration or a timeout; returns whether there were any."""
+        ended = bool(self._arrays.call(END_DUE, 0))
+        self._notify([])
+        if self.thrusters.due_ns <= self.time_ns:
+            loads, timed_out = self.thrusters.end_due(self.time_ns, self._timeout_ns)
+            if timed_out and self.logs_timeouts:
+                self.log("timeout", {"thrusters": True})
+            self._thrust(loads)
+            ended = True
+        return ended
 
     def _apply(self, pending: Pending) -> None:
         command, arrays = pending.command, self._arrays
@@ -403,7 +431,7 @@ class Simulation:
         self._pending: list[Waiting] = []
         self.listed = None
         self.failure = ""
-        self.time_ns = 0
+        self.time_ns, self._acted_ns = 0, -1
         self.state = State(0, self.setup.initial.copy())
         self.thrusters = ThrusterControl(self.setup.thrusters)
         self._arrays.start_over(self.setup)
@@ -539,18 +567,6 @@ class Simulation:
         start = np.array(angular_momentum(self.flight.start, self.setup.body.inertia.ravel()))
         moved, size = self.angular_momentum - start, length(start)
         return length(moved) / size if size > 0.0 else 0.0
-
-    @property
-    def waiting_changes(self) -> list[tuple[int, Change]]:
-        """The changes of parameters that wait, with their times [ns], in the order in which they will act; from any
-        thread.
-        """
-        return [(t, p.command) for t, _, p in sorted(self._pending) if isinstance(p.command, Change)]
-
-    @property
-    def commands_wait(self) -> bool:
-        """Whether a command is due that time has to go on for."""
-        return any(time_ns <= self.time_ns for time_ns, *_ in self._pending[:1])
 
     @property
     def at_rest(self) -> bool:

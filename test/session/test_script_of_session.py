@@ -34,7 +34,6 @@ from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule, schedules
 from rigid_proto_ros.session.as_script import SceneAndScript, script_of_session
 from rigid_proto_ros.session.recorded_session import RecordedSession
-from rigid_proto_ros.simulation.commands import Change
 
 
 class HandSession:
@@ -62,7 +61,7 @@ class HandSession:
                 self.simulation.log(kind, {"data": True})  # commands now pile up at one instant
             else:
                 command = of_event(kind, with_mass_of_density(content) if kind == "set" else content)
-                self.simulation.submit(self.run.bound(command) if isinstance(command, Change) else command)
+                self.run.take(command)
 
     def load(self, kind: str, frame_id: str, force, torque=(0.0, 0.0, 0.0)) -> None:
         """A message of the wrench or the poke topic."""
