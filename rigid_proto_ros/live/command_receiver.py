@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import CommandRefused, InputError
 from ..scene.scenario import Scenario
-from ..scene.script import expand_schedule, read_schedule
+from ..scene.script import Schedule, expand_schedule, read_schedule
 from ..simulation.commands import Change, Command, Listed, nanoseconds
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class CommandReceiver:
         loop.catch_up()
         try:
             sent = command()
-            when_ns, counter = self._effective(sent.stamp_ns, loop.stamps.offset_ns)
+            when_ns, counter = self._effective(sent.stamp_ns, loop.simulation.time_ns, loop.stamps.offset_ns)
             self._count(counter, 1)
             scenario = None
             if isinstance(sent, Change):
@@ -73,51 +73,59 @@ class CommandReceiver:
     def receive_schedule(self, text: Callable[[], str]) -> None:
         """Take an entry of a script, or a list of entries whole or not at all, as YAML; raises CommandRefused, counted
         by entries. A mesh that it needs is loaded here and now. text() gives it, or raises CommandRefused.
+
+        A list may be headed by a reset, which is taken with it; one that says ``more`` keeps time at 0 for the next.
         """
         loop = self._loop
         loop.catch_up()
         self._schedules += 1
-        count = 1
+        count, more = 1, None
         try:
             listed = read_schedule(text())
-            count = len(listed) if isinstance(listed, list) else 1
-            commands = expand_schedule(listed)
-            taken, counted = self._planned(commands, isinstance(listed, list))
+            count, more = listed.sent, listed.more if listed.is_list else None
+            taken, counted = self._planned(listed)
         except InputError as error:
             reason = error.reason if isinstance(error, CommandRefused) else "schedule"
             refusal = CommandRefused(reason, error.field, error.received, error.accepted)
             loop.simulation.refuse(refusal, count)
             raise refusal from None
         else:
+            if listed.reset:
+                loop.reset()
+                loop.hold()
             for counter, entries in counted.items():
                 self._count(counter, len(entries))
             for submission in taken:
                 loop.take(*submission)
         finally:
             self.received["schedule"] += count
+            if more is not None:
+                loop.hold_on(more)
 
-    def _planned(self, commands: list[Command], is_list: bool) -> tuple[list[Submission], dict[str, set[int]]]:
+    def _planned(self, listed: Schedule) -> tuple[list[Submission], dict[str, set[int]]]:
         """The commands in order of time, those of one time in the order of the list, checked; and the entries to be
         counted by each counter, once though they stand for several commands. Raises InputError.
         """
         taken: list[Submission] = []
         counted: dict[str, set[int]] = {}
+        commands = expand_schedule(listed)
+        now_ns = 0 if listed.reset else self._loop.simulation.time_ns
         order = sorted(range(len(commands)), key=lambda k: commands[k].stamp_ns)
-        in_order = self._loop.check(commands[k] for k in order)
+        in_order = self._loop.check((commands[k] for k in order), anew=listed.reset)
         for k, (command, scenario) in zip(order, in_order, strict=True):
-            when_ns, counter = self._effective(command.stamp_ns, 0)
+            when_ns, counter = self._effective(command.stamp_ns, now_ns)
             counted.setdefault(counter, set()).add(command.entry)
-            taken.append((command, when_ns, (self._schedules, k) if is_list else None, scenario))
+            taken.append((command, when_ns, (self._schedules, k) if listed.is_list else None, scenario))
         return taken, counted
 
-    def _effective(self, stamp_ns: int, offset_ns: int) -> tuple[int, str]:
+    def _effective(self, stamp_ns: int, now_ns: int, offset_ns: int = 0) -> tuple[int, str]:
         """Simulated time [ns] at which a command with this stamp acts, and the counter it goes to, if any.
 
         Zero or past means now (past: ``late``); one up to the horizon ahead acts at exactly that time; one within a day
         of the system clock comes from a tool that stamps by it: it means now (``wall_stamp``). Raises CommandRefused
         (``stamp``). offset_ns: how far stamps are ahead of simulated time.
         """
-        now_ns, time_ns = self._loop.simulation.time_ns, stamp_ns - offset_ns
+        time_ns = stamp_ns - offset_ns
         if stamp_ns == 0:
             return now_ns, ""
         if time_ns <= now_ns:

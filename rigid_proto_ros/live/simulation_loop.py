@@ -42,6 +42,10 @@ STEP_PATIENCE_S = 10.0
 """How long a request to step waits for the end of it."""
 
 
+HOLD_NS = 1_000_000_000
+"""Time stays at 0 for the next list of a script for so long [ns of wall time]."""
+
+
 @dataclass
 class Endpoints:
     """What surrounds a loop; by default nothing does. All but the last two are called on the physics thread.
@@ -89,7 +93,7 @@ class SimulationLoop(ScenarioRun):
         self._in_step = False
         self._steps_begun = self._given_up = 0
         self._commands_come = self._steps_expected = False
-        self._present_ns = 0
+        self._present_ns = self._held_until_ns = 0
         self._last_drain_ns = 0
         self._paused_publication_ns = 0
         self._next_listener_check_ns = 0
@@ -118,7 +122,7 @@ class SimulationLoop(ScenarioRun):
         self.endpoints.parameters_changed()
         if scenario.parameters.real_time_factor != self.pace.factor:
             self.pace.factor = scenario.parameters.real_time_factor
-            if not self.pace.followed:
+            if not (self.pace.followed or self._held_until_ns):
                 self._anchor()
         return setup
 
@@ -144,14 +148,15 @@ class SimulationLoop(ScenarioRun):
                 self.ghost.act(self.simulation.time_ns)
 
     def settle(self) -> None:
-        """Let act what is due now and, where time stands, what was sent before."""
+        """While time stands, let act what is due now and what was sent before."""
         if self.paused:
             self.take_commands()
-        self.act()
+            self.act()
 
     def planned(self, changes: Mapping[str, object], at_hand: Scenario) -> Scenario:
         """The scenario that these parameters would make now. Raises InputError, counted; at_hand: see ``take``."""
         self.settle()
+        self.act()
         try:
             scenario = self.scenario.with_changes(changes, at_hand=at_hand)
             self.check_change(scenario)
@@ -184,6 +189,7 @@ class SimulationLoop(ScenarioRun):
                 self._refuse_failed("pause")
                 self.take_commands()
             self.paused = paused
+            self._held_until_ns = 0
             self._give_up_steps()
             self.simulation.log("pause", {"data": paused})
             self.simulation.notify_floor()
@@ -272,14 +278,32 @@ class SimulationLoop(ScenarioRun):
     def reset(self) -> None:
         """Time 0 and the initial state; paused or running stays."""
         self.resets += 1
+        self._held_until_ns = 0
         self.simulation.reset(self.scenario.setup)
         if self.ghost is not None or Published in self.observer.takes:
             self.begin_ghost()
         self.publications.restart()
         self._give_up_steps()
+        self._present_ns = 0
         self._anchor()
         # Stamped anew: the message that is latched is from before.
         self.simulation.announce()
+
+    def hold(self) -> None:
+        """Keep running time at 0, where a reset has just put it, until ``hold_on`` says otherwise."""
+        if not self.paused:
+            self._held_until_ns = time.monotonic_ns() + HOLD_NS
+
+    def hold_on(self, more: bool) -> None:
+        """A list has come: time that is held is held for the next one, or goes on."""
+        if self._held_until_ns:
+            self.hold()
+            if not more:
+                self._let_go()
+
+    def _let_go(self) -> None:
+        self._held_until_ns = 0
+        self._anchor()
 
     # In the thread's loop
 
@@ -292,15 +316,15 @@ class SimulationLoop(ScenarioRun):
     def tick(self) -> None:
         """Do what is due, for no longer than pacing.WORK_NS."""
         self._budget.begin_tick()
-        if self.paused:
-            self._tick_paused()
+        if self.paused or self._held_until_ns:
+            self._tick_standing()
         else:
             self._tick_running()
 
     def prepare_request(self) -> None:
         """Bring simulated time up to now for a request, unless a publication comes first."""
         self._budget.begin_tick()
-        if not self.paused:
+        if not (self.paused or self._held_until_ns):
             self._present_ns = min(self._simulated_present_ns(), LAST_STAMP_NS)
             if self._present_ns < self.publications.next_ns:
                 self.catch_up()
@@ -350,7 +374,13 @@ class SimulationLoop(ScenarioRun):
         if self.simulation.failure:
             self._give_up_steps()
 
-    def _tick_paused(self) -> None:
+    def _tick_standing(self) -> None:
+        if 0 < self._held_until_ns <= time.monotonic_ns():
+            self._let_go()
+            self.endpoints.warn(
+                f"a script said that more of it follows, and nothing came for {HOLD_NS / 1e9:g} s: it runs without"
+            )
+            return
         if self.stepping:
             self._step_on()
         if self.pace.followed and not self.pace.anchored_ns:
@@ -432,7 +462,7 @@ class SimulationLoop(ScenarioRun):
             return 0
         if self.pace.followed:
             return min(latest_ns, self._last_drain_ns + FOLLOW_NS)
-        if self.paused:
+        if self.paused or self._held_until_ns:
             waits = self._steps_expected or (self._commands_come and self.scenario.parameters.lockstep)
             return self._last_drain_ns + LOCKSTEP_NS if waits else latest_ns
         if factor == 0.0:

@@ -186,10 +186,10 @@ class ScenarioRun:
             self.ghost.submit(command, when_ns, listed)
         return when_ns
 
-    def check(self, commands: Iterable[Command]) -> Iterator[tuple[Command, Scenario]]:
+    def check(self, commands: Iterable[Command], anew: bool = False) -> Iterator[tuple[Command, Scenario]]:
         """Commands in order of time, contacts by their points, each with the scenario that it acts in: the one that the
         changes up to it, among them, make of the present one. Raises InputError for one that this scenario can't take,
-        unless a change that waits already may permit it.
+        unless a change that waits already may permit it, which a reset (``anew``) drops.
         """
         scenario = self.scenario
         for command in commands:
@@ -203,7 +203,7 @@ class ScenarioRun:
                 else:
                     check_command(command, scenario.setup)
             except InputError:
-                if not self.simulation.change_waits(max(command.stamp_ns, self.simulation.time_ns)):
+                if anew or not self.simulation.change_waits(max(command.stamp_ns, self.simulation.time_ns)):
                     raise
             yield command, scenario
 

@@ -140,6 +140,59 @@ def test_commands_are_checked_under_the_changes_that_wait_before_them(live):
     assert live.scenario.parameters.angular_damping == 1e-6 and live.state.linear_velocity[1] > 0.0
 
 
+def test_a_reset_and_the_list_that_it_heads_are_taken_together_or_not_at_all(live, watcher):
+    live.step(3)
+    refused = [{"service": "reset"}, {"t": 0.01, "impulse": [1, 0, 0]}, {"t": 0.0, "at": "nowhere", "force": [1, 0, 0]}]
+    with pytest.raises(CommandRefused, match="nowhere"):
+        live.schedule(json.dumps(refused))
+    assert live.state.time_ns == 3 * PERIOD_NS and live.loop.resets == 0
+    with pytest.raises(CommandRefused, match="entry 3"):
+        live.schedule(
+            '[{"service": "reset", "more": true}, {"t": 0, "impulse": [1, 0, 0]}, {"t": 0, "forse": [1, 0, 0]}]'
+        )
+    for single in ("{service: reset}", "[{t: 0, impulse: [1, 0, 0]}, {service: reset}]"):
+        with pytest.raises(CommandRefused, match="heads a list"):
+            live.schedule(single)
+    watcher.lines.clear()
+    live.schedule(json.dumps(refused[:2]))
+    assert live.state.time_ns == 0 and live.loop.resets == 1 and live.paused
+    live.step(2)
+    assert [json.loads(line)["kind"] for line in watcher.lines] == ["reset", "step", "poke"]
+    assert live.loop.commands.received["schedule"] == 3 + 3 + 1 + 2 + 2
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.0])
+def test_a_list_that_says_more_keeps_time_at_0_until_the_last_one_has_come(live, watcher, factor):
+    live.set_parameters({"real_time_factor": factor})
+    live.pause(False)
+    live.schedule('[{"service": "reset", "more": true}]')
+    for k in range(5):
+        time.sleep(0.3)  # 1.5 s in all: each list keeps it for another second
+        live.schedule(json.dumps([{"more": True, "t": 0.02 - 0.001 * k, "impulse": [1e-3, 0, 0]}]))
+        assert live.state.time_ns == 0
+    live.schedule("[{t: 0.001, impulse: [1, 0, 0]}]")
+    while live.state.time_ns < 3 * PERIOD_NS:
+        time.sleep(0.01)
+    live.pause(True)
+    told = [json.loads(line) for line in watcher.lines]
+    assert [event["time_ns"] for event in told if event["kind"] == "poke"][-6:] == [
+        k * 10**6 for k in (1, 16, 17, 18, 19, 20)
+    ]
+    assert live.loop.commands.late == 0
+
+
+def test_time_goes_on_with_a_warning_where_a_list_that_was_announced_does_not_come(live):
+    warned = []
+    live.endpoints.warn = warned.append
+    live.pause(False)
+    live.schedule('[{"service": "reset", "more": true}]')
+    begun = time.monotonic()
+    while live.state.time_ns == 0:
+        time.sleep(0.01)
+    assert time.monotonic() - begun > 0.9
+    assert len(warned) == 1 and "nothing came for 1 s" in warned[0]
+
+
 def test_in_lockstep_a_refused_message_steps_too(live):
     live.set_parameters({"lockstep": True})
     for command in (

@@ -140,7 +140,13 @@ class Paused:
         self.script.append({"t": self.now_s, "set": {"lockstep": False}})
 
     def step(self) -> None:
-        self.live.step(self.draw.choice((1, 1, 3)))
+        self.advance(self.draw.choice((1, 1, 3)))
+
+    def advance(self, periods: int) -> None:
+        """As the physics thread does, of which there is none here."""
+        steps = self.live.loop.steps(periods)
+        while next(steps, "made") != "made":
+            self.live.loop.tick()
 
     def reset(self) -> None:
         self.compare()
@@ -152,7 +158,7 @@ class Paused:
 
     def compare(self) -> None:
         """With the run without ROS and clock."""
-        self.live.step()
+        self.advance(1)
         simulation, lines = self.live.loop.simulation, EventLines()
         offline = OfflineRun(self.begun, parse_script(json.dumps(self.script)), lines)
         assert offline.advance(simulation.time_ns)
@@ -194,7 +200,7 @@ def test_states_published_while_time_stands_are_verified_as_those_behind_command
         if flown.draw.random() < 0.6:
             loop._paused_publication_ns = 0
             loop.tick()
-    flown.live.step()
+    flown.advance(1)
     flown.live.stop()
     times = np.array([time_ns for time_ns, _ in published])
     session = RecordedSession(scene=flown.begun.text, events=flown.lines.timed)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -172,8 +173,8 @@ def test_what_was_done_in_one_paused_instant_is_one_message_to_a_node_in_the_ord
     hand.load("poke", "normal@tip;impulse", [1e-4, 0.0, 0.0])
     hand.wait(SECOND)
     script = parse_script(assert_flies_again(hand).script)
-    ((_, count, text),) = schedules(script)
-    assert count == len(script) and expand_schedule(read_schedule(text)) == script
+    ((_, entries),) = schedules(script)
+    assert len(entries) == len(script) and expand_schedule(read_schedule(json.dumps(entries))) == script
     assert [c.content["ballast.tip"][0] for c in script[:200]] == [0.0001 * k for k in range(200)]
 
 
