@@ -447,7 +447,32 @@ class SimulationLoop(ScenarioRun):
         self._next_listener_check_ns = 0
         self._caught_up = True
 
+    def _jump(self, by_ns: int) -> None:
+        """The followed clock has jumped, and stamps go with it: ahead, simulated time does, without motion; back, it
+        goes on, and what waits for a time of before is dropped.
+        """
+        self.endpoints.warn(
+            f"/clock jumped by {by_ns / 1e9:+.9g} s: "
+            + ("nothing moves in between" if by_ns > 0 else "commands that waited are dropped")
+        )
+        self._present_ns = self.pace.present_before_ns
+        self.catch_up()
+        if by_ns > 0:
+            if self.ghost is not None:
+                self.ghost.simulation.advance(self.simulation.time_ns)
+                self.ghost.simulation.leap(by_ns)
+            self.simulation.leap(by_ns)
+            self.publications.pass_over(self.simulation.time_ns)
+        else:
+            if self.ghost is not None:
+                self.ghost.simulation.drop_commands()
+            self.simulation.drop_commands()
+            self.simulation.log("jump", {"by_ns": by_ns})
+            self._anchor()
+
     def _simulated_present_ns(self) -> int:
+        if jump_ns := self.pace.jump():
+            self._jump(jump_ns)
         anchored_ns = self.pace.anchored_ns
         present_ns = self.pace.present_ns(self.simulation.time_ns, self.publications.next_ns)
         if self.pace.anchored_ns != anchored_ns:

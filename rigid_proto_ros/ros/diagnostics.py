@@ -32,6 +32,7 @@ WARNED_OF = {
     "queue_full": "messages may have been lost: a queue of commands was full",
     "overruns": "{} published late",
     "real_time_lost_s": "{:.2g} s behind real time",
+    "clock_jumps": "/clock jumped {} times",
 }
 """Counters whose growth makes a report a warning, and what it says of how much they grew."""
 
@@ -68,6 +69,7 @@ class Diagnostics:
             "wall_stamp": commands.wall_stamp,
             "messages_lost": self._subscriber.messages_lost,
             "queue_full": self._subscriber.queue_full,
+            "clock_jumps": loop.pace.jumps,
             "resets": loop.resets,
             "kinetic_energy": simulation.kinetic_energy,
             "potential_energy": simulation.potential_energy,

@@ -106,7 +106,7 @@ def read_schedule(text: str) -> Schedule:
     if not isinstance(head, dict):
         return Schedule(entries, True, count, False, False)
     own = {key: value for key, value in head.items() if key != "more"}
-    more, reset = plain(head.get("more", False)), plain(own) == RESET
+    more, reset = plain(head.get("more", False)), plain(own) in (RESET, {"t": 0, **RESET})
     if not isinstance(more, bool):
         raise InputError("schedule, entry 1, more", more, "true or false")
     return Schedule(entries[1:] if reset or not own else [own, *entries[1:]], True, count, reset, more)

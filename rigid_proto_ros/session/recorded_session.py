@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -173,6 +173,12 @@ def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
     return find
 
 
+def _leap_of(kind: str, content: Mapping[str, Any]) -> int:
+    """How far an event of the log took simulated time ahead at once [ns]."""
+    by_ns = content.get("by_ns", 0) if kind == "jump" else 0
+    return max(by_ns, 0) if type(by_ns) is int else 0
+
+
 class Resimulation(ScenarioRun):
     """A session's simulation; its commands are submitted when their time has come, as they were then. Raises InputError
     for events that can't be decoded.
@@ -209,7 +215,7 @@ class Resimulation(ScenarioRun):
             except InputError as error:
                 raise InputError(f"event {number}, {error.field}", error.received, error.accepted) from None
             # A mark is made before what acts at its time, which the recording may not have come to.
-            self.end_ns = max(self.end_ns, time_ns + (command is not None))
+            self.end_ns = max(self.end_ns, time_ns + (command is not None) + _leap_of(kind, content))
             waiting.append((time_ns, kind, content, command, number))
         # Stable: what happened at one instant keeps its order.
         self._waiting = deque(sorted(waiting, key=itemgetter(0)))
@@ -219,10 +225,12 @@ class Resimulation(ScenarioRun):
 
         Raises CommandRefused for a recorded command that can't be taken.
         """
-        # Marks at the time asked for were made before anything else could act there.
-        while self._waiting and (
-            self._waiting[0][0] < until_ns or (self._waiting[0][0] == until_ns and self._waiting[0][3] is None)
-        ):
+        while self._waiting:
+            time_ns, kind, content, command, _ = self._waiting[0]
+            # Marks at the time asked for were made before anything else could act there.
+            made_there = time_ns == until_ns and command is None and not _leap_of(kind, content)
+            if time_ns >= until_ns and not made_there:
+                break
             self._take_next()
         return self.simulation.advance(until_ns).row
 
@@ -231,14 +239,17 @@ class Resimulation(ScenarioRun):
         self.simulation.advance(max(time_ns, self.simulation.time_ns))
         if command is None:
             self.simulation.act()  # the commands before it
-            self.simulation.log(kind, content)
+            if by_ns := _leap_of(kind, content):
+                self.simulation.leap(by_ns)
+            else:
+                self.simulation.log(kind, content)
         else:
             # What acted at one instant acts in the order of the log, whatever rule made it.
             self.take(command, time_ns, (0, number))
 
     def act_next(self) -> bool:
         """Let the next event of the present instant happen, as it did while time stood; False when there is none."""
-        if not self._waiting or self._waiting[0][0] > self.simulation.time_ns:
+        if not self._waiting or self._waiting[0][0] > self.simulation.time_ns or _leap_of(*self._waiting[0][1:3]):
             return False
         self._take_next()
         self.simulation.act()

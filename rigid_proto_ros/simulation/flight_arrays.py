@@ -20,7 +20,7 @@ from ..motion.state import State
 from ..motion.string import StringState, string_of
 from . import flight as fl
 from .commands import HELD_WRENCH, NO_SLOT, Pending, Row, WrenchCommand, row_of
-from .effects import BEGIN, FLY, change, check_change, check_load, command, operate
+from .effects import BEGIN, CUT, FINISH, FLY, change, check_change, check_load, command, operate
 from .flight import EVENT, FLIGHT, LOAD_ROW, accelerations_now, note_floors
 from .refusals import REFUSAL, refused_command
 from .setup import Setup, refused_load
@@ -42,7 +42,9 @@ def _numbers(*names: str) -> list[int]:
     return [place_of(FLIGHT, name) // 8 for name in names]
 
 
-_NOW_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers("now_ns", "acting", "due", "due_end", "events")
+_NOW_NS, _START_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers(
+    "now_ns", "start_ns", "acting", "due", "due_end", "events"
+)
 NOTEWORTHY, _LOAD_IDS = _numbers("noteworthy", "load_ids")
 _REACHED = fl.REACHED
 
@@ -128,6 +130,12 @@ class FlightArrays:
         """Raises CommandRefused where the flight can't go on as that of another setup."""
         if not check_change(old.scene, new.scene, new.mesh, self.flight, self._loads, self._refusal):
             raise refused_command(self._refusal)
+
+    def leap(self, to_ns: int) -> None:
+        """Go on at a later time in the same state, with what acts; what is due by then hasn't ended yet."""
+        self.call(CUT, 0)
+        self.integers[_NOW_NS] = self.integers[_START_NS] = to_ns
+        self.call(FINISH, 0)
 
     # Commands
 

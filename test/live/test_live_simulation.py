@@ -150,7 +150,7 @@ def test_a_reset_and_the_list_that_it_heads_are_taken_together_or_not_at_all(liv
         live.schedule(
             '[{"service": "reset", "more": true}, {"t": 0, "impulse": [1, 0, 0]}, {"t": 0, "forse": [1, 0, 0]}]'
         )
-    for single in ("{service: reset}", "[{t: 0, impulse: [1, 0, 0]}, {service: reset}]"):
+    for single in ("{t: 0, service: reset}", "[{t: 0, impulse: [1, 0, 0]}, {t: 0, service: reset}]"):
         with pytest.raises(CommandRefused, match="heads a list"):
             live.schedule(single)
     watcher.lines.clear()

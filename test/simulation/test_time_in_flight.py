@@ -238,12 +238,14 @@ def test_with_use_sim_time_simulated_time_follows_the_clock_of_another(ros_envir
             stamps = [stamp_ns(m) for m in client.heard("pose")]
             assert [s for s in stamps if s not in (0, start)] == wanted[1:]
             assert last["stamp_offset_ns"] == str(later)
-            client.until(lambda: len(client.events()) >= 4, "last event")
+            assert last["clock_jumps"] == "1" and "/clock jumped by -1.134 s" in node.errors
+            client.until(lambda: len(client.events()) >= 5, "last event")
             found = [(e["kind"], e["time_ns"], e["content"].get("offset_ns")) for e in client.events()]
             assert found == [
                 ("clock", 0, start),
                 ("poke", 700 * MS, None),
                 ("poke", 800 * MS, None),
+                ("jump", 1234 * MS, None),
                 ("clock", 1234 * MS, later),
             ]
         finally:
