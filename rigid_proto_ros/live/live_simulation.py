@@ -35,15 +35,18 @@ LOOK_S = 0.002
 """Between looks whether a step is made [s]."""
 
 SHORT_NS = 3_000_000
-"""Shorter waits [ns] are a plain sleep, which costs a third of a wait that a request can end."""
+"""Shorter waits [ns] are a plain sleep, which costs half of a wait that an arrival ends."""
+
+SPACING_NS = 1_000_000
+"""In running time what arrives is taken at most this often [ns of wall time]."""
 
 
 class LiveSimulation:
     """A simulation on a thread of its own. Methods may be called from any thread, except where they say otherwise.
 
     name: the body's, and a recording's. endpoints: what it publishes to and takes commands from beside these methods.
-    clock: simulated time follows this one [ns] instead of the wall's. Raises InputError for contacts that no command
-    could name.
+    stamps: with a clock, simulated time follows that one instead of the wall's. Raises InputError for contacts that no
+    command could name.
     """
 
     def __init__(
@@ -52,11 +55,11 @@ class LiveSimulation:
         name: str = "rigid_body",
         observers: Sequence[Observer] = (),
         endpoints: Endpoints | None = None,
-        clock: Callable[[], int] | None = None,
+        stamps: Stamps | None = None,
     ) -> None:
         self.name = name
         self.endpoints = endpoints or Endpoints()
-        self.stamps = Stamps(clock)
+        self.stamps = stamps or Stamps()
         self.frames = frame_names(scenario.parameters, name)
         self._check_contacts(scenario)
         self._observers = tuple(observers)
@@ -64,7 +67,6 @@ class LiveSimulation:
         self._recorder: Observer | None = None
         self.loop = SimulationLoop(scenario, Observers(*observers), self.endpoints, self.stamps)
         self._requests: list[tuple[Callable[[], Any], Future[Any]]] = []
-        self._wake = threading.Event()
         # Held while a request is taken, and while the thread begins or is to end.
         self._handing_over = threading.Lock()
         self._stopping = False
@@ -104,7 +106,7 @@ class LiveSimulation:
         """End the motion, then the observers: what they hold goes out. Requests that still wait are refused."""
         with self._handing_over:
             self._stopping = True
-        self._wake.set()
+        self.endpoints.wake()
         if self._thread is not None:
             self._thread.join(timeout=5.0)
         for _, future in self._requests:
@@ -126,7 +128,7 @@ class LiveSimulation:
             if self._thread is None:
                 return function()
             self._requests.append((function, future))
-        self._wake.set()
+        self.endpoints.wake()
         try:
             return future.result(BUSY_S)
         except CancelledError:
@@ -143,20 +145,22 @@ class LiveSimulation:
         ask_for_short_slices()
         try:
             loop.start()
-            wake_ns = loop.next_wake_ns()
+            wake_ns, arrived = loop.next_wake_ns(), False
             while not self._stopping:
                 rest_ns = wake_ns - time.monotonic_ns()
                 if rest_ns > 0 and not self._requests:
                     if rest_ns < SHORT_NS:
+                        arrived = False
                         time.sleep(rest_ns * 1e-9)
                     else:
-                        self._wake.wait(rest_ns * 1e-9)
-                        self._wake.clear()
+                        if arrived and not loop.paused:
+                            time.sleep(SPACING_NS * 1e-9)
+                        arrived = self.endpoints.wait((wake_ns - time.monotonic_ns()) * 1e-9)
                 if self._requests:
                     self._serve_requests()
                     wake_ns = loop.next_wake_ns()
-                if wake_ns <= time.monotonic_ns():
-                    loop.tick()
+                if arrived or wake_ns <= time.monotonic_ns():
+                    loop.tick(arrived)
                     wake_ns = loop.next_wake_ns()
         except Exception:
             traceback.print_exc()

@@ -121,8 +121,10 @@ class Pace:
         """How far the followed clock was ahead of simulated time at the anchor; 0 while there is none."""
         return self.anchored_ns - self._anchor_simulated_ns if self.followed and self.anchored_ns else 0
 
-    def present_ns(self, reached_ns: int, next_publication_ns: int) -> int:
-        """Simulated time asked for now; time lost beyond MAX_LAG_NS is given up and counted. Call ``jump`` before."""
+    def present_ns(self, reached_ns: int, next_publication_ns: int, idle: bool = False) -> int:
+        """Simulated time asked for now; time lost beyond MAX_LAG_NS is given up and counted, unless nobody waits for
+        it (``idle``). Call ``jump`` before.
+        """
         if self.followed:
             return self._followed_present_ns(reached_ns)
         if self.factor == 0.0:
@@ -131,7 +133,7 @@ class Pace:
         present_ns = self._anchor_simulated_ns + int(elapsed_ns * self.factor)
         expected_ns = max(reached_ns, next_publication_ns)
         lag_ns = (present_ns - expected_ns) / self.factor
-        if lag_ns > MAX_LAG_NS:
+        if lag_ns > MAX_LAG_NS and not idle:
             self.real_time_lost_s += lag_ns * 1e-9
             self.overruns += 1
             self.anchor(expected_ns)

@@ -6,12 +6,11 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 
 from ..base.errors import CommandRefused, InputError
-from ..motion.state import State
 from ..scene.scenario import Scenario
 from ..scene.scenario_run import ScenarioRun
 from ..simulation.commands import Change, Command, Listed
@@ -29,8 +28,8 @@ LEAD = 0.2
 PAUSED_NS = 100_000_000
 """States go out at 10 Hz while paused [ns of wall time]."""
 
-LOCKSTEP_NS = 100_000
-"""In lockstep commands are looked for this often [ns of wall time], for some seconds after the last one."""
+IDLE_NS = 500_000_000
+"""A loop whose states nobody takes wakes this often [ns of wall time], so that what a command means by now is near."""
 
 FOLLOW_NS = 1_000_000
 """A followed clock is read this often [ns of wall time]."""
@@ -46,23 +45,50 @@ HOLD_NS = 1_000_000_000
 """Time stays at 0 for the next list of a script for so long [ns of wall time]."""
 
 
-@dataclass
 class Endpoints:
-    """What surrounds a loop; by default nothing does. All but the last two are called on the physics thread.
+    """What surrounds a loop; by itself it does nothing. All but the last three are called on the physics thread."""
 
-    publish(state): one is due. has_subscribers(): whether anybody gets it; without, no state is built for them.
-    take_commands(wall_ns, all_topics): submit what has arrived, on quiet topics too if all_topics; whether commands
-    come in these seconds. serve_steps(wall_ns): answer requests for steps; whether more are to be expected soon.
-    parameters_changed(): they have changed, by whatever, or a recording has stopped by itself. warn(message): tell the
-    user.
-    """
+    def __init__(self) -> None:
+        self._woken = threading.Event()
 
-    publish: Callable[[State], None] = lambda _: None
-    has_subscribers: Callable[[], bool] = lambda: False
-    take_commands: Callable[[int, bool], bool] = lambda *_: False
-    serve_steps: Callable[[int], bool] = lambda _: False
-    parameters_changed: Callable[[], None] = lambda: None
-    warn: Callable[[str], None] = lambda message: print(message, file=sys.stderr)
+    def publish(self, run: ScenarioRun) -> None:
+        """Publish the present state, which is due."""
+
+    def has_subscribers(self) -> bool:
+        """Whether anybody gets states; without, none is built for them."""
+        return False
+
+    def take_commands(self, _commands: CommandReceiver, _wall_ns: int, _at_once: bool) -> bool:
+        """Give ``_commands`` what has arrived, on quiet topics too if ``_at_once``; whether commands come in these
+        seconds.
+        """
+        return False
+
+    def serve_steps(self, loop: SimulationLoop) -> None:
+        """Answer requests for steps."""
+
+    def parameters_changed(self) -> None:
+        """Parameters have changed, by whatever, or a recording has stopped by itself."""
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until a command, a request for a step or a subscriber comes, ``wake`` is called, or the time is over;
+        whether one may have come.
+        """
+        self._woken.wait(timeout_s)
+        self._woken.clear()
+        return False
+
+    def wake(self) -> None:
+        """End the wait."""
+        self._woken.set()
+
+    def say(self, message: str) -> None:
+        """Tell the user."""
+        print(message, file=sys.stderr)
+
+    def warn(self, message: str) -> None:
+        """Warn the user."""
+        print(message, file=sys.stderr)
 
 
 class SimulationLoop(ScenarioRun):
@@ -92,7 +118,7 @@ class SimulationLoop(ScenarioRun):
         self._steps_left = 0
         self._in_step = False
         self._steps_begun = self._given_up = 0
-        self._commands_come = self._steps_expected = False
+        self._commands_come = False
         self._present_ns = self._held_until_ns = 0
         self._last_drain_ns = 0
         self._paused_publication_ns = 0
@@ -197,7 +223,7 @@ class SimulationLoop(ScenarioRun):
 
     def take_commands(self) -> None:
         """Take all commands that have arrived."""
-        self.endpoints.take_commands(time.monotonic_ns(), True)
+        self.endpoints.take_commands(self.commands, time.monotonic_ns(), True)
 
     def catch_up(self) -> None:
         """Advance to this tick's present, or as far towards it as the tick's time allows: what a command means by now.
@@ -313,13 +339,13 @@ class SimulationLoop(ScenarioRun):
             self.begin_ghost()
         self._anchor()
 
-    def tick(self) -> None:
-        """Do what is due, for no longer than pacing.WORK_NS."""
+    def tick(self, arrived: bool = True) -> None:
+        """Do what is due, for no longer than pacing.WORK_NS. arrived: commands or requests may have come."""
         self._budget.begin_tick()
         if self.paused or self._held_until_ns:
-            self._tick_standing()
+            self._tick_standing(arrived)
         else:
-            self._tick_running()
+            self._tick_running(arrived)
 
     def prepare_request(self) -> None:
         """Bring simulated time up to now for a request, unless a publication comes first."""
@@ -329,21 +355,22 @@ class SimulationLoop(ScenarioRun):
             if self._present_ns < self.publications.next_ns:
                 self.catch_up()
 
-    def _tick_running(self) -> None:
+    def _tick_running(self, arrived: bool) -> None:
         """Advance to the present: publish what is due, then take the commands that have arrived."""
         wall_ns = time.monotonic_ns()
-        if wall_ns >= self._next_listener_check_ns:
+        # Before somebody who has come is noticed: what has passed isn't published for them.
+        present_ns = self._simulated_present_ns()
+        check = wall_ns >= self._next_listener_check_ns or (arrived and not self._has_subscribers)
+        if check:
             self._next_listener_check_ns = wall_ns + TICK_NS
             self._check_listeners()
-            self.endpoints.serve_steps(wall_ns)  # refuses them
-        present_ns = self._simulated_present_ns()
+        if check or arrived:
+            self.endpoints.serve_steps(self)  # refuses them
         if present_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
             return
         ends = present_ns >= self._end_ns
         present_ns = min(present_ns, self._end_ns)
-        if not self._has_listeners and self._caught_up and (self.pace.factor > 0.0 or self.pace.followed):
-            self.publications.pass_over(present_ns)
         due_ns = self.publications.next_ns
         while due_ns <= present_ns:
             if not self._publish_next():
@@ -355,7 +382,7 @@ class SimulationLoop(ScenarioRun):
                 self.pace.overruns += 1
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
-        self._commands_come = self.endpoints.take_commands(wall_ns, False)
+        self._commands_come = self.endpoints.take_commands(self.commands, wall_ns, arrived)
         # Else what acts in between, and reports of it, would wait for the next publication.
         rarely = self.publications.rate * self.pace.factor * RAREST_NS < 1e9
         if ends or rarely or not self._has_listeners or self.pace.followed or not self._caught_up:
@@ -374,7 +401,7 @@ class SimulationLoop(ScenarioRun):
         if self.simulation.failure:
             self._give_up_steps()
 
-    def _tick_standing(self) -> None:
+    def _tick_standing(self, arrived: bool) -> None:
         if 0 < self._held_until_ns <= time.monotonic_ns():
             self._let_go()
             self.endpoints.warn(
@@ -388,15 +415,17 @@ class SimulationLoop(ScenarioRun):
             self._anchor()
         now_ns = time.monotonic_ns()
         self._last_drain_ns = now_ns
-        self._commands_come = self.endpoints.take_commands(now_ns, False)
+        if arrived and not self._has_subscribers:
+            self._check_listeners()
+        self._commands_come = self.endpoints.take_commands(self.commands, now_ns, arrived)
         if self.step_requested and not self.stepping:
             self.step_requested = False
             self._begin_step(1)
-        self._steps_expected = self.endpoints.serve_steps(now_ns)
+        self.endpoints.serve_steps(self)
         if now_ns >= self._paused_publication_ns and not self.stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS
             self._check_listeners()
-            self.endpoints.publish(self.simulation.state)
+            self.endpoints.publish(self)
 
     def _publish_next(self) -> bool:
         """Advance to the next publication and make it; False when the tick's time is over before, or the
@@ -411,7 +440,7 @@ class SimulationLoop(ScenarioRun):
         state = self.simulation.state
         self.publications.pass_over(state.time_ns)
         self.publish(state.time_ns, state.row)
-        self.endpoints.publish(state)
+        self.endpoints.publish(self)
         return True
 
     def _stop_at_the_last_stamp(self) -> None:
@@ -474,27 +503,30 @@ class SimulationLoop(ScenarioRun):
         if jump_ns := self.pace.jump():
             self._jump(jump_ns)
         anchored_ns = self.pace.anchored_ns
-        present_ns = self.pace.present_ns(self.simulation.time_ns, self.publications.next_ns)
+        idle = not self._has_listeners and self._caught_up and (self.pace.factor > 0.0 or bool(self.pace.followed))
+        present_ns = self.pace.present_ns(self.simulation.time_ns, self.publications.next_ns, idle)
         if self.pace.anchored_ns != anchored_ns:
             self._begin_anew()
+        if idle:
+            self.publications.pass_over(min(present_ns, self._end_ns))
         return present_ns
 
     def next_wake_ns(self) -> int:
-        """When ``tick`` is due next [ns of wall time]."""
-        latest_ns = self._last_drain_ns + TICK_NS
+        """When ``tick`` is due next [ns of wall time], unless something arrives before."""
         factor = self.pace.factor
         if self.stepping or self.step_requested or not self._caught_up:
             return 0
-        if self.pace.followed:
-            return min(latest_ns, self._last_drain_ns + FOLLOW_NS)
         if self.paused or self._held_until_ns:
-            waits = self._steps_expected or (self._commands_come and self.scenario.parameters.lockstep)
-            return self._last_drain_ns + LOCKSTEP_NS if waits else latest_ns
+            soon_ns = self._paused_publication_ns + (0 if self._has_subscribers else IDLE_NS)
+            return min(soon_ns, self._held_until_ns or soon_ns)
+        if self.pace.followed:
+            return self._last_drain_ns + (FOLLOW_NS if self._has_listeners else TICK_NS)
+        latest_ns = self._last_drain_ns + (TICK_NS if self._has_listeners else IDLE_NS)
         if factor == 0.0:
             return 0
         if not self._has_subscribers:
             # Recordings and viewers take states in bundles: theirs are made together, at 1 kHz ten a wake-up.
-            return latest_ns
+            return min(latest_ns, self.pace.wall_ns(min(self.simulation.next_event_ns, self._end_ns)))
         publication_ns = self.pace.wall_ns(self.publications.next_ns)
         if self._commands_come:
             # Commands taken a little before a publication show in it; those taken with it would show a period later.

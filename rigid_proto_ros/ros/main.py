@@ -96,7 +96,7 @@ class NodeProcess(threading.Thread):
             if isinstance(error, RuntimeError) and "QoS override" not in str(error):
                 raise
             raise InputError("ROS arguments", " ".join(str(error).split())) from None
-        node.states.pack_all(node.live.loop.simulation.state)
+        node.states.pack_all(node.live.loop)
         self._close_page = open_page(node)
         node.live.announce()
         if until_s is not None:

@@ -99,7 +99,7 @@ Store = Callable[[list[RosParameter]], SetParametersResult]
 
 
 class LiveParameters:
-    """The parameters of a node. All but ``changed`` runs on the executor's thread.
+    """The parameters of a node; all runs on the executor's thread.
 
     The node's ``set_parameters_atomically`` calls ``set_together``: rclpy's pre-set callback can't refuse; before its
     on-set callback all that is read-only or of another type is refused, also where it is in force already.
@@ -110,11 +110,6 @@ class LiveParameters:
         self._store_in_ros = store
         self._live = live
         self._states = states
-        self._behind = node.create_guard_condition(self._follow)
-
-    def changed(self) -> None:
-        """From any thread: a command has changed what parameters say."""
-        self._behind.trigger()
 
     def set_together(self, parameters: list[RosParameter]) -> SetParametersResult:
         """Convert, check together, and pass to the physics thread; after a refusal nothing is changed."""
@@ -143,7 +138,7 @@ class LiveParameters:
         self._states.configure(self._live.scenario.parameters)
         return self._store(changed)
 
-    def _follow(self) -> None:
+    def follow(self) -> None:
         """Set the ROS parameters to what scheduled commands and inertia messages have changed, and to no recording
         where one has stopped.
         """

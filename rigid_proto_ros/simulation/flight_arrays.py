@@ -154,6 +154,14 @@ class FlightArrays:
         self.integers[_DUE], self.integers[_DUE_END] = first, last
 
     @property
+    def next_end_ns(self) -> int:
+        """When the next load ends or the string is released [ns]; NEVER where neither is known to be."""
+        ends: list[int] = [fl.NEVER, *self._loads["end_ns"][: self.integers[_ACTING]].tolist()]
+        if self.flight.tied:
+            ends.append(int(self.flight.string_release_ns))
+        return min(ends)
+
+    @property
     def waiting(self) -> int:
         """Number of the commands put last that haven't been applied yet."""
         return self.integers[_DUE_END] - self.integers[_DUE]

@@ -350,6 +350,12 @@ class Simulation:
             self._arrays.call(CUT, 0)
             self._notify_string()
 
+    @property
+    def next_event_ns(self) -> int:
+        """When the next command acts, or load or string ends [ns]; fl.NEVER where none is known to."""
+        command_ns = self._pending[0][0] if self._pending else fl.NEVER
+        return min(command_ns, self.thrusters.due_ns, self._arrays.next_end_ns)
+
     def drop_commands(self) -> None:
         """Drop the commands that wait."""
         self._pending.clear()

@@ -11,6 +11,7 @@ from flights import EventLines
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation
+from rigid_proto_ros.live.pacing import Stamps
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.rerun_view.session_files import read_runs
 from rigid_proto_ros.scene.parameters import ZERO
@@ -31,7 +32,7 @@ class Followed:
         self.clock_ns = START
         self.lines, self.warned = EventLines(), []
         scenario = make_scenario({"mesh": "t_handle", "publish_rate": 100.0, **values})
-        self.live = LiveSimulation(scenario, observers=[self.lines], clock=lambda: self.clock_ns)
+        self.live = LiveSimulation(scenario, observers=[self.lines], stamps=Stamps(lambda: self.clock_ns))
         self.live.endpoints.warn = self.warned.append
         self.live.announce()
         self.live.loop.start()

@@ -193,6 +193,27 @@ def test_time_goes_on_with_a_warning_where_a_list_that_was_announced_does_not_co
     assert len(warned) == 1 and "nothing came for 1 s" in warned[0]
 
 
+@pytest.mark.parametrize("paused", [False, True])
+def test_without_anybody_who_looks_the_thread_sleeps_until_something_is_due(monkeypatch, paused):
+    scenario = make_scenario({"mesh": "t_handle", "publish_rate": 1000.0, "start_paused": paused})
+    live, ticks = LiveSimulation(scenario), []
+    tick = live.loop.tick
+    monkeypatch.setattr(live.loop, "tick", lambda arrived: (ticks.append(time.monotonic()), tick(arrived)))
+    live.start()
+    time.sleep(3.0)
+    assert len(ticks) <= 10
+    if not paused:
+        # What is scheduled acts when it is due, though nobody waits for a state.
+        due_ns = live.call(lambda: live.loop.simulation.time_ns) + 200_000_000
+        live.schedule(json.dumps({"t": due_ns / 1e9, "wrench": {"force": [1, 0, 0], "duration": 0.1}}))
+        begun = time.monotonic()
+        while not live.loop.simulation.events.count:
+            time.sleep(0.001)
+        assert time.monotonic() - begun < 0.45, "before the next of the rare wake-ups"
+        assert live.loop.pace.real_time_lost_s == 0.0 and live.loop.pace.overruns == 0
+    live.stop()
+
+
 def test_in_lockstep_a_refused_message_steps_too(live):
     live.set_parameters({"lockstep": True})
     for command in (

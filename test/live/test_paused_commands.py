@@ -194,7 +194,7 @@ def test_states_published_while_time_stands_are_verified_as_those_behind_command
     published: list[tuple[int, StateRow]] = []
     loop = flown.live.loop
     loop.endpoints.has_subscribers = lambda: True
-    loop.endpoints.publish = lambda state: published.append((state.time_ns, state.row.copy()))
+    loop.endpoints.publish = lambda run: published.append((run.simulation.time_ns, run.simulation.state.row.copy()))
     for _ in range(15):
         flown.draw.choice((flown.by_list, flown.by_parameter, flown.ahead, flown.step))()
         if flown.draw.random() < 0.6:
