@@ -63,7 +63,7 @@ class LiveSimulation:
         self.frames = frame_names(scenario.parameters, name)
         self._check_contacts(scenario)
         self._observers = tuple(observers)
-        self._recording_error = ""
+        self._recording_error = self._recorded_to = ""
         self._recorder: Observer | None = None
         self.loop = SimulationLoop(scenario, Observers(*observers), self.endpoints, self.stamps)
         self._requests: list[tuple[Callable[[], Any], Future[Any]]] = []
@@ -89,6 +89,7 @@ class LiveSimulation:
 
         def announce() -> None:
             self._recorder = self._open_recorder(self.scenario)
+            self._say_recording(self.scenario.parameters.record)
             self._watch()
             self._introduce(self.loop.observer)
 
@@ -113,6 +114,7 @@ class LiveSimulation:
             future.cancel()
         self.loop.simulation.notify_floor(at_end=True)
         self.loop.observer.close()
+        self._say_recording("")
 
     def call(self, function: Callable[[], Any]) -> Any:
         """Run a function on the physics thread between two ticks and return what it returns, or raise what it raises;
@@ -283,7 +285,8 @@ class LiveSimulation:
         def change() -> Observer | None:
             scenario = loop.planned(changes, planned)
             # A recording begins in the scene before the change that begins it, and has that as its first event.
-            finished = self._switch_recording(recorder) if "record" in changes else None
+            path = scenario.parameters.record
+            finished = self._switch_recording(recorder, path) if "record" in changes else None
             loop.change(changes, scenario)
             return finished
 
@@ -341,10 +344,19 @@ class LiveSimulation:
 
         return make_recorder(path, self.name, scenario.parameters, self._recording_failed)
 
-    def _switch_recording(self, recorder: Observer | None) -> Observer | None:
-        """On the physics thread: the new recorder is told what flies. Returns the old one, to be closed by whom nobody
-        waits for.
+    def _say_recording(self, path: str) -> None:
+        """What is recorded to from now on; empty for nothing."""
+        before, self._recorded_to = self._recorded_to, path
+        if before:
+            self.endpoints.say(f"the recording to {before} ends")
+        if path:
+            self.endpoints.say(f"a recording to {path} begins")
+
+    def _switch_recording(self, recorder: Observer | None, path: str = "") -> Observer | None:
+        """On the physics thread: the new recorder, to this path, is told what flies. Returns the old one, to be closed
+        by whom nobody waits for.
         """
+        self._say_recording(path)
         finished = self._recorder
         self.loop.simulation.notify_floor(at_end=True)
         self._recording_error = getattr(finished, "error", "") if recorder is None else ""

@@ -83,8 +83,7 @@ class Endpoints:
         self._woken.set()
 
     def say(self, message: str) -> None:
-        """Tell the user."""
-        print(message, file=sys.stderr)
+        """Tell the user, who may want to know."""
 
     def warn(self, message: str) -> None:
         """Warn the user."""
@@ -218,6 +217,7 @@ class SimulationLoop(ScenarioRun):
             self._held_until_ns = 0
             self._give_up_steps()
             self.simulation.log("pause", {"data": paused})
+            self.endpoints.say(f"{'paused' if paused else 'resumed'} at {self.simulation.time_ns / 1e9:.9g} s")
             self.simulation.notify_floor()
             self._anchor(stamps_stay=paused)
 
@@ -314,6 +314,7 @@ class SimulationLoop(ScenarioRun):
         self._anchor()
         # Stamped anew: the message that is latched is from before.
         self.simulation.announce()
+        self.endpoints.say("reset: simulated time is 0")
 
     def hold(self) -> None:
         """Keep running time at 0, where a reset has just put it, until ``hold_on`` says otherwise."""

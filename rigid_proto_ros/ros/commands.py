@@ -26,7 +26,7 @@ from ..live.command_receiver import CommandReceiver
 from ..live.simulation_loop import SimulationLoop
 from ..scene import cdr
 from ..scene.command_codec import Names, of_message
-from ..simulation.commands import Command, ThrusterCommand
+from ..simulation.commands import Command, MoveString, ThrusterCommand, WrenchCommand
 from . import qos
 from .arrivals import Arrivals
 
@@ -51,15 +51,21 @@ class CommandQueue:
     """The messages of one topic below the node's name, as bytes.
 
     queue_full: how often the queue was found full, so that messages may have been dropped here, nobody knows how many.
-    messages_lost: how many the middleware has said that their senders dropped.
+    messages_lost: how many the middleware has said that their senders dropped. contended: several publishers are there,
+    and nobody was told yet.
     """
 
     def __init__(self, node: Node, topic: str, arrivals: Arrivals) -> None:
         self.topic = topic
         self.queue_full = 0
         self.messages_lost = 0
+        self.contended = False
         self._logger = node.get_logger()
-        events = SubscriptionEventCallbacks(message_lost=self._on_lost, incompatible_qos=self._on_incompatible)
+        events = SubscriptionEventCallbacks(
+            message_lost=self._on_lost,
+            incompatible_qos=self._on_incompatible,
+            matched=self._on_matched,
+        )
         self._messages = arrivals.subscribe(TOPICS[topic], topic, qos.COMMAND, events)
         self._topic_name = node.resolve_topic_name(f"~/{topic}")
 
@@ -69,6 +75,17 @@ class CommandQueue:
             if count == self._messages.depth - 1:
                 self.queue_full += 1
             yield data
+
+    def note_sender(self, command: Command) -> None:
+        """Warn, once for each publisher that comes, where a command replaces what another publisher may hold."""
+        held = isinstance(command, WrenchCommand) and command.held and not command.frame.slot
+        if self.contended and (held or isinstance(command, MoveString | ThrusterCommand)):
+            self.contended = False
+            slots = "; with ;slot=<name> in their frames they don't" if held else ""
+            self._logger.warning(f"several publishers on {self._topic_name} replace each other's commands{slots}")
+
+    def _on_matched(self, status: Any) -> None:
+        self.contended = status.current_count > 1 and status.current_count_change > 0
 
     def _on_lost(self, status: Any) -> None:
         self.messages_lost = status.total_count
@@ -115,11 +132,17 @@ class CommandSubscriber:
                         if queue.topic == "schedule":
                             commands.receive_schedule(partial(read_text, data))
                         else:
-                            convert = partial(read_command, queue.topic, data, self._frames)
+                            convert = partial(self._read, queue, data)
                             commands.receive(queue.topic.partition("/")[0], convert)
                     if commands.step_requested:
                         return True
         return wall_ns < self._active_until_ns
+
+    def _read(self, queue: CommandQueue, data: bytes) -> Command:
+        command = read_command(queue.topic, data, self._frames)
+        if queue.contended:
+            queue.note_sender(command)
+        return command
 
 
 def read_command(topic: str, data: bytes, frames: Names) -> Command:

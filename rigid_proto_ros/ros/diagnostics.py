@@ -13,6 +13,7 @@ from rclpy.node import Node
 from ..base.errors import InputError
 from ..live.command_receiver import TOPICS
 from ..live.live_simulation import LiveSimulation
+from .commands import TOPICS as COMMAND_TOPICS
 from .commands import CommandSubscriber
 
 WARNING_S = 10.0
@@ -47,6 +48,12 @@ class Diagnostics:
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._before = live.call(self._values)
         self._of_this_name = 1
+        self._command_types = {
+            node.resolve_topic_name(f"~/{topic}"): message_type.__module__.split(".")[0]
+            + f"/msg/{message_type.__name__}"
+            for topic, message_type in COMMAND_TOPICS.items()
+        }
+        self._other_types: set[str] = set()
         # Steady: the node's own clock stands still with /clock.
         node.create_timer(REPORT_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -93,9 +100,20 @@ class Diagnostics:
             )
         self._of_this_name = max(count, 1)
 
+    def _warn_of_other_types(self) -> None:
+        """Log when a publisher of another type comes to a command topic, of which nobody else would tell it."""
+        for topic, types in self._node.get_topic_names_and_types():
+            wanted = self._command_types.get(topic)
+            for other in set(types) - {wanted, *self._other_types} if wanted else ():
+                self._other_types.add(other)
+                self._node.get_logger().warning(
+                    f"a publisher on {topic} has the type {other}, not {wanted}: none of its messages will be received"
+                )
+
     def _report(self) -> None:
         """Publish the diagnostics, and log when simulated time falls behind real time."""
         self._warn_of_namesakes()
+        self._warn_of_other_types()
         # Before the values are read: what was done before the stamp is in them.
         stamp = self._node.get_clock().now().to_msg()
         try:

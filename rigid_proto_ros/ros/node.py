@@ -110,8 +110,8 @@ class NodeEndpoints(Endpoints):
 
 
 class RigidBodyNode(Node):
-    """values: parameters by name as scene files give them, the others at their defaults. make_viewer(scenario, node
-    name) gives an observer that shows the body, or None. ``live`` flies once it is announced and started.
+    """values: parameters by name as scene files give them, the others at their defaults. make_viewer(scenario, node)
+    gives an observer that shows the body, or None. ``live`` flies once it is announced and started.
 
     Raises InputError when a parameter given at start is refused.
     """
@@ -119,7 +119,7 @@ class RigidBodyNode(Node):
     def __init__(
         self,
         values: Mapping[str, object],
-        make_viewer: Callable[[Scenario, str], Observer | None] = lambda *_: None,
+        make_viewer: Callable[[Scenario, Node], Observer | None] = lambda *_: None,
     ) -> None:
         super().__init__(NODE_NAME)
         scenario = make_scenario(declare_parameters(self, values))
@@ -128,7 +128,7 @@ class RigidBodyNode(Node):
         frames = frame_names(scenario.parameters, self.get_name())
         stamps = Stamps(self._followed_clock(scenario))
         events = EventPublisher(self, frames[1], stamps)
-        viewer = make_viewer(scenario, self.get_name())
+        viewer = make_viewer(scenario, self)
         arrivals = Arrivals(self)
         self.states = StatePublisher(self, frames, stamps, arrivals.note)
         self.states.configure(scenario.parameters)

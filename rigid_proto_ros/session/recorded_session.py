@@ -195,8 +195,9 @@ class Resimulation(ScenarioRun):
         node_name: str = "rigid_body",
     ) -> None:
         super().__init__(scenario, observer)
-        # Recordings from before there were such events have none.
-        self.simulation.logs_timeouts = False
+        # Recordings from before there were such events, of one thing or another, have none.
+        logged: set[str] = set()
+        self.simulation.logged_timeouts = logged
         self.frames = frame_names(scenario.parameters, node_name)
         self._mesh_of = mesh_of
         self.end_ns = 0
@@ -205,7 +206,7 @@ class Resimulation(ScenarioRun):
             time_ns, kind, content = decode_event(line, number)
             if kind == "timeout":
                 # It comes by itself, where it belongs: one that a change brings about comes behind that.
-                self.simulation.logs_timeouts = True
+                logged.update(content)
                 self.end_ns = max(self.end_ns, time_ns + 1)
                 continue
             try:

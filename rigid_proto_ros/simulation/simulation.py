@@ -8,7 +8,7 @@ segment loads are constant and an integrator advances the body. ``advance`` is t
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from heapq import heappop, heappush
 from typing import Any
 
@@ -65,6 +65,9 @@ from .thrusters import ThrusterControl
 _UNTIL_REPLACED_NS = fl.NEVER >> 1
 
 
+TIMEOUTS = frozenset({"slot", "thrusters", "string"})
+"""What may time out: the held wrench of a slot, thrusters, the string."""
+
 FLOOR_PERIOD_NS = 50_000_000
 """[ns, simulated] Interval at which observers are notified of error floors."""
 
@@ -75,7 +78,7 @@ class Simulation:
     Not thread-safe: a single owner submits and advances. ``time_ns`` and ``state`` are those of the last advance.
     ``refused`` counts refusals by reason, ``refusals`` has the text of the last one of each; ``failure`` says why the
     motion stopped, or is empty. ``listed``: place in its list of the command being applied, if it is an entry of one.
-    ``logs_timeouts``: whether the timeout of a held wrench is logged.
+    ``logged_timeouts``: of which things a timeout is logged, by the keys of its event.
     """
 
     time_ns: int
@@ -89,7 +92,7 @@ class Simulation:
         self.refusals: dict[str, str] = {}
         self._arrivals = 0
         self.listed: Listed | None = None
-        self.logs_timeouts = True
+        self.logged_timeouts: Collection[str] = TIMEOUTS
         self._arrays = FlightArrays()
         self._told_string = b""
         self.watch(observer or Observer())
@@ -291,11 +294,12 @@ class Simulation:
             self.time_ns = now_ns
             if what == fl.RELEASED:
                 self._notify_string()
+                self._log_timeout("string", True)
                 continue
             if what in (fl.ENDED, fl.TIMED_OUT):
                 observer.on(LoadEnded(now_ns, load_id))
-                if what == fl.TIMED_OUT and self.logs_timeouts:
-                    self.log("timeout", {"slot": slot_name(row)})
+                if what == fl.TIMED_OUT:
+                    self._log_timeout("slot", slot_name(row))
                 continue
             pending = due[row - first]
             command = pending.command
@@ -312,6 +316,10 @@ class Simulation:
             else:
                 kind = "impulse" if command.flight_kind == IMPULSE else command.kind
                 self._notify_load(load_id, kind, load_of_bytes(pending.row))
+
+    def _log_timeout(self, of: str, which: object) -> None:
+        if of in self.logged_timeouts:
+            self.log("timeout", {of: which})
 
     def _log_command(self, command: Command) -> None:
         # A noted change would keep its whole setup in memory, mesh included.
@@ -393,8 +401,8 @@ class Simulation:
         self._notify([])
         if self.thrusters.due_ns <= self.time_ns:
             loads, timed_out = self.thrusters.end_due(self.time_ns, self._timeout_ns)
-            if timed_out and self.logs_timeouts:
-                self.log("timeout", {"thrusters": True})
+            if timed_out:
+                self._log_timeout("thrusters", True)
             self._thrust(loads)
             ended = True
         return ended

@@ -168,7 +168,7 @@ def test_what_moves_nothing_has_no_command_and_what_is_damaged_is_named() -> Non
         ("wrench", {"frame_id": 5, "force": [1, 2, 3], "torque": [0, 0, 0]}),
         ("string_target", {"frame_id": "world"}),
         ("inertia", {"frame_id": "", "mass": 1.0, "com": [0, 0, 0], "tensor": [1]}),
-        ("jump", {}),
+        ("leap", {}),
     ):
         with pytest.raises(InputError):
             of_event(kind, content, NODE)
