@@ -49,11 +49,10 @@ class Diagnostics:
         self._before = live.call(self._values)
         self._of_this_name = 1
         self._command_types = {
-            node.resolve_topic_name(f"~/{topic}"): message_type.__module__.split(".")[0]
-            + f"/msg/{message_type.__name__}"
-            for topic, message_type in COMMAND_TOPICS.items()
+            node.resolve_topic_name(f"~/{topic}"): f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
+            for topic, kind in COMMAND_TOPICS.items()
         }
-        self._other_types: set[str] = set()
+        self._other_types: set[tuple[str, str]] = set()
         # Steady: the node's own clock stands still with /clock.
         node.create_timer(REPORT_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -104,8 +103,10 @@ class Diagnostics:
         """Log when a publisher of another type comes to a command topic, of which nobody else would tell it."""
         for topic, types in self._node.get_topic_names_and_types():
             wanted = self._command_types.get(topic)
-            for other in set(types) - {wanted, *self._other_types} if wanted else ():
-                self._other_types.add(other)
+            for other in types:
+                if wanted in (None, other) or (topic, other) in self._other_types:
+                    continue
+                self._other_types.add((topic, other))
                 self._node.get_logger().warning(
                     f"a publisher on {topic} has the type {other}, not {wanted}: none of its messages will be received"
                 )
