@@ -149,7 +149,9 @@ def main() -> None:
         print(f"{what}: {without:.3g} without a page, {with_page:.3g} with one (load {row['load']:.1f})", flush=True)
 
     # Somebody takes every state, as a subscriber to a topic does: each is due at its own moment.
-    flown = Flown("t_handle", endpoints=Endpoints(has_subscribers=lambda: True))
+    endpoints = Endpoints()
+    endpoints.has_subscribers = lambda: True
+    flown = Flown("t_handle", endpoints=endpoints)
     port = flown.server.get_port()
     try:
         flown.live.set_parameters({"publish_rate": 1000.0})

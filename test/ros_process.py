@@ -22,7 +22,8 @@ READY_S = 180.0
 
 def command(name: str, *arguments: object) -> list[str]:
     """How to start one of the package's executables with this interpreter."""
-    module = ["often_reporting_node"] if name == "often_reporting_node" else ["rigid_proto_ros.cli.executables", name]
+    own = ("often_reporting_node", "plain_callbacks_node")
+    module = [name] if name in own else ["rigid_proto_ros.cli.executables", name]
     return [sys.executable, "-m", *module, *map(str, arguments)]
 
 

@@ -79,7 +79,7 @@ def _load_history(
         if time_ns > end_ns:
             break
         command = of_event(kind, content, frames)
-        if command is None:
+        if command is None and kind != "jump":
             continue
         if isinstance(command, ClearWrench):
             for one in acting:

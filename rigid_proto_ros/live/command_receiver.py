@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..base.errors import CommandRefused, InputError
-from ..scene.script import expand_schedule, read_schedule
+from ..scene.scenario import Scenario
+from ..scene.script import Schedule, expand_schedule, read_schedule
 from ..simulation.commands import Change, Command, Listed, nanoseconds
-from ..simulation.setup import Setup
 
 if TYPE_CHECKING:
     from .simulation_loop import SimulationLoop
@@ -20,8 +19,8 @@ if TYPE_CHECKING:
 TOPICS = ("wrench", "thrusters", "poke", "string", "inertia", "schedule")
 """What received messages are counted by."""
 
-Submission = tuple[Command, int, Listed | None, tuple[bytes, Setup]]
-"""What ``Simulation.submit`` takes."""
+Submission = tuple[Command, int, Listed | None, Scenario]
+"""What ``ScenarioRun.take`` takes."""
 
 DAY_NS = 24 * 3600 * 1_000_000_000
 
@@ -40,23 +39,29 @@ class CommandReceiver:
         self._loop = loop
         self._schedules = 0
 
+    @property
+    def step_requested(self) -> bool:
+        """Whether a step is to follow before another command is taken."""
+        return self._loop.step_requested
+
     def receive(self, topic: str, command: Callable[[], Command]) -> None:
         """Count a command and submit it, to act at its stamp read as that of a message; raises CommandRefused, counted,
         for what can be checked now.
 
-        The loop catches up first, so that now is the tick's own time. topic: one of TOPICS. command() gives it, or
+        The loop catches up first, so that now is the tick's own time; while time stands, a command of now acts at once.
+        topic: one of TOPICS. command() gives it, or
         raises CommandRefused.
         """
         loop = self._loop
         loop.catch_up()
         try:
             sent = command()
-            if isinstance(sent, Change):
-                sent = loop.bound(sent)
-            when_ns, counter = self._effective(sent.stamp_ns, loop.stamps.offset_ns)
+            when_ns, counter = self._effective(sent.stamp_ns, loop.simulation.time_ns, loop.stamps.offset_ns)
             self._count(counter, 1)
-            checked = loop.accepted(lambda waiting: self._checked(sent, when_ns, waiting))
-            loop.simulation.submit(sent, when_ns, checked=checked)
+            scenario = None
+            if isinstance(sent, Change):
+                ((_, scenario),) = loop.check([sent])
+            loop.take(sent, when_ns, at_hand=scenario)
         except CommandRefused as refusal:
             loop.simulation.refuse(refusal)
             raise
@@ -68,61 +73,59 @@ class CommandReceiver:
     def receive_schedule(self, text: Callable[[], str]) -> None:
         """Take an entry of a script, or a list of entries whole or not at all, as YAML; raises CommandRefused, counted
         by entries. A mesh that it needs is loaded here and now. text() gives it, or raises CommandRefused.
+
+        A list may be headed by a reset, which is taken with it; one that says ``more`` keeps time at 0 for the next.
         """
         loop = self._loop
         loop.catch_up()
         self._schedules += 1
-        count = 1
+        count, more = 1, None
         try:
             listed = read_schedule(text())
-            count = len(listed) if isinstance(listed, list) else 1
-            commands = expand_schedule(listed)
-            taken, counted = loop.accepted(lambda ahead: self._planned(commands, isinstance(listed, list), ahead))
+            count, more = listed.sent, listed.more if listed.is_list else None
+            taken, counted = self._planned(listed)
         except InputError as error:
             reason = error.reason if isinstance(error, CommandRefused) else "schedule"
             refusal = CommandRefused(reason, error.field, error.received, error.accepted)
             loop.simulation.refuse(refusal, count)
             raise refusal from None
         else:
+            if listed.reset:
+                loop.reset()
+                loop.hold()
             for counter, entries in counted.items():
                 self._count(counter, len(entries))
             for submission in taken:
-                loop.simulation.submit(*submission)
+                loop.take(*submission)
         finally:
             self.received["schedule"] += count
+            if more is not None:
+                loop.hold_on(more)
 
-    def _checked(self, command: Command, when_ns: int, waiting: Sequence[tuple[int, Change]]) -> tuple[bytes, Setup]:
-        """The command's load and the setup for which it holds; raises InputError."""
-        # Its own stamp stays: it is logged as sent. Only changes that wait ask when it acts.
-        timed = replace(command, stamp_ns=when_ns) if waiting else command
-        ((_, checked),) = self._loop.checked([timed], waiting)
-        return checked
-
-    def _planned(
-        self, commands: list[Command], is_list: bool, waiting: Sequence[tuple[int, Change]]
-    ) -> tuple[list[Submission], dict[str, set[int]]]:
-        """The commands in order of time, those of one time in the order of the list, each checked in the scene that
-        those before it, and changes that wait, have made of the present one; and the entries to be counted by each
-        counter, once though they stand for several commands. Raises InputError.
+    def _planned(self, listed: Schedule) -> tuple[list[Submission], dict[str, set[int]]]:
+        """The commands in order of time, those of one time in the order of the list, checked; and the entries to be
+        counted by each counter, once though they stand for several commands. Raises InputError.
         """
         taken: list[Submission] = []
         counted: dict[str, set[int]] = {}
+        commands = expand_schedule(listed)
+        now_ns = 0 if listed.reset else self._loop.simulation.time_ns
         order = sorted(range(len(commands)), key=lambda k: commands[k].stamp_ns)
-        in_order = self._loop.checked([commands[k] for k in order], waiting)
-        for k, (command, checked) in zip(order, in_order, strict=True):
-            when_ns, counter = self._effective(command.stamp_ns, 0)
+        in_order = self._loop.check((commands[k] for k in order), anew=listed.reset)
+        for k, (command, scenario) in zip(order, in_order, strict=True):
+            when_ns, counter = self._effective(command.stamp_ns, now_ns)
             counted.setdefault(counter, set()).add(command.entry)
-            taken.append((command, when_ns, (self._schedules, k) if is_list else None, checked))
+            taken.append((command, when_ns, (self._schedules, k) if listed.is_list else None, scenario))
         return taken, counted
 
-    def _effective(self, stamp_ns: int, offset_ns: int) -> tuple[int, str]:
+    def _effective(self, stamp_ns: int, now_ns: int, offset_ns: int = 0) -> tuple[int, str]:
         """Simulated time [ns] at which a command with this stamp acts, and the counter it goes to, if any.
 
         Zero or past means now (past: ``late``); one up to the horizon ahead acts at exactly that time; one within a day
         of the system clock comes from a tool that stamps by it: it means now (``wall_stamp``). Raises CommandRefused
         (``stamp``). offset_ns: how far stamps are ahead of simulated time.
         """
-        now_ns, time_ns = self._loop.simulation.time_ns, stamp_ns - offset_ns
+        time_ns = stamp_ns - offset_ns
         if stamp_ns == 0:
             return now_ns, ""
         if time_ns <= now_ns:

@@ -36,15 +36,18 @@ LOOK_S = 0.002
 """Between looks whether a step is made [s]."""
 
 SHORT_NS = 3_000_000
-"""Shorter waits [ns] are a plain sleep, which costs a third of a wait that a request can end."""
+"""Shorter waits [ns] are a plain sleep, which costs half of a wait that an arrival ends."""
+
+SPACING_NS = 1_000_000
+"""In running time what arrives is taken at most this often [ns of wall time]."""
 
 
 class LiveSimulation:
     """A simulation on a thread of its own. Methods may be called from any thread, except where they say otherwise.
 
     name: the body's, and a recording's. endpoints: what it publishes to and takes commands from beside these methods.
-    clock: simulated time follows this one [ns] instead of the wall's. Raises InputError for contacts that no command
-    could name.
+    stamps: with a clock, simulated time follows that one instead of the wall's. Raises InputError for contacts that no
+    command could name.
     """
 
     def __init__(
@@ -53,11 +56,11 @@ class LiveSimulation:
         name: str = "rigid_body",
         observers: Sequence[Observer] = (),
         endpoints: Endpoints | None = None,
-        clock: Callable[[], int] | None = None,
+        stamps: Stamps | None = None,
     ) -> None:
         self.name = name
         self.endpoints = endpoints or Endpoints()
-        self.stamps = Stamps(clock)
+        self.stamps = stamps or Stamps()
         self.frames = frame_names(scenario.parameters, name)
         self._check_contacts(scenario)
         self._observers = tuple(observers)
@@ -65,7 +68,6 @@ class LiveSimulation:
         self._recorders: list[WritingObserver] = []
         self.loop = SimulationLoop(scenario, Observers(*observers), self.endpoints, self.stamps)
         self._requests: list[tuple[Callable[[], Any], Future[Any]]] = []
-        self._wake = threading.Event()
         # Held while a request is taken, and while the thread begins or is to end.
         self._handing_over = threading.Lock()
         self._stopping = False
@@ -88,6 +90,7 @@ class LiveSimulation:
 
         def announce() -> None:
             self._recorders = self._open_recorders(self.scenario)
+            self._say_recording([], self._recorders)
             self._watch()
             self._introduce(self.loop.observer)
 
@@ -105,13 +108,14 @@ class LiveSimulation:
         """End the motion, then the observers: what they hold goes out. Requests that still wait are refused."""
         with self._handing_over:
             self._stopping = True
-        self._wake.set()
+        self.endpoints.wake()
         if self._thread is not None:
             self._thread.join(timeout=5.0)
         for _, future in self._requests:
             future.cancel()
         self.loop.simulation.notify_floor(at_end=True)
         self.loop.observer.close()
+        self._say_recording(self._recorders, [])
 
     def call(self, function: Callable[[], Any]) -> Any:
         """Run a function on the physics thread between two ticks and return what it returns, or raise what it raises;
@@ -127,7 +131,7 @@ class LiveSimulation:
             if self._thread is None:
                 return function()
             self._requests.append((function, future))
-        self._wake.set()
+        self.endpoints.wake()
         try:
             return future.result(BUSY_S)
         except CancelledError:
@@ -144,20 +148,22 @@ class LiveSimulation:
         ask_for_short_slices()
         try:
             loop.start()
-            wake_ns = loop.next_wake_ns()
+            wake_ns, arrived = loop.next_wake_ns(), False
             while not self._stopping:
                 rest_ns = wake_ns - time.monotonic_ns()
                 if rest_ns > 0 and not self._requests:
                     if rest_ns < SHORT_NS:
+                        arrived = False
                         time.sleep(rest_ns * 1e-9)
                     else:
-                        self._wake.wait(rest_ns * 1e-9)
-                        self._wake.clear()
+                        if arrived and not loop.paused:
+                            time.sleep(SPACING_NS * 1e-9)
+                        arrived = self.endpoints.wait((wake_ns - time.monotonic_ns()) * 1e-9)
                 if self._requests:
                     self._serve_requests()
                     wake_ns = loop.next_wake_ns()
-                if wake_ns <= time.monotonic_ns():
-                    loop.tick()
+                if arrived or wake_ns <= time.monotonic_ns():
+                    loop.tick(arrived)
                     wake_ns = loop.next_wake_ns()
         except Exception:
             traceback.print_exc()
@@ -194,7 +200,12 @@ class LiveSimulation:
 
     def submit(self, command: Command) -> None:
         """Take a command of a service, which acts now and is counted by no topic."""
-        self.call(lambda: self.loop.simulation.submit(command))
+
+        def submit() -> None:
+            self.loop.settle()
+            self.loop.take(command)
+
+        self.call(submit)
 
     def schedule(self, text: str) -> None:
         """Take an entry of a script, or a list of entries, as YAML, ``t`` in simulated seconds; a list is taken or
@@ -210,7 +221,12 @@ class LiveSimulation:
 
     def reset(self) -> None:
         """Time 0 and the initial state; paused or running stays."""
-        self.call(self.loop.reset)
+
+        def reset() -> None:
+            self.loop.settle()  # what was sent before goes with what it did
+            self.loop.reset()
+
+        self.call(reset)
 
     def begin(self, scenario: Scenario) -> None:
         """Another scene, from its time 0; paused or running stays. Raises InputError, and then the present one begins
@@ -225,7 +241,6 @@ class LiveSimulation:
 
         self._check_contacts(scenario)
         self.call(begin)
-        self.endpoints.parameters_changed()
 
     def step(self, periods: int = 1) -> int:
         """While paused, advance over so many publications; returns the simulated time reached [ns]. Raises InputError
@@ -237,6 +252,17 @@ class LiveSimulation:
         return self.loop.simulation.time_ns
 
     # Parameters
+
+    @property
+    def parameters_now(self) -> dict[str, Any]:
+        """The parameters in force by name, behind everything sent before."""
+
+        def now() -> dict[str, Any]:
+            self.loop.settle()
+            return self.scenario.parameters.named()
+
+        named: dict[str, Any] = self.call(now)
+        return named
 
     def set_parameters(self, changes: Mapping[str, object]) -> None:
         """Change parameters all at once, or none: raises InputError, and then all stays as it was. Setting density sets
@@ -257,26 +283,17 @@ class LiveSimulation:
         if not changes:
             return
 
-        def check() -> Scenario:
-            try:
-                scenario = loop.scenario.with_changes(changes, at_hand=planned)
-                loop.check_change(scenario)
-            except CommandRefused as refusal:
-                loop.simulation.refuse(refusal)
-                raise
-            return scenario
-
         def change() -> list[WritingObserver]:
-            scenario = check()
+            scenario = loop.planned(changes, planned)
             # A recording begins in the scene before the change that begins it, and has that as its first event.
             finished = self._switch_recording(recorders) if "record" in changes else []
-            loop.expect(scenario, Change(dict(changes)))
+            loop.change(changes, scenario)
             return finished
 
         recorders: list[WritingObserver] = []
         if "record" in changes:
             # Opened last: a refused change must leave the file of that name as it is.
-            self.call(check)
+            self.call(partial(loop.planned, changes, planned))
             recorders = self._open_recorders(planned)
         try:
             finished = self.call(change)
@@ -284,7 +301,6 @@ class LiveSimulation:
             _close([recorder for recorder in recorders if recorder not in self._recorders])
             raise
         _close(finished)
-        self.endpoints.parameters_changed()
 
     # Observers
 
@@ -330,11 +346,20 @@ class LiveSimulation:
         new = ",".join(name for name in names if name not in (recorder.place for recorder in going_on))
         return going_on + make_recorders(new, self.name, scenario.parameters, self._recording_failed)
 
+    def _say_recording(self, before: list[WritingObserver], now: list[WritingObserver]) -> None:
+        for recorder in before:
+            if recorder not in now:
+                self.endpoints.say(f"the recording to {recorder.place} ends")
+        for recorder in now:
+            if recorder not in before:
+                self.endpoints.say(f"a recording to {recorder.place} begins")
+
     def _switch_recording(self, recorders: list[WritingObserver]) -> list[WritingObserver]:
         """On the physics thread: switch recorders; new ones are told what flies. Returns those that have finished; the
         caller closes them outside the physics thread.
         """
         before, self._recorders = self._recorders, recorders
+        self._say_recording(before, recorders)
         self.loop.simulation.notify_floor(at_end=True)
         finished = [recorder for recorder in before if recorder not in recorders]
         errors = [recorder.error for recorder in finished if recorder.error]
@@ -365,7 +390,8 @@ class LiveSimulation:
                 return []
             going_on = [recorder for recorder in recorders if not recorder.error]
             finished = self._switch_recording(going_on)
-            self.loop.stop_recording(",".join(recorder.place for recorder in going_on))
+            left = ",".join(recorder.place for recorder in going_on)
+            self.loop.setup_of(Change({"record": left}))  # no event, since the motion stays
             return finished
 
         _close(self.call(give_up))

@@ -37,6 +37,9 @@ LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
 LONGEST_NS = 1e18
 """Thirty years [ns of wall time], for which nobody waits: a small enough factor asks for infinity."""
 
+JUMP_NS, JUMP_SPACINGS = 1_000_000_000, 10
+"""A followed clock that goes ahead by more than this [ns], and by more than so many of its usual steps, has jumped."""
+
 MAX_LAG_NS = 250_000_000
 """A thread further behind than this [ns of wall time] gives the time up instead of racing after it."""
 
@@ -93,7 +96,8 @@ class WorkBudget:
 class Pace:
     """The simulated time that a clock asks for: the wall clock times ``factor``, or ``followed()``, a clock in
     nanoseconds that isn't the wall's. factor 0: as fast as it goes. anchored_ns: what the clock showed at the anchor.
-    overruns: publications more than a period late. real_time_lost_s: time given up rather than caught up.
+    overruns: publications more than a period late. real_time_lost_s: time given up rather than caught up. jumps: how
+    often the followed clock has jumped.
     """
 
     def __init__(self, factor: float, followed: Callable[[], int] | None = None) -> None:
@@ -101,6 +105,9 @@ class Pace:
         self.followed = followed
         self.overruns = 0
         self.real_time_lost_s = 0.0
+        self.jumps = 0
+        self._spacing_ns = 0.0
+        self.present_before_ns = 0
         self.anchor(0)
 
     def anchor(self, simulated_ns: int) -> None:
@@ -114,8 +121,10 @@ class Pace:
         """How far the followed clock was ahead of simulated time at the anchor; 0 while there is none."""
         return self.anchored_ns - self._anchor_simulated_ns if self.followed and self.anchored_ns else 0
 
-    def present_ns(self, reached_ns: int, next_publication_ns: int) -> int:
-        """Simulated time asked for now; time lost beyond MAX_LAG_NS is given up and counted."""
+    def present_ns(self, reached_ns: int, next_publication_ns: int, idle: bool = False) -> int:
+        """Simulated time asked for now; time lost beyond MAX_LAG_NS is given up and counted, unless nobody waits for
+        it (``idle``). Call ``jump`` before.
+        """
         if self.followed:
             return self._followed_present_ns(reached_ns)
         if self.factor == 0.0:
@@ -124,7 +133,7 @@ class Pace:
         present_ns = self._anchor_simulated_ns + int(elapsed_ns * self.factor)
         expected_ns = max(reached_ns, next_publication_ns)
         lag_ns = (present_ns - expected_ns) / self.factor
-        if lag_ns > MAX_LAG_NS:
+        if lag_ns > MAX_LAG_NS and not idle:
             self.real_time_lost_s += lag_ns * 1e-9
             self.overruns += 1
             self.anchor(expected_ns)
@@ -132,13 +141,27 @@ class Pace:
         return present_ns
 
     def _followed_present_ns(self, reached_ns: int) -> int:
-        assert self.followed
-        reading_ns = self.followed()
-        if self.anchored_ns == 0 or reading_ns < self._last_reading_ns:
-            # It hasn't begun before, or was set back: its steps count from here, simulated time goes on.
+        if self.anchored_ns == 0:
+            # It hasn't begun before: its steps count from here.
             self.anchor(reached_ns)
-        self._last_reading_ns = reading_ns
-        return max(reached_ns, self._anchor_simulated_ns + reading_ns - self.anchored_ns)
+        return max(reached_ns, self._anchor_simulated_ns + self._last_reading_ns - self.anchored_ns)
+
+    def jump(self) -> int:
+        """Read the followed clock; by how much it has jumped since the last reading [ns], below 0 for back, or 0.
+        ``present_before_ns`` is the simulated time that it asked for until then.
+        """
+        if not self.followed or not self.anchored_ns:
+            return 0
+        self.present_before_ns = self._followed_present_ns(0)
+        before_ns, self._last_reading_ns = self._last_reading_ns, self.followed()
+        step_ns = self._last_reading_ns - before_ns
+        spacing_ns = self._spacing_ns
+        if step_ns < 0 or (spacing_ns and step_ns > max(JUMP_NS, JUMP_SPACINGS * spacing_ns)):
+            self.jumps += 1
+            return step_ns
+        if step_ns:
+            self._spacing_ns += (step_ns - spacing_ns) * (0.1 if spacing_ns else 1.0)
+        return 0
 
     def wall_ns(self, simulated_ns: int) -> int:
         """When the wall clock gets to a simulated time, or in LONGEST_NS where it is later."""

@@ -6,16 +6,14 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
 
-from ..base.errors import InputError
-from ..motion.state import State
+from ..base.errors import CommandRefused, InputError
 from ..scene.scenario import Scenario
-from ..scene.scenario_run import ScenarioRun, after_change
-from ..simulation.commands import Change
+from ..scene.scenario_run import ScenarioRun
+from ..simulation.commands import Change, Command, Listed
 from ..simulation.observer import Observer, Published
 from ..simulation.setup import Setup
 from .command_receiver import CommandReceiver
@@ -30,8 +28,8 @@ LEAD = 0.2
 PAUSED_NS = 100_000_000
 """States go out at 10 Hz while paused [ns of wall time]."""
 
-LOCKSTEP_NS = 100_000
-"""In lockstep commands are looked for this often [ns of wall time], for some seconds after the last one."""
+IDLE_NS = 500_000_000
+"""A loop whose states nobody takes wakes this often [ns of wall time], so that what a command means by now is near."""
 
 FOLLOW_NS = 1_000_000
 """A followed clock is read this often [ns of wall time]."""
@@ -43,29 +41,60 @@ STEP_PATIENCE_S = 10.0
 """How long a request to step waits for the end of it."""
 
 
-@dataclass
+HOLD_NS = 1_000_000_000
+"""Time stays at 0 for the next list of a script for so long [ns of wall time]."""
+
+
 class Endpoints:
-    """What surrounds a loop; by default nothing does. All but the last two are called on the physics thread.
+    """What surrounds a loop; by itself it does nothing. All but the last three are called on the physics thread."""
 
-    publish(state): one is due. has_subscribers(): whether anybody gets it; without, no state is built for them.
-    take_commands(wall_ns, all_topics): submit what has arrived, on quiet topics too if all_topics; whether commands
-    come in these seconds. serve_steps(wall_ns): answer requests for steps; whether more are to be expected soon.
-    parameters_changed(): they have changed, by whatever, or a recording has stopped by itself. warn(message): tell the
-    user.
-    """
+    def __init__(self) -> None:
+        self._woken = threading.Event()
 
-    publish: Callable[[State], None] = lambda _: None
-    has_subscribers: Callable[[], bool] = lambda: False
-    take_commands: Callable[[int, bool], bool] = lambda *_: False
-    serve_steps: Callable[[int], bool] = lambda _: False
-    parameters_changed: Callable[[], None] = lambda: None
-    warn: Callable[[str], None] = lambda message: print(message, file=sys.stderr)
+    def publish(self, run: ScenarioRun) -> None:
+        """Publish the present state, which is due."""
+
+    def has_subscribers(self) -> bool:
+        """Whether anybody gets states; without, none is built for them."""
+        return False
+
+    def take_commands(self, _commands: CommandReceiver, _wall_ns: int, _at_once: bool) -> bool:
+        """Give ``_commands`` what has arrived, on quiet topics too if ``_at_once``; whether commands come in these
+        seconds.
+        """
+        return False
+
+    def serve_steps(self, loop: SimulationLoop) -> None:
+        """Answer requests for steps."""
+
+    def parameters_changed(self) -> None:
+        """Parameters have changed, by whatever, or a recording has stopped by itself."""
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until a command, a request for a step or a subscriber comes, ``wake`` is called, or the time is over;
+        whether one may have come.
+        """
+        self._woken.wait(timeout_s)
+        self._woken.clear()
+        return False
+
+    def wake(self) -> None:
+        """End the wait."""
+        self._woken.set()
+
+    def say(self, message: str) -> None:
+        """Tell the user, who may want to know."""
+
+    def warn(self, message: str) -> None:
+        """Warn the user."""
+        print(message, file=sys.stderr)
 
 
 class SimulationLoop(ScenarioRun):
     """observer: gets every publication, in bundles where nobody subscribes to the endpoints; without subscribers and an
     observer that takes states none is made, and the body crosses the time between two moments at which commands are
     taken at once. stamps: those of a clock that is followed from the start, a reset and the end of a pause on.
+    step_requested: whether a step is to follow the command taken last, before the next one is taken.
     """
 
     def __init__(
@@ -84,18 +113,18 @@ class SimulationLoop(ScenarioRun):
         self._budget = WorkBudget()
         self.pace = Pace(scenario.parameters.real_time_factor, self.stamps.clock)
         self.resets = 0
-        self._steps_left = self._steps_requested = 0
+        self.step_requested = False
+        self._steps_left = 0
+        self._in_step = False
         self._steps_begun = self._given_up = 0
-        self._commands_come = self._steps_expected = False
-        self._present_ns = 0
+        self._commands_come = False
+        self._present_ns = self._held_until_ns = 0
         self._last_drain_ns = 0
         self._paused_publication_ns = 0
         self._next_listener_check_ns = 0
         self._caught_up = True
         self._end_ns = LAST_STAMP_NS + 1
         self._on_end: Callable[[], None] = lambda: None
-        self._waiting: list[Change] = []
-        self._acting = scenario
         self._anchor(stamps_stay=True)
 
     def end_at(self, time_ns: int, on_end: Callable[[], None]) -> None:
@@ -115,62 +144,59 @@ class SimulationLoop(ScenarioRun):
     def replace(self, scenario: Scenario) -> Setup:
         """Put another scenario in force; its real time factor takes effect at once, too."""
         setup = super().replace(scenario)
-        if not self._waiting:
-            self._acting = scenario
+        self.endpoints.parameters_changed()
         if scenario.parameters.real_time_factor != self.pace.factor:
             self.pace.factor = scenario.parameters.real_time_factor
-            if not self.pace.followed:
+            if not (self.pace.followed or self._held_until_ns):
                 self._anchor()
         return setup
 
-    def expect(self, scenario: Scenario, change: Change) -> None:
-        """Put a checked scenario in force that a change has made of the present one; it acts when its time comes, on
-        what acts by then, and is taken back when it is refused then.
-        """
-        acting = self._acting
-        self.replace(scenario)
-        self._acting = acting
-        self._waiting.append(change)
+    def take(
+        self,
+        command: Command,
+        at_ns: int | None = None,
+        listed: Listed | None = None,
+        at_hand: Scenario | None = None,
+    ) -> int:
+        """See ScenarioRun; while time stands, a command of now has acted when this returns."""
+        when_ns = super().take(command, at_ns, listed, at_hand)
+        if self.paused:
+            self.act()
+        return when_ns
 
-        def apply() -> Setup:
-            # Changes made by hand act in the order in which they came.
-            self._waiting.pop(0)
-            return self.setup_of(change, scenario)
+    def act(self) -> None:
+        """Let the commands that are due now act."""
+        if self.simulation.act():
+            # What is published of this time was published before they acted.
+            self.publications.pass_over(self.simulation.time_ns)
+            if self.ghost is not None:
+                self.ghost.act(self.simulation.time_ns)
 
-        self.simulation.submit(replace(change, apply=apply))
+    def settle(self) -> None:
+        """While time stands, let act what is due now and what was sent before."""
+        if self.paused:
+            self.take_commands()
+            self.act()
 
-    def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
-        """Put in force what a change says that acts now; returns the setup, without changes that still wait. Raises
-        InputError. at_hand: a scenario whose mesh may be its.
-        """
-        acting = self._acting
+    def planned(self, changes: Mapping[str, object], at_hand: Scenario) -> Scenario:
+        """The scenario that these parameters would make now. Raises InputError, counted; at_hand: see ``take``."""
+        self.settle()
+        self.act()
         try:
-            acting = after_change(acting, command, at_hand)
-            self.check_change(acting)
-            self._acting = acting
-        finally:
-            planned = self._acting
-            for change in self._waiting:
-                with suppress(InputError):  # refused when it acts
-                    changed = after_change(planned, change)
-                    self.check_change(changed)
-                    planned = changed
-            if planned.parameters == self.scenario.parameters:
-                self.scenario = planned
-            else:
-                self.replace(planned)
-                self.endpoints.parameters_changed()
-        return acting.setup
+            scenario = self.scenario.with_changes(changes, at_hand=at_hand)
+            self.check_change(scenario)
+        except CommandRefused as refusal:
+            self.simulation.refuse(refusal)
+            raise
+        return scenario
 
-    def stop_recording(self, going_on: str = "") -> None:
-        """``record`` names no more than this from now on, which is no event and doesn't touch the motion; behind
-        changes that wait, of which one may have begun the recording, it is one of them.
-        """
-        change = Change({"record": going_on})
-        if self._waiting:
-            self.expect(after_change(self.scenario, change), change)
+    def change(self, changes: Mapping[str, object], scenario: Scenario) -> None:
+        """Change parameters now, to what ``planned`` gave."""
+        if self.simulation.failure:
+            self.replace(scenario)  # for the run after the reset: nothing acts any more in this one
         else:
-            self.setup_of(change)
+            self.take(Change(dict(changes)), at_hand=scenario)
+            self.act()
 
     def watch(self, observer: Observer) -> None:
         """Tell another observer from now on."""
@@ -188,20 +214,24 @@ class SimulationLoop(ScenarioRun):
                 self._refuse_failed("pause")
                 self.take_commands()
             self.paused = paused
+            self._held_until_ns = 0
             self._give_up_steps()
             self.simulation.log("pause", {"data": paused})
+            self.endpoints.say(f"{'paused' if paused else 'resumed'} at {self.simulation.time_ns / 1e9:.9g} s")
             self.simulation.notify_floor()
             self._anchor(stamps_stay=paused)
 
     def take_commands(self) -> None:
         """Take all commands that have arrived."""
-        self.endpoints.take_commands(time.monotonic_ns(), True)
+        self.endpoints.take_commands(self.commands, time.monotonic_ns(), True)
 
     def catch_up(self) -> None:
         """Advance to this tick's present, or as far towards it as the tick's time allows: what a command means by now.
-        Without commands nobody needs it.
+        Without commands nobody needs it. While time stands, what is due acts.
         """
-        if not self.paused and self._present_ns > self.simulation.time_ns:
+        if self.paused:
+            self.act()
+        elif self._present_ns > self.simulation.time_ns:
             self._caught_up = self._budget.advance(self.simulation, self._present_ns)
             self._check_failure()
 
@@ -209,10 +239,13 @@ class SimulationLoop(ScenarioRun):
         """While paused, take all commands that have arrived and begin to advance over so many publications; whether
         they are made already, else ``stepping`` says.
         """
-        requested = self._steps_requested
+        # This very step follows what is taken now, also where each command would have one of its own.
+        self._in_step = True
         self.take_commands()
-        # This very step follows what was taken now.
-        self._steps_requested = requested
+        self._in_step = False
+        return self._begin_step(periods)
+
+    def _begin_step(self, periods: int) -> bool:
         self.simulation.log("step", {"periods": periods} if periods > 1 else {})
         # Who has subscribed since the last publication waits for these.
         self._check_listeners()
@@ -252,7 +285,7 @@ class SimulationLoop(ScenarioRun):
         """Of the step under way, and of those requested, no more publications are made."""
         if self.stepping:
             self._given_up = self._steps_begun
-        self._steps_left = self._steps_requested = 0
+        self._steps_left, self.step_requested = 0, False
 
     def _refuse_failed(self, asked: str) -> None:
         if self.simulation.failure:
@@ -260,8 +293,8 @@ class SimulationLoop(ScenarioRun):
 
     def request_step(self) -> None:
         """A wrench or thruster command has come: paused and in lockstep it is followed by a step."""
-        if self.paused and self.scenario.parameters.lockstep:
-            self._steps_requested += 1
+        if self.paused and self.scenario.parameters.lockstep and not self._in_step:
+            self.step_requested = True
 
     @property
     def stepping(self) -> bool:
@@ -271,17 +304,33 @@ class SimulationLoop(ScenarioRun):
     def reset(self) -> None:
         """Time 0 and the initial state; paused or running stays."""
         self.resets += 1
-        # Changes still waiting for the paused time to go on are dropped with the schedule; the parameters stay.
-        self._waiting.clear()
-        self._acting = self.scenario
+        self._held_until_ns = 0
         self.simulation.reset(self.scenario.setup)
         if self.ghost is not None or Published in self.observer.takes:
             self.begin_ghost()
         self.publications.restart()
         self._give_up_steps()
+        self._present_ns = 0
         self._anchor()
         # Stamped anew: the message that is latched is from before.
         self.simulation.announce()
+        self.endpoints.say("reset: simulated time is 0")
+
+    def hold(self) -> None:
+        """Keep running time at 0, where a reset has just put it, until ``hold_on`` says otherwise."""
+        if not self.paused:
+            self._held_until_ns = time.monotonic_ns() + HOLD_NS
+
+    def hold_on(self, more: bool) -> None:
+        """A list has come: time that is held is held for the next one, or goes on."""
+        if self._held_until_ns:
+            self.hold()
+            if not more:
+                self._let_go()
+
+    def _let_go(self) -> None:
+        self._held_until_ns = 0
+        self._anchor()
 
     # In the thread's loop
 
@@ -291,37 +340,38 @@ class SimulationLoop(ScenarioRun):
             self.begin_ghost()
         self._anchor()
 
-    def tick(self) -> None:
-        """Do what is due, for no longer than pacing.WORK_NS."""
+    def tick(self, arrived: bool = True) -> None:
+        """Do what is due, for no longer than pacing.WORK_NS. arrived: commands or requests may have come."""
         self._budget.begin_tick()
-        if self.paused:
-            self._tick_paused()
+        if self.paused or self._held_until_ns:
+            self._tick_standing(arrived)
         else:
-            self._tick_running()
+            self._tick_running(arrived)
 
     def prepare_request(self) -> None:
         """Bring simulated time up to now for a request, unless a publication comes first."""
         self._budget.begin_tick()
-        if not self.paused:
+        if not (self.paused or self._held_until_ns):
             self._present_ns = min(self._simulated_present_ns(), LAST_STAMP_NS)
             if self._present_ns < self.publications.next_ns:
                 self.catch_up()
 
-    def _tick_running(self) -> None:
+    def _tick_running(self, arrived: bool) -> None:
         """Advance to the present: publish what is due, then take the commands that have arrived."""
         wall_ns = time.monotonic_ns()
-        if wall_ns >= self._next_listener_check_ns:
+        # Before somebody who has come is noticed: what has passed isn't published for them.
+        present_ns = self._simulated_present_ns()
+        check = wall_ns >= self._next_listener_check_ns or (arrived and not self._has_subscribers)
+        if check:
             self._next_listener_check_ns = wall_ns + TICK_NS
             self._check_listeners()
-            self.endpoints.serve_steps(wall_ns)  # refuses them
-        present_ns = self._simulated_present_ns()
+        if check or arrived:
+            self.endpoints.serve_steps(self)  # refuses them
         if present_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
             return
         ends = present_ns >= self._end_ns
         present_ns = min(present_ns, self._end_ns)
-        if not self._has_listeners and self._caught_up and (self.pace.factor > 0.0 or self.pace.followed):
-            self.publications.pass_over(present_ns)
         due_ns = self.publications.next_ns
         while due_ns <= present_ns:
             if not self._publish_next():
@@ -333,7 +383,7 @@ class SimulationLoop(ScenarioRun):
                 self.pace.overruns += 1
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
-        self._commands_come = self.endpoints.take_commands(wall_ns, False)
+        self._commands_come = self.endpoints.take_commands(self.commands, wall_ns, arrived)
         # Else what acts in between, and reports of it, would wait for the next publication.
         rarely = self.publications.rate * self.pace.factor * RAREST_NS < 1e9
         if ends or rarely or not self._has_listeners or self.pace.followed or not self._caught_up:
@@ -352,7 +402,13 @@ class SimulationLoop(ScenarioRun):
         if self.simulation.failure:
             self._give_up_steps()
 
-    def _tick_paused(self) -> None:
+    def _tick_standing(self, arrived: bool) -> None:
+        if 0 < self._held_until_ns <= time.monotonic_ns():
+            self._let_go()
+            self.endpoints.warn(
+                f"a script said that more of it follows, and nothing came for {HOLD_NS / 1e9:g} s: it runs without"
+            )
+            return
         if self.stepping:
             self._step_on()
         if self.pace.followed and not self.pace.anchored_ns:
@@ -360,15 +416,17 @@ class SimulationLoop(ScenarioRun):
             self._anchor()
         now_ns = time.monotonic_ns()
         self._last_drain_ns = now_ns
-        self._commands_come = self.endpoints.take_commands(now_ns, False)
-        if self._steps_requested and not self.stepping:
-            self._steps_requested -= 1
-            self.step()
-        self._steps_expected = self.endpoints.serve_steps(now_ns)
+        if arrived and not self._has_subscribers:
+            self._check_listeners()
+        self._commands_come = self.endpoints.take_commands(self.commands, now_ns, arrived)
+        if self.step_requested and not self.stepping:
+            self.step_requested = False
+            self._begin_step(1)
+        self.endpoints.serve_steps(self)
         if now_ns >= self._paused_publication_ns and not self.stepping:
             self._paused_publication_ns = now_ns + PAUSED_NS
             self._check_listeners()
-            self.endpoints.publish(self.simulation.state)
+            self.endpoints.publish(self)
 
     def _publish_next(self) -> bool:
         """Advance to the next publication and make it; False when the tick's time is over before, or the
@@ -383,7 +441,7 @@ class SimulationLoop(ScenarioRun):
         state = self.simulation.state
         self.publications.pass_over(state.time_ns)
         self.publish(state.time_ns, state.row)
-        self.endpoints.publish(state)
+        self.endpoints.publish(self)
         return True
 
     def _stop_at_the_last_stamp(self) -> None:
@@ -419,29 +477,57 @@ class SimulationLoop(ScenarioRun):
         self._next_listener_check_ns = 0
         self._caught_up = True
 
+    def _jump(self, by_ns: int) -> None:
+        """The followed clock has jumped, and stamps go with it: ahead, simulated time does, without motion; back, it
+        goes on, and what waits for a time of before is dropped.
+        """
+        self.endpoints.warn(
+            f"/clock jumped by {by_ns / 1e9:+.9g} s: "
+            + ("nothing moves in between" if by_ns > 0 else "commands that waited are dropped")
+        )
+        self._present_ns = self.pace.present_before_ns
+        self.catch_up()
+        if by_ns > 0:
+            if self.ghost is not None:
+                self.ghost.simulation.advance(self.simulation.time_ns)
+                self.ghost.simulation.leap(by_ns)
+            self.simulation.leap(by_ns)
+            self.publications.pass_over(self.simulation.time_ns)
+        else:
+            if self.ghost is not None:
+                self.ghost.simulation.drop_commands()
+            self.simulation.drop_commands()
+            self.simulation.log("jump", {"by_ns": by_ns})
+            self._anchor()
+
     def _simulated_present_ns(self) -> int:
+        if jump_ns := self.pace.jump():
+            self._jump(jump_ns)
         anchored_ns = self.pace.anchored_ns
-        present_ns = self.pace.present_ns(self.simulation.time_ns, self.publications.next_ns)
+        idle = not self._has_listeners and self._caught_up and (self.pace.factor > 0.0 or bool(self.pace.followed))
+        present_ns = self.pace.present_ns(self.simulation.time_ns, self.publications.next_ns, idle)
         if self.pace.anchored_ns != anchored_ns:
             self._begin_anew()
+        if idle:
+            self.publications.pass_over(min(present_ns, self._end_ns))
         return present_ns
 
     def next_wake_ns(self) -> int:
-        """When ``tick`` is due next [ns of wall time]."""
-        latest_ns = self._last_drain_ns + TICK_NS
+        """When ``tick`` is due next [ns of wall time], unless something arrives before."""
         factor = self.pace.factor
-        if self.stepping or self._steps_requested or not self._caught_up:
+        if self.stepping or self.step_requested or not self._caught_up:
             return 0
+        if self.paused or self._held_until_ns:
+            soon_ns = self._paused_publication_ns + (0 if self._has_subscribers else IDLE_NS)
+            return min(soon_ns, self._held_until_ns or soon_ns)
         if self.pace.followed:
-            return min(latest_ns, self._last_drain_ns + FOLLOW_NS)
-        if self.paused:
-            waits = self._steps_expected or (self._commands_come and self.scenario.parameters.lockstep)
-            return self._last_drain_ns + LOCKSTEP_NS if waits else latest_ns
+            return self._last_drain_ns + (FOLLOW_NS if self._has_listeners else TICK_NS)
+        latest_ns = self._last_drain_ns + (TICK_NS if self._has_listeners else IDLE_NS)
         if factor == 0.0:
             return 0
         if not self._has_subscribers:
             # Recordings and viewers take states in bundles: theirs are made together, at 1 kHz ten a wake-up.
-            return latest_ns
+            return min(latest_ns, self.pace.wall_ns(min(self.simulation.next_event_ns, self._end_ns)))
         publication_ns = self.pace.wall_ns(self.publications.next_ns)
         if self._commands_come:
             # Commands taken a little before a publication show in it; those taken with it would show a period later.

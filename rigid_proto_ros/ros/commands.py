@@ -1,11 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The command topics: taken by the physics thread at each tick, converted, and submitted; and ``~/step``, taken
+"""The command topics: taken by the physics thread (arrivals.py), converted, and submitted; and ``~/step``, taken
 likewise.
-
-A message taken from the middleware's queue like this costs a third of one that an executor hands to a callback, and is
-taken at the moment that the motion needs it. rclpy has no public way for it, so this one file uses what its own
-executors use: ``take_message`` of a subscription's handle, ``service_take_request`` of a service's, and the callback
-groups of its executors. Tried with rclpy 7.1.6 (Jazzy).
 
 Lost messages are counted by the middleware, which tells the executor of them in the public way: those that a sender had
 to drop before they were fetched. What this side's own queue drops when it is full nobody counts.
@@ -19,22 +14,21 @@ from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import InertiaStamped, PointStamped, WrenchStamped
-from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import qos_policy_name_from_kind
 from rclpy.serialization import deserialize_message
-from rclpy.waitable import Waitable
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import Trigger
 
 from ..base.errors import CommandRefused, InputError
 from ..live.command_receiver import CommandReceiver
-from ..live.live_simulation import LiveSimulation
+from ..live.simulation_loop import SimulationLoop
 from ..scene import cdr
 from ..scene.command_codec import Names, of_message
-from ..simulation.commands import Command, ThrusterCommand
+from ..simulation.commands import Command, MoveString, ThrusterCommand, WrenchCommand
 from . import qos
+from .arrivals import Arrivals
 
 QUIET_NS = 4_000_000
 """How often topics are read while nothing comes [ns of wall time]."""
@@ -53,59 +47,45 @@ TOPICS = {
 }
 
 
-class ManualCallbackGroup(CallbackGroup):
-    """A callback group of whose entities an executor serves the events alone."""
-
-    def can_execute(self, entity: object) -> bool:
-        """Whether it is an event."""
-        return isinstance(entity, Waitable)
-
-    def beginning_execution(self, entity: object) -> bool:
-        """Whether it is an event."""
-        return isinstance(entity, Waitable)
-
-    def ending_execution(self, entity: object) -> None:
-        """Nothing is held."""
-
-
 class CommandQueue:
     """The messages of one topic below the node's name, as bytes.
 
     queue_full: how often the queue was found full, so that messages may have been dropped here, nobody knows how many.
-    messages_lost: how many the middleware has said that their senders dropped.
+    messages_lost: how many the middleware has said that their senders dropped. contended: several publishers are there,
+    and nobody was told yet.
     """
 
-    def __init__(self, node: Node, topic: str, group: CallbackGroup) -> None:
+    def __init__(self, node: Node, topic: str, arrivals: Arrivals) -> None:
         self.topic = topic
         self.queue_full = 0
         self.messages_lost = 0
+        self.contended = False
         self._logger = node.get_logger()
-        self._subscription = node.create_subscription(
-            TOPICS[topic],
-            f"~/{topic}",
-            _never_called,
-            qos.own(qos.COMMAND),
-            callback_group=group,
-            event_callbacks=SubscriptionEventCallbacks(
-                message_lost=self._on_lost, incompatible_qos=self._on_incompatible
-            ),
-            raw=True,
-            qos_overriding_options=qos.OVERRIDABLE,
+        events = SubscriptionEventCallbacks(
+            message_lost=self._on_lost,
+            incompatible_qos=self._on_incompatible,
+            matched=self._on_matched,
         )
+        self._messages = arrivals.subscribe(TOPICS[topic], topic, qos.COMMAND, events)
+        self._topic_name = node.resolve_topic_name(f"~/{topic}")
 
     def take(self) -> Iterator[bytes]:
-        """What has arrived, message by message; at most as many as a queue holds, so that a flood can't hold up the
-        motion for ever.
-        """
-        handle = self._subscription.handle
-        with handle:
-            for count in range(qos.COMMAND_DEPTH):
-                taken = handle.take_message(TOPICS[self.topic], True)
-                if taken is None:
-                    return
-                if count == self._subscription.qos_profile.depth - 1:
-                    self.queue_full += 1
-                yield taken[0]
+        """What has arrived, message by message."""
+        for count, data in enumerate(self._messages.take()):
+            if count == self._messages.depth - 1:
+                self.queue_full += 1
+            yield data
+
+    def note_sender(self, command: Command) -> None:
+        """Warn, once for each publisher that comes, where a command replaces what another publisher may hold."""
+        held = isinstance(command, WrenchCommand) and command.held and not command.frame.slot
+        if self.contended and (held or isinstance(command, MoveString | ThrusterCommand)):
+            self.contended = False
+            slots = "; with ;slot=<name> in their frames they don't" if held else ""
+            self._logger.warning(f"several publishers on {self._topic_name} replace each other's commands{slots}")
+
+    def _on_matched(self, status: Any) -> None:
+        self.contended = status.current_count > 1 and status.current_count_change > 0
 
     def _on_lost(self, status: Any) -> None:
         self.messages_lost = status.total_count
@@ -113,7 +93,7 @@ class CommandQueue:
     def _on_incompatible(self, status: Any) -> None:
         policy = qos_policy_name_from_kind(status.last_policy_kind)
         self._logger.warning(
-            f"a publisher on {self._subscription.topic_name} offers incompatible QoS (last policy: {policy}): "
+            f"a publisher on {self._topic_name} offers incompatible QoS (last policy: {policy}): "
             "none of its messages will be received; commands have to be reliable"
         )
 
@@ -121,12 +101,12 @@ class CommandQueue:
 class CommandSubscriber:
     """The subscriptions of one node. frames: what it calls the world's and the body's frame."""
 
-    def __init__(self, node: Node, commands: CommandReceiver, frames: Names, has_thrusters: bool) -> None:
-        self._commands = commands
+    def __init__(self, node: Node, arrivals: Arrivals, frames: Names, has_thrusters: bool) -> None:
         self._frames = frames
         self._next_quiet_ns = self._active_until_ns = 0
-        group = ManualCallbackGroup()
-        self._queues = [CommandQueue(node, topic, group) for topic in TOPICS if has_thrusters or topic != "thrusters"]
+        self._queues = [
+            CommandQueue(node, topic, arrivals) for topic in TOPICS if has_thrusters or topic != "thrusters"
+        ]
 
     @property
     def queue_full(self) -> int:
@@ -138,10 +118,10 @@ class CommandSubscriber:
         """How many messages the middleware has said to be lost."""
         return sum(queue.messages_lost for queue in self._queues)
 
-    def take(self, wall_ns: int, at_once: bool) -> bool:
+    def take(self, commands: CommandReceiver, wall_ns: int, at_once: bool) -> bool:
         """Take every message that has arrived, convert it, and submit its command; what is refused is counted and
-        notified of, and the rest goes on. Returns whether something has arrived within the last ACTIVE_NS. Quiet topics
-        are read every QUIET_NS, or now if ``at_once``.
+        notified of, and the rest goes on; in lockstep only up to one that is followed by a step. Returns whether
+        something has arrived within the last ACTIVE_NS. Quiet topics are read every QUIET_NS, or now if ``at_once``.
         """
         if at_once or wall_ns >= self._next_quiet_ns or wall_ns < self._active_until_ns:
             self._next_quiet_ns = wall_ns + QUIET_NS
@@ -150,11 +130,19 @@ class CommandSubscriber:
                     self._active_until_ns = wall_ns + ACTIVE_NS
                     with suppress(CommandRefused):  # counted, and the observer was told
                         if queue.topic == "schedule":
-                            self._commands.receive_schedule(partial(read_text, data))
+                            commands.receive_schedule(partial(read_text, data))
                         else:
-                            convert = partial(read_command, queue.topic, data, self._frames)
-                            self._commands.receive(queue.topic.partition("/")[0], convert)
+                            convert = partial(self._read, queue, data)
+                            commands.receive(queue.topic.partition("/")[0], convert)
+                    if commands.step_requested:
+                        return True
         return wall_ns < self._active_until_ns
+
+    def _read(self, queue: CommandQueue, data: bytes) -> Command:
+        command = read_command(queue.topic, data, self._frames)
+        if queue.contended:
+            queue.note_sender(command)
+        return command
 
 
 def read_command(topic: str, data: bytes, frames: Names) -> Command:
@@ -183,47 +171,32 @@ def _undecodable(topic: str, data: bytes) -> CommandRefused:
     return CommandRefused("frame", "message", f"{len(data)} bytes that can't be decoded", accepted)
 
 
-EXPECTED_NS = 1_000_000_000
-"""How long after a request to step the next one is looked for often [ns of wall time]."""
-
-
 class StepService:
-    """``~/step`` of one node; the loop calls ``serve``. A controller in lockstep waits for every answer, and an
-    executor, which gathers all that it waits for anew each time, costs several times what the step itself does.
+    """``~/step`` of one node. A controller in lockstep waits for every answer, and an executor, which gathers all that
+    it waits for anew each time, costs several times what the step itself does.
     """
 
-    def __init__(self, node: Node, live: LiveSimulation) -> None:
-        self._live = live
-        self._service = node.create_service(Trigger, "~/step", _never_called, callback_group=ManualCallbackGroup())
+    def __init__(self, arrivals: Arrivals) -> None:
+        self._requests = arrivals.serve(Trigger, "step")
         self._under_way: tuple[Any, Iterator[None]] | None = None
-        self._expected_until_ns = 0
 
-    def serve(self, wall_ns: int) -> bool:
-        """Take what is asked for, one request after another, each for as long as a tick has time, and answer. Returns
-        whether more is to be expected soon.
-        """
-        loop, handle = self._live.loop, self._service.handle
+    def serve(self, loop: SimulationLoop) -> None:
+        """Take what is asked for, one request after another, each for as long as a tick has time, and answer."""
         while True:
             if self._under_way is None:
-                with handle:
-                    _, header = handle.service_take_request(Trigger.Request)
-                if header is None:
-                    return wall_ns < self._expected_until_ns
-                self._under_way = header, loop.steps()
-            self._expected_until_ns = wall_ns + EXPECTED_NS
-            header, steps = self._under_way
+                request = self._requests.take()
+                if request is None:
+                    return
+                self._under_way = request, loop.steps()
+            request, steps = self._under_way
             answer = Trigger.Response(success=True)
             try:
                 next(steps)
-                return True
+                return
             except StopIteration:
                 time_s, received = loop.simulation.time_ns / 1e9, loop.commands.received.total()
                 answer.message = f"simulated time is {time_s:.9g} s; {received} commands received"
             except InputError as error:
                 answer = Trigger.Response(success=False, message=str(error))
             self._under_way = None
-            self._service.send_response(answer, header)
-
-
-def _never_called(*_: object) -> None:
-    """The callback that subscriptions and services require; it is never called."""
+            self._requests.answer(request, answer)

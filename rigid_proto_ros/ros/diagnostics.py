@@ -13,6 +13,7 @@ from rclpy.node import Node
 from ..base.errors import InputError
 from ..live.command_receiver import TOPICS
 from ..live.live_simulation import LiveSimulation
+from .commands import TOPICS as COMMAND_TOPICS
 from .commands import CommandSubscriber
 
 WARNING_S = 10.0
@@ -32,6 +33,7 @@ WARNED_OF = {
     "queue_full": "messages may have been lost: a queue of commands was full",
     "overruns": "{} published late",
     "real_time_lost_s": "{:.2g} s behind real time",
+    "clock_jumps": "/clock jumped {} times",
 }
 """Counters whose growth makes a report a warning, and what it says of how much they grew."""
 
@@ -46,6 +48,11 @@ class Diagnostics:
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._before = live.call(self._values)
         self._of_this_name = 1
+        self._command_types = {
+            node.resolve_topic_name(f"~/{topic}"): f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
+            for topic, kind in COMMAND_TOPICS.items()
+        }
+        self._other_types: set[tuple[str, str]] = set()
         # Steady: the node's own clock stands still with /clock.
         node.create_timer(REPORT_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -68,6 +75,7 @@ class Diagnostics:
             "wall_stamp": commands.wall_stamp,
             "messages_lost": self._subscriber.messages_lost,
             "queue_full": self._subscriber.queue_full,
+            "clock_jumps": loop.pace.jumps,
             "resets": loop.resets,
             "kinetic_energy": simulation.kinetic_energy,
             "potential_energy": simulation.potential_energy,
@@ -91,9 +99,22 @@ class Diagnostics:
             )
         self._of_this_name = max(count, 1)
 
+    def _warn_of_other_types(self) -> None:
+        """Log when a publisher of another type comes to a command topic, of which nobody else would tell it."""
+        for topic, types in self._node.get_topic_names_and_types():
+            wanted = self._command_types.get(topic)
+            for other in types:
+                if wanted in (None, other) or (topic, other) in self._other_types:
+                    continue
+                self._other_types.add((topic, other))
+                self._node.get_logger().warning(
+                    f"a publisher on {topic} has the type {other}, not {wanted}: none of its messages will be received"
+                )
+
     def _report(self) -> None:
         """Publish the diagnostics, and log when simulated time falls behind real time."""
         self._warn_of_namesakes()
+        self._warn_of_other_types()
         # Before the values are read: what was done before the stamp is in them.
         stamp = self._node.get_clock().now().to_msg()
         try:

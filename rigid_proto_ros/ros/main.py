@@ -20,6 +20,8 @@ from ..live.shutdown import Shutdown, begin_closing, begin_teardown
 from .domain import hold_own_domain
 
 if TYPE_CHECKING:
+    from rclpy.node import Node
+
     from ..scene.scenario import Scenario
     from ..simulation.observer import Observer
     from .node import RigidBodyNode
@@ -96,7 +98,7 @@ class NodeProcess(threading.Thread):
             if isinstance(error, RuntimeError) and "QoS override" not in str(error):
                 raise
             raise InputError("ROS arguments", " ".join(str(error).split())) from None
-        node.states.pack_all(node.live.loop.simulation.state)
+        node.states.pack_all(node.live.loop)
         self._close_page = open_page(node)
         node.live.announce()
         if until_s is not None:
@@ -119,8 +121,8 @@ class NodeProcess(threading.Thread):
             f"integrator {scenario.setup.integrator.name}"
         )
 
-    def _make_viewer(self, scenario: Scenario, node_name: str) -> Observer | None:
-        self._viewer = make_viewer(scenario, node_name)
+    def _make_viewer(self, scenario: Scenario, node: Node) -> Observer | None:
+        self._viewer = make_viewer(scenario, node)
         return self._viewer
 
     def _spin(self, spin: Callable[[], None]) -> None:
@@ -173,8 +175,10 @@ class NodeProcess(threading.Thread):
         try_shutdown()
 
 
-def make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
-    """The live view, or None; Rerun is imported only when something is to be shown or recorded with it."""
+def make_viewer(scenario: Scenario, node: Node) -> Observer | None:
+    """The live view, which says its addresses in the node's log, or None; Rerun is imported only when something is to
+    be shown or recorded with it.
+    """
     parameters = scenario.parameters
     if parameters.viewer in ("none", "workbench"):
         return None
@@ -182,16 +186,13 @@ def make_viewer(scenario: Scenario, node_name: str) -> Observer | None:
         raise InputError("viewer", is_missing("rerun-sdk", "rerun"))
     from ..rerun_view.live_view import LiveView
 
-    def report(line: str) -> None:
-        print(f"{node_name}: {line}", file=sys.stderr)
-
     return LiveView(
         parameters.viewer,
         rerun_port=_asked_for("rerun_port", parameters.rerun_port),
         web_port=_asked_for("web_port", parameters.web_port),
-        name=node_name,
-        report=report,
-        on_error=report,
+        name=node.get_name(),
+        report=node.get_logger().info,
+        on_error=node.get_logger().warning,
     )
 
 
@@ -209,7 +210,7 @@ def open_page(node: RigidBodyNode) -> Callable[[], None]:
     except InputError as error:
         # By the name that the node knows it by, which isn't the command's option.
         raise InputError("workbench_port", error.received, error.accepted) from None
-    print(f"{node.get_name()}: the workbench is at {page.address}", file=sys.stderr)
+    node.get_logger().info(f"the workbench is at {page.address}")
     return page.close
 
 

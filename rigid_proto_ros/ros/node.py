@@ -16,13 +16,17 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
 from ..base.errors import InputError
+from ..live.command_receiver import CommandReceiver
 from ..live.live_simulation import LiveSimulation
-from ..live.simulation_loop import Endpoints
+from ..live.pacing import Stamps
+from ..live.simulation_loop import Endpoints, SimulationLoop
 from ..scene.command_codec import frame_names
 from ..scene.scenario import Scenario, make_scenario
+from ..scene.scenario_run import ScenarioRun
 from ..simulation.commands import ClearWrench, ReleaseString
 from ..simulation.observer import Observer
 from .arguments import NODE_NAME
+from .arrivals import Arrivals
 from .commands import CommandSubscriber, StepService
 from .diagnostics import Diagnostics
 from .parameters import LiveParameters, declare_parameters
@@ -54,9 +58,60 @@ def offer_services(node: Node, live: LiveSimulation) -> None:
     offer(SetBool, "pause", lambda request: live.pause(request.data), lambda r: "paused" if r.data else "running")
 
 
+class NodeEndpoints(Endpoints):
+    """Topics, commands and the log of one node, for the loop."""
+
+    def __init__(
+        self, node: RigidBodyNode, states: StatePublisher, arrivals: Arrivals, subscriber: CommandSubscriber
+    ) -> None:
+        super().__init__()
+        self._states = states
+        self._arrivals = arrivals
+        self._subscriber = subscriber
+        self._steps = StepService(arrivals)
+        self._logger = node.get_logger()
+        self._parameters_behind = node.create_guard_condition(lambda: node.follow_parameters())
+
+    def publish(self, run: ScenarioRun) -> None:
+        """See Endpoints."""
+        self._states.publish(run)
+
+    def has_subscribers(self) -> bool:
+        """See Endpoints."""
+        return self._states.find_subscribers()
+
+    def take_commands(self, commands: CommandReceiver, wall_ns: int, at_once: bool) -> bool:
+        """See Endpoints."""
+        return self._subscriber.take(commands, wall_ns, at_once)
+
+    def serve_steps(self, loop: SimulationLoop) -> None:
+        """See Endpoints."""
+        self._steps.serve(loop)
+
+    def parameters_changed(self) -> None:
+        """See Endpoints; the node's own parameters follow on the executor's thread."""
+        self._parameters_behind.trigger()
+
+    def wait(self, timeout_s: float) -> bool:
+        """See Endpoints."""
+        return self._arrivals.wait(timeout_s)
+
+    def wake(self) -> None:
+        """See Endpoints."""
+        self._arrivals.wake()
+
+    def say(self, message: str) -> None:
+        """See Endpoints."""
+        self._logger.info(message)
+
+    def warn(self, message: str) -> None:
+        """See Endpoints."""
+        self._logger.warning(message)
+
+
 class RigidBodyNode(Node):
-    """values: parameters by name as scene files give them, the others at their defaults. make_viewer(scenario, node
-    name) gives an observer that shows the body, or None. ``live`` flies once it is announced and started.
+    """values: parameters by name as scene files give them, the others at their defaults. make_viewer(scenario, node)
+    gives an observer that shows the body, or None. ``live`` flies once it is announced and started.
 
     Raises InputError when a parameter given at start is refused.
     """
@@ -64,30 +119,25 @@ class RigidBodyNode(Node):
     def __init__(
         self,
         values: Mapping[str, object],
-        make_viewer: Callable[[Scenario, str], Observer | None] = lambda *_: None,
+        make_viewer: Callable[[Scenario, Node], Observer | None] = lambda *_: None,
     ) -> None:
         super().__init__(NODE_NAME)
         scenario = make_scenario(declare_parameters(self, values))
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
         frames = frame_names(scenario.parameters, self.get_name())
-        events = EventPublisher(self, frames[1])
-        viewer = make_viewer(scenario, self.get_name())
-        endpoints = Endpoints(warn=self.get_logger().warning)
-        clock = self._followed_clock(scenario)
+        stamps = Stamps(self._followed_clock(scenario))
+        events = EventPublisher(self, frames[1], stamps)
+        viewer = make_viewer(scenario, self)
+        arrivals = Arrivals(self)
+        self.states = StatePublisher(self, frames, stamps, arrivals.note)
+        self.states.configure(scenario.parameters)
+        subscriber = CommandSubscriber(self, arrivals, frames, bool(scenario.parameters.thrusters))
+        endpoints = NodeEndpoints(self, self.states, arrivals, subscriber)
         # With its namespace: a recording has the node's own topics.
         name = self.get_fully_qualified_name().strip("/")
-        self.live = LiveSimulation(scenario, name, [events, *filter(None, [viewer])], endpoints, clock)
-        events.stamps = self.live.stamps
-        self.states = StatePublisher(self, frames, self.live.loop, self.live.stamps)
-        self.states.configure(scenario.parameters)
-        subscriber = CommandSubscriber(self, self.live.loop.commands, frames, bool(scenario.parameters.thrusters))
+        self.live = LiveSimulation(scenario, name, [events, *filter(None, [viewer])], endpoints, stamps)
         self._parameters_in_flight = LiveParameters(self, super().set_parameters_atomically, self.live, self.states)
-        endpoints.publish = self.states.publish
-        endpoints.has_subscribers = self.states.find_subscribers
-        endpoints.take_commands = subscriber.take
-        endpoints.serve_steps = StepService(self, self.live).serve
-        endpoints.parameters_changed = self._parameters_in_flight.changed
         offer_services(self, self.live)
         offer_simulation_interfaces(self, self.live)
         Diagnostics(self, self.live, subscriber)
@@ -98,6 +148,10 @@ class RigidBodyNode(Node):
             return None
         clock = self.get_clock()
         return lambda: clock.now().nanoseconds
+
+    def follow_parameters(self) -> None:
+        """Set the ROS parameters to those in force."""
+        self._parameters_in_flight.follow()
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """All changes of parameters come here, on the executor's thread: checked, and handed to the physics thread."""

@@ -8,6 +8,7 @@ follow.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, ParameterType, SetParametersResult
@@ -98,7 +99,7 @@ Store = Callable[[list[RosParameter]], SetParametersResult]
 
 
 class LiveParameters:
-    """The parameters of a node. All but ``changed`` runs on the executor's thread.
+    """The parameters of a node; all runs on the executor's thread.
 
     The node's ``set_parameters_atomically`` calls ``set_together``: rclpy's pre-set callback can't refuse; before its
     on-set callback all that is read-only or of another type is refused, also where it is in force already.
@@ -109,11 +110,6 @@ class LiveParameters:
         self._store_in_ros = store
         self._live = live
         self._states = states
-        self._behind = node.create_guard_condition(self._follow)
-
-    def changed(self) -> None:
-        """From any thread: a command has changed what parameters say."""
-        self._behind.trigger()
 
     def set_together(self, parameters: list[RosParameter]) -> SetParametersResult:
         """Convert, check together, and pass to the physics thread; after a refusal nothing is changed."""
@@ -124,13 +120,12 @@ class LiveParameters:
         named = {p.name: p for p in parameters}
         for name in with_mass_of_density(named).keys() - named.keys():
             named[name] = ros_parameter(name, 0.0)
-        # What is so already is no change: a dump of this very node can be loaded. But a command that acts before may
-        # change it: one that waits, or comes while time stands.
-        ahead = {name for _, change in self._live.loop.simulation.waiting_changes for name in change.content}
-        waiting = named.keys() if self._live.paused else ahead
-        changed = [
-            p for p in named.values() if not self._is_in_force(p) or (p.name in waiting and not is_read_only(p.name))
-        ]
+        # Values already in force are not changes, so a parameter dump can be reloaded.
+        try:
+            now = self._live.parameters_now
+        except InputError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        changed = [p for p in named.values() if not self._is_set(p, now)]
         fixed = [p.name for p in changed if is_read_only(p.name)]
         if fixed:
             return SetParametersResult(successful=False, reason=f"{', '.join(fixed)}: can be set at start only")
@@ -143,14 +138,14 @@ class LiveParameters:
         self._states.configure(self._live.scenario.parameters)
         return self._store(changed)
 
-    def _follow(self) -> None:
+    def follow(self) -> None:
         """Set the ROS parameters to what scheduled commands and inertia messages have changed, and to no recording
         where one has stopped.
         """
         self._live.give_up_failed_recording()
         now = self._live.scenario.parameters
         named = [ros_parameter(name, value) for name, value in now.named().items() if not is_read_only(name)]
-        behind = [p for p in named if not self._is_in_force(p)]
+        behind = [p for p in named if not self._is_set(p)]
         if behind:
             self._store(behind)
             self._states.configure(now)
@@ -162,12 +157,13 @@ class LiveParameters:
                 self._node.declare_parameter(p.name, p.value, descriptor(parameter_named(p.name)), ignore_override=True)
         return self._store_in_ros(parameters)
 
-    def _is_in_force(self, parameter: RosParameter) -> bool:
-        """Whether the node has that parameter, with that value."""
+    def _is_set(self, parameter: RosParameter, values: Mapping[str, Any] = MappingProxyType({})) -> bool:
+        """Whether it has that value: among these by name, or else as rclpy's parameter."""
         name = parameter.name
-        return self._node.has_parameter(name) and _plain(self._node.get_parameter(name).value) == _plain(
-            parameter.value
-        )
+        if name not in values and not self._node.has_parameter(name):
+            return False
+        value = values[name] if name in values else self._node.get_parameter(name).value
+        return bool(_plain(value) == _plain(parameter.value))
 
 
 def _plain(value: Any) -> Any:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import json
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +39,7 @@ def main(argv: list[str] | None = None) -> int:
         # Read the script before waiting for a node, so that an error in it is reported at once.
         script = _script(args)
         if args.dry_run:
-            print("\n".join(text for _, _, text in schedules(script)), flush=True)  # in here: what fails is told
+            print("\n".join(json.dumps(entries) for _, entries in schedules(script)), flush=True)
             return 0
         # This import takes half a second, during which there is nothing to close yet.
         importlib.import_module(".script_sender", __package__)

@@ -13,6 +13,7 @@ from typing import Any
 
 from geometry_msgs.msg import InertiaStamped, PoseStamped, TransformStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
@@ -21,7 +22,6 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import String
 
 from ..live.pacing import Stamps
-from ..motion.state import State
 from ..parameters.declarations import Parameters
 from ..scene import cdr
 from ..scene.scenario_run import ScenarioRun
@@ -33,30 +33,44 @@ from . import qos
 WARNING_S = 1.0
 """Between two warnings of one reason, wall time."""
 
-Topics = list[tuple[Publisher, Callable[[int, list[float]], Any]]]
-"""A publisher, and how its message is made from time and state."""
+Topics = list[tuple[Publisher, Callable[[ScenarioRun, int, list[float]], Any]]]
+"""A publisher, and how its message is made from what flies, time and state."""
 
 
-def _publisher(node: Node, message_type: type, topic: str, profile: QoSProfile) -> Publisher:
-    return node.create_publisher(message_type, f"~/{topic}", qos.own(profile), qos_overriding_options=qos.OVERRIDABLE)
+def _publisher(
+    node: Node,
+    message_type: type,
+    topic: str,
+    profile: QoSProfile,
+    events: PublisherEventCallbacks | None = None,
+) -> Publisher:
+    return node.create_publisher(
+        message_type,
+        f"~/{topic}",
+        qos.own(profile),
+        event_callbacks=events,
+        qos_overriding_options=qos.OVERRIDABLE,
+    )
 
 
 class StatePublisher:
     """Pose, twist, odometry, IMU, /clock and /tf of one body. Use ``configure`` for what parameters switch on and off.
 
-    frames: the world's and the body's. run: what flies, for what follows from more than the state.
+    frames: the world's and the body's. on_matched() is called on the executor's thread when a subscriber comes or goes.
     """
 
-    def __init__(self, node: Node, frames: tuple[str, str], run: ScenarioRun, stamps: Stamps) -> None:
+    def __init__(
+        self, node: Node, frames: tuple[str, str], stamps: Stamps, on_matched: Callable[[], None] = lambda: None
+    ) -> None:
         self._node = node
+        self._events = PublisherEventCallbacks(matched=lambda _: on_matched())
         self._stamps = stamps
-        self._run = run
         self._frames = frames
         self._topics: Topics = [
-            (_publisher(node, PoseStamped, "pose", qos.STATE), partial(self._in_world, PROJECTIONS["pose"])),
-            (_publisher(node, TwistStamped, "twist", qos.STATE), partial(self._in_world, PROJECTIONS["twist"])),
-            (_publisher(node, Odometry, "odom", qos.STATE), self._odometry),
-            (_publisher(node, Imu, "imu", qos.STATE), self._imu_message),
+            (self._publisher(PoseStamped, "pose"), partial(self._in_world, PROJECTIONS["pose"])),
+            (self._publisher(TwistStamped, "twist"), partial(self._in_world, PROJECTIONS["twist"])),
+            (self._publisher(Odometry, "odom"), self._odometry),
+            (self._publisher(Imu, "imu"), self._imu_message),
         ]
         self._clock: Publisher | None = None
         self._tf: Publisher | None = None
@@ -68,11 +82,14 @@ class StatePublisher:
         self._imu_frame = ""
         self._noise: ImuNoise | None = None
 
+    def _publisher(self, message_type: type, topic: str) -> Publisher:
+        return _publisher(self._node, message_type, topic, qos.STATE, self._events)
+
     def configure(self, parameters: Parameters) -> None:
         """Switch /clock and /tf on and off; on the executor's thread."""
         if parameters.publish_clock and self._clock is None:
-            self._clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK)
-            self._topics = [(self._clock, lambda time_ns, _: cdr.time(time_ns)), *self._topics]
+            self._clock = self._node.create_publisher(Clock, "/clock", qos.CLOCK, event_callbacks=self._events)
+            self._topics = [(self._clock, lambda _, time_ns, __: cdr.time(time_ns)), *self._topics]
         if parameters.publish_tf and not self._sought_tf:
             self._sought_tf = True
             self._begin_tf()
@@ -90,7 +107,7 @@ class StatePublisher:
             self._node.get_logger().warning("publish_tf: tf2_msgs isn't installed (ros-jazzy-tf2-msgs); no /tf")
             return
         self._tf_message = TFMessage
-        self._tf = self._node.create_publisher(TFMessage, "/tf", qos.TF)
+        self._tf = self._node.create_publisher(TFMessage, "/tf", qos.TF, event_callbacks=self._events)
         self._topics = [*self._topics, (self._tf, self._transform)]
 
     def find_subscribers(self) -> bool:
@@ -102,28 +119,32 @@ class StatePublisher:
         ]
         return bool(self._wanted)
 
-    def publish(self, state: State) -> None:
-        """Publish one state on every topic that had a subscriber when that was last noted."""
+    def publish(self, run: ScenarioRun) -> None:
+        """Publish the present state on every topic that had a subscriber when that was last noted."""
         if self._wanted:
+            state = run.simulation.state
             row = state.row.tolist()
             for publisher, message in self._wanted:
-                publisher.publish(message(state.time_ns, row))
+                publisher.publish(message(run, state.time_ns, row))
 
-    def pack_all(self, state: State) -> None:
-        """Make every message once and publish none, so that what they need is compiled."""
+    def pack_all(self, run: ScenarioRun) -> None:
+        """Make every message once and publish none, so that what they need is loaded."""
+        state = run.simulation.state
         for _, message in self._topics:
-            message(state.time_ns, state.row.tolist())
+            message(run, state.time_ns, state.row.tolist())
 
-    def _in_world(self, project: Callable[[list[float]], list[float]], time_ns: int, row: list[float]) -> bytes:
+    def _in_world(
+        self, project: Callable[[list[float]], list[float]], _: ScenarioRun, time_ns: int, row: list[float]
+    ) -> bytes:
         return cdr.stamped_doubles(time_ns + self._stamps.offset_ns, self._frames[0], project(row))
 
-    def _odometry(self, time_ns: int, row: list[float]) -> bytes:
+    def _odometry(self, _: ScenarioRun, time_ns: int, row: list[float]) -> bytes:
         # An Odometry's twist is in the child frame: body axes.
         return cdr.odometry(time_ns + self._stamps.offset_ns, self._frames, PROJECTIONS["odom"](row))
 
-    def _imu_message(self, time_ns: int, row: list[float]) -> Imu:
+    def _imu_message(self, run: ScenarioRun, time_ns: int, row: list[float]) -> Imu:
         """Attitude, angular velocity and specific force, both in body axes, at the contact that was chosen."""
-        parameters = self._run.scenario.parameters
+        parameters = run.scenario.parameters
         contact = parameters.imu_contact
         if parameters is not self._imu_of:
             self._imu_of, self._noise = parameters, imu_noise(parameters)
@@ -133,9 +154,9 @@ class StatePublisher:
         message.header.frame_id = self._imu_frame
         o, rate, felt = message.orientation, message.angular_velocity, message.linear_acceleration
         o.x, o.y, o.z, o.w = row[3:7]
-        setup = self._run.simulation.setup
+        setup = run.simulation.setup
         point = setup.body.point(setup.contacts[contact]).tolist() if contact else (0.0, 0.0, 0.0)
-        noise, turns, force = self._noise, row[10:13], self._run.simulation.specific_force(point).tolist()
+        noise, turns, force = self._noise, row[10:13], run.simulation.specific_force(point).tolist()
         if noise is not None:
             turns, force = noise.measured(time_ns + self._stamps.offset_ns, turns, force)
             covariances = (message.angular_velocity_covariance, message.linear_acceleration_covariance)
@@ -145,7 +166,7 @@ class StatePublisher:
         felt.x, felt.y, felt.z = force
         return message
 
-    def _transform(self, time_ns: int, row: list[float]) -> Any:
+    def _transform(self, _: ScenarioRun, time_ns: int, row: list[float]) -> Any:
         transform = TransformStamped()
         transform.header.stamp.sec, transform.header.stamp.nanosec = self._stamps.of(time_ns)
         transform.header.frame_id, transform.child_frame_id = self._frames
@@ -155,13 +176,13 @@ class StatePublisher:
 
 
 class EventPublisher(Observer):
-    """An observer that publishes on the physics thread what happens, which is rare. stamps: set before the first."""
+    """An observer that publishes on the physics thread what happens, which is rare."""
 
     takes = frozenset({SceneChanged, BodyChanged, Applied, Refused, Logged})
 
-    def __init__(self, node: Node, body_frame: str) -> None:
+    def __init__(self, node: Node, body_frame: str, stamps: Stamps) -> None:
         self._logger = node.get_logger()
-        self.stamps = Stamps()
+        self._stamps = stamps
         self._body_frame = body_frame
         self._inertia = _publisher(node, InertiaStamped, "inertia", qos.LATCHED)
         self._scene = _publisher(node, String, "scene", qos.LATCHED)
@@ -183,12 +204,12 @@ class EventPublisher(Observer):
                 # All parameters, and the mesh's hash in a comment, as a parameter file.
                 self._scene.publish(cdr.string(scene))
             case BodyChanged(time_ns, setup):
-                stamp_ns = time_ns + self.stamps.offset_ns
+                stamp_ns = time_ns + self._stamps.offset_ns
                 self._inertia.publish(inertia_bytes(stamp_ns, self._body_frame, setup.body))
             case Applied(time_ns) if self._applied.get_subscription_count():
                 # About the COM in the body's frame, which TF knows. What its sender said of point, axes, slot and
                 # duration stands in its event.
-                stamp_ns = time_ns + self.stamps.offset_ns
+                stamp_ns = time_ns + self._stamps.offset_ns
                 self._applied.publish(applied_bytes(stamp_ns, self._body_frame, event.load, event.body, event.attitude))
             case Refused(_, reason, message):
                 self._warn(reason, message)

@@ -5,6 +5,7 @@ counted at the end.
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections import Counter
@@ -24,10 +25,9 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.utilities import try_shutdown
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String
-from std_srvs.srv import SetBool, Trigger
 
 from ..base.errors import InputError
-from ..scene.script import schedules
+from ..scene.script import RESET, schedules
 from ..simulation.commands import Command, nanoseconds
 from . import qos
 from .arguments import begin_ros
@@ -36,9 +36,12 @@ MAX_UNCONFIRMED = 500
 """Commands sent beyond what the node has reported as received: far below what its queues hold."""
 
 SEND_AHEAD_NS = 60 * 1_000_000_000
-"""Commands to a node that runs go out at most this far ahead of simulated time, so that a client that is ended leaves
-little behind; before it resumes it gets all that its schedule_horizon lets in.
+"""Commands to a node whose time runs go out at most this far ahead of simulated time, so that a client that is ended
+leaves little behind; while its time is held at 0 it gets all that its schedule_horizon lets in.
 """
+
+KEEP_HELD_S = 0.25
+"""A node that holds its time waits 1 s for the next list: it is told so often that there will be one."""
 
 STALLED_S = 15.0
 """A node that confirms nothing for this long is gone, or receives nothing."""
@@ -101,7 +104,7 @@ def send_script(
     try:
         return sender.send(script, reset, lead_s)
     finally:
-        sender.close()
+        sender.destroy_node()
 
 
 class ScriptSender(Node):
@@ -118,44 +121,40 @@ class ScriptSender(Node):
         super().__init__("poke_client", start_parameter_services=False, enable_rosout=False)
         self._counters: dict[str, str] = {}
         self._reported_s = 0.0
-        self._restarted = self._paused = False
+        self._restarted = False
+        self._sent, self._sent_s = 0, 0.0
         self._schedule = self.create_publisher(String, f"{self.target}/schedule", qos.COMMAND)
         self._get_parameters = self.create_client(GetParameters, f"{self.target}/get_parameters")
-        self._reset_client = self.create_client(Trigger, f"{self.target}/reset")
-        self._pause_client = self.create_client(SetBool, f"{self.target}/pause")
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
         self._wait_for_node(timeout_s)
 
     def send(self, script: list[Command], reset: bool, lead_s: float) -> Report:
-        """Send all commands, each for the simulated time at which it acts, and wait until all have acted."""
+        """Send all commands, each for the simulated time at which it acts, and wait until all have acted. With
+        ``reset``, simulated time begins at 0 when all within the horizon are there.
+        """
         before = dict(self._counters)
         self._received_before = int(before["commands_received"])
         self._resets = int(before.get("resets", 0)) + reset
-        start_ns = 0
-        if reset:
-            self._pause(True)
-            self._call(self._reset_client, Trigger.Request())
-        else:
-            start_ns = self._present_ns() + nanoseconds(lead_s)
+        start_ns = 0 if reset else self._present_ns() + nanoseconds(lead_s)
         horizon_ns = nanoseconds(float(self._parameter("schedule_horizon") or 0.0))
+        lists = list(schedules(script, start_ns))
+        held = sum(time_ns <= horizon_ns for time_ns, _ in lists) if reset else 0
+        if reset:
+            # Alone: a command that is refused takes its own list with it.
+            self._publish([RESET], held > 0)
         number = 0
-        for time_ns, count, text in schedules(script, start_ns):
-            if self._paused and time_ns > horizon_ns:
-                self._confirm(number)
-                self._pause(False)
-            if number + count - self._confirmed() > MAX_UNCONFIRMED:
-                self._confirm(min(number, number + count - MAX_UNCONFIRMED))
-            ahead_ns = horizon_ns if self._paused else min(horizon_ns, SEND_AHEAD_NS)
-            while time_ns > self._reached_ns() + ahead_ns and not self._was_reset():
-                self._listen()
+        for place, (time_ns, entries) in enumerate(lists):
+            if place < held:
+                self._make_room(len(entries), holding=True)
+            else:
+                self._make_room(MAX_UNCONFIRMED if place == held and reset else len(entries))
+                while time_ns > self._reached_ns() + min(horizon_ns, SEND_AHEAD_NS) and not self._was_reset():
+                    self._listen()
             if self._was_reset():
                 break
-            self._schedule.publish(String(data=text))
-            number += count
-        if not self._was_reset():
-            self._confirm(number)
-        if self._paused:
-            self._pause(False)
+            self._publish(entries, place + 1 < held)
+            number += len(entries)
+        self._make_room(MAX_UNCONFIRMED)
         last_ns = start_ns + (script[-1].stamp_ns if script else 0)
         if script:
             self._wait_until_acted(last_ns)
@@ -169,16 +168,25 @@ class ScriptSender(Node):
         sent = Counter(command.kind for command in script[:number])
         return Report(sent, late, refused, reasons, last_ns, self._reached_ns(), self._was_reset())
 
-    def close(self) -> None:
-        """Where an error or a signal has come between, time goes on, and what was sent acts."""
-        if self._paused:
-            self._pause_client.call_async(SetBool.Request(data=False))
-        self.destroy_node()
+    def _publish(self, entries: list[dict[str, Any]], more: bool = False) -> None:
+        """Send a list; more: the node keeps time at 0 for the next one."""
+        if more:
+            entries = [{"more": True, **entries[0]}, *entries[1:]]
+        self._schedule.publish(String(data=json.dumps(entries)))
+        self._sent += len(entries)
+        self._sent_s = time.monotonic()
 
-    def _pause(self, paused: bool) -> None:
-        self._paused |= paused
-        self._call(self._pause_client, SetBool.Request(data=paused))
-        self._paused = paused
+    def _make_room(self, count: int, holding: bool = False) -> None:
+        """Wait until the node has confirmed all but MAX_UNCONFIRMED of what is sent with ``count`` more. holding: it
+        keeps time at 0 meanwhile.
+        """
+
+        def has_room() -> bool:
+            if holding and time.monotonic() > self._sent_s + KEEP_HELD_S:
+                self._publish([{}], more=True)
+            return self._was_reset() or self._sent + min(count, MAX_UNCONFIRMED) - self._confirmed() <= MAX_UNCONFIRMED
+
+        self._spin_until(has_room, f"{self.target} to confirm {self._sent} commands")
 
     def _was_reset(self) -> bool:
         """Whether somebody else has reset the node since ``send`` began, or it has restarted."""
@@ -191,11 +199,8 @@ class ScriptSender(Node):
 
     def _wait_for_node(self, timeout_s: float) -> None:
         deadline = time.monotonic() + timeout_s
-        clients = (self._get_parameters, self._reset_client, self._pause_client)
         while not (
-            self._counters
-            and self._schedule.get_subscription_count()
-            and all(client.service_is_ready() for client in clients)
+            self._counters and self._schedule.get_subscription_count() and self._get_parameters.service_is_ready()
         ):
             if timeout_s and time.monotonic() > deadline:
                 raise InputError("--node", self.target, f"a running rigid_body node within {timeout_s:g} s")
@@ -229,10 +234,6 @@ class ScriptSender(Node):
     def _confirmed(self) -> int:
         return int(self._counters["commands_received"]) - self._received_before
 
-    def _confirm(self, count: int) -> None:
-        if count:
-            self._spin_until(lambda: self._confirmed() >= count, f"{self.target} to confirm {count} commands")
-
     def _wait_until_acted(self, last_ns: int) -> None:
         """Until a report from after the last command: only there a ray meets the body or misses it. Not for ever where
         simulated time doesn't get there.
@@ -259,11 +260,6 @@ class ScriptSender(Node):
         future = client.call_async(request)
         self._spin_until(future.done, f"an answer of {client.srv_name}")
         return future.result()
-
-    def _call(self, client: Client, request: Any) -> None:
-        answer = self._answer(client, request)
-        if not answer.success:
-            raise InputError(client.srv_name, answer.message, "success")
 
     def _spin_until(self, condition: Callable[[], object], what: str) -> None:
         deadline = time.monotonic() + STALLED_S

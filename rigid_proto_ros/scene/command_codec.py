@@ -27,8 +27,8 @@ from ..simulation.commands import (
 from . import cdr
 from .script import MESH_FRAME
 
-MARKS = ("reset", "pause", "step", "timeout", "clock")
-"""Events that stand in the log and don't act on the body."""
+MARKS = ("reset", "pause", "step", "timeout", "clock", "jump")
+"""Events that no command is behind."""
 
 _WRENCH: dict[str, int | slice] = {"force": slice(0, 3), "torque": slice(3, 6)}
 _POINT: dict[str, int | slice] = {"point": slice(0, 3)}
@@ -84,8 +84,7 @@ def of_message(topic: str, data: bytes, names: Names = WORDS) -> Command:
 
 
 def of_event(kind: str, content: Mapping[str, Any], names: Names = WORDS) -> Command | None:
-    """The command that an event of the log tells of, as the node with these frames read it; None for MARKS, which don't
-    affect the motion.
+    """The command that an event of the log tells of, as the node with these frames read it; None for MARKS.
 
     Raises InputError for content that is none of its kind, CommandRefused for what such a node would refuse.
     """

@@ -94,11 +94,7 @@ class Scenario:
         mesh: a mesh at hand, used instead of loading the one that the parameter names. at_hand: a scenario whose mesh
         is used where it is the one that the parameters ask for.
         """
-        for name, value in convert_all(changes).items():
-            if parameter_named(name).changes == READ_ONLY:
-                raise InputError(
-                    name, value, "a parameter that can be changed while running; this one is set at start only"
-                )
+        check_values(changes)
         parameters = self.parameters.replaced(changes)
         for one in (self, at_hand):
             if mesh is None and one is not None and _made_of(one.parameters) == _made_of(parameters):
@@ -109,6 +105,17 @@ class Scenario:
     def text(self) -> str:
         """The scenario as a parameter file that starts the same simulation."""
         return scene_text(self.parameters.named(), self.body_mesh.mesh.sha256 if self.body_mesh else "")
+
+
+def check_values(changes: Mapping[str, object]) -> None:
+    """Raises InputError for what is no change of any scenario in flight: an unknown name, a value of another type or
+    outside its bounds, a parameter that is set at start only.
+    """
+    for name, value in convert_all(changes).items():
+        if parameter_named(name).changes == READ_ONLY:
+            raise InputError(
+                name, value, "a parameter that can be changed while running; this one is set at start only"
+            )
 
 
 def scene_text(values: Mapping[str, Value], mesh_sha256: str = "") -> str:

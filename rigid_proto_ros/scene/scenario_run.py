@@ -10,13 +10,11 @@ has none.
 from __future__ import annotations
 
 import time
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from heapq import heappop, heappush
-from typing import Any, TypeVar
+from typing import Any
 
 from ..base.command_line import Progress
 from ..base.errors import InputError
@@ -34,14 +32,12 @@ from ..simulation.observer import (
 )
 from ..simulation.setup import Setup, check_command
 from ..simulation.simulation import Simulation
-from .scenario import Scenario, publication_ns, with_inertia
+from .scenario import Scenario, check_values, publication_ns, with_inertia
 from .script import at_contact
-
-Value = TypeVar("Value")
 
 
 class Ghost(Observer):
-    """The simulation of ``Scenario.ghost``; follows another one's commands (Simulation.follower). The observer is told
+    """The simulation of ``Scenario.ghost``; follows another one's commands. The observer is told
     of what the ghost doesn't support, once until the next reset; ``refusal`` keeps it.
     """
 
@@ -74,10 +70,9 @@ class Ghost(Observer):
         """
         if isinstance(command, Change):
             return  # ``change`` brings its own setup
-        # A change before it in its list may allow what the present setup doesn't: then it is checked when it acts.
-        checked = None if listed is None else (b"", self.simulation.setup)
         try:
-            self.simulation.submit(command, when_ns, listed, checked)
+            # A change before it in its list may allow what the present setup doesn't.
+            self.simulation.submit(command, when_ns, listed, check=listed is None)
         except InputError as error:
             self._goes_without(str(error))
 
@@ -95,6 +90,11 @@ class Ghost(Observer):
         if setup is not None:
             self.simulation.submit(Change({}, lambda: setup), max(time_ns, self.simulation.time_ns), listed)
         self._observer.on(GhostChanged(time_ns, setup))
+
+    def act(self, now_ns: int) -> None:
+        """Let the commands that are due now act."""
+        self.simulation.advance(now_ns)
+        self.simulation.act()
 
     def advance(self, until_ns: int) -> None:
         """Advance the ghost and tell the observer where it is."""
@@ -157,10 +157,9 @@ class ScenarioRun:
 
     def begin_ghost(self) -> None:
         """Begin the ghost that the scenario asks for, if any; it gets all commands that are submitted from now on."""
-        self.ghost, self.simulation.follower = None, None
+        self.ghost = None
         if self.scenario.ghost is not None:
             self.ghost = Ghost(self.scenario.ghost, self.observer)
-            self.simulation.follower = self.ghost.submit
             self.ghost.announce()
 
     def publish(self, time_ns: int, row: StateRow) -> None:
@@ -170,44 +169,47 @@ class ScenarioRun:
         if self.ghost is not None:
             self.ghost.advance(time_ns)
 
-    def checked(
-        self, commands: Iterable[Command], waiting: Iterable[tuple[int, Change]] = ()
-    ) -> Iterator[tuple[Command, tuple[bytes, Setup]]]:
-        """Commands in order of time, changes ``bound`` and contacts by their points; each with what
-        ``Simulation.submit`` takes as ``checked``, in the scenario that changes before it make of the present one:
-        those among them, and those that wait. Raises InputError.
+    def take(
+        self,
+        command: Command,
+        at_ns: int | None = None,
+        listed: Listed | None = None,
+        at_hand: Scenario | None = None,
+    ) -> int:
+        """Submit a command to the simulation (see ``Simulation.submit``) and to the ghost; a change acts on the
+        parameters in force then (``setup_of``). at_hand: a scenario whose mesh may be that of the change.
         """
-        scenario, changes = self.scenario, deque(waiting)
-        for command in commands:
-            while changes and changes[0][0] <= command.stamp_ns:
-                with suppress(InputError):  # refused when it acts
-                    scenario = after_change(scenario, changes.popleft()[1])
-            if isinstance(command, Change):
-                scenario = after_change(scenario, command)
-                command = self.bound(command, scenario)
-            elif isinstance(command, TieString) and command.contact:
-                command = at_contact(command, scenario.setup.contacts)
-            yield command, (check_command(command, scenario.setup), scenario.setup)
+        if isinstance(command, Change):
+            command = replace(command, apply=partial(self.setup_of, command, at_hand))
+        when_ns = self.simulation.submit(command, at_ns, listed)
+        if self.ghost is not None:
+            self.ghost.submit(command, when_ns, listed)
+        return when_ns
 
-    def accepted(self, check: Callable[[Sequence[tuple[int, Change]]], Value]) -> Value:
-        """What check(waiting) returns, a check of commands: under the present parameters, and where these don't take
-        them under the changes that wait. Raises InputError.
+    def check(self, commands: Iterable[Command], anew: bool = False) -> Iterator[tuple[Command, Scenario]]:
+        """Commands in order of time, contacts by their points, each with the scenario that it acts in: the one that the
+        changes up to it, among them, make of the present one. Raises InputError for one that this scenario can't take,
+        unless a change that waits already may permit it, which a reset (``anew``) drops.
         """
-        try:
-            return check(())
-        except InputError:
-            waiting = self.simulation.waiting_changes
-            if not waiting:
-                raise
-            return check(waiting)
+        scenario = self.scenario
+        for command in commands:
+            if isinstance(command, TieString) and command.contact:
+                command = at_contact(command, scenario.setup.contacts)
+            if isinstance(command, Change) and command.kind == "set":
+                check_values(command.content)
+            try:
+                if isinstance(command, Change):
+                    scenario = after_change(scenario, command)
+                else:
+                    check_command(command, scenario.setup)
+            except InputError:
+                if anew or not self.simulation.change_waits(max(command.stamp_ns, self.simulation.time_ns)):
+                    raise
+            yield command, scenario
 
     def check_change(self, scenario: Scenario) -> None:
         """Raises InputError where this scenario can't follow the present one."""
         self.simulation.check_change(scenario.setup)
-
-    def bound(self, change: Change, at_hand: Scenario | None = None) -> Change:
-        """The change with a setup from this run's parameters (``setup_of``) at the time when it acts."""
-        return replace(change, apply=partial(self.setup_of, change, at_hand))
 
     def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
         """Put in force what a change says that acts now; returns the setup. Raises InputError, and then all stays as it
@@ -262,18 +264,16 @@ class OfflineRun(ScenarioRun):
         checked in the scene that those before it in the script have made by then. Takes all, or none and raises
         InputError.
         """
-        for command, checked in self.accepted(partial(self._all_checked, list(script))):
+        for command, scenario in self._all_checked(list(script)):
             self._submitted += 1
-            when_ns = self.simulation.submit(command, command.stamp_ns, (0, self._submitted), checked)
+            when_ns = self.take(command, command.stamp_ns, (0, self._submitted), scenario)
             if isinstance(command, Change) and "publish_rate" in command.content:
                 heappush(self._rates_ns, when_ns)
 
-    def _all_checked(
-        self, commands: Sequence[Command], waiting: Sequence[tuple[int, Change]]
-    ) -> list[tuple[Command, tuple[bytes, Setup]]]:
-        taken: list[tuple[Command, tuple[bytes, Setup]]] = []
+    def _all_checked(self, commands: Sequence[Command]) -> list[tuple[Command, Scenario]]:
+        taken: list[tuple[Command, Scenario]] = []
         try:
-            for each in self.checked(commands, waiting):
+            for each in self.check(commands):
                 taken.append(each)
         except InputError as error:
             number, at_s = self._submitted + len(taken) + 1, commands[len(taken)].stamp_ns / 1e9

@@ -6,14 +6,13 @@
 
 from __future__ import annotations
 
-import json
 import random
 from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from dataclasses import replace
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..base.errors import CommandRefused, InputError, did_you_mean
 from ..base.vectors import Vector
@@ -34,11 +33,24 @@ from ..simulation.commands import (
 )
 from .yaml_text import flow, load_json, load_yaml, plain, read_text
 
-Entries = dict[str, Any] | list[Any]
-"""An entry of a script, or a list of entries."""
-
 Stamp = dict[str, Any]
 """A command's stamp_ns and entry."""
+
+RESET = {"service": "reset"}
+"""Heads a list on the schedule topic: the reset and the list are taken together."""
+
+
+class Schedule(NamedTuple):
+    """A message on the schedule topic: an entry, or a list of entries without its head. sent: how many entries came.
+    reset: the list is headed by RESET. more: further lists of the same script follow.
+    """
+
+    entries: list[Any]
+    is_list: bool
+    sent: int
+    reset: bool
+    more: bool
+
 
 MESH_FRAME = "body/mesh"
 """Frame of a point in mesh coordinates, where the body frame's own name isn't known."""
@@ -75,9 +87,10 @@ def parse_script(text: str, name: str = "script") -> list[Command]:
     return expand_script(load_yaml(text, name), name)
 
 
-def read_schedule(text: str) -> Entries:
-    """What a message on the schedule topic says: an entry, or a list of entries. JSON, which is YAML, may be longer and
-    is read faster. Raises InputError.
+def read_schedule(text: str) -> Schedule:
+    """What a message on the schedule topic says: an entry, or a list of entries, of which the first may be
+    ``{service: reset}`` and may have ``more: true``, alone or beside its own keys. JSON, which is YAML, may be longer
+    and is read faster. Raises InputError.
     """
     entries = load_json(text) if len(text) <= MAX_SCHEDULE_LENGTH else None
     if entries is None:
@@ -87,24 +100,34 @@ def read_schedule(text: str) -> Entries:
         entries = load_yaml(text, "schedule")
     if not entries or not isinstance(entries, (dict, list)):
         raise InputError("schedule", text[:80], "an entry such as {t: 0.5, force: [0, 0, 1]}, or a list of entries")
-    return entries
+    if isinstance(entries, dict):
+        return Schedule([entries], False, 1, False, False)
+    head, count = entries[0], len(entries)
+    if not isinstance(head, dict):
+        return Schedule(entries, True, count, False, False)
+    own = {key: value for key, value in head.items() if key != "more"}
+    more, reset = plain(head.get("more", False)), plain(own) in (RESET, {"t": 0, **RESET})
+    if not isinstance(more, bool):
+        raise InputError("schedule, entry 1, more", more, "true or false")
+    return Schedule(entries[1:] if reset or not own else [own, *entries[1:]], True, count, reset, more)
 
 
-def expand_schedule(entries: Entries) -> list[Command]:
+def expand_schedule(schedule: Schedule) -> list[Command]:
     """The commands of what ``read_schedule`` gives, in the order in which they are listed; raises InputError."""
-    commands = expand_script(entries if isinstance(entries, list) else [entries], "schedule", MAX_SCHEDULED)
+    first = 1 + schedule.sent - len(schedule.entries)
+    commands = expand_script(schedule.entries, "schedule", MAX_SCHEDULED, first)
     # As listed, which only matters among those that act at once because their time is past.
     return sorted(commands, key=attrgetter("entry"))
 
 
-def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES) -> list[Command]:
-    """As ``parse_script``, from what its YAML says: a list of entries, or nothing."""
+def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES, first: int = 1) -> list[Command]:
+    """As ``parse_script``, from what its YAML says: a list of entries, or nothing. first: number of the first entry."""
     if entries is None:
         entries = []
     if not isinstance(entries, list):
         raise InputError(name, type(entries).__name__, "a list of entries such as - {t: 0.5, force: [0, 0, 1]}")
     commands: list[Command] = []
-    for number, entry in enumerate(entries, 1):
+    for number, entry in enumerate(entries, first):
         commands += expand_entry(entry, name, number, max_commands)
         if len(commands) > max_commands:
             raise InputError(f"{name}, entry {number}", f"more than {max_commands} commands")
@@ -216,7 +239,7 @@ def _set(changes: Any, stamp: Stamp) -> list[Command]:
 
 def _service(name: Any, stamp: Stamp) -> list[Command]:
     if plain(name) != "clear_wrench":
-        raise InputError("", name, "clear_wrench")
+        raise InputError("", name, "clear_wrench; reset heads a list on the topic ~/schedule")
     return [ClearWrench(**stamp)]
 
 
@@ -394,9 +417,9 @@ def script_text(entries: Iterable[Mapping[str, Any]]) -> str:
     return "".join(f"- {flow(entry)}\n" for entry in entries) or "[]\n"
 
 
-def schedules(script: list[Command], start_ns: int = 0) -> Iterator[tuple[int, int, str]]:
-    """The messages on the schedule topic that a script is sent by, in order of time: when its commands act [ns], how
-    many they are, and its text. Commands of one instant are one list, so that they act in its order. Raises InputError.
+def schedules(script: list[Command], start_ns: int = 0) -> Iterator[tuple[int, list[dict[str, Any]]]]:
+    """The lists on the schedule topic that a script is sent by, in order of time: when its commands act [ns], and its
+    entries, one a command. Commands of one instant are one list, so that they act in its order. Raises InputError.
     """
     for t_ns, commands in groupby(script, key=attrgetter("stamp_ns")):
         time_ns = start_ns + t_ns
@@ -404,4 +427,4 @@ def schedules(script: list[Command], start_ns: int = 0) -> Iterator[tuple[int, i
         if len(entries) > MAX_SCHEDULED:
             accepted = f"at most {MAX_SCHEDULED}, all in one message"
             raise InputError("script", f"{len(entries)} commands at {time_ns / 1e9:.9g} s", accepted)
-        yield time_ns, len(entries), json.dumps(entries)
+        yield time_ns, entries

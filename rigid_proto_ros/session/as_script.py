@@ -104,6 +104,8 @@ class _Writer(Observer):
     def _write(self, time_ns: int, line: str) -> None:
         self.lines.append(line)
         _, kind, content = decode_event(line, len(self.lines))
+        if kind == "jump" and content.get("by_ns", 0) > 0:
+            raise InputError("script", f"a jump of /clock at {time_ns / 1e9:.9g} s", "a run whose time goes on evenly")
         if kind in MARKS:
             return
         if kind in ("set", "inertia"):

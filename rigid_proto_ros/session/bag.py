@@ -212,7 +212,8 @@ class _Cut:
 class _Body:
     """Topics below one prefix. names: those declared, without the prefix. scenes: (log [ns], text). spans: by state
     topic; counts: of messages, by topic; cut: state topics since whose last message a reset has come. undecodable: what
-    is wrong with the first event that can't be decoded; timeouts: there are such events; offset: a clock was followed.
+    is wrong with the first event that can't be decoded; timeouts: of what, as keys of their events; offset: a clock was
+    followed.
     """
 
     names: set[str] = field(default_factory=set)
@@ -222,7 +223,7 @@ class _Body:
     counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys((*PROJECTIONS, "events"), 0))
     cut: set[str] = field(default_factory=set)
     undecodable: InputError | None = None
-    timeouts: bool = False
+    timeouts: set[str] = field(default_factory=set)
     offset: bool = False
 
     def take(self, name: str, topic: str, log: int, data: bytes) -> None:
@@ -240,7 +241,8 @@ class _Body:
             _, kind, content = decode_event(line, self.counts["events"] + 1)
         except InputError as error:  # said where this body is the one that counts
             self.undecodable = self.undecodable or error
-        self.timeouts |= kind == "timeout"
+        if kind == "timeout":
+            self.timeouts.update(content)
         self.offset |= kind == "clock" and bool(content.get("offset_ns"))
         if kind == "reset":
             self.resets.append(_Cut(log, dict(self.counts)))
@@ -434,7 +436,7 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
         missing=tuple(f"{prefix}/{name}" for name, is_there in there.items() if not is_there),
         attachments=content.attachments,
         made_with=content.metadata.get(MADE_WITH, {}),
-        logs_timeouts=body.timeouts,
+        logged_timeouts=body.timeouts,
         folder=path.absolute().parent,
     )
     # Our own recorder writes all topics in the order in which they were told; another one gets each topic by itself.

@@ -164,7 +164,7 @@ def _first_difference(
         command = recorded.last_before(time_ns)
         for name, row in {name: row for _, name, row in published}.items():
             number += 1
-            if what := _row_difference(number, name, np.asarray(row), state):
+            if what := _difference_now(again, number, name, np.asarray(row), state):
                 if number == 1 and not len(session.events) and states.first_ns > 0:
                     raise _began_later(session)
                 return Difference(time_ns, what, command)
@@ -204,6 +204,14 @@ def _advance(
         what = f"command {recorded.compared + 1} was applied in the recording, but is refused here: {refused}"
         return Difference(again.simulation.time_ns, what), row
     return None, row
+
+
+def _difference_now(again: Resimulation, number: int, name: str, recorded: FloatArray, computed: FloatArray) -> str:
+    """See ``_row_difference``. While time stands, states are published behind commands of that instant, too."""
+    found = difference = _row_difference(number, name, recorded, computed)
+    while difference and again.act_next():
+        difference = _row_difference(number, name, recorded, again.simulation.state.row)
+    return difference and found
 
 
 def _row_difference(number: int, name: str, recorded: FloatArray, computed: FloatArray) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -31,6 +31,7 @@ from ..scene.scene_file import read_scene_text
 from ..simulation.commands import Change, Command
 from ..simulation.observer import BodyChanged, Observer, Published
 from ..simulation.setup import Setup
+from ..simulation.simulation import TIMEOUTS
 from .messages import PROJECTIONS
 
 ROUNDING = 1e-12
@@ -89,8 +90,9 @@ class RecordedSession:
     states: those that were published. complete: the file was finished properly. scenes: the texts of the scene topic
     from the run's start on, in order. node_name: what stands before the topics' names. missing: topics that a check
     would need. attachments: (name, bytes) of files inside; made_with: the processor, and versions by package;
-    accuracy_floor: why the motion is held to less than its accuracy, as an .mcap of ours says it; logs_timeouts: the
-    events have timeouts among them, as those of earlier versions haven't; folder: where the session lies.
+    accuracy_floor: why the motion is held to less than its accuracy, as an .mcap of ours says it; logged_timeouts:
+    of what the events have timeouts (simulation.TIMEOUTS), which those of earlier versions lack; folder: where the
+    session lies.
     """
 
     scene: str = ""
@@ -103,7 +105,7 @@ class RecordedSession:
     attachments: list[tuple[str, bytes]] = field(default_factory=list)
     made_with: dict[str, str] = field(default_factory=dict)
     accuracy_floor: str = ""
-    logs_timeouts: bool = True
+    logged_timeouts: Collection[str] = TIMEOUTS
     folder: Path | None = None
 
     @property
@@ -305,13 +307,19 @@ class _Upcoming:
         return first
 
 
+def _leap_of(kind: str, content: Mapping[str, Any]) -> int:
+    """How far an event of the log took simulated time ahead at once [ns]."""
+    by_ns = content.get("by_ns", 0) if kind == "jump" else 0
+    return max(by_ns, 0) if type(by_ns) is int else 0
+
+
 class Resimulation(ScenarioRun):
     """A session's simulation; its commands are submitted when their time has come, as they were then. Raises InputError
     for events that can't be decoded.
 
     event_lines: in the order of time, read as the flight comes to them. mesh_of(name) gives the mesh that a change
-    names, or None to load it. logs_timeouts: the recording has events of timeouts, as those of earlier versions
-    haven't. end_ns: when all events that have been read have acted.
+    names, or None to load it. logged_timeouts: of what there are events of timeouts, as those of earlier
+    versions lack some. end_ns: when all events that have been read have acted.
     """
 
     def __init__(
@@ -321,20 +329,20 @@ class Resimulation(ScenarioRun):
         observer: Observer | None = None,
         mesh_of: Callable[[str], Mesh | None] = lambda _: None,
         node_name: str = "rigid_body",
-        logs_timeouts: bool = True,
+        logged_timeouts: Collection[str] = TIMEOUTS,
     ) -> None:
         super().__init__(scenario, observer)
-        self.simulation.logs_timeouts = logs_timeouts
+        self.simulation.logged_timeouts = logged_timeouts
         self.frames = frame_names(scenario.parameters, node_name)
         self._mesh_of = mesh_of
-        self._changes_ns = -1
         self.end_ns = 0
         self._waiting = _Upcoming(self._to_come(event_lines))
 
     def _to_come(self, event_lines: Iterable[str]) -> Iterator[_Waiting]:
         for number, time_ns, kind, content, command in decoded_events(event_lines, self.frames):
             # A mark is made before what acts at its time, which the recording may not have come to.
-            self.end_ns = max(self.end_ns, time_ns + (command is not None or kind == "timeout"))
+            acts = command is not None or kind == "timeout"
+            self.end_ns = max(self.end_ns, time_ns + acts + _leap_of(kind, content))
             # A timeout comes by itself, where it belongs: one that a change brings about comes behind that.
             if kind != "timeout":
                 yield time_ns, kind, content, command, number
@@ -355,28 +363,35 @@ class Resimulation(ScenarioRun):
 
         Raises CommandRefused for a recorded command that can't be taken.
         """
-        acted_ns = -1
-        # Marks at the time asked for were made before anything else could act there.
-        while self._waiting and (
-            self._waiting[0][0] < until_ns or (self._waiting[0][0] == until_ns and self._waiting[0][3] is None)
-        ):
-            time_ns, kind, content, command, number = self._waiting.popleft()
-            self.simulation.advance(max(time_ns, self.simulation.time_ns))
-            if command is None:
-                if acted_ns == time_ns:
-                    # Nothing but the end of the motion, in its next step, keeps time where a command has acted.
-                    self.simulation.advance(time_ns + int(self.simulation.flight.step_ns))
-                self.simulation.log(kind, content)
-                continue
-            acted_ns = time_ns
-            if isinstance(command, Change):
-                self._changes_ns = time_ns
-                command = self.bound(command)
-            # What acts under a change of its own instant can't be checked before that acts.
-            checked = (b"", self.simulation.setup) if self._changes_ns == time_ns else None
-            # What acted at one instant acts in the order of the log, whatever rule made it.
-            self.simulation.submit(command, time_ns, (0, number), checked)
+        while self._waiting:
+            time_ns, kind, content, command, _ = self._waiting[0]
+            # Marks at the time asked for were made before anything else could act there.
+            made_there = time_ns == until_ns and command is None and not _leap_of(kind, content)
+            if time_ns >= until_ns and not made_there:
+                break
+            self._take_next()
         return self.simulation.advance(until_ns).row
+
+    def _take_next(self) -> None:
+        time_ns, kind, content, command, number = self._waiting.popleft()
+        self.simulation.advance(max(time_ns, self.simulation.time_ns))
+        if command is None:
+            self.simulation.act()  # the commands before it
+            if by_ns := _leap_of(kind, content):
+                self.simulation.leap(by_ns)
+            else:
+                self.simulation.log(kind, content)
+        else:
+            # What acted at one instant acts in the order of the log, whatever rule made it.
+            self.take(command, time_ns, (0, number))
+
+    def act_next(self) -> bool:
+        """Let the next event of the present instant happen, as it did while time stood; False when there is none."""
+        if not self._waiting or self._waiting[0][0] > self.simulation.time_ns or _leap_of(*self._waiting[0][1:3]):
+            return False
+        self._take_next()
+        self.simulation.act()
+        return True
 
     def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
         """Put in force what a change says, with the mesh that was flown then."""
@@ -394,7 +409,7 @@ def resimulation(
     """
     lines = (line for _, line in session.events) if lines is None else lines
     mesh_of, scenario = mesh_finder(session), session_scenario(session)
-    return Resimulation(scenario, lines, observer, mesh_of, session.node_name, session.logs_timeouts)
+    return Resimulation(scenario, lines, observer, mesh_of, session.node_name, session.logged_timeouts)
 
 
 def check_playable(session: RecordedSession, given: Scenario | None = None) -> None:

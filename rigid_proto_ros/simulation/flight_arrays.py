@@ -21,7 +21,7 @@ from ..motion.state import State
 from ..motion.string import StringState, string_of
 from . import flight as fl
 from .commands import HELD_WRENCH, NO_SLOT, Pending, Row, WrenchCommand, row_of
-from .effects import BEGIN, FLY, change, check_change, check_load, command, operate
+from .effects import BEGIN, CUT, FINISH, FLY, change, check_change, check_load, command, operate
 from .flight import EVENT, FLIGHT, LOAD_ROW, accelerations_now, note_floors
 from .refusals import REFUSAL, refused_command
 from .setup import Setup, refused_load
@@ -43,7 +43,9 @@ def _numbers(*names: str) -> list[int]:
     return [place_of(FLIGHT, name) // 8 for name in names]
 
 
-_NOW_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers("now_ns", "acting", "due", "due_end", "events")
+_NOW_NS, _START_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers(
+    "now_ns", "start_ns", "acting", "due", "due_end", "events"
+)
 NOTEWORTHY, _LOAD_IDS = _numbers("noteworthy", "load_ids")
 _REACHED = fl.REACHED
 
@@ -135,6 +137,12 @@ class FlightArrays:
         if not check_change(old.scene, new.scene, new.mesh, self.flight, self._loads, self._refusal):
             raise refused_command(self._refusal)
 
+    def leap(self, to_ns: int) -> None:
+        """Go on at a later time in the same state, with what acts; what is due by then hasn't ended yet."""
+        self.call(CUT, 0)
+        self.integers[_NOW_NS] = self.integers[_START_NS] = to_ns
+        self.call(FINISH, 0)
+
     # Commands
 
     def put(self, rows: Iterable[Row]) -> None:
@@ -150,6 +158,14 @@ class FlightArrays:
             table[at + _LOAD_AT : at + _LOAD_AT + len(load)] = load
             last += 1
         self.integers[_DUE], self.integers[_DUE_END] = first, last
+
+    @property
+    def next_end_ns(self) -> int:
+        """When the next load ends or the string is released [ns]; NEVER where neither is known to be."""
+        ends: list[int] = [fl.NEVER, *self._loads["end_ns"][: self.integers[_ACTING]].tolist()]
+        if self.flight.tied:
+            ends.append(int(self.flight.string_release_ns))
+        return min(ends)
 
     @property
     def waiting(self) -> int:

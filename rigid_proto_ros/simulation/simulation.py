@@ -8,7 +8,7 @@ segment loads are constant and an integrator advances the body. ``advance`` is t
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from heapq import heappop, heappush
 from typing import Any
 
@@ -65,6 +65,9 @@ from .thrusters import ThrusterControl
 _UNTIL_REPLACED_NS = fl.NEVER >> 1
 
 
+TIMEOUTS = frozenset({"slot", "thrusters", "string"})
+"""What may time out: the held wrench of a slot, thrusters, the string."""
+
 FLOOR_PERIOD_NS = 50_000_000
 """[ns, simulated] Interval at which observers are notified of error floors."""
 
@@ -75,21 +78,21 @@ class Simulation:
     Not thread-safe: a single owner submits and advances. ``time_ns`` and ``state`` are those of the last advance.
     ``refused`` counts refusals by reason, ``refusals`` has the text of the last one of each; ``failure`` says why the
     motion stopped, or is empty. ``listed``: place in its list of the command being applied, if it is an entry of one.
-    ``logs_timeouts``: whether the timeout of a held wrench is logged.
+    ``logged_timeouts``: of which things a timeout is logged, by the keys of its event.
     """
 
     time_ns: int
     state: State
+    _acted_ns: int
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
         self.setup = setup
-        self.follower: Callable[[Command, int, Listed | None], None] | None = None
         self.events = EventLog()
         self.refused: dict[str, int] = defaultdict(int)
         self.refusals: dict[str, str] = {}
         self._arrivals = 0
         self.listed: Listed | None = None
-        self.logs_timeouts = True
+        self.logged_timeouts: Collection[str] = TIMEOUTS
         self._arrays = FlightArrays()
         self._told_string = b""
         self.watch(observer or Observer())
@@ -157,24 +160,32 @@ class Simulation:
         command: Command,
         at_ns: int | None = None,
         listed: Listed | None = None,
-        checked: tuple[bytes, Setup] | None = None,
+        check: bool = True,
     ) -> int:
         """Schedule a command for ``at_ns``, or for now if that is None or past; returns the time at which it will act.
 
-        listed: its place, if it is an entry of a list. checked: result of ``check_command`` and the setup it was
-        checked for, if not the current one: an earlier change in its list may permit what this one doesn't. Raises
-        CommandRefused for what can be checked now; the rest (a ray) is checked when it acts, and a refusal counted.
+        listed: its place, if it is an entry of a list. Raises CommandRefused for what the present body and integrator
+        can't take. Checked when it acts, and a refusal counted then: a ray, a command behind a change of parameters
+        that may permit it, and one without ``check``.
         """
         when_ns = self.time_ns if at_ns is None or at_ns < self.time_ns else at_ns
-        row, setup = (check_command(command, self.setup), self.setup) if checked is None else checked
+        row = b""
+        if check:
+            try:
+                row = check_command(command, self.setup)
+            except CommandRefused:
+                if not self.change_waits(when_ns):
+                    raise
         self._arrivals += 1
         pending = Pending(when_ns, command, order_of(command, listed, self._arrivals), listed)
         if row:
-            pending.row, pending.resolved_on = row, setup.surface
+            pending.row, pending.resolved_on = row, self.setup.surface
         self._push(pending)
-        if self.follower is not None:
-            self.follower(command, when_ns, listed)
         return when_ns
+
+    def change_waits(self, until_ns: int) -> bool:
+        """Whether a change of parameters is scheduled for ``until_ns`` or before."""
+        return any(time_ns <= until_ns and isinstance(p.command, Change) for time_ns, _, p in self._pending)
 
     def _push(self, pending: Pending) -> None:
         heappush(self._pending, (pending.time_ns, pending.order, pending))
@@ -278,11 +289,12 @@ class Simulation:
             self.time_ns = now_ns
             if what == fl.RELEASED:
                 self._notify_string()
+                self._log_timeout("string", True)
                 continue
             if what in (fl.ENDED, fl.TIMED_OUT):
                 observer.on(LoadEnded(now_ns, load_id))
-                if what == fl.TIMED_OUT and self.logs_timeouts:
-                    self.log("timeout", {"slot": slot_name(row)})
+                if what == fl.TIMED_OUT:
+                    self._log_timeout("slot", slot_name(row))
                 continue
             pending = due[row - first]
             command = pending.command
@@ -300,6 +312,10 @@ class Simulation:
                 kind = "impulse" if command.flight_kind == IMPULSE else command.kind
                 self._notify_load(load_id, kind, load_of_bytes(pending.row))
 
+    def _log_timeout(self, of: str, which: object) -> None:
+        if of in self.logged_timeouts:
+            self.log("timeout", {of: which})
+
     def _log_command(self, command: Command) -> None:
         # A noted change would keep its whole setup in memory, mesh included.
         if self.observer.wants(Logged) or isinstance(command, Change):
@@ -309,18 +325,57 @@ class Simulation:
 
     # Events that need Python code
 
+    def act(self) -> bool:
+        """Apply the commands that are due now, without waiting for time to go on; returns whether there were any."""
+        due = not self.failure and self._is_due
+        if due:
+            self._act()
+        return due
+
+    def leap(self, by_ns: int) -> None:
+        """Go on ``by_ns`` later with the same state: no motion in between. What is due by then ends, and commands that
+        are due by then act at the end, in the order of their times.
+        """
+        if self.failure:
+            return
+        self.log("jump", {"by_ns": by_ns})
+        self.time_ns += by_ns
+        self._arrays.leap(self.time_ns)
+        self.state = self._arrays.state
+        due = []
+        while self._pending and self._pending[0][0] <= self.time_ns:
+            due.append(heappop(self._pending)[-1])
+        for place, pending in enumerate(due):
+            pending.time_ns, pending.order = self.time_ns, (-1, place, 0, 0)
+            self._push(pending)
+        self._acted_ns = self.time_ns
+        if self._end_due():
+            self._arrays.call(CUT, 0)
+            self._notify_string()
+
+    @property
+    def next_event_ns(self) -> int:
+        """When the next command acts, or load or string ends [ns]; fl.NEVER where none is known to."""
+        command_ns = self._pending[0][0] if self._pending else fl.NEVER
+        return min(command_ns, self.thrusters.due_ns, self._arrays.next_end_ns)
+
+    def drop_commands(self) -> None:
+        """Drop the commands that wait."""
+        self._pending.clear()
+
+    @property
+    def _is_due(self) -> bool:
+        """Whether a command is to act now."""
+        return bool(self._pending) and self._pending[0][0] == self.time_ns
+
     def _act(self) -> None:
         """Apply everything that ends or begins now, and begin a new segment if anything did."""
-        arrays, now_ns = self._arrays, self.time_ns
-        changed = bool(arrays.call(END_DUE, 0))
-        self._notify([])
-        if self.thrusters.due_ns <= now_ns:
-            loads, timed_out = self.thrusters.end_due(now_ns, self._timeout_ns)
-            if timed_out and self.logs_timeouts:
-                self.log("timeout", {"thrusters": True})
-            self._thrust(loads)
-            changed = True
-        while self._pending and self._pending[0][0] == now_ns:
+        arrays, now_ns, changed = self._arrays, self.time_ns, False
+        # Commands of one instant act one behind the other, however they come: what they let end ends behind them.
+        if not (self._acted_ns == now_ns and self._is_due):
+            changed = self._end_due()
+        self._acted_ns = now_ns
+        while self._is_due:
             pending = heappop(self._pending)[-1]
             self.listed = pending.listed
             try:
@@ -334,6 +389,18 @@ class Simulation:
         if changed:
             arrays.call(CUT, 0)
             self._notify_string()
+
+    def _end_due(self) -> bool:
+        """End the loads that end now, by their duration or a timeout; returns whether there were any."""
+        ended = bool(self._arrays.call(END_DUE, 0))
+        self._notify([])
+        if self.thrusters.due_ns <= self.time_ns:
+            loads, timed_out = self.thrusters.end_due(self.time_ns, self._timeout_ns)
+            if timed_out:
+                self._log_timeout("thrusters", True)
+            self._thrust(loads)
+            ended = True
+        return ended
 
     def _apply(self, pending: Pending) -> None:
         command, arrays = pending.command, self._arrays
@@ -398,7 +465,7 @@ class Simulation:
         self._pending: list[Waiting] = []
         self.listed = None
         self.failure = ""
-        self.time_ns = 0
+        self.time_ns, self._acted_ns = 0, -1
         self.state = State(0, self.setup.initial.copy())
         self.thrusters = ThrusterControl(self.setup.thrusters)
         self._arrays.start_over(self.setup)
@@ -534,18 +601,6 @@ class Simulation:
         start = np.array(angular_momentum(self.flight.start, self.setup.body.inertia.ravel()))
         moved, size = self.angular_momentum - start, length(start)
         return length(moved) / size if size > 0.0 else 0.0
-
-    @property
-    def waiting_changes(self) -> list[tuple[int, Change]]:
-        """The changes of parameters that wait, with their times [ns], in the order in which they will act; from any
-        thread.
-        """
-        return [(t, p.command) for t, _, p in sorted(self._pending) if isinstance(p.command, Change)]
-
-    @property
-    def commands_wait(self) -> bool:
-        """Whether a command is due that time has to go on for."""
-        return any(time_ns <= self.time_ns for time_ns, *_ in self._pending[:1])
 
     @property
     def at_rest(self) -> bool:

@@ -277,8 +277,7 @@ class Page:
         simulation = self.live.loop.simulation
         tied = simulation.string is not None
         loads = len(self.picture.loads.acting)
-        words = motion_words(self._scenario, loads, tied, simulation.at_rest, self.live.paused)
-        return f"{words}: acts on Play" if self.live.paused and simulation.commands_wait else words
+        return motion_words(self._scenario, loads, tied, simulation.at_rest, self.live.paused)
 
     def _take(self, events: list[tuple[Event, str]]) -> None:
         times: list[int] = []

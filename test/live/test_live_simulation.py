@@ -71,26 +71,25 @@ def submit(live: LiveSimulation, command: WrenchCommand | ThrusterCommand) -> No
 
 @pytest.mark.parametrize("late", [False, True], ids=["list first", "list last"])
 @pytest.mark.parametrize("changed", [{"mass": 5.0}, {"gravity": [0.0, 0.0, -7.0]}], ids=["another", "the same"])
-def test_parameters_set_while_a_list_waits_act_after_it_and_undo_nothing(live, watcher, changed, late):
+def test_parameters_and_lists_of_a_pause_act_at_once_in_the_order_in_which_they_come(live, watcher, changed, late):
     scheduled = json.dumps([{"t": 0, "set": changed}])
     given = {"gravity": [0.0, 0.0, -3.0]}
     for act in (lambda: live.schedule(scheduled), lambda: live.set_parameters(given))[:: -1 if late else 1]:
         act()
-    live.step()
     setup, parameters = live.loop.simulation.setup, live.scenario.parameters
     assert setup is live.scenario.setup
-    assert setup.gravity.tolist() == [0.0, 0.0, -3.0] and list(parameters.gravity) == [0.0, 0.0, -3.0]
+    gravity = changed.get("gravity", given["gravity"]) if late else given["gravity"]
+    assert setup.gravity.tolist() == list(parameters.gravity) == gravity
     if "mass" in changed:
         assert setup.body.mass == 5.0
     kinds = [json.loads(line)["content"] for line in watcher.lines if json.loads(line)["kind"] == "set"]
-    assert kinds == [changed, given], "the order in which they acted, which a replay follows"
+    assert kinds == [changed, given][:: -1 if late else 1]
 
 
-def test_parameters_refused_when_they_act_are_again_what_they_were(live):
+def test_parameters_that_what_acts_cannot_take_are_refused_and_stay_what_they_were(live):
     live.schedule("[{t: 0, wrench: {at: tip, force: [0.01, 0, 0]}}]")
-    live.set_parameters({"integrator": "taylor", "linear_damping": 0.5})
-    assert live.scenario.parameters.integrator == "taylor"
-    live.step()
+    with pytest.raises(CommandRefused, match="taylor"):
+        live.set_parameters({"integrator": "taylor", "linear_damping": 0.5})
     assert live.call(lambda: dict(live.loop.simulation.refused)) == {"integrator": 1}
     assert live.scenario.parameters.integrator == "auto" and live.scenario.parameters.linear_damping == 0.0
     assert live.loop.simulation.setup.integrator.name == "auto"
@@ -140,6 +139,80 @@ def test_commands_are_checked_under_the_changes_that_wait_before_them(live):
     live.step(5)
     assert live.call(lambda: dict(live.loop.simulation.refused)) == {"integrator": 2}
     assert live.scenario.parameters.angular_damping == 1e-6 and live.state.linear_velocity[1] > 0.0
+
+
+def test_a_reset_and_the_list_that_it_heads_are_taken_together_or_not_at_all(live, watcher):
+    live.step(3)
+    refused = [{"service": "reset"}, {"t": 0.01, "impulse": [1, 0, 0]}, {"t": 0.0, "at": "nowhere", "force": [1, 0, 0]}]
+    with pytest.raises(CommandRefused, match="nowhere"):
+        live.schedule(json.dumps(refused))
+    assert live.state.time_ns == 3 * PERIOD_NS and live.loop.resets == 0
+    with pytest.raises(CommandRefused, match="entry 3"):
+        live.schedule(
+            '[{"service": "reset", "more": true}, {"t": 0, "impulse": [1, 0, 0]}, {"t": 0, "forse": [1, 0, 0]}]'
+        )
+    for single in ("{t: 0, service: reset}", "[{t: 0, impulse: [1, 0, 0]}, {t: 0, service: reset}]"):
+        with pytest.raises(CommandRefused, match="heads a list"):
+            live.schedule(single)
+    watcher.lines.clear()
+    live.schedule(json.dumps(refused[:2]))
+    assert live.state.time_ns == 0 and live.loop.resets == 1 and live.paused
+    live.step(2)
+    assert [json.loads(line)["kind"] for line in watcher.lines] == ["reset", "step", "poke"]
+    assert live.loop.commands.received["schedule"] == 3 + 3 + 1 + 2 + 2
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.0])
+def test_a_list_that_says_more_keeps_time_at_0_until_the_last_one_has_come(live, watcher, factor):
+    live.set_parameters({"real_time_factor": factor})
+    live.pause(False)
+    live.schedule('[{"service": "reset", "more": true}]')
+    for k in range(5):
+        time.sleep(0.3)  # 1.5 s in all: each list keeps it for another second
+        live.schedule(json.dumps([{"more": True, "t": 0.02 - 0.001 * k, "impulse": [1e-3, 0, 0]}]))
+        assert live.state.time_ns == 0
+    live.schedule("[{t: 0.001, impulse: [1, 0, 0]}]")
+    while live.state.time_ns < 3 * PERIOD_NS:
+        time.sleep(0.01)
+    live.pause(True)
+    told = [json.loads(line) for line in watcher.lines]
+    assert [event["time_ns"] for event in told if event["kind"] == "poke"][-6:] == [
+        k * 10**6 for k in (1, 16, 17, 18, 19, 20)
+    ]
+    assert live.loop.commands.late == 0
+
+
+def test_time_goes_on_with_a_warning_where_a_list_that_was_announced_does_not_come(live):
+    warned = []
+    live.endpoints.warn = warned.append
+    live.pause(False)
+    live.schedule('[{"service": "reset", "more": true}]')
+    begun = time.monotonic()
+    while live.state.time_ns == 0:
+        time.sleep(0.01)
+    assert time.monotonic() - begun > 0.9
+    assert len(warned) == 1 and "nothing came for 1 s" in warned[0]
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_without_anybody_who_looks_the_thread_sleeps_until_something_is_due(monkeypatch, paused):
+    scenario = make_scenario({"mesh": "t_handle", "publish_rate": 1000.0, "start_paused": paused})
+    live, ticks = LiveSimulation(scenario), []
+    tick = live.loop.tick
+    monkeypatch.setattr(live.loop, "tick", lambda arrived: (ticks.append(time.monotonic()), tick(arrived)))
+    live.start()
+    time.sleep(3.0)
+    assert len(ticks) <= 10
+    if not paused:
+        # What is scheduled acts when it is due, though nobody waits for a state.
+        due_ns = live.call(lambda: live.loop.simulation.time_ns) + 200_000_000
+        live.schedule(json.dumps({"t": due_ns / 1e9, "wrench": {"force": [1, 0, 0], "duration": 0.1}}))
+        begun = time.monotonic()
+        while not live.loop.simulation.events.count:
+            time.sleep(0.001)
+        assert time.monotonic() - begun < 0.45, "before the next of the rare wake-ups"
+        assert live.loop.pace.real_time_lost_s == 0.0 and live.loop.pace.overruns == 0
+    live.stop()
 
 
 def test_in_lockstep_a_refused_message_steps_too(live):
@@ -265,8 +338,8 @@ def test_a_recording_that_begins_at_time_0_after_other_commands_is_not_taken_for
     live.step(3)
     live.stop()
     first, second = read_runs(path)
-    assert first.times[0] == 0 and json.loads(first.lines[0])["kind"] == "pause"
-    with pytest.raises(NotVerifiableError, match="begins at 0 s, in the middle of a run"):
+    assert first.times[0] == PERIOD_NS and json.loads(first.lines[0])["content"] == {"record": str(path)}
+    with pytest.raises(NotVerifiableError, match="begins at 0.01 s, in the middle of a run"):
         verify(first)
     assert verify(second) is None
 

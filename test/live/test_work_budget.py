@@ -33,15 +33,14 @@ class Rig:
         self.commands: list = []
         self.has_listeners = True
         self.lively = False
-        endpoints = Endpoints(
-            publish=lambda state: self.published.append(state.time_ns),
-            has_subscribers=lambda: self.has_listeners,
-            take_commands=self.take_commands,
-        )
+        endpoints = Endpoints()
+        endpoints.publish = lambda run: self.published.append(run.simulation.time_ns)
+        endpoints.has_subscribers = lambda: self.has_listeners
+        endpoints.take_commands = self.take_commands
         self.loop = SimulationLoop(make_scenario(values), endpoints=endpoints)
         self.loop.start()
 
-    def take_commands(self, wall_ns: int, all_topics: bool) -> bool:
+    def take_commands(self, _, wall_ns: int, at_once: bool) -> bool:
         if self.commands:
             self.loop.catch_up()
         while self.commands:

@@ -15,10 +15,11 @@ import often_reporting_node
 import pytest
 import rclpy
 import yaml
-from command_rig import wrench_message
+from command_rig import point_message, wrench_message
 from rcl_interfaces.srv import DescribeParameters
 from ros_client import COMMANDS, LATCHED, TOPICS, RosClient
 from ros_process import running_node
+from std_msgs.msg import String
 
 from node_interface import INTERFACES, PUBLISHED, SERVED, SUBSCRIBED
 from rigid_proto_ros.base.errors import InputError
@@ -37,7 +38,7 @@ KEYS = {
     *("refused_nonfinite", "refused_magnitude", "refused_stamp", "refused_ray_miss", "refused_tensor"),
     *("refused_integrator", "refused_schedule", "refused_thrusters", "refused_state", "late", "wall_stamp"),
     *("messages_lost", "queue_full", "kinetic_energy", "potential_energy", "angular_momentum_norm"),
-    *("angular_momentum_drift", "integrator", "state", "recording", "resets"),
+    *("angular_momentum_drift", "integrator", "state", "recording", "resets", "clock_jumps"),
 }
 NODE = "/rigid_body"
 OF_RCLPY = {
@@ -221,7 +222,7 @@ def test_a_port_that_a_scene_names_is_asked_for_and_a_default_one_may_move(monke
     monkeypatch.setattr("rigid_proto_ros.rerun_view.live_view.LiveView", lambda viewer, **given: given)
     default = PARAMETERS["web_port"].default
     for named, asked in ((9191, 9191), (default, None)):
-        viewer = make_viewer(make_scenario({"viewer": "web", "web_port": named}), "tool")
+        viewer = make_viewer(make_scenario({"viewer": "web", "web_port": named}), Mock())
         assert (viewer["rerun_port"], viewer["web_port"]) == (None, asked)
 
 
@@ -229,7 +230,7 @@ def test_a_report_is_read_between_two_ticks_so_that_its_values_belong_together(m
     live = LiveSimulation(make_scenario({"mesh": "t_handle", "start_paused": True}))
     node = Mock()
     node.create_publisher().get_subscription_count.return_value = 0
-    node.get_node_names_and_namespaces.return_value = []
+    node.get_node_names_and_namespaces.return_value = node.get_topic_names_and_types.return_value = []
     report = Diagnostics(node, live, SimpleNamespace(messages_lost=0, queue_full=0))._report
     threads: list[str] = []
     seen = property(lambda _: threads.append(threading.current_thread().name) or 0.0)
@@ -259,6 +260,61 @@ def test_a_publisher_with_incompatible_qos_on_a_command_topic_is_warned_of(rig):
     rig.advertise("string/target#2", wait=False, best_effort=True)
     said = "a publisher on /rigid_body/string/target offers incompatible QoS (last policy: RELIABILITY)"
     rig.until(lambda: said in rig.node_process.errors, "a warning")
+
+
+def test_a_publisher_of_another_type_on_a_command_topic_is_warned_of(rig):
+    # In a context of its own: one participant has one type on a topic.
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context, domain_id=int(rig.environment["ROS_DOMAIN_ID"]))
+    other = rclpy.create_node("other", context=context, start_parameter_services=False, enable_rosout=False)
+    other.create_publisher(String, "/rigid_body/string/target", 10)
+    said = (
+        "a publisher on /rigid_body/string/target has the type std_msgs/msg/String, not geometry_msgs/msg/PointStamped"
+    )
+    rig.until(lambda: said in rig.node_process.errors, "a warning")
+    other.destroy_node()
+    context.try_shutdown()
+
+
+def test_publishers_that_replace_each_others_wrench_are_warned_of_and_those_with_slots_are_not(rig):
+    said = "several publishers on /rigid_body/wrench replace each other's commands; with ;slot="
+    before = rig.node_process.errors.count(said)
+    for k, slot in enumerate(("left", "right", ""), 2):
+        rig.advertise(f"wrench#{k}")
+        assert rig.node_process.errors.count(said) == before
+        rig.publish(f"wrench#{k}", wrench_message(0, f"world@com;slot={slot}" if slot else "world"))
+        rig.sent += 1
+        rig.until_received(rig.sent)
+    rig.publish("wrench", wrench_message(0, "world"), wrench_message(0, "world"))
+    rig.until_received(rig.sent)
+    rig.until(lambda: rig.node_process.errors.count(said) == before + 1, "one warning")
+
+
+def test_the_log_has_a_line_for_pause_resume_reset_and_the_ends_of_a_recording(rig, tmp_path):
+    path = tmp_path / "flight.mcap"
+    rig.set(record=str(path))
+    rig.pause(True)
+    rig.trigger("reset")
+    rig.pause(False)
+    rig.set(record="")
+    wanted = (
+        *(f"a recording to {path} begins", "paused at ", "reset: simulated time is 0", "resumed at 0 s"),
+        f"the recording to {path} ends",
+    )
+
+    def told() -> bool:
+        lines = iter(rig.node_process.errors.splitlines())
+        return all(any("[INFO]" in line and words in line for line in lines) for words in wanted)
+
+    rig.until(told, "the lines in this order")
+
+
+def test_the_timeout_of_a_string_is_an_event(rig):
+    rig.set(string__timeout=0.2, string__stiffness=1.0)
+    rig.publish("string/target", point_message(0, "", (0.0, 0.0, 0.2)))
+    (tied,), (released,) = rig.wait_event("string_target"), rig.wait_event("timeout")
+    assert released["content"] == {"string": True}
+    assert released["time_ns"] == tied["time_ns"] + 200_000_000
 
 
 def test_another_node_of_the_same_name_is_warned_of_once(rig):

@@ -52,7 +52,7 @@ def fly(values: dict, counts: tuple[Counter, Counter], heard: bool = False) -> d
     """Fly for a moment, and count in the next half second. heard: by a subscriber who sends wrenches meanwhile."""
     published, made = counts
     node = RigidBodyNode(values)
-    node.states.pack_all(node.live.loop.simulation.state)
+    node.states.pack_all(node.live.loop)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     other = rclpy.create_node("other")

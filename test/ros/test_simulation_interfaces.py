@@ -133,7 +133,7 @@ def test_what_the_simulation_refuses_is_a_failed_operation_with_its_reason(servi
     monkeypatch.setattr("rigid_proto_ros.live.live_simulation.BUSY_S", 0.0)
     held = threading.Event()
     live._requests.append((held.wait, Future()))
-    live._wake.set()
+    live.endpoints.wake()
     refused = client.call("get_entity_state").result
     held.set()
     assert refused.result == FAILED and "too busy" in refused.error_message

@@ -131,7 +131,7 @@ def test_a_command_comes_back_from_its_entry_in_a_script(command: Command) -> No
 @given(st.lists(st.one_of(loads(), others).filter(can_be_an_entry), max_size=8))
 def test_a_script_is_sent_as_it_is_listed_each_instant_in_one_message(listed) -> None:
     script = sorted(listed, key=lambda command: command.stamp_ns)
-    sent = [(time_ns, expand_schedule(read_schedule(text))) for time_ns, _, text in schedules(script)]
+    sent = [(time_ns, expand_schedule(read_schedule(json.dumps(entries)))) for time_ns, entries in schedules(script)]
     assert [command for _, commands in sent for command in commands] == script
     assert [time_ns for time_ns, _ in sent] == sorted({command.stamp_ns for command in script})
 
@@ -168,7 +168,7 @@ def test_what_moves_nothing_has_no_command_and_what_is_damaged_is_named() -> Non
         ("wrench", {"frame_id": 5, "force": [1, 2, 3], "torque": [0, 0, 0]}),
         ("string_target", {"frame_id": "world"}),
         ("inertia", {"frame_id": "", "mass": 1.0, "com": [0, 0, 0], "tensor": [1]}),
-        ("jump", {}),
+        ("leap", {}),
     ):
         with pytest.raises(InputError):
             of_event(kind, content, NODE)

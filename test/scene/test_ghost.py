@@ -38,8 +38,8 @@ def test_a_command_that_the_ghost_cannot_carry_is_said_once_until_the_next_reset
     push = WrenchCommand(False, parse_frame("world@com"), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "")
 
     def fly() -> None:
-        simulation.submit(push)
-        simulation.submit(push, simulation.time_ns + 1_000_000)
+        run.take(push)
+        run.take(push, simulation.time_ns + 1_000_000)
         end_ns = simulation.time_ns + SECOND // 10
         simulation.advance(end_ns)
         run.ghost.advance(end_ns)

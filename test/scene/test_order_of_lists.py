@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import itertools
 import random
+from dataclasses import replace
+from functools import partial
 
 import pytest
 from flights import SECOND, EventLines, wrench
@@ -41,7 +43,10 @@ def kinds(told: EventLines) -> list[str]:
 def commands(entries: list[dict]) -> list[Command]:
     run = OfflineRun(make_scenario(SCENE))
     read = expand_script([{"t": 1.0, **entry} for entry in entries])
-    return [run.bound(command) if isinstance(command, Change) else command for command in read]
+    return [
+        replace(command, apply=partial(run.setup_of, command)) if isinstance(command, Change) else command
+        for command in read
+    ]
 
 
 @pytest.mark.parametrize("seed", range(5))

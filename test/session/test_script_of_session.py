@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -34,7 +35,6 @@ from rigid_proto_ros.scene.scene_file import read_scene_text
 from rigid_proto_ros.scene.script import expand_schedule, parse_script, read_schedule, schedules
 from rigid_proto_ros.session.as_script import SceneAndScript, script_of_session
 from rigid_proto_ros.session.recorded_session import RecordedSession, StateRows
-from rigid_proto_ros.simulation.commands import Change
 
 
 class HandSession:
@@ -62,7 +62,7 @@ class HandSession:
                 self.simulation.log(kind, {"data": True})  # commands now pile up at one instant
             else:
                 command = of_event(kind, with_mass_of_density(content) if kind == "set" else content)
-                self.simulation.submit(self.run.bound(command) if isinstance(command, Change) else command)
+                self.run.take(command)
 
     def load(self, kind: str, frame_id: str, force, torque=(0.0, 0.0, 0.0)) -> None:
         """A message of the wrench or the poke topic."""
@@ -172,8 +172,8 @@ def test_what_was_done_in_one_paused_instant_is_one_message_to_a_node_in_the_ord
     hand.load("poke", "normal@tip;impulse", [1e-4, 0.0, 0.0])
     hand.wait(SECOND)
     script = parse_script(assert_flies_again(hand).script)
-    ((_, count, text),) = schedules(script)
-    assert count == len(script) and expand_schedule(read_schedule(text)) == script
+    ((_, entries),) = schedules(script)
+    assert len(entries) == len(script) and expand_schedule(read_schedule(json.dumps(entries))) == script
     assert [c.content["ballast.tip"][0] for c in script[:200]] == [0.0001 * k for k in range(200)]
 
 
