@@ -8,7 +8,6 @@ import json
 import numpy as np
 import pytest
 from flights import EventLines
-from rigid_proto_ros.rerun_view.session_files import read_runs
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.live.live_simulation import LiveSimulation
@@ -17,6 +16,7 @@ from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.parameters.declarations import ZERO
 from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.session.as_script import script_of_session
+from rigid_proto_ros.session.bag import read_runs
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.simulation.commands import WrenchCommand
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import json
 import random
+from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 import pytest
 from flights import EventLines
 
@@ -21,7 +21,7 @@ from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import at_contact, expand_entry, parse_script
 from rigid_proto_ros.session.check import verify
 from rigid_proto_ros.session.messages import PROJECTIONS
-from rigid_proto_ros.session.recorded_session import RecordedSession, StampedRows, decode_event
+from rigid_proto_ros.session.recorded_session import RecordedSession, States, decode_event
 from rigid_proto_ros.simulation.commands import TieString
 from rigid_proto_ros.simulation.observer import EventLog
 
@@ -187,6 +187,19 @@ def test_commands_of_a_pause_act_as_a_script_that_lists_them_in_the_order_in_whi
     fly(seed)
 
 
+class OfTopics(States):
+    """What was published of states: times [ns], topics and rows."""
+
+    topics = ("pose", "twist")
+
+    def __init__(self, published: list[tuple[int, str, list[float]]]) -> None:
+        self._published, self.count = published, len(published) // 2
+        self.first_ns, self.end_ns = published[0][0], published[-1][0]
+
+    def __iter__(self) -> Iterator[tuple[int, str, list[float]]]:
+        return iter(self._published)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_states_published_while_time_stands_are_verified_as_those_behind_commands_of_that_instant(seed):
     """As a bag of the topics has them, frozen ones too."""
@@ -202,14 +215,15 @@ def test_states_published_while_time_stands_are_verified_as_those_behind_command
             loop.tick()
     flown.advance(1)
     flown.live.stop()
-    times = np.array([time_ns for time_ns, _ in published])
-    session = RecordedSession(scene=flown.begun.text, events=flown.lines.timed)
-    for name in ("pose", "twist"):
-        rows = np.array([PROJECTIONS[name](row.tolist()) for _, row in published])
-        session.published[name] = StampedRows(times, rows)
+    states = [
+        (time_ns, name, list(PROJECTIONS[name](row.tolist())))
+        for time_ns, row in published
+        for name in ("pose", "twist")
+    ]
+    session = RecordedSession(scene=flown.begun.text, events=flown.lines.timed, states=OfTopics(states))
     assert verify(session) is None
     # And one that lies behind none of them is found.
-    session.published["twist"].rows[-1, 0] += 1e-12
+    states[-1][2][0] += 1e-12
     assert verify(session) is not None
 
 

@@ -13,6 +13,7 @@ from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.session.recorded_session import Resimulation
 from rigid_proto_ros.simulation.commands import slot_name, slot_number
+from rigid_proto_ros.simulation.simulation import TIMEOUTS
 
 SCENE = {"mesh": "t_handle", "mass": 1.0, "publish_rate": 10.0}
 SCRIPT = """
@@ -66,7 +67,8 @@ def test_slots_replay_to_the_bit_also_from_recordings_without_timeouts(timeouts_
     run, told = flown()
     recorded = [line for line in told.lines if timeouts_recorded or '"timeout"' not in line]
     again_told = EventLines()
-    again = Resimulation(make_scenario(SCENE), recorded, again_told)
+    logged = TIMEOUTS if timeouts_recorded else ()
+    again = Resimulation(make_scenario(SCENE), recorded, again_told, logged_timeouts=logged)
     row = again.advance(4 * SECOND)
     assert row.tobytes() == run.simulation.state.row.tobytes()
     assert len(again_told.lines) == len(recorded)
