@@ -79,8 +79,8 @@ INTERFACES = (
         SUBSCRIBED,
         "~/schedule",
         "std_msgs/String",
-        "one entry of a poke script as YAML, or a list of entries, which is accepted or refused as a whole; `t` is "
-        "absolute simulated time in seconds",
+        "one entry of a poke script as YAML, or a list of entries, which is accepted or refused as a whole and may begin "
+        "with a reset; `t` is absolute simulated time in seconds",
     ),
     _topic(PUBLISHED, "~/pose", "geometry_msgs/PoseStamped", "COM and attitude of the mesh's axes, in the world"),
     _topic(

@@ -1,41 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""SIGINT and SIGTERM end a command at any moment, quietly, with 128 + their number; a second one changes nothing. And
-a process that this one starts ends when this one has ended.
-
-A signal that comes before Python has run our first line ends the interpreter as Python does: with a traceback.
+"""SIGINT and SIGTERM end a command, quietly, with 128 + their number; a second one changes nothing. And a process that
+this one starts ends when this one has ended.
 """
 
 from __future__ import annotations
 
-import _thread
 import os
 import signal
 import sys
 import time
-import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
-AGAIN_S = 0.5
-"""How soon an interrupt is raised anew where a library's code has swallowed it [s]."""
+CLOSING_S = 10.0
+"""Signals that come so soon after the first one change nothing, so that what is being closed is closed [s]."""
 
 PR_SET_PDEATHSIG = 1
 """From linux/prctl.h."""
-
-_received = 0
-_done = False
-
-
-class Interrupted(KeyboardInterrupt):
-    """What the first signal raises.
-
-    A class of its own: where KeyboardInterrupt itself leaves a text that is executed, as when a dataclass is made,
-    `python -m` takes it for unhandled, and ends by SIGINT whatever becomes of it (CPython 3.11 to 3.14).
-    """
 
 
 def end_at_once(status: int | None = None) -> None:
@@ -46,69 +31,34 @@ def end_at_once(status: int | None = None) -> None:
         signal.signal(number, lambda got, _: os._exit(128 + got if status is None else status))
 
 
+class Interrupt:
+    """From now on a signal raises KeyboardInterrupt in the main thread. number: the signal's, 0 before the first."""
+
+    def __init__(self) -> None:
+        self.number = 0
+        self._again_s = 0.0
+        for number in NUMBERS:
+            signal.signal(number, self._handle)
+
+    def _handle(self, number: int, _: object) -> None:
+        if time.monotonic() < self._again_s:
+            return
+        self.number, self._again_s = number, time.monotonic() + CLOSING_S
+        raise KeyboardInterrupt
+
+
 def run(work: Callable[[], int], tell: Callable[[Exception], int]) -> int:
-    """What ``work`` returns, or ``tell`` of what it raises. The first signal raises KeyboardInterrupt in it, and
-    128 + the signal's number is returned; those that follow change nothing, so that what is being closed is closed.
-    """
+    """What ``work`` returns, or ``tell`` of what it raises, or 128 + the number of the signal that interrupted it."""
+    interrupt = Interrupt()
     try:
-        _interrupt_once()
-        try:
-            status = work()
-        except Exception as error:
-            if _received:
-                # A library takes an interrupt for an error of its own, as numpy does when it is imported.
-                done()
-                return 128 + _received
-            status = tell(error)
-        done()  # in here: a signal that comes now is handled, too
-        return status
+        status = work()
     except KeyboardInterrupt:
-        done()
-        return 128 + _received
-
-
-def _interrupt_once() -> None:
-    unraisable = sys.unraisablehook
-
-    def quiet(ignored: Any) -> None:
-        """Where no exception can leave, as from a finalizer, Python prints it and goes on."""
-        if not isinstance(ignored.exc_value, Interrupted):
-            unraisable(ignored)
-
-    def interrupt(got: int, _: object) -> None:
-        global _received
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        _received = got
-        sys.unraisablehook = quiet
-        # Not by threading: what was interrupted may hold a lock of it.
-        _thread.start_new_thread(_raise_again, ())
-        _raise()
-
-    for number in NUMBERS:
-        signal.signal(number, interrupt)
-
-
-def _raise() -> None:
-    """Raise Interrupted, and when SIGTERM is handled once more if nobody handles it: only who does that keeps it."""
-    error = Interrupted()
-    handled = weakref.ref(error)
-
-    def look(*_: object) -> None:
-        if handled() is None:
-            _raise()
-
-    signal.signal(signal.SIGTERM, look)
-    try:
-        raise error
-    finally:
-        del error  # the traceback holds this frame, which would hold the exception
-
-
-def _raise_again() -> None:
-    """On a thread, until ``done``: have the main thread look whether the interrupt is handled."""
-    while not _done:
-        time.sleep(AGAIN_S)
-        _thread.interrupt_main(signal.SIGTERM)
+        status = 128 + interrupt.number
+    except Exception as error:
+        # A library takes an interrupt for an error of its own, as numpy does when it is imported.
+        status = 128 + interrupt.number if interrupt.number else tell(error)
+    done()
+    return status
 
 
 def done() -> None:
@@ -116,8 +66,6 @@ def done() -> None:
 
     Python itself forgets its handlers before it ends, and would be killed by the signal then.
     """
-    global _done
-    _done = True
     for number in NUMBERS:
         signal.signal(number, signal.SIG_IGN)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import threading
 
 from ..base.errors import InputError, is_missing
 
@@ -29,8 +30,6 @@ def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     if importlib.util.find_spec("viser") is None:
         raise InputError("workbench", is_missing("viser", "workbench"))
-    from ..base.interrupts import leave
-    from ..live.shutdown import Shutdown
     from ..parameters.declarations import Parameters
     from ..rerun_view.ports import LOOPBACK
     from ..scene.scenario import make_scenario
@@ -45,9 +44,6 @@ def run(args: argparse.Namespace) -> int:
     if port is None and asked != Parameters().workbench_port:
         port = asked
     name = "" if args.mesh else scene
-    with Shutdown() as shutdown:
-        number = serve(
-            lambda: make_scenario(values), name, port, args.host or LOOPBACK, not args.no_browser, shutdown.wait
-        )
-        # The interpreter would wait for a kernel that is being compiled.
-        leave(128 + number)
+    wait = threading.Event().wait  # until a signal interrupts it
+    serve(lambda: make_scenario(values), name, port, args.host or LOOPBACK, not args.no_browser, wait)
+    return 0

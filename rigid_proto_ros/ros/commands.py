@@ -85,7 +85,10 @@ class CommandQueue:
             self._logger.warning(f"several publishers on {self._topic_name} replace each other's commands{slots}")
 
     def _on_matched(self, status: Any) -> None:
-        self.contended = status.current_count > 1 and status.current_count_change > 0
+        if status.current_count < 2:
+            self.contended = False
+        elif status.current_count_change > 0:
+            self.contended = True
 
     def _on_lost(self, status: Any) -> None:
         self.messages_lost = status.total_count

@@ -12,11 +12,12 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from ..base.errors import InputError, is_missing, tell
-from ..base.interrupts import leave
-from ..live.shutdown import Shutdown, begin_closing, begin_teardown
+from ..base.interrupts import Interrupt, leave
+from ..live.shutdown import begin_closing, begin_teardown
 from .domain import hold_own_domain
 
 if TYPE_CHECKING:
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from ..scene.scenario import Scenario
     from ..simulation.observer import Observer
     from .node import RigidBodyNode
+
+LOOK_S = 1.0
+"""Between looks of the main thread."""
 
 LAST_START_S = 0.2
 """How long shutdown waits for a start that is nearly complete; a start that compiles isn't waited for."""
@@ -35,14 +39,18 @@ def main(argv: list[str] | None = None, as_job: bool = False) -> int:
     with 0, since launch reports any other status as a death, or as a job's with 128 + its number.
     """
     try:
-        with Shutdown() as shutdown:
-            process = NodeProcess(sys.argv if argv is None else argv, shutdown.request)
-            process.start()
-            number = shutdown.wait()
-            status = process.end()
-            if as_job and number:
-                status = status or 128 + number
-            leave(status)
+        ended = threading.Event()
+        process = NodeProcess(sys.argv if argv is None else argv, ended.set)
+        process.start()
+        interrupt = Interrupt()
+        with suppress(KeyboardInterrupt):
+            # A signal that the system delivers to another thread is noticed at the next turn.
+            while not ended.wait(LOOK_S):
+                pass
+        status = process.end()
+        if as_job and interrupt.number:
+            status = status or 128 + interrupt.number
+        leave(status)
     except Exception as error:
         return tell("rigid_body_node", error)
 

@@ -25,6 +25,7 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.utilities import try_shutdown
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String
+from std_srvs.srv import SetBool
 
 from ..base.errors import InputError
 from ..scene.script import RESET, schedules
@@ -130,7 +131,7 @@ class ScriptSender(Node):
 
     def send(self, script: list[Command], reset: bool, lead_s: float) -> Report:
         """Send all commands, each for the simulated time at which it acts, and wait until all have acted. With
-        ``reset``, simulated time begins at 0 when all within the horizon are there.
+        ``reset``, simulated time begins at 0 when all within the horizon are there, also where it was paused.
         """
         before = dict(self._counters)
         self._received_before = int(before["commands_received"])
@@ -142,12 +143,15 @@ class ScriptSender(Node):
         if reset:
             # Alone: a command that is refused takes its own list with it.
             self._publish([RESET], held > 0)
-        number = 0
+        paused, number = reset and before.get("state") == "paused", 0
         for place, (time_ns, entries) in enumerate(lists):
             if place < held:
                 self._make_room(len(entries), holding=True)
             else:
-                self._make_room(MAX_UNCONFIRMED if place == held and reset else len(entries))
+                if place == held and reset:
+                    self._make_room(MAX_UNCONFIRMED)
+                    paused = paused and self._resume()
+                self._make_room(len(entries))
                 while time_ns > self._reached_ns() + min(horizon_ns, SEND_AHEAD_NS) and not self._was_reset():
                     self._listen()
             if self._was_reset():
@@ -155,6 +159,8 @@ class ScriptSender(Node):
             self._publish(entries, place + 1 < held)
             number += len(entries)
         self._make_room(MAX_UNCONFIRMED)
+        if paused:
+            self._resume()
         last_ns = start_ns + (script[-1].stamp_ns if script else 0)
         if script:
             self._wait_until_acted(last_ns)
@@ -175,6 +181,15 @@ class ScriptSender(Node):
         self._schedule.publish(String(data=json.dumps(entries)))
         self._sent += len(entries)
         self._sent_s = time.monotonic()
+
+    def _resume(self) -> bool:
+        """Let the time of a paused node go on; returns whether it is paused."""
+        client = self.create_client(SetBool, f"{self.target}/pause")
+        self._spin_until(client.service_is_ready, f"the service {client.srv_name}")
+        answer = self._answer(client, SetBool.Request(data=False))
+        if not answer.success:
+            raise InputError(client.srv_name, answer.message, "success")
+        return False
 
     def _make_room(self, count: int, holding: bool = False) -> None:
         """Wait until the node has confirmed all but MAX_UNCONFIRMED of what is sent with ``count`` more. holding: it

@@ -98,7 +98,7 @@ def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, A
                 failed += sum(reason is not None for reason in chunk.columns["failure"])
                 shown.fraction(done, study.rows)
         except KeyboardInterrupt as error:
-            interrupt = error  # kept, by which it counts as handled (base/interrupts.py)
+            interrupt = error
             if not done:
                 raise SweepInterrupted(0) from error
         finally:

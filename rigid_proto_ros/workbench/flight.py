@@ -129,20 +129,25 @@ class RunMemory(Observer):
 
 
 class Flight:
-    """say(text) tells the users of a refusal, and refused() is called after it. busy(text): what takes time from now
+    """say(text) tells the users of a refusal, and on_refused() is called after it. busy(text): what takes time from now
     on, "" when it is over.
 
     scenario: the one in force. moment_ns: the time of the past that is looked at, None while the present is.
-    before_jump() is called before time jumps. jump: SCENE or FUTURE while one begins, empty else: what is told
-    meanwhile wasn't done by hand.
+    before_jump() is called before time jumps; it and on_refused() on the page's thread. jump: SCENE or FUTURE while one
+    begins, empty else: what is told meanwhile wasn't done by hand.
     """
 
-    def __init__(self, live: LiveSimulation, say: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        live: LiveSimulation,
+        say: Callable[[str], None],
+        on_refused: Callable[[], None] = lambda: None,
+        before_jump: Callable[[], None] = lambda: None,
+    ) -> None:
         self.live = live
         self.memory = RunMemory(live.name)
         self.say = say
-        self.refused: Callable[[], None] = lambda: None
-        self.before_jump: Callable[[], None] = lambda: None
+        self._on_refused, self._before_jump = on_refused, before_jump
         self._doing = "", 0.0
         self._worker = ThreadPoolExecutor(1, "page")
         self.jump = ""
@@ -186,7 +191,7 @@ class Flight:
             self.say(f"Refused: {error}")
         except Exception as error:
             self._say_failed(error)
-        self.refused()
+        self._on_refused()
         return None
 
     def _say_failed(self, error: Exception) -> None:
@@ -223,7 +228,7 @@ class Flight:
         if self.moment_ns is None:
             return False
         self.say("The past is shown: press Play to go on from here, or return to the present first.")
-        self.refused()
+        self._on_refused()
         return True
 
     def pause(self, paused: bool) -> None:
@@ -246,7 +251,7 @@ class Flight:
         """Begin a scene (parameter-file text, or its parameters) and a poke script (YAML text) at time 0; paused: or as
         it was; speed: simulated seconds per second, or as they were. Returns whether it was taken.
         """
-        self.before_jump()
+        self._before_jump()
         goes_on = self.leave_past()
 
         def begin() -> bool:
@@ -285,7 +290,7 @@ class Flight:
 
     def reset(self) -> None:
         """Time 0 of the scene, or of the branch."""
-        self.before_jump()
+        self._before_jump()
         self.look_at_present()
         self.ask(self.live.reset)
 
@@ -309,7 +314,7 @@ class Flight:
                 return
             if not len(past.times):
                 return
-            self.before_jump()
+            self._before_jump()
             self._past, self._ran_before = past, not self.paused
             self.pause(True)
         k = int(np.searchsorted(self._past.times, round(time_s * 1e9), side="right")) - 1

@@ -68,11 +68,10 @@ def serve(
     port: int | None,
     host: str,
     opens: bool,
-    wait: Callable[[], int],
-) -> int:
-    """Fly a scenario with its page until ``wait`` returns, and return what it did. read(): the scenario, whose mesh may
-    need kernels that are to be compiled: the page says so meanwhile. scene: its name; one of a lesson begins with its
-    question.
+    wait: Callable[[], object],
+) -> None:
+    """Fly a scenario with its page until ``wait`` returns or raises. read(): the scenario. scene: its name; one of a
+    lesson begins with its question.
 
     Raises InputError as Workbench does, and as ``read`` does.
     """
@@ -96,7 +95,7 @@ def serve(
         tell()
         live.announce()
         live.start()
-        return wait()
+        wait()
     finally:
         workbench.close()
         live.stop()

@@ -116,7 +116,9 @@ class Page:
         self._begins_anew = anew
         self.server = server
         self.live = live
-        self.flight = Flight(live, self._say)
+        self.flight = Flight(
+            live, self._say, lambda: self.controls.show_again(), before_jump=lambda: self.pointer.let_go()
+        )
         live.add_observer(self.flight.memory)
         self._told = Told(self.flight)
         self._listening = False
@@ -130,7 +132,6 @@ class Page:
         )
         self.pointer = Pointer(self.flight)
         self.pointer.attach_com(self._com)
-        self.flight.before_jump = self.pointer.let_go
         # What is known of the motion.
         self.state = live.state
         self._scenario = live.scenario
@@ -159,7 +160,6 @@ class Page:
     def _make_panel(self) -> None:
         gui, flight = self.server.gui, self.flight
         self.controls = Controls(gui, flight)
-        flight.refused = self.controls.show_again
         self.bar = TimeBar(gui, self.controls, flight)
         self._class_style = gui.add_html("", order=-9.0)
         tabs = gui.add_tab_group()

@@ -78,16 +78,21 @@ def test_a_node_that_is_refused_behind_its_viewer_leaves_none(ros_environment, t
         socket.create_connection(("127.0.0.1", port))
 
 
+def wait_for_the_end_of(pids: set[int]) -> None:
+    """They have been killed, which takes a moment."""
+    deadline = time.monotonic() + READY_S
+    while going_on := [pid for pid in pids if alive(pid)]:
+        assert time.monotonic() < deadline, going_on
+        time.sleep(0.02)
+
+
 @needs_rerun
 def test_a_node_that_is_killed_takes_its_viewer_with_it(ros_environment, tmp_path):
     node = start_node(ros_environment, tmp_path / "node", {"viewer": "web"})
     node.wait_for("is simulating")
     (viewer,) = descendants(node.pid)
     node.process.kill()
-    deadline = time.monotonic() + READY_S
-    while alive(viewer):
-        assert time.monotonic() < deadline, "the viewer goes on"
-        time.sleep(0.02)
+    wait_for_the_end_of({viewer})
 
 
 @BOTH
@@ -99,6 +104,6 @@ def test_a_node_that_builds_its_kernels_ends_at_once(ros_environment, tmp_path, 
     while not (children := descendants(node.pid)):
         time.sleep(0.01)
     assert node.end(number, within_s=10.0) == 0, node.errors
-    assert not [pid for pid in children if alive(pid)]
+    wait_for_the_end_of(children)
     assert "Traceback" not in node.errors
     assert "is simulating" not in node.output + node.errors

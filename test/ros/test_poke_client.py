@@ -113,10 +113,14 @@ def flies_as_offline(rig, sent: list, end_ns: int, **changes) -> int:
     return checked
 
 
-def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(rig, script):
+@pytest.mark.parametrize("paused", [False, True])
+def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(rig, script, paused):
     """By the installed program. Held wrenches with a duration outlast the timeout, 0.4 s here."""
     rig.set(real_time_factor=4.0, wrench_timeout=0.4)
+    if paused:
+        rig.pause(True)
     before, (flown_before,) = rig.counters(), rig.heard("twist", last=1)
+    rig.forget("events")
     rig.forget("pose", "twist")
     done = run("poke_client", script, "--reset", "--timeout", 120, environment=rig.environment)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -125,8 +129,9 @@ def test_with_reset_every_entry_moves_the_node_as_simulate_moves_it_to_the_bit(r
     rig.state_at(4 * SECOND)
     assert stamp_ns(flown_before) < 4 * SECOND
     assert flies_as_offline(rig, sent, 4 * SECOND, wrench_timeout=0.4) > 300
-    # Nothing was paused; the reset is an entry, too.
-    assert [event["kind"] for event in rig.events() if event["kind"] in ("reset", "pause")] == ["reset"]
+    # Nothing was paused, a paused node goes on; the reset is an entry, too.
+    kinds = [event["kind"] for event in rig.events() if event["kind"] in ("reset", "pause")]
+    assert kinds == ["reset", "pause"][: 1 + paused]
     gained = rig.gained(before, "commands_received")
     rig.sent += gained["commands_received"]
     assert gained.keys() == {"commands_received"}
