@@ -21,9 +21,10 @@ from pathlib import Path
 import node_interface
 from rigid_proto_ros.base import bundled
 from rigid_proto_ros.cli import main as cli
+from rigid_proto_ros.parameters import declarations
 from rigid_proto_ros.ros import diagnostics, poke_client
 from rigid_proto_ros.ros.arguments import own_arguments
-from rigid_proto_ros.scene import parameters, script
+from rigid_proto_ros.scene import script
 
 OPTION = re.compile(r"^  (-\S+(?: \S+)*)", re.MULTILINE)
 POSITIONAL = re.compile(r"^positional arguments:\n((?:  .*\n)+)", re.MULTILINE)
@@ -55,7 +56,7 @@ def commands() -> Iterator[str]:
 
 def declared_parameters() -> Iterator[str]:
     """Parameters with type, default, bounds and when they may change."""
-    for parameter in (*parameters.PARAMETERS.values(), *parameters.PATTERNS.values()):
+    for parameter in (*declarations.PARAMETERS.values(), *declarations.PATTERNS.values()):
         default = json.dumps(parameter.default)
         yield f"parameter {parameter.name}: {parameter.type}, {default}; {parameter.accepted}; {parameter.changes}"
 
