@@ -260,10 +260,8 @@ export interface Motion {
   watch(changed: () => void): () => void;
 }
 
-/** What the page's file holds beside the program: written by rigid_proto_ros/page/data.py. Its form is nobody's business
- * but simulation.ts's. */
-export type PageData = unknown;
-
-/** The motion that is simulated in the page; of `inside("kernels")` and `inside("data")` (file.ts). It begins with the
- * scene or take that the file was made for. */
-export type OpenMotion = (kernels: Uint8Array<ArrayBuffer>, data: Uint8Array<ArrayBuffer>) => Promise<Motion>;
+/** The motion that is simulated in the page (`openMotion` in simulation.ts), of `inside("kernels")`, `inside("data")` and
+ * `inside("take")` (file.ts). It begins with the scene or take that the file was made for. */
+export type OpenMotion = (
+  kernels: Uint8Array<ArrayBuffer>, data: Uint8Array<ArrayBuffer>, take?: Uint8Array<ArrayBuffer> | null,
+) => Promise<Motion>;

@@ -5,18 +5,21 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+from pathlib import Path
 
 from ..base.errors import InputError, is_missing
 
 EXAMPLES = (
     ("rigid_proto workbench hammer", "a bundled scene"),
     ("rigid_proto workbench --mesh part.obj", "your own mesh"),
+    ("rigid_proto workbench hammer --html out/hammer.html", "a page that needs nothing but a browser, as one file"),
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("scene", metavar="SCENE.yaml", nargs="?", help="scene file or bundled name (default t_handle)")
+    parser.add_argument("--html", metavar="FILE", help="write a page in which the body flies without a server, and end")
     parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(
         "--port", type=int, metavar="PORT", help="port of the page (default 8080, or the next free one)"
@@ -26,7 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until Ctrl-C."""
+    """Serve until Ctrl-C, or write a file."""
+    if args.html:
+        return _write(args)
     if importlib.util.find_spec("viser") is None:
         raise InputError("workbench", is_missing("viser", "workbench"))
     from ..base.interrupts import leave
@@ -50,3 +55,18 @@ def run(args: argparse.Namespace) -> int:
         )
         # The interpreter would wait for a kernel that is being compiled.
         leave(128 + number)
+
+
+def _write(args: argparse.Namespace) -> int:
+    from ..page.file import write_page
+    from ..scene.scene_file import scene_file, scene_values
+
+    scene, mesh = args.scene, args.mesh
+    if scene and not scene.endswith((".yaml", ".yml")) and Path(scene).is_file():
+        scene, mesh = None, scene
+    values = scene_values(scene_file(scene)) if scene else {} if mesh else None
+    if mesh:
+        values = {**(values or {"initial.angular_velocity": [0.05, 0.1, 3.0]}), "mesh": mesh}
+    write_page(args.html, values)
+    print(f"wrote {args.html}: open it in a browser")
+    return 0
