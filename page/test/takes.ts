@@ -182,9 +182,11 @@ for (let number = 0; number < Number(count); number++) {
   page.openScene(scene);
   for (let k = Math.floor(hand.number(5, 25)); k > 0; k--) hand.next();
   hand.pass(0.3);
-  const hash = page.stateHash(), files = page.take(), link = await page.link(), { endNs } = page.history();
+  const { endNs } = page.history();
+  page.goTo(endNs);
+  const hash = page.stateHash(), files = page.take(), link = await page.link();
   const script = fault === "late" ? files.script.replaceAll(/t: (\d+\.\d+), string/g, (_, t: string) => `t: ${Number(t) + 1e-9}, string`) : files.script;
-  const told = { name: scene, ...files, script, hash, atEnd: hand.timeNs === endNs, done: hand.done, refused: hand.refused, failure: page.snapshot().body.failure };
+  const told = { name: scene, ...files, script, hash, done: hand.done, refused: hand.refused, failure: page.snapshot().body.failure };
   // The link opens the same take, and so does going back to its middle.
   await page.openLink(link);
   page.goTo(endNs);
