@@ -105,5 +105,12 @@ export class Whole {
   }
 }
 
-/** What was given isn't accepted; the message is the one line that people read. */
-export class Refused extends Error {}
+const LONGEST = 4000;
+
+/** What was given isn't accepted; the message is the one line that people read: without what a file may have in it that
+ * isn't to be seen, and no longer than anybody reads. */
+export class Refused extends Error {
+  constructor(message: string) {
+    super(message.slice(0, LONGEST).replace(/[\p{C}\p{Zl}\p{Zp}]/gu, "?"));
+  }
+}

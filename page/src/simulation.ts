@@ -59,6 +59,7 @@ export class Simulation implements Motion {
   readonly version: string;
   readonly bodies: readonly Bundled[];
   readonly scenes: readonly Bundled[];
+  readonly #kernels: Kernels;
   readonly #data: Data;
   readonly #declared: Declarations;
   readonly #parameters: Parameters;
@@ -85,6 +86,7 @@ export class Simulation implements Motion {
 
   constructor(kernels: Kernels, data: Data) {
     const { memory } = kernels;
+    this.#kernels = kernels;
     this.#data = data;
     const declared = (this.#declared = data.declared);
     this.version = declared.version;
@@ -118,7 +120,7 @@ export class Simulation implements Motion {
 
   openMesh(name: string, bytes: Uint8Array, scale?: number): string | null {
     return this.#tried(() => {
-      const mesh = readMesh(name, bytes), surface = this.#surfaces.judged(mesh);
+      const mesh = readMesh(name, bytes, this.#kernels), surface = this.#surfaces.judged(mesh);
       const side = Math.max(...new Float64Array(surface.record.slice(8, 32).buffer));
       const unit = scale ?? (side > LONGEST_M ? 0.001 : 1);
       const values: Record<string, Value> = { ...this.#withoutPoints(), mesh: mesh.name, scale: [unit, unit, unit] };

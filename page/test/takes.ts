@@ -8,7 +8,7 @@ import { readFileSync } from "node:fs";
 import { Data } from "../src/data.ts";
 import { Kernels } from "../src/kernels.ts";
 import { Simulation } from "../src/simulation.ts";
-import type { Entry, Value, Vec3 } from "../src/source.ts";
+import type { At, Entry, Value, Vec3 } from "../src/source.ts";
 
 const [kernelsFile = "", dataFile = "", count = "20", seed = "1", fault = ""] = process.argv.slice(2);
 
@@ -98,7 +98,7 @@ class Hand {
     const { massKg, length } = this.#page.body(), { body } = this.#page.snapshot();
     const [x = 0, y = 0, z = 0] = body.row, { triangles } = this.#page.body();
     const from = this.vector(3 * length);
-    const at = this.pick(
+    const at = this.pick<At>(
       { point: this.grip() }, { vertex: triangles[Math.floor(this.#random() * triangles.length)] ?? 0 }, "com", "origin",
       { ray: { origin: [x + from[0], y + from[1], z + from[2]] as Vec3, direction: [-from[0], -from[1], -from[2]] as Vec3 } },
     );
