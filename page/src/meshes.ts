@@ -16,6 +16,7 @@ export const ENDINGS = [".obj", ".stl", ".ply", ".glb"];
 export interface Read { readonly vertices: Float64Array; readonly corners: Int32Array; readonly counts: Int32Array | null }
 
 const NUMBER = /^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?$/;
+const EDGES = /^[ \t\v\f]+|[ \t\v\f]+$/g;
 const NAMED = /^[+-]?(?:nan|inf(?:inity)?)$/i;
 
 /** The number that a word is, or null. Those that aren't finite are refused where the surface is judged. */
@@ -24,7 +25,7 @@ export function numberOf(word: string): number | null {
   return NAMED.test(word) ? NaN : null;
 }
 
-/** Every byte as a character. */
+/** Every byte as a character; those beyond ASCII as some other. */
 export const latin = (bytes: Uint8Array): string => new TextDecoder("latin1").decode(bytes);
 
 /** A piece of a file for a message. */
@@ -105,7 +106,7 @@ function objSurface(bytes: Uint8Array, name: string): Read {
   for (const { text, lines } of logicalLines(latin(bytes).replace(/^\xef\xbb\xbf/, ""))) {
     const first = number + 1;
     number += lines;
-    const words = text.trim().split(/[ \t\v\f]+/);
+    const words = text.replace(EDGES, "").split(/[ \t\v\f]+/);
     if (words[0] === "v") {
       for (let k = 1; k <= 3; k++) {
         const x = numberOf(words[k] ?? "");
@@ -154,9 +155,13 @@ function* logicalLines(text: string): Generator<{ text: string; lines: number }>
 
 const FACET_BYTES = 50;
 const SPARE = 2;
+/** Blanks and what isn't one are ASCII's, as in Python's patterns of bytes. */
+const ascii = (pattern: string, flags = ""): RegExp => new RegExp(pattern.replaceAll("\\s", "[ \\t\\n\\r\\f\\v]").replaceAll("\\S", "[^ \\t\\n\\r\\f\\v]"), flags);
 const CORNER = String.raw`\s+vertex\s+(\S+)\s+(\S+)\s+(\S+)`;
-const FACET = new RegExp(String.raw`\bfacet\s+normal(?:\s+\S+){3}\s+outer\s+loop${CORNER}${CORNER}${CORNER}\s+endloop\s+endfacet(?!\S)`, "g");
-const PART = /\bfacet\s+normal|\bouter\s+loop|\bvertex(?:\s+[-+.\d]\S*){3}|\bendloop/;
+const FACET = ascii(String.raw`\bfacet\s+normal(?:\s+\S+){3}\s+outer\s+loop${CORNER}${CORNER}${CORNER}\s+endloop\s+endfacet(?!\S)`, "g");
+const PART = ascii(String.raw`\bfacet\s+normal|\bouter\s+loop|\bvertex(?:\s+[-+.\d]\S*){3}|\bendloop`);
+const WORDS = ascii(String.raw`\S{1,80}`, "g");
+const BEGINS = ascii(String.raw`^\s*solid`);
 
 function stlSurface(bytes: Uint8Array, name: string): Read {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.length);
@@ -177,8 +182,8 @@ function stlSurface(bytes: Uint8Array, name: string): Read {
 /** Binary files, too, may begin with the word solid. */
 function isAscii(bytes: Uint8Array, view: DataView): boolean {
   if (bytes.length >= 84 && bytes.length === 84 + FACET_BYTES * view.getUint32(80, true)) return false;
-  const words = latin(bytes.subarray(0, 10_000)).match(/[^\s]{1,80}/g) ?? [];
-  const head = words.slice(0, 100).join(" ").replace(/^\xef\xbb\xbf/, "").trimStart().toLowerCase();
+  const words = latin(bytes.subarray(0, 10_000)).match(WORDS) ?? [];
+  const head = words.slice(0, 100).join(" ").replace(/^\xef\xbb\xbf/, "").replace(/^ +/, "").toLowerCase();
   return head.startsWith("solid") && (head.includes("facet") || head.includes("endsolid")) && !head.includes("\0");
 }
 
@@ -200,7 +205,7 @@ function asciiPoints(text: string, name: string): Float64Array {
   }
   rest.push(text.slice(end));
   const others = rest.join(" ");
-  if (!others.trimStart().startsWith("solid") || PART.test(others)) {
+  if (!BEGINS.test(others) || PART.test(others)) {
     throw new Refused(`${name}: ${text.split("vertex").length - 1} vertices in ${points.length / 9} whole facets, which is not three a facet; the file may be truncated`);
   }
   return points.all();

@@ -37,7 +37,7 @@ class Document {
       if (!chunks.has(kind)) chunks.set(kind, bytes.subarray(at + 8, at + 8 + size));
       at += 8 + size;
     }
-    this.json = JSON.parse(new TextDecoder().decode(chunks.get(0x4e4f534a))) as Fields;
+    this.json = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(chunks.get(0x4e4f534a))) as Fields;
     this.#blob = chunks.get(0x004e4942) ?? new Uint8Array(0);
   }
 
@@ -166,12 +166,17 @@ function triangles(document: Document, primitive: Fields): Part | null {
   if ("KHR_draco_mesh_compression" in ((primitive["extensions"] as Fields | undefined) ?? {})) throw new Refused(`${name}: got its meshes are compressed with Draco; accepted: a file exported without compression`);
   const { numbers: vertices, width } = document.numbers((primitive["attributes"] as Fields)["POSITION"]);
   if (width !== 3) throw new Refused(`${name}: its positions aren't three numbers each`);
-  const corners = "indices" in primitive ? Int32Array.from(document.numbers(primitive["indices"]).numbers) : Int32Array.from({ length: vertices.length / 3 }, (_, k) => k);
+  const corners = "indices" in primitive ? indices(document, primitive["indices"]) : Int32Array.from({ length: vertices.length / 3 }, (_, k) => k);
   if (mode !== TRIANGLES) throw new Refused(`${name}: got it has triangle strips or fans; accepted: a file exported as triangles`);
   if (corners.length % 3 !== 0) throw new Refused(`${name}: ${corners.length} corners of triangles, which isn't a multiple of 3`);
   const wrong = corners.find((corner) => corner < 0 || corner >= vertices.length / 3);
   if (wrong !== undefined) throw new Refused(`${name}: a part uses vertex ${wrong}, but it has only ${vertices.length / 3}`);
   return { vertices, triangles: corners };
+}
+
+function indices(document: Document, accessor: unknown): Int32Array {
+  const { numbers, width } = document.numbers(accessor);
+  return Int32Array.from({ length: numbers.length / width }, (_, row) => numbers[row * width] ?? 0);
 }
 
 /** A part in the scene's axes, wound the other way if its matrix mirrors. */

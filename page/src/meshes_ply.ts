@@ -12,6 +12,8 @@ const KINDS: Readonly<Record<string, string>> = {
 };
 const INDICES = ["vertex_indices", "vertex_index"];
 const REMEDY = "faces that all have the same number of corners; save the mesh as .obj or .stl";
+/** What separates words in Python. */
+const BLANKS = /[ \t\n\r\v\f\x1c-\x1f]+/;
 const SPARE = 2;
 const MOST_HEADER = 1_000_000;
 
@@ -48,8 +50,8 @@ function header(bytes: Uint8Array, name: string): { layout: string; elements: El
   if (!head.startsWith("ply") || end < 0 || body === 0) throw new Refused(`${name}: got ${excerpt(head)}; accepted: a .ply file: ply, a header, end_header, a body`);
   let layout = "";
   const elements: Element[] = [];
-  for (const line of head.slice(0, end).split(/\r\n|\r|\n/).slice(1)) {
-    const [key = "", ...words] = line.trim().split(/\s+/), last = elements.at(-1);
+  for (const line of head.slice(0, end).split(/\r\n|[\n\r\v\f\x1c-\x1e]/).slice(1)) {
+    const [key = "", ...words] = line.split(BLANKS).filter((word) => word !== ""), last = elements.at(-1);
     const kindOf = (word: string | undefined): string => KINDS[word ?? ""] ?? "";
     if (key === "" || key === "comment" || key === "obj_info") continue;
     if (key === "format" && words.length === 2) layout = words[0] ?? "";
@@ -100,7 +102,7 @@ function rows(element: Element, numbers: Numbers, name: string): { points: Float
 }
 
 function wordsOf(text: string, name: string): Numbers {
-  const words = text.split(/\s+/).filter((word) => word !== "");
+  const words = text.split(/[ \t\n\r\v\f]+/).filter((word) => word !== "");
   let at = 0;
   return {
     get left(): number {
