@@ -10,6 +10,8 @@ const RATES = [1, 0.5, 0.25, 0.1, 0.02] as const;
 const STEP_NS = 10_000_000, BACK_NS = 2_000_000_000;
 /** [ms] of the wall clock that a picture makes up for: after a pause that nobody saw the body goes on from where it was. */
 const MOST_MS = 100;
+/** [ms] Between two readings of the time: each has the page put its bar together anew. */
+const READ_MS = 90;
 /** [s] The bar spans this, or twice, four times as much. */
 const SPAN_S = 10;
 
@@ -32,6 +34,7 @@ export class Clock {
   private shownText = "";
   private stale = true;
   private wanted: number | null = null;
+  private readMs = 0;
 
   constructor(motion: Motion, reset: () => void) {
     this.motion = motion;
@@ -93,6 +96,9 @@ export class Clock {
   changed(): void { this.stale = true; }
 
   show(timeNs: number): void {
+    const clock = performance.now();
+    if (clock - this.readMs < READ_MS) return;
+    this.readMs = clock;
     const end = this.motion.history().endNs, seconds = timeNs * 1e-9;
     let span = SPAN_S;
     while (span < Math.max(end, timeNs) * 1e-9) span *= 2;

@@ -178,9 +178,12 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
 async function start(): Promise<void> {
   const scriptMs = performance.now(), app = document.getElementById("app")!;
   try {
-    const [kernels, data] = await Promise.all([inside("kernels"), inside("data")]);
-    const motion = await openMotion(kernels, data);
+    const [kernels, data, take] = await Promise.all([inside("kernels"), inside("data"), inside("take")]);
+    if (!kernels || !data) throw new Error(words.picture.incomplete);
+    const motion = await openMotion(kernels, data, take);
     const shared = location.hash.slice(1), refusal = shared ? await motion.openLink(shared) : null;
+    // Who was sent nothing sees what a box in place of the truth does.
+    if (!take && !shared) motion.setGhost({ inertia_model: "bounding_box" });
     const probe = begin(motion, app, scriptMs);
     if (refusal ?? motion.notice()) say(refusal ?? motion.notice(), 12);
     Object.assign(window, { page: probe });

@@ -64,6 +64,8 @@ const WIDE = 10, WIDEST = 30, SIZED = 2.5;
 const LIVELY = 0.9;
 /** [s] in which the energy bars find another scale. */
 const RESCALED_S = 8;
+/** [ms] Between two readings: each has the page put its cards together anew. */
+const READ_MS = 80;
 const LOCK = "M7 10V7a5 5 0 0 1 10 0v3h1.500v11h-13V10zM9.500 10h5V7a2.500 2.500 0 0 0-5 0z";
 
 type Name = keyof typeof words.cards;
@@ -89,6 +91,7 @@ export class Panel {
   private first = { mass: 1, scale: [1, 1, 1] as Vec3, impulse: 1 };
   private largest = 0;
   private shownMs = 0;
+  private passedS = 0;
   private shownAngle = "";
 
   constructor(desk: Desk, resized: () => void) {
@@ -179,6 +182,7 @@ export class Panel {
     } else this.chips[name].focus({ preventScroll: true });
     this.shownMs = 0;
     this.node.classList.toggle("open", this.open.size > 0);
+    this.node.classList.toggle("plotted", this.open.has("plots"));
     this.resized();
   }
 
@@ -212,19 +216,21 @@ export class Panel {
   }
 
   show(now: Snapshot, gravity: Vec3, seconds: number): void {
+    for (const card of this.cards.values()) card.draw?.(now);
+    const clock = performance.now();
+    this.passedS += seconds;
+    if (clock - this.shownMs < READ_MS) return;
+    this.shownMs = clock;
     const e = energies(now.body, gravity), weighs = gravity.some((g) => g !== 0), all = e.spin + e.move + e.string + e.height;
     const values = [e.spin, e.move, e.string, e.height, all], low = weighs && Math.min(...values) < 0;
-    this.largest = Math.max(...values.map(Math.abs), this.largest * Math.exp(-seconds / RESCALED_S));
+    this.largest = Math.max(...values.map(Math.abs), this.largest * Math.exp(-this.passedS / RESCALED_S));
     const show = (k: number, on: boolean): void => { for (const part of this.bars[k]!) part.hidden = !on; };
     show(3, weighs);
     this.bars.forEach(([holder], k) => {
       const part = this.largest > 0 ? values[k]! / this.largest : 0;
       (holder.firstElementChild as HTMLElement).style.transform = low ? `translateY(-50%) scaleY(${(0.5 * part).toFixed(3)})` : `scaleY(${part.toFixed(3)})`;
     });
-    for (const card of this.cards.values()) card.draw?.(now);
-    const clock = performance.now();
-    if (clock - this.shownMs < 100) return;
-    this.shownMs = clock;
+    this.passedS = 0;
     this.angleCard.hidden = !now.ghost;
     const text = now.ghost ? `${((now.angleToGhost * 180) / Math.PI).toFixed(0)}°` : "";
     if (text !== this.shownAngle) this.angle.textContent = this.shownAngle = text;

@@ -64,6 +64,12 @@ export function numberField(name: string, set: (value: number) => string | null,
   return { node, show };
 }
 
+/** "size x": where there is no room, its last word alone. */
+function named(name: string): Node[] {
+  const [, kind, own] = /^(.* )(.)$/.exec(name) ?? ["", "", name];
+  return [make("span", { class: "kind" }, kind ?? ""), make("span", {}, own ?? name)];
+}
+
 export interface Slider { readonly node: HTMLElement; readonly range: HTMLInputElement; show(value: number): void }
 
 /** A slider over low .. high in equal ratios, with its number beside it. set: of a slider that is moved; typed: of a
@@ -71,13 +77,13 @@ export interface Slider { readonly node: HTMLElement; readonly range: HTMLInputE
 export function slider(name: string, kind: string, unit: string, bounds: () => readonly [number, number], set: (value: number) => void, typed: (value: number) => string | null): Slider {
   const steps = 400, field = numberField(name, typed, unit);
   const range = make("input", { type: "range", min: 0, max: steps, step: 1, "aria-label": name });
-  const node = make("div", { class: `slider ${kind}` }, make("span", { class: "name" }, name), field.node, make("span", { class: "unit" }, unit), range);
+  const node = make("div", { class: `slider ${kind}` }, make("span", { class: "name" }, ...named(name)), field.node, make("span", { class: "unit" }, unit), range);
   const paint = (): void => {
     const part = Number(range.value) / steps;
     // The thumb's middle isn't at the part of the width: it stays within.
     range.style.setProperty("--at", `calc(12px + ${(100 * part).toFixed(2)}% - ${(24 * part).toFixed(2)}px)`);
   };
-  let shown = NaN, held = false;
+  let shown = "", held = false;
   const told = (value: number): void => range.setAttribute("aria-valuetext", `${short(value)} ${unit}`);
   range.addEventListener("input", () => {
     const [low, high] = bounds(), value = low * (high / low) ** (Number(range.value) / steps);
@@ -91,9 +97,9 @@ export function slider(name: string, kind: string, unit: string, bounds: () => r
     node, range,
     show(value) {
       field.show(value);
-      if (held || Object.is(value, shown)) return;
-      shown = value;
-      const [low, high] = bounds();
+      const [low, high] = bounds(), all = `${value} ${low} ${high}`;
+      if (held || all === shown) return;
+      shown = all;
       range.value = String(Math.round((steps * Math.log(value / low)) / Math.log(high / low)));
       told(value);
       paint();

@@ -3,9 +3,9 @@
 // What is seen of a motion: body, ghost, arrows, string, and what one asks for beside them.
 
 import {
-  BoxGeometry, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, EdgesGeometry, FrontSide, Group, HemisphereLight, Line, LineBasicMaterial,
+  BoxGeometry, BufferAttribute, BufferGeometry, CanvasTexture, Color, DirectionalLight, DoubleSide, EdgesGeometry, FrontSide, Group, HemisphereLight, Line, LineBasicMaterial,
   LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, NotEqualStencilFunc, Points, PointsMaterial, ReplaceStencilOp, Scene,
-  SphereGeometry, Vector3,
+  SphereGeometry, SRGBColorSpace, Vector3,
 } from "three";
 import { Arrow, Cord, Scales } from "./picture_arrows.ts";
 import { Eye, type Free } from "./picture_camera.ts";
@@ -23,12 +23,14 @@ export const COLOURS = {
 } as const;
 
 /** Body sizes (diagonals of its box): lengths of the first L, omega and other arrows, and of none more. */
-const FIRST_MOMENTUM = 0.62, FIRST_OMEGA = 0.52, FIRST_LOAD = 0.4, LONGEST = 0.7;
-const FRAMED = 0.77;
+const FIRST_MOMENTUM = 0.58, FIRST_OMEGA = 0.47, FIRST_LOAD = 0.36, LONGEST = 0.63;
+const FRAMED = 0.69;
 /** Shaft radii in body sizes. */
 const STRONG = 0.0135, PLAIN = 0.009, CORD = 0.0075;
 const LIGHT = new Vector3(-0.35, -0.5, 1);
 const MOST_TRACE = 4000;
+/** What lies behind everything; lighter round the middle where that costs nothing. */
+const SKY = 0xf1f4f9, LIGHT_SKY = "#ffffff", DARK_SKY = "#dfe5f0";
 
 /** How a body lies, or lay. */
 export interface Pose { readonly row: readonly number[]; readonly scale: Vec3; readonly com: Vec3 }
@@ -204,7 +206,25 @@ export class Picture {
     this.reach = reach;
   }
 
+  /** The background: one colour where each pixel costs, since a see-through canvas is put together once more by the page. */
+  private sky(): void {
+    const plain = !this.renderer?.shown.smooth;
+    if (plain) { this.scene.background = new Color(SKY); return; }
+    const canvas = document.createElement("canvas");
+    canvas.width = canvas.height = 256;
+    const paper = canvas.getContext("2d")!, shade = paper.createRadialGradient(115, 90, 0, 115, 90, 240);
+    shade.addColorStop(0, LIGHT_SKY);
+    shade.addColorStop(0.5, "#f3f5fa");
+    shade.addColorStop(1, DARK_SKY);
+    paper.fillStyle = shade;
+    paper.fillRect(0, 0, 256, 256);
+    const texture = new CanvasTexture(canvas);
+    texture.colorSpace = SRGBColorSpace;
+    this.scene.background = texture;
+  }
+
   fit(width: number, height: number, free: Free): void {
+    this.sky();
     this.free = free;
     this.eye.fit(width, height, free);
     this.renderer?.resize(width, height);
@@ -227,7 +247,7 @@ export class Picture {
     const apart = shown.apart && ghost !== null;
     eye.frame(Math.max(1.03 * this.reach, FRAMED * size) * (apart ? 1.55 : 1));
     if (!held) eye.follow(apart ? at.clone().addScaledVector(aside, 0.5) : at, seconds);
-    eye.place(seconds);
+    eye.place(held ? 0 : seconds);
 
     place(this.body, body, this.surface, null);
     this.body.frame.visible = true;
@@ -392,7 +412,7 @@ export class Picture {
     const seen = Math.max(0, Math.min(1, (left - 0.05) / 0.2, (1.1 - left) / 0.2));
     floor.scale.setScalar(cell);
     floor.position.set(Math.round(eye.target.x / cell) * cell, Math.round(eye.target.y / cell) * cell, height);
-    (floor.material as LineBasicMaterial).opacity = 0.9 * seen;
+    (floor.material as LineBasicMaterial).opacity = 0.6 * seen;
     shadow.visible = (this.renderer?.shown.shadow ?? false) && seen > 0 && at.z > height;
     if (!shadow.visible) return;
     const { mesh } = this.body, sx = LIGHT.x / LIGHT.z, sy = LIGHT.y / LIGHT.z;

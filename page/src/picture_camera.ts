@@ -59,7 +59,7 @@ export class Eye {
 
   jump(to: Vec3): void {
     this.target.set(...to);
-    this.shownRadius = this.radius;
+    this.shownRadius = 0;
   }
 
   follow(to: Vector3, seconds: number): void {

@@ -110,7 +110,7 @@ export class Renderer {
   }
 
   private made(antialias: boolean): WebGLRenderer {
-    const gl = new WebGLRenderer({ antialias, alpha: true, stencil: true, powerPreference: "high-performance" });
+    const gl = new WebGLRenderer({ antialias, alpha: false, stencil: true, powerPreference: "high-performance" });
     gl.debug.checkShaderErrors = false;
     gl.domElement.setAttribute("aria-hidden", "true");
     this.stage.prepend(gl.domElement);

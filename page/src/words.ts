@@ -13,6 +13,7 @@ const english = {
     weight: (newtons: string) => `weight ${newtons} N`,
     pull: "pull me",
     noWebGL: "This browser draws no WebGL: the picture is a plain one.",
+    incomplete: "the file holds no kernels",
     broken: (why: string) => `The page can't start: ${why}`,
   },
   pointer: { nothingThere: "There is no body where you aim" },

@@ -7,6 +7,7 @@ export function short(value: number, figures = 3): string {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   let text = size === 0 ? "0" : size >= 1e5 || size < 1e-4 ? value.toExponential(figures - 1) : size >= 10 ** figures ? value.toFixed(0) : value.toPrecision(figures);
+  if (text.includes(".") && !text.includes("e")) text = text.replace(/\.?0+$/, "");
   text = text.replace(/e\+?(-?)(\d+)$/, (_, sign: string, power: string) => `·10${raised(sign + power)}`);
   return text.replace("-", "−");
 }
