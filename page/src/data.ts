@@ -28,7 +28,7 @@ export interface Constants {
   readonly operation: Readonly<Record<"FLY" | "BEGIN" | "CUT" | "END_DUE" | "FINISH", number>>;
   readonly flight: Readonly<Record<"REACHED" | "NEVER", number>>;
   readonly refusal: Readonly<Record<"NO_MOMENTS" | "SCALE" | "MASS" | "TENSOR" | "ORIENTATION" | "INTEGRATOR" | "RATE" | "MAGNITUDE" | "PULL" | "UNRESOLVED" | "OUT_OF_BOUNDS", number>>;
-  readonly load: Readonly<Record<"WORLD_AXES" | "BODY_AXES" | "NORMAL_AXES" | "AT_COM" | "AT_POINT" | "AT_VERTEX" | "ON_RAY" | "LOAD" | "LOAD_AXES" | "PLACE" | "POINT" | "FORCE" | "TORQUE" | "NORMAL" | "FORCE_WORLD" | "FORCE_BODY" | "MISSED", number>>;
+  readonly load: Readonly<Record<"WORLD_AXES" | "BODY_AXES" | "NORMAL_AXES" | "AT_COM" | "AT_POINT" | "AT_VERTEX" | "ON_RAY" | "LOAD" | "LOAD_AXES" | "PLACE" | "POINT" | "FORCE" | "TORQUE" | "NORMAL" | "FORCE_WORLD" | "FORCE_BODY", number>>;
   readonly body: Readonly<Record<"MASS" | "COM" | "INERTIA" | "MOMENTS" | "AXES" | "BODY_SCALE" | "LENGTH" | "BODY", number>>;
   readonly string: Readonly<Record<"KNOT" | "ORIGIN" | "TARGET" | "REST" | "PUSHES", number>>;
   readonly quantity: Readonly<Record<"KINETIC" | "POTENTIAL" | "INERTIA" | "STATE" | "CONTEXT", number>>;

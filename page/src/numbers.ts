@@ -18,12 +18,22 @@ export function repr(x: number): string {
 /** `{x:.Ng}` of Python. */
 export function general(x: number, digits: number): string {
   if (!Number.isFinite(x)) return repr(x);
-  const [mantissa = "0", exponent = "0"] = x.toExponential(digits - 1).split("e");
+  const [mantissa = "0", exponent = "0"] = rounded(x, digits).split("e");
   const trimmed = mantissa.includes(".") ? mantissa.replace(/\.?0+$/, "") : mantissa;
   const power = Number(exponent);
   if (power < -4 || power >= digits) return pythonExponent(`${trimmed}e${power}`);
-  const plain = x.toFixed(Math.max(0, digits - 1 - power));
-  return plain.includes(".") ? plain.replace(/\.?0+$/, "") : plain;
+  const sign = trimmed.startsWith("-") ? "-" : "", figures = trimmed.replace(/[-.]/g, "");
+  if (power < 0) return `${sign}0.${"0".repeat(-1 - power)}${figures}`;
+  const whole = figures.padEnd(power + 1, "0");
+  return sign + (whole.length > power + 1 ? `${whole.slice(0, power + 1)}.${whole.slice(power + 1)}` : whole);
+}
+
+/** toExponential, with halves to the even digit. */
+function rounded(x: number, digits: number): string {
+  const [mantissa = "", exponent = "0"] = x.toExponential(80).split("e");
+  const cut = mantissa.indexOf(".") + digits, kept = mantissa.slice(0, cut).replace(/\.$/, "");
+  const isHalf = /^50*$/.test(mantissa.slice(cut)), isEven = "02468".includes(kept.at(-1) ?? "");
+  return isHalf && isEven ? `${kept}e${exponent}` : x.toExponential(digits - 1);
 }
 
 function pythonExponent(text: string): string {

@@ -365,7 +365,7 @@ export class Simulation implements Motion {
 
   submit(entry: Entry): string | null {
     return this.#tried(() => {
-      if ("set" in entry && Object.keys(entry.set).some((name) => name.startsWith("ghost."))) {
+      if ("set" in entry && Object.keys(entry.set ?? {}).some((name) => name.startsWith("ghost."))) {
         this.#setWithGhost(entry.set);
         return;
       }

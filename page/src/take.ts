@@ -16,6 +16,8 @@ export const FORM = 1;
 const MOST_TEXT = 2_000_000;
 const MOST_BYTES = 50_000_000;
 const MOST_ENTRIES = 200_000;
+/** Numbers of a record MOMENTS. */
+const MOMENTS = 16;
 
 /** What was done from one start. values: that differ from the defaults; script: entries with their times [s]. */
 export interface Take {
@@ -72,13 +74,16 @@ export function takeOf(bytes: Uint8Array): Take {
 }
 
 function meshOf(mesh: NonNullable<Written["mesh"]>): MeshNumbers {
-  const f8 = (text: string): Float64Array => new Float64Array(whole(fromBase64(text), 8));
-  const i4 = (text: string): Int32Array => new Int32Array(whole(fromBase64(text), 4));
-  const { name, vertices, triangles, starts, solid } = mesh;
-  return {
-    name: String(name), vertices: f8(vertices), triangles: i4(triangles),
-    starts: starts === undefined ? null : i4(starts), ...(solid === undefined ? {} : { solid: f8(solid) }),
-  };
+  const f8 = (text: string): Float64Array => new Float64Array(whole(fromBase64(String(text)), 8));
+  const i4 = (text: string): Int32Array => new Int32Array(whole(fromBase64(String(text)), 4));
+  const { name, starts, solid } = mesh, vertices = f8(mesh.vertices), triangles = i4(mesh.triangles);
+  const polygons = starts === undefined ? null : i4(starts), moments: { solid?: Float64Array } = solid === undefined ? {} : { solid: f8(solid) };
+  const rises = polygons?.every((start, k) => start > (polygons[k - 1] ?? -1)) ?? true;
+  const fits = polygons === null || (polygons[0] === 0 && polygons.at(-1) === triangles.length / 3 && rises);
+  if (vertices.length % 3 !== 0 || triangles.length % 3 !== 0 || !fits || (moments.solid?.length ?? MOMENTS) !== MOMENTS) {
+    throw new Refused("the take is damaged: its mesh isn't one");
+  }
+  return { name: String(name), vertices, triangles, starts: polygons, ...moments };
 }
 
 function whole(bytes: Bytes, size: number): ArrayBuffer {

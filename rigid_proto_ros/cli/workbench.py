@@ -30,8 +30,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C, or write a file."""
-    if args.html:
-        return _write(args)
+    return _write(args) if args.html else _serve(args)
+
+
+def _serve(args: argparse.Namespace) -> int:
     if importlib.util.find_spec("viser") is None:
         raise InputError("workbench", is_missing("viser", "workbench"))
     from ..base.interrupts import leave

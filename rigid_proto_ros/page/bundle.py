@@ -105,8 +105,6 @@ def _run(command: list[str | Path], cwd: Path | None = None) -> str:
     )
     if done.returncode:
         lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
-        raise InputError(
-            "page",
-            f"{Path(command[0]).name} failed: {next((l for l in lines if 'error' in l.lower()), lines[-1] if lines else 'no word')}",
-        )
+        told = next((line for line in lines if "error" in line.lower()), lines[-1] if lines else "it says nothing")
+        raise InputError("page", f"{Path(command[0]).name} failed: {told}")
     return done.stdout

@@ -18,9 +18,9 @@ from .. import __version__
 from ..base.bundled import body_names, scene_names, scene_path
 from ..base.vectors import FloatArray, IntArray
 from ..mass import INERTIA_MODELS
-from ..mesh.reading import Mesh, load_mesh
 from ..mass import moments as of_mesh
 from ..mass import tensor as of_tensor
+from ..mesh.reading import Mesh, load_mesh
 from ..motion import body as of_body
 from ..motion import loads as of_load
 from ..motion import string as of_string
@@ -37,8 +37,8 @@ USED = (*SCENE_PARAMETERS, "mesh", "ghost.inertia_model", "ghost.integrator")
 """Parameters that a page has beside ballast and contacts; a scene's others don't change a motion without ROS."""
 
 HAND: dict[str, Any] = {"string.frequency": 8.0, "string.damping_ratio": 0.3, "string.timeout": 0.0}
-"""The string of a hand where a scene ties none from its start: bodies of all masses follow alike, 8 rad/s is brisk for a
-nut and a satellite, and a hand that holds still holds on.
+"""The string of a hand where a scene ties none from its start: bodies of all masses follow alike, 8 rad/s is brisk for
+a nut and a satellite, and a hand that holds still holds on.
 """
 
 START = "t_handle"
@@ -96,7 +96,7 @@ _CONSTANTS: dict[str, tuple[Any, str]] = {
     "load": (
         of_load,
         "WORLD_AXES BODY_AXES NORMAL_AXES AT_COM AT_POINT AT_VERTEX ON_RAY LOAD LOAD_AXES PLACE POINT FORCE TORQUE "
-        "NORMAL FORCE_WORLD FORCE_BODY MISSED",
+        "NORMAL FORCE_WORLD FORCE_BODY",
     ),
     "body": (of_body, "MASS COM INERTIA MOMENTS AXES BODY_SCALE LENGTH BODY"),
     "string": (of_string, "KNOT ORIGIN TARGET REST PUSHES"),
@@ -136,9 +136,7 @@ def _declared(one: Parameter) -> dict[str, Any]:
 
 def _supported(name: str) -> list[int]:
     """Numbers of the needs (motion/loads.py, NEEDS) that an integrator meets."""
-    from ..motion.loads import NEEDS
-
-    return [k for k, need in enumerate(NEEDS) if need in INTEGRATORS[name].supports]
+    return [k for k, need in enumerate(of_load.NEEDS) if need in INTEGRATORS[name].supports]
 
 
 # Meshes, packed: a bundled one has a few decimals, and neighbours are near each other.
@@ -170,6 +168,6 @@ def _as_integers(vertices: FloatArray) -> tuple[IntArray, int]:
 def _planes(rows: IntArray) -> bytes:
     """Differences of successive rows (n, 3), column after column, their signs last, as four planes of bytes."""
     steps = np.diff(rows, axis=0, prepend=0).T.ravel()
-    if not ((_LEAST // 2 < steps) & (steps < _LARGEST // 2)).all():
+    if not ((steps > _LEAST // 2) & (steps < _LARGEST // 2)).all():
         raise ValueError("numbers too far from each other")
     return ((steps << 1) ^ (steps >> 63)).astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()

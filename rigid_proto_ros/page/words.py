@@ -19,7 +19,7 @@ from ..mass.tensor import check_tensor
 from ..mass.verdict import check_surface
 from ..motion.frames import Frame
 from ..motion.integrators import INTEGRATORS, check_supported
-from ..motion.loads import NEEDS, NO_MESH, NO_MESH_NORMAL, NO_NORMAL, NO_VERTEX, unresolved
+from ..motion.loads import MISSED, NEEDS, NO_MESH, NO_MESH_NORMAL, NO_NORMAL, NO_VERTEX, unresolved
 from ..scene.scenario import make_scenario
 from ..simulation import refusals as rf
 from ..simulation.simulation import Simulation
@@ -45,13 +45,14 @@ def words() -> dict[str, Any]:
         "needs": NEEDS,
         "unresolved": {
             str(code): str(unresolved(code, _FRAME, 1235)).replace(_FRAME.text, "{0}").replace("1234", "{1}")
-            for code in (NO_MESH, NO_VERTEX, NO_MESH_NORMAL, NO_NORMAL)
-        }
-        | {"missed": str(unresolved(5, _FRAME, 1)).replace(_FRAME.text, "{0}")},
+            for code in (NO_MESH, NO_VERTEX, NO_MESH_NORMAL, NO_NORMAL, MISSED)
+        },
         "tensor": _tensors(),
         "failure": _failures(),
         "surface": _surfaces(),
-        "atStart": _raised(lambda: make_scenario({}).with_changes({"contacts.a": [0.0, 0.0, 0.0]})).partition("accepted: ")[2],
+        "atStart": _raised(lambda: make_scenario({}).with_changes({"contacts.a": [0.0, 0.0, 0.0]})).partition(
+            "accepted: "
+        )[2],
     }
 
 
@@ -94,7 +95,7 @@ def _integrator() -> str:
 
 
 def _tensors() -> dict[str, str]:
-    """By the rule that a tensor breaks (mass/tensor.py); {source}: what it is of, {0} to {2}: its moments, {3}: A + B."""
+    """By the rule that a tensor breaks (mass/tensor.py): {source} is what it is of, {0} to {2} its moments, {3} A + B."""
     a, b, c = _NUMBERS
 
     def said(matrix: Any) -> str:
