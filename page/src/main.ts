@@ -16,6 +16,8 @@ import { words } from "./words.ts";
 
 /** [ns simulated], [s of the wall clock]: an impulse acts at an instant; its arrow stays so long that it can be seen. */
 const BLOW_NS = 150_000_000, BLOW_S = 0.5;
+/** [rad/s] of a body that comes at rest. */
+const SPIN = 5;
 /** [s] of a point's path that is drawn. */
 const TRACE_S = 8;
 /** [s] in which the hand shows what can be grabbed. */
@@ -29,6 +31,7 @@ export interface Probe {
   readonly motion: Motion;
   readonly picture: Picture;
   readonly clock: Clock;
+  readonly pointer: Pointer;
   /** [ms] when the script began, and when the first and the first moving picture were drawn. */
   readonly times: { script: number; first: number; moving: number };
   /** [ms] at which pictures were drawn, and that a drag took until it was. */
@@ -64,7 +67,16 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     const notice = motion.notice();
     if (notice) say(notice, 10);
   };
-  const desk: Desk = { motion, picture, pointer, clock, look, track: () => track, later: (name, act) => { waiting.set(name, act); }, told, open };
+  // A body that comes at rest shows nothing: it spins about its middle axis, nearly, and so turns over.
+  const lively = (refusal: string | null): string | null => {
+    const spin = motion.values()["initial.angular_velocity"] as readonly number[] | undefined;
+    if (refusal || !spin || spin.some((w) => w !== 0)) return refusal;
+    const { axes } = motion.body(), R = motion.snapshot().body.rotation, own = [0, 1, 2].map((k) => SPIN * (axes[3 * k + 1]! + 0.02 * axes[3 * k]!));
+    const refused = motion.set({ "initial.angular_velocity": [0, 1, 2].map((k) => R[3 * k]! * own[0]! + R[3 * k + 1]! * own[1]! + R[3 * k + 2]! * own[2]!) });
+    motion.reset();
+    return refused;
+  };
+  const desk: Desk = { motion, picture, pointer, clock, look, track: () => track, later: (name, act) => { waiting.set(name, act); }, told, open, lively };
   const panel = new Panel(desk, () => { moved = true; });
   const drop = make("div", { id: "drop", hidden: true }, words.body.drop);
   app.append(panel.node, drop, make("div", { id: "say", role: "status", "aria-live": "polite" }));
@@ -133,7 +145,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     hint.style.transform = `translate(${(at.x - 6 + sway).toFixed(1)}px, ${(at.y + 4 - 0.5 * sway).toFixed(1)}px)`;
   };
 
-  const probe: Probe = { motion, picture, clock, times: { script: scriptMs, first: 0, moving: 0 }, pictures: [], drags: [] };
+  const probe: Probe = { motion, picture, clock, pointer, times: { script: scriptMs, first: 0, moving: 0 }, pictures: [], drags: [] };
   let last = 0, failure = "";
   const draw = (ms: number): void => {
     const passed = last ? ms - last : 0, seconds = Math.min(0.1, passed / 1000);

@@ -43,6 +43,8 @@ export interface Desk {
   later(name: string, act: () => void): void;
   /** Say a refusal; whether there was none. */
   told(refusal: string | null): boolean;
+  /** A body that was just opened, unless it was refused, gets a spin where it has none. */
+  lively(refusal: string | null): string | null;
   /** Another take: a function that opens one, said if it is refused. */
   open(how: () => string | null | Promise<string | null>): Promise<void>;
 }
@@ -242,7 +244,7 @@ export class Panel {
   /** Files dropped on the page are bodies. */
   takeFile(file: File): void {
     if (file.size > 50 * 1024 * 1024) { say(words.body.tooLarge); return; }
-    void this.desk.open(async () => this.desk.motion.openMesh(file.name, new Uint8Array(await file.arrayBuffer())));
+    void this.desk.open(async () => this.desk.lively(this.desk.motion.openMesh(file.name, new Uint8Array(await file.arrayBuffer()))));
   }
 }
 

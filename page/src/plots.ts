@@ -98,7 +98,7 @@ export class Plots {
     const energy = (name: string, colour: string, of: (e: Energies) => number): Curve => ({ name, colour, value: ({ now, gravity }) => of(energies(now.body, gravity)) });
     this.plots = [
       plot(words.plots.energy, "J", [
-        energy(words.energy.spin, "#7a45d1", (e) => e.spin), energy(words.energy.move, "#0f8d7c", (e) => e.move), energy(words.energy.string, "#d1432f", (e) => e.string),
+        energy(words.energy.spin, "#7a45d1", (e) => e.spin), energy(words.energy.move, "#0b7466", (e) => e.move), energy(words.energy.string, "#d1432f", (e) => e.string),
         energy(words.energy.all, "#6b7385", (e) => e.spin + e.move + e.string + e.height)]),
       plot(words.plots.omega, "rad/s", AXES.map((colour, k) => ({ name: `ω${"₁₂₃"[k]}`, colour, value: (seen) => principal(seen, k) }))),
       plot(words.plots.momentum, "N m s", AXES.map((colour, k) => ({ name: `L${"xyz"[k]}`, colour, value: ({ now }) => now.body.momentum[k]! }))),

@@ -33,12 +33,13 @@ const english = {
   body: {
     name: "Body", bundled: "Ready-made", scenes: "Flights", own: "Your own", choose: "choose a file",
     drop: "Drop the file here", formats: ".obj, .stl, .ply or .glb, up to 50 MB. It stays on this machine.", unit: "one unit is",
-    units: [["1", "1 m"], ["0.01", "1 cm"], ["0.001", "1 mm"], ["0.0254", "1 inch"]] as const,
+    units: [["", "as it seems"], ["1", "1 m"], ["0.01", "1 cm"], ["0.001", "1 mm"], ["0.0254", "1 inch"]] as const,
     sound: "Closed, and wound alike. Whether it crosses itself isn't judged here.", tooLarge: "The file is larger than 50 MB",
     mass: "Mass", fixed: "mass", dense: "density", model: "Where the mass is",
     models: { solid: "all through (true)", shell: "in the skin", points: "in the corners", bounding_box: "in the bounding box", explicit: "numbers of its own" } as Record<string, string>,
     table: "Moments [kg m²]", beside: "beside the truth", ballast: "Ballast", add: "stick on",
     addTitle: "Then press the place of the body", press: "Press the place on the body", remove: "remove", none: "none",
+    centre: "centre", ownNote: "Mass and tensor of your own, about the centre of mass, in the mesh's axes [kg m²].",
     facts: (vertices: number, triangles: number, litres: string) => `${vertices} vertices, ${triangles} triangles${litres ? `, ${litres} l` : ""}`,
   },
   world: {

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from page_browser import NO_WEBGL, Opened, chromium
+from page_browser import Opened, chromium
 
 pytestmark = pytest.mark.drawn
 
@@ -284,19 +284,6 @@ def test_a_finger_pulls_and_a_second_one_that_makes_it_a_pinch_takes_the_drag_ba
     assert page.now["body"]["string"] is None
     assert page.js("page.picture.eye.camera.position.length()") < 0.8 * far
     page.close()
-
-
-def test_without_webgl_it_says_so_and_draws_on_a_plain_canvas() -> None:
-    with chromium(NO_WEBGL) as browser:
-        page = Opened(browser)
-        page.faults.clear()  # three.js says on the console that there is no WebGL
-        assert "no WebGL" in page.page.locator("#say").inner_text()
-        page.pause()
-        page.fly(0.4)
-        before = page.look()
-        page.fly(0.3)
-        assert (np.abs(page.look() - before).max(axis=2) > 40).sum() > 1000
-        page.close()
 
 
 def test_a_person_who_wants_less_motion_gets_a_page_that_stands(browser: Any) -> None:
