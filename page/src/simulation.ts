@@ -114,7 +114,9 @@ export class Simulation implements Motion {
 
   openBody(name: string): string | null {
     if (!Object.hasOwn(this.#declared.bodies, name)) return this.#unknown("mesh", name, Object.keys(this.#declared.bodies));
-    const values = { ...this.#withoutPoints(), mesh: name, scale: [1, 1, 1] };
+    // Density, contacts and start of the body's own scene, in the world that is there.
+    const own = Object.entries(this.#sceneValues(name)).filter(([key]) => /^(?:density|mass|scale|contacts\.|initial\.)/.test(key));
+    const values = { ...this.#withoutPoints(), ...Object.fromEntries(own), mesh: name };
     return this.#tried(() => this.#start(values, this.#choice, null, []));
   }
 
@@ -166,8 +168,8 @@ export class Simulation implements Motion {
   /** The values in force but for points in the coordinates of one mesh. */
   #withoutPoints(): Record<string, Value> {
     const own = Object.entries(this.#body.values).filter(([name]) => !/^(?:ballast|contacts)\./.test(name) && name !== "string.attach");
-    const { "string.attach": attach = [0, 0, 0] } = this.#parameters.defaults();
-    return { ...Object.fromEntries(own), "string.attach": attach, "string.attached": false };
+    const { "string.attach": attach = [0, 0, 0] } = this.#parameters.defaults(), model = this.#body.values["inertia_model"] ?? "solid";
+    return { ...Object.fromEntries(own), "string.attach": attach, "string.attached": false, inertia_model: model === "explicit" ? "solid" : model };
   }
 
   #unknown(field: string, name: string, known: readonly string[]): string {
@@ -198,6 +200,7 @@ export class Simulation implements Motion {
       this.#endNs = done.at(-1)?.tNs ?? 0;
       this.#rewind();
       this.#notice = "";
+      for (const name of this.#known.keys()) if (name !== own?.name && !(name in this.#declared.bodies)) this.#known.delete(name);
     } catch (error) {
       if (whole !== null) this.#restore(whole);
       throw error;

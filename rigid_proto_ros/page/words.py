@@ -95,7 +95,7 @@ def _integrator() -> str:
 
 
 def _tensors() -> dict[str, str]:
-    """By the rule that a tensor breaks (mass/tensor.py): {source} is what it is of, {0} to {2} its moments, {3} A + B."""
+    """By the rule that a tensor breaks (mass/tensor.py): {source} is what has it, {0} to {2} its moments, {3} A + B."""
     a, b, c = _NUMBERS
 
     def said(matrix: Any) -> str:
