@@ -32,8 +32,9 @@ export interface Probe {
   readonly picture: Picture;
   readonly clock: Clock;
   readonly pointer: Pointer;
-  /** [ms] when the script began, and when the first and the first moving picture were drawn. */
-  readonly times: { script: number; first: number; moving: number };
+  /** [ms] when the script began, the motion was there, what draws was there, and the first and the first moving picture
+   * were drawn. */
+  readonly times: { readonly script: number; readonly motion: number; drawing: number; first: number; moving: number };
   /** [ms] at which pictures were drawn, and that a drag took until it was. */
   readonly pictures: number[];
   readonly drags: number[];
@@ -45,10 +46,10 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   const aim = make("div", { class: "label", hidden: true }, "⊕"), hint = make("div", { id: "hint", "aria-hidden": "true" }, icon(HAND), words.picture.pull);
   labels.append(hint, aim);
   app.replaceChildren(stage, labels);
-  const picture = new Picture(stage, labels);
+  const motionMs = performance.now(), picture = new Picture(stage, labels), drawingMs = performance.now();
 
   let track = new Track(), changed = true, gravity: Vec3 = [0, 0, 0], impulses: Impulse[] = [], moved = true;
-  const look: Look = { apart: false, boundingBox: false, inertiaBox: false, ellipsoid: false, principal: false, turned: null, trace: null, protractor: null, kept: null };
+  const look: Look = { apart: false, boundingBox: false, inertiaBox: false, ellipsoid: false, principal: false, turned: null, trace: null, chalk: [], protractor: null, kept: null };
   const waiting = new Map<string, () => void>();
   const told = (refusal: string | null): boolean => { if (refusal) say(refusal); return !refusal; };
   const startOver = (): void => { pointer.forget(); picture.restart(motion.snapshot()); };
@@ -60,6 +61,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     if (!told(refusal)) return;
     track.seen.length = 0;
     look.kept = null;
+    look.chalk = [];
     look.trace = look.trace === "com" ? "com" : null;
     picture.setBody(motion.body());
     startOver();
@@ -145,7 +147,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     hint.style.transform = `translate(${(at.x - 6 + sway).toFixed(1)}px, ${(at.y + 4 - 0.5 * sway).toFixed(1)}px)`;
   };
 
-  const probe: Probe = { motion, picture, clock, pointer, times: { script: scriptMs, first: 0, moving: 0 }, pictures: [], drags: [] };
+  const probe: Probe = { motion, picture, clock, pointer, times: { script: scriptMs, motion: motionMs, drawing: drawingMs, first: 0, moving: 0 }, pictures: [], drags: [] };
   let last = 0, failure = "";
   const draw = (ms: number): void => {
     const passed = last ? ms - last : 0, seconds = Math.min(0.1, passed / 1000);

@@ -27,6 +27,8 @@ export interface Look {
   turned: readonly number[] | null;
   /** A point [mesh], or the centre of mass, whose path is drawn. */
   trace: Vec3 | "com" | null;
+  /** Pairs of points [mesh], of chalk; another array with each stroke. */
+  chalk: readonly number[];
   protractor: readonly [string, string] | null;
   kept: Track | null;
 }

@@ -50,12 +50,30 @@ export function measureCard(desk: Desk): Card {
   const press = (which: number): void => traces.forEach((node, k) => node.setAttribute("aria-pressed", String(k === which)));
   press(look.trace === null ? 0 : look.trace === "com" ? 2 : 1);
 
+  // Chalk lies a little above the surface, where it is seen.
+  let from: Vec3 = [0, 0, 0];
+  const chalk = button(w.draw, () => {
+    const on = desk.pointer.chalk === null;
+    chalk.setAttribute("aria-pressed", String(on));
+    desk.pointer.chalk = !on ? null : ({ body, normal }, begins) => {
+      const { rotation: R } = motion.snapshot().body, info = motion.body(), up = 0.004 * info.length;
+      const out = [0, 1, 2].map((k) => R[k]! * normal[0] + R[3 + k]! * normal[1] + R[6 + k]! * normal[2]);
+      const place = body.map((c, k) => (c + info.com[k]! + up * out[k]!) / info.scale[k]!) as unknown as Vec3;
+      if (begins) from = place;
+      look.chalk = [...look.chalk, ...from, ...place];
+      from = place;
+    };
+    if (on) say(w.drawNote, 4);
+  }, { "aria-pressed": "false" });
+  const wipe = button(w.wipe, () => { look.chalk = []; });
+
   const readings = make("table");
   let first: Vec3 | null = null;
   const node = make("div", {},
     make("h3", {}, w.protractor), one.node, two.node, make("p", {}, angle),
     make("h3", {}, w.watch), make("div", { class: "row" }, watch, go, clear),
     make("h3", {}, w.trace), make("div", { class: "row", role: "group", "aria-label": w.trace }, ...traces),
+    make("h3", {}, w.chalk), make("div", { class: "row" }, chalk, wipe),
     make("h3", {}, w.readings), readings);
   return {
     node, changed: () => { first = desk.track().seen[0]?.now.body.momentum ?? null; },
@@ -68,7 +86,7 @@ export function measureCard(desk: Desk): Card {
       readings.replaceChildren(...([[w.spin, Math.hypot(...omega), "rad/s"], ["L", Math.hypot(...momentum), "N m s"], [w.speed, Math.hypot(row[7]!, row[8]!, row[9]!), "m/s"], [words.hand.mass, now.body.massKg, "kg"]] as const)
         .map(([name, value, unit]) => make("tr", {}, make("th", { scope: "row" }, name), make("td", {}, `${short(value, 4)} ${unit}`))));
     },
-    closed: () => { desk.pointer.claim = null; },
+    closed: () => { desk.pointer.claim = desk.pointer.chalk = null; },
   };
 }
 

@@ -19,7 +19,7 @@ import { short } from "./words_numbers.ts";
 export const COLOURS = {
   body: { true: 0xf2a33a, box: 0x4a86dd, other: 0x8f9a4a }, kept: 0x6b7385,
   omega: 0x0f9d8a, momentum: 0x7a45d1, string: 0xd1432f, force: 0xd1432f, torque: 0xb8860b, weight: 0x2f63ad,
-  axes: [0xd1432f, 0x1f9d55, 0x2f63ad], trace: 0xc2347f, inertia: 0xc79a12, angle: 0x1d2433,
+  axes: [0xd1432f, 0x1f9d55, 0x2f63ad], trace: 0xc2347f, inertia: 0xc79a12, angle: 0x1d2433, chalk: 0xffffff,
 } as const;
 
 /** Body sizes (diagonals of its box): lengths of the first L, omega and other arrows, and of none more. */
@@ -54,6 +54,8 @@ export interface Shown {
   /** Places of the trace [m, world] from the oldest on. */
   readonly trace: readonly number[] | null;
   readonly tracePoint: Vec3 | null;
+  /** Pairs of points [mesh] between which chalk was drawn. */
+  readonly chalk: readonly number[];
   /** The two directions [world] between which an angle is measured. */
   readonly protractor: readonly [Vec3, Vec3] | null;
   readonly kept: Pose | null;
@@ -107,6 +109,9 @@ export class Picture {
   private readonly trace: Line;
   private readonly traceDots: Points;
   private readonly arc: Line;
+  private readonly chalk = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: COLOURS.chalk }));
+  private readonly chalkDots = new Points(this.chalk.geometry, new PointsMaterial({ color: COLOURS.chalk, size: 4, sizeAttenuation: false }));
+  private chalked: readonly number[] = [];
   private readonly labels: Record<"omega" | "momentum" | "weight" | "string" | "angle" | "one" | "two" | "three" | "ghost", Label>;
   private readonly loadLabels: Label[] = [];
   private readonly labelRoom: HTMLElement;
@@ -157,6 +162,8 @@ export class Picture {
     this.arc = new Line(new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(3 * 33), 3)), new LineBasicMaterial({ color: COLOURS.angle, depthTest: false, transparent: true }));
     this.trace.frustumCulled = this.traceDots.frustumCulled = this.arc.frustumCulled = false;
     this.arc.renderOrder = 25;
+    this.body.mesh.add(this.chalk, this.chalkDots);
+    this.chalk.frustumCulled = this.chalkDots.frustumCulled = false;
     this.body.frame.add(this.boundingBox, this.inertiaBox, this.ellipsoid);
     for (const arrow of [this.omega, this.momentum, this.weight, ...this.principal, ...this.turned]) scene.add(arrow.node);
     scene.add(this.cord.node, this.ghostCord.node, this.trace, this.traceDots, this.arc);
@@ -379,6 +386,12 @@ export class Picture {
   }
 
   private drawMeasures(shown: Shown, at: Vector3): void {
+    if (shown.chalk !== this.chalked) {
+      this.chalked = shown.chalk;
+      const { middle } = this.surface!;
+      this.chalk.geometry.setAttribute("position", new BufferAttribute(Float32Array.from(shown.chalk, (x, k) => x - middle[k % 3]!), 3));
+    }
+    this.chalk.visible = this.chalkDots.visible = shown.chalk.length > 0;
     const trace = shown.trace, count = trace ? Math.min(MOST_TRACE, trace.length / 3) : 0;
     this.trace.visible = this.traceDots.visible = count > 1;
     if (trace && count > 1) {

@@ -18,10 +18,9 @@ const LEVELS: readonly Level[] = [
   { smooth: false, ratio: 1, shadow: true },
   { smooth: false, ratio: 0.75, shadow: true },
   { smooth: false, ratio: 0.75, shadow: false },
-  { smooth: false, ratio: 0.5, shadow: false },
 ];
 /** [ms] A picture that takes longer on the mean of a window is drawn with less; one that takes less, with more. */
-const SLOW_MS = 1000 / 30, QUICK_MS = 1000 / 52;
+const SLOW_MS = 1000 / 27, QUICK_MS = 1000 / 52;
 const WINDOW_MS = 1200, RAISED_AFTER_MS = 5000;
 /** [ms] A gap this long is a page that nobody saw, not a slow picture. */
 const UNSEEN_MS = 400;

@@ -40,6 +40,9 @@ interface Hand {
 export class Pointer {
   /** Who takes the next place on the body that is pressed, instead of a poke. */
   claim: ((hit: Hit) => void) | null = null;
+  /** Who is told of each place of the body that is drawn over, instead of a drag; begins: of a stroke. */
+  chalk: ((hit: Hit, begins: boolean) => void) | null = null;
+  private drawing: number | null = null;
   /** Where the keyboard aims [px]. */
   aim: [number, number] | null = null;
   /** Called when a person has touched the picture. */
@@ -127,6 +130,7 @@ export class Pointer {
     const hit = this.hitAt(event.clientX, event.clientY);
     if (!hit) { this.turnFrom(event); return; }
     this.stage.setPointerCapture(event.pointerId);
+    if (this.chalk) { this.drawing = event.pointerId; this.chalk(hit, true); return; }
     this.begin(event.pointerId, hit, event.clientX, event.clientY, STILL_PX[event.pointerType as keyof typeof STILL_PX] ?? 4);
   }
 
@@ -144,6 +148,11 @@ export class Pointer {
 
   private move(event: PointerEvent): void {
     const { hand } = this, at = this.turning.get(event.pointerId);
+    if (this.drawing === event.pointerId) {
+      const over = this.hitAt(event.clientX, event.clientY);
+      if (over) this.chalk?.(over, false);
+      return;
+    }
     if (hand?.id === event.pointerId) {
       if (hand.x !== event.clientX || hand.y !== event.clientY) { hand.moved = true; this.waitingMs ||= event.timeStamp; }
       hand.x = event.clientX;
@@ -192,6 +201,7 @@ export class Pointer {
 
   private up(event: PointerEvent): void {
     this.turning.delete(event.pointerId);
+    if (this.drawing === event.pointerId) this.drawing = null;
     const { hand } = this;
     if (hand?.id !== event.pointerId) return;
     if (hand.tied) { hand.ended = true; return; }

@@ -62,6 +62,7 @@ const english = {
     name: "Measure", protractor: "Protractor", between: "between", and: "and", off: "off",
     things: { omega: "ω", momentum: "L", one: "I₁", two: "I₂", three: "I₃", up: "upwards", start: "L at first", velocity: "velocity" } as Record<string, string>,
     watch: "Stopwatch", start: "start", stop: "stop", clear: "clear", trace: "Trace", far: "farthest point", own: "a point I press",
+    chalk: "Chalk", draw: "draw on the body", wipe: "wipe off", drawNote: "Drag over the body to draw; press again to pull it",
     com: "centre of mass", readings: "Readings", speed: "speed", spin: "spin",
   },
   plots: { name: "Plots", energy: "Energy", omega: "ω in principal axes", momentum: "L in world axes", angle: "Angle to the ghost" },

@@ -216,6 +216,28 @@ def test_protractor_stopwatch_and_trace_measure(opened: Opened) -> None:
     assert opened.js("page.picture.arc.visible && page.picture.trace.visible")
 
 
+def test_chalk_stays_on_the_body_where_it_was_drawn(opened: Opened) -> None:
+    page = opened.page
+    page.locator("[data-card=measure]").click()
+    page.get_by_role("button", name="draw on the body").click()
+    opened.drawn(20)
+    place = opened.on_body(10)
+    page.mouse.move(place["x"], place["y"])
+    page.mouse.down()
+    page.mouse.move(place["x"] + 2, place["y"] + 1, steps=2)
+    page.mouse.up()
+    opened.drawn()
+    assert opened.script == [], "nothing is pulled or poked"
+    points = np.reshape(opened.js("[...page.picture.chalk.geometry.getAttribute('position').array]"), (-1, 3))
+    middle = opened.js("page.picture.surface.middle")
+    size = opened.js("page.motion.body().length")
+    # Measured 0.004 of the size: so far it lies above the surface.
+    assert np.linalg.norm(points[0] + middle - place["mesh"]) < 0.006 * size
+    page.get_by_role("button", name="wipe off").click()
+    opened.drawn()
+    assert not opened.js("page.picture.chalk.visible")
+
+
 def test_gravity_pulls_the_body_down_and_its_weight_is_an_arrow(opened: Opened) -> None:
     page = opened.page
     page.locator("[data-card=world]").click()
