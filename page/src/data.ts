@@ -53,6 +53,8 @@ export interface Declarations {
   readonly bodies: Readonly<Record<string, Packed>>;
   readonly scenes: Readonly<Record<string, { readonly title: string; readonly values: Readonly<Record<string, Value>> }>>;
   readonly start: string;
+  /** longest side of a mesh file [mesh units] above which its unit is taken for a millimetre */
+  readonly longest: number;
 }
 
 /** The declarations, and the bundled meshes as they are asked for. */

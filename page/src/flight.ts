@@ -12,8 +12,8 @@ import type { Command, Load } from "./script.ts";
 import type { Values } from "./source.ts";
 import type { Placed, Surfaces } from "./surface.ts";
 
-const ROWS = 1024;
 /** Loads that may act at once; more are a mistake of a script. */
+const ROWS = 1024;
 
 /** What a flight is at one time, to be put back. */
 export interface Kept {

@@ -10,8 +10,8 @@ import { fromBase64 } from "./packing.ts";
 
 const TRIANGLES = 4;
 const QUANTIZED = "KHR_mesh_quantization";
-const LOOKS = ["KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_"];
 /** Names of extensions that change no triangle begin so. */
+const LOOKS = ["KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_"];
 const WIDTHS: Readonly<Record<string, number>> = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 const SIZES: Readonly<Record<number, number>> = { 5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4 };
 const MOST_TRIANGLES = 20_000_000;

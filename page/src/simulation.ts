@@ -23,13 +23,11 @@ import type { MeshNumbers, Surface } from "./surface.ts";
 import { FORM, linkText, madeBy, takeBytes, takeFiles, takeOf, takeOfLink } from "./take.ts";
 import type { Take } from "./take.ts";
 
+/** States of a take are kept every so often, to go back to: each is 30 kB. Of too many every other one is forgotten. */
 const KEEP_NS = 1_000_000_000;
 const MOST_KEPT = 128;
-/** States of a take that are kept, every so often, to go back to: each is 30 kB. */
 
 const NO_GHOST: GhostChoice = { inertia_model: "", integrator: "", gyroscopic: true };
-const LONGEST_M = 10;
-/** Longest side of a mesh file [mesh units] above which its unit is taken as a millimetre. */
 
 interface Done { readonly tNs: number; readonly entry: Entry }
 
@@ -124,7 +122,7 @@ export class Simulation implements Motion {
     return this.#tried(() => {
       const mesh = readMesh(name, bytes, this.#kernels), surface = this.#surfaces.judged(mesh);
       const side = Math.max(...new Float64Array(surface.record.slice(8, 32).buffer));
-      const unit = scale ?? (side > LONGEST_M ? 0.001 : 1);
+      const unit = scale ?? (side > this.#declared.longest ? 0.001 : 1);
       const values: Record<string, Value> = { ...this.#withoutPoints(), mesh: mesh.name, scale: [unit, unit, unit] };
       if (!surface.closed) {
         const mass = this.#body.flight.body[this.#declared.numbers.body.MASS] ?? 1;

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import sys
 from pathlib import Path
 
 from ..base.errors import InputError, is_missing
@@ -19,7 +20,11 @@ EXAMPLES = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("scene", metavar="SCENE.yaml", nargs="?", help="scene file or bundled name (default t_handle)")
-    parser.add_argument("--html", metavar="FILE", help="write a page in which the body flies without a server, and end")
+    parser.add_argument(
+        "--html",
+        metavar="FILE",
+        help="write a page in which the scene, or a mesh given in its place, flies without a server",
+    )
     parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(
         "--port", type=int, metavar="PORT", help="port of the page (default 8080, or the next free one)"
@@ -60,15 +65,19 @@ def _serve(args: argparse.Namespace) -> int:
 
 
 def _write(args: argparse.Namespace) -> int:
-    from ..page.file import write_page
+    from ..page.file import values_of_mesh, write_page
     from ..scene.scene_file import scene_file, scene_values
 
     scene, mesh = args.scene, args.mesh
-    if scene and not scene.endswith((".yaml", ".yml")) and Path(scene).is_file():
+    if scene and not mesh and not scene.endswith((".yaml", ".yml")) and Path(scene).is_file():
         scene, mesh = None, scene
-    values = scene_values(scene_file(scene)) if scene else {} if mesh else None
-    if mesh:
-        values = {**(values or {"initial.angular_velocity": [0.05, 0.1, 3.0]}), "mesh": mesh}
+    values = scene_values(scene_file(scene)) if scene else None
+    if mesh and values is not None:
+        values["mesh"] = mesh
+    elif mesh:
+        values, note = values_of_mesh(mesh)
+        if note:
+            print(f"rigid_proto workbench: {mesh}: {note}", file=sys.stderr)
     write_page(args.html, values)
     print(f"wrote {args.html}: open it in a browser")
     return 0

@@ -41,6 +41,9 @@ HAND: dict[str, Any] = {"string.frequency": 8.0, "string.damping_ratio": 0.3, "s
 a nut and a satellite, and a hand that holds still holds on.
 """
 
+LONGEST = 10.0
+"""Longest side of a mesh [mesh units] above which its unit is taken for a millimetre: few hold what is 10 m long."""
+
 START = "t_handle"
 """Scene of a page that is opened without one."""
 
@@ -64,6 +67,7 @@ def page_data() -> bytes:
         "bodies": bodies,
         "scenes": {name: {"title": lesson(name).title, "values": bundled_values(name)} for name in scene_names()},
         "start": START,
+        "longest": LONGEST,
     }
     text = json.dumps(described, ensure_ascii=False, separators=(",", ":")).encode()
     return struct.pack("<I", len(text)) + text + bytes(blob)

@@ -16,12 +16,14 @@ from ..base.bundled import body_names
 from ..base.errors import InputError
 from ..base.files import whole_file
 from ..parameters.declarations import Parameters
-from ..scene.scenario import BodyMesh, make_scenario
+from ..scene.scenario import BodyMesh, load_body_mesh, make_scenario
 from .bundle import built_page
-from .data import page_values
+from .data import LONGEST, page_values
 
 FORM = 1
 """Of a take in a file or link; page/src/take.ts has the same."""
+SPIN = {"initial.angular_velocity": [0.05, 0.1, 3.0]}
+"""Of a mesh alone [rad/s], so that there is something to see."""
 _PLACE = '<script type="application/gzip" id="take"></script>'
 
 
@@ -35,6 +37,24 @@ def write_page(file: str | Path, values: dict[str, Any] | None = None) -> None:
         page = page.replace(_PLACE, f"{_PLACE.partition('></')[0]}>{take}</script>")
     with whole_file("--html", file) as beside:
         beside.write_text(page, "utf-8")
+
+
+def values_of_mesh(mesh: str) -> tuple[dict[str, Any], str]:
+    """Parameters with which a mesh flies alone, and what there is to say about it: its unit where it is large, and a
+    shell of 1 kg where it bounds no solid. Raises InputError.
+    """
+    values: dict[str, Any] = {"mesh": mesh, **SPIN}
+    notes = []
+    body = load_body_mesh(Parameters().replaced(values))
+    assert body is not None, mesh
+    side = float(body.numbers["extent"].max())
+    if side > LONGEST:
+        values["scale"] = [0.001] * 3
+        notes.append(f"its longest side of {side:.3g} is taken as millimetres")
+    if body.moments.no_solid:
+        values |= {"inertia_model": "shell", "mass": 1.0}
+        notes.append(f"{body.moments.no_solid.partition('; use ')[0]}; it flies as a shell of 1 kg")
+    return values, "; ".join(notes)
 
 
 def take_of(values: dict[str, Any]) -> dict[str, Any]:

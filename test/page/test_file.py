@@ -17,7 +17,7 @@ from page_tools import kernels
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.page import bundle
-from rigid_proto_ros.page.file import take_of, write_page
+from rigid_proto_ros.page.file import take_of, values_of_mesh, write_page
 
 MOST_BYTES, MOST_GZIPPED = 1_500_000, 500_000
 
@@ -79,6 +79,26 @@ def test_the_command_writes_it_for_scenes_and_meshes(page: str, tmp_path: Path) 
         assert take["values"]["mesh"] == mesh and take["script"] == []
     refused = subprocess.run([*command[:5], "nothing", *command[-2:]], capture_output=True, text=True, check=False)
     assert refused.returncode == 2 and len(refused.stderr.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_an_open_or_large_mesh_is_written_with_what_is_assumed(page: str, tmp_path: Path) -> None:
+    (tmp_path / "part.obj").write_bytes(mf.obj(50.0 * mf.CUBE_VERTICES, mf.CUBE_QUADS[1:]))
+    values, note = values_of_mesh(str(tmp_path / "part.obj"))
+    assert values["scale"] == [0.001] * 3 and values["inertia_model"] == "shell"
+    assert "50 is taken as millimetres" in note and "open surface with 4 boundary edges" in note
+    write_page(tmp_path / "page.html", values)
+    take = json.loads(part((tmp_path / "page.html").read_text("utf-8"), "take"))
+    assert "solid" not in take["mesh"] and take["values"]["mass"] == 1.0
+
+
+def test_a_wheel_carries_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(bundle, "SOURCE", tmp_path / "none")
+    monkeypatch.setattr(bundle, "CARRIED", tmp_path / "page.html")
+    with pytest.raises(InputError, match="doesn't carry the page"):
+        bundle.built_page()
+    bundle.CARRIED.write_text("carried")
+    assert bundle.built_page() == bundle.CARRIED
 
 
 def test_without_node_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
