@@ -67,20 +67,29 @@ def page_stamp() -> str:
 
 
 def _build(page: Path) -> None:
-    node, npm = _node()
+    node = installed_node()
     print("building the page, once; some seconds ...", file=sys.stderr, flush=True)
     kernels = _run(
         [sys.executable, "-P", "-m", "rigid_proto_ros.kernels", "wasm", "--typescript", SOURCE / "src" / GENERATED]
     )
-    lock = hashlib.sha256((SOURCE / "package-lock.json").read_bytes()).hexdigest()
-    mark = SOURCE / "node_modules" / ".installed"
-    if not mark.is_file() or mark.read_text() != lock:
-        _run([*npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=SOURCE)
-        mark.write_text(lock)
     with tempfile.TemporaryDirectory() as work, whole_file("page", page) as made:
         data = Path(work) / "data"
         data.write_bytes(page_data())
         _run([node, SOURCE / "build.mjs", kernels.split()[-1], data, made])
+
+
+def installed_node() -> str:
+    """Node, with the packages that the page is built of in the source tree. Raises InputError."""
+    node, npm = _node()
+    lock = hashlib.sha256((SOURCE / "package-lock.json").read_bytes()).hexdigest()
+    mark = SOURCE / "node_modules" / ".installed"
+    with open(SOURCE / ".installing", "w") as alone:
+        fcntl.flock(alone, fcntl.LOCK_EX)
+        if not mark.is_file() or mark.read_text() != lock:
+            print("installing what the page is built with into page/node_modules ...", file=sys.stderr, flush=True)
+            _run([*npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=SOURCE)
+            mark.write_text(lock)
+    return node
 
 
 def _node() -> tuple[str, list[str]]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import __version__
 from ..base.bundled import body_names, scene_names, scene_path
+from ..base.library import stamp
 from ..base.vectors import FloatArray, IntArray
 from ..mass import INERTIA_MODELS
 from ..mass import moments as of_mesh
@@ -56,7 +57,7 @@ def page_data() -> bytes:
     blob = bytearray()
     bodies = {name: _packed(load_mesh(name), blob) for name in body_names()}
     described = {
-        "version": __version__,
+        "version": page_version(),
         "parameters": [_declared(one) for one in _declarations()],
         "fields": {name: field_of(name) for name in SCENE_PARAMETERS},
         "models": INERTIA_MODELS,
@@ -71,6 +72,11 @@ def page_data() -> bytes:
     }
     text = json.dumps(described, ensure_ascii=False, separators=(",", ":")).encode()
     return struct.pack("<I", len(text)) + text + bytes(blob)
+
+
+def page_version() -> str:
+    """What a page says of itself, and of what it makes: pages of one version have the same kernels and so the same bits."""
+    return f"{__version__}+{stamp().partition('-')[2][:7]}"
 
 
 def page_values(values: dict[str, Any]) -> dict[str, Any]:

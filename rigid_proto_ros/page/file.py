@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..base.bundled import body_names
 from ..base.errors import InputError
 from ..base.files import whole_file
 from ..parameters.declarations import Parameters
 from ..scene.scenario import BodyMesh, load_body_mesh, make_scenario
 from .bundle import built_page
-from .data import LONGEST, page_values
+from .data import LONGEST, page_values, page_version
 
 FORM = 1
 """Of a take in a file or link; page/src/take.ts has the same."""
@@ -61,7 +60,7 @@ def take_of(values: dict[str, Any]) -> dict[str, Any]:
     """A take in which nothing was done yet, as page/src/take.ts reads it. Raises InputError."""
     scenario = make_scenario(values)
     used = page_values(_changed(scenario.parameters))
-    take: dict[str, Any] = {"form": FORM, "version": __version__, "values": used, "script": [], "endNs": 0}
+    take: dict[str, Any] = {"form": FORM, "version": page_version(), "values": used, "script": [], "endNs": 0}
     if scenario.body_mesh is not None and values.get("mesh", "t_handle") not in body_names():
         used["mesh"] = f"{scenario.body_mesh.mesh.name}.obj"
         take["mesh"] = _mesh_of(scenario.body_mesh, used["mesh"])

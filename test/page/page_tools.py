@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 from kernels.wasm_tools import module, node
 
-from rigid_proto_ros.page.bundle import SOURCE
+from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.page.bundle import SOURCE, installed_node
 
 READS_TYPESCRIPT = (22, 18)
 TESTS = SOURCE / "test"
@@ -38,6 +39,17 @@ def kernels() -> Path:
     else:
         beside.replace(target)
     return module()
+
+
+@cache
+def packages() -> Path:
+    """The folder with the packages that the page is built of; a test that asks for it skips where they can't be had."""
+    kernels()
+    try:
+        installed_node()
+    except InputError as error:
+        pytest.skip(str(error))
+    return SOURCE / "node_modules"
 
 
 def run_node(*arguments: object, **options: Any) -> str:

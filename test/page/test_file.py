@@ -13,7 +13,7 @@ from pathlib import Path
 
 import mesh_files as mf
 import pytest
-from page_tools import kernels
+from page_tools import kernels, packages
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.page import bundle
@@ -25,9 +25,7 @@ MOST_BYTES, MOST_GZIPPED = 1_500_000, 500_000
 @pytest.fixture(scope="module")
 def page() -> str:
     """The built page; the test skips where it can't be built."""
-    kernels()
-    if not (bundle.SOURCE / "node_modules").is_dir():
-        pytest.skip("page/node_modules is missing: rigid_proto workbench --html FILE installs it")
+    packages()
     return bundle.built_page().read_text("utf-8")
 
 

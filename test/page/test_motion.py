@@ -14,7 +14,7 @@ import mesh_files as mf
 import numpy as np
 import pytest
 from mass_solids import box, moved, together
-from page_tools import TESTS, kernels, node, run_node
+from page_tools import TESTS, kernels, node, packages, run_node
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.page.bundle import SOURCE
@@ -38,11 +38,8 @@ def test_what_the_motion_does_for_those_that_use_it(page_file: Path) -> None:
     run_node("--test", *sorted(TESTS.glob("*.test.ts")), env=environment)
 
 
-def test_the_program_is_of_the_types_that_it_states(page_file: Path) -> None:
-    compiler = SOURCE / "node_modules" / "typescript" / "bin" / "tsc"
-    if not compiler.is_file():
-        pytest.skip("page/node_modules is missing: rigid_proto workbench --html FILE installs it")
-    kernels()
+def test_the_program_is_of_the_types_that_it_states() -> None:
+    compiler = packages() / "typescript" / "bin" / "tsc"
     done = subprocess.run([node(), compiler, "--noEmit"], cwd=SOURCE, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
 

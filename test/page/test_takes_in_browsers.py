@@ -16,10 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_tools import TESTS, kernels, node, run_node
+from page_tools import TESTS, kernels, node, packages, run_node
 from test_takes import check_equal
-
-from rigid_proto_ros.page.bundle import SOURCE
 
 SECONDS = 240.0
 BROWSERS = {
@@ -42,10 +40,7 @@ def program(name: str) -> str:
 
 def taking_page(page_file: Path, folder: Path, count: int, seed: int) -> str:
     """A page that makes takes and sends them back."""
-    if not (SOURCE / "node_modules" / "esbuild").is_dir():
-        pytest.skip("page/node_modules is missing: rigid_proto workbench --html FILE installs it")
-    script = folder / "takes.js"
-    esbuild = SOURCE / "node_modules" / "esbuild" / "bin" / "esbuild"
+    script, esbuild = folder / "takes.js", packages() / "esbuild" / "bin" / "esbuild"
     run_node(esbuild, TESTS / "takes_browser.ts", "--bundle", "--format=iife", f"--outfile={script}")
     packed = {"kernels": kernels().read_bytes(), "data": page_file.read_bytes()}
     parts = [
