@@ -83,7 +83,7 @@ function meshOf(mesh: NonNullable<Written["mesh"]>): MeshNumbers {
   if (vertices.length % 3 !== 0 || triangles.length % 3 !== 0 || !fits || (moments.solid?.length ?? MOMENTS) !== MOMENTS) {
     throw new Refused("the take is damaged: its mesh isn't one");
   }
-  return { name: String(name), vertices, triangles, starts: polygons, ...moments };
+  return { name: String(name).replace(/^.*[\\/]/, ""), vertices, triangles, starts: polygons, ...moments };
 }
 
 function whole(bytes: Bytes, size: number): ArrayBuffer {

@@ -75,7 +75,7 @@ def page_data() -> bytes:
 
 
 def page_version() -> str:
-    """What a page says of itself, and of what it makes: pages of one version have the same kernels and so the same bits."""
+    """What a page says of itself and of what it makes: pages of one version have the same kernels, so the same bits."""
     return f"{__version__}+{stamp().partition('-')[2][:7]}"
 
 
