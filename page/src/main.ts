@@ -126,6 +126,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     clock.setPaused(!clock.paused);
     event.preventDefault();
   });
+  addEventListener("hashchange", () => { const shared = location.hash.slice(1); if (shared) void open(() => motion.openLink(shared)); });
   for (const kind of ["dragenter", "dragover"] as const) addEventListener(kind, (event) => { event.preventDefault(); drop.hidden = false; });
   addEventListener("dragleave", (event) => { if (!event.relatedTarget) drop.hidden = true; });
   addEventListener("drop", (event) => {

@@ -11,13 +11,14 @@ export interface Level {
   readonly shadow: boolean;
 }
 
+/** Fewer pixels than the page has would look coarse and save nothing: in software most of a picture goes into putting canvas
+ * and cards together. */
 const LEVELS: readonly Level[] = [
   { smooth: true, ratio: 2, shadow: true },
   { smooth: false, ratio: 2, shadow: true },
   { smooth: false, ratio: 1.5, shadow: true },
   { smooth: false, ratio: 1, shadow: true },
-  { smooth: false, ratio: 0.75, shadow: true },
-  { smooth: false, ratio: 0.75, shadow: false },
+  { smooth: false, ratio: 1, shadow: false },
 ];
 /** [ms] A picture that takes longer on the mean of a window is drawn with less; one that takes less, with more. */
 const SLOW_MS = 1000 / 27, QUICK_MS = 1000 / 52;
