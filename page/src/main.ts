@@ -20,6 +20,8 @@ const BLOW_NS = 150_000_000, BLOW_S = 0.5;
 const SPIN = 5;
 /** [s] of a point's path that is drawn. */
 const TRACE_S = 8;
+/** [ms] in which what moves of itself, the eye and arrows, comes to rest. */
+const AWAKE_MS = 2500;
 /** [s] in which the hand shows what can be grabbed. */
 const HINT_S = 9;
 const HAND = "M9 11V4.500a1.500 1.500 0 0 1 3 0V10h.6V8.800a1.400 1.400 0 0 1 2.800 0V11h.6V9.700a1.400 1.400 0 0 1 2.800 0V12h.4v-.9a1.300 1.300 0 0 1 2.600 0V16c0 4-2.600 6.500-6.300 6.500-3.200 0-4.700-1.400-6.300-3.800L5.300 14a1.500 1.500 0 0 1 2.400-1.800L9 13.600z";
@@ -149,10 +151,16 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   };
 
   const probe: Probe = { motion, picture, clock, pointer, times: { script: scriptMs, motion: motionMs, drawing: drawingMs, first: 0, moving: 0 }, pictures: [], drags: [] };
-  let last = 0, failure = "";
+  // While time stands and nobody does anything, nothing is drawn anew.
+  let last = 0, failure = "", awakeMs = Infinity, drawnNs = -1;
+  const wake = (): void => { awakeMs = performance.now() + AWAKE_MS; };
+  for (const kind of ["pointerdown", "pointermove", "pointerup", "wheel", "keydown", "keyup", "input", "change", "click", "focusin"])
+    addEventListener(kind, wake, { capture: true, passive: true });
   const draw = (ms: number): void => {
     const passed = last ? ms - last : 0, seconds = Math.min(0.1, passed / 1000);
     last = ms;
+    if (changed || moved || waiting.size || hintS > 0 || !clock.paused || pointer.holding || motion.snapshot().timeNs !== drawnNs) wake();
+    if (performance.now() > awakeMs) { requestAnimationFrame(draw); return; }
     for (const act of waiting.values()) act();
     waiting.clear();
     pointer.act();
@@ -160,6 +168,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     if (changed) refresh();
     if (moved) fit();
     const now = motion.snapshot();
+    drawnNs = now.timeNs;
     track.add(now, motion.body(), gravity);
     picture.draw(now, shownNow(now), still ? 1 : seconds, pointer.holding);
     clock.show(now.timeNs);
