@@ -48,6 +48,7 @@ AGAIN := --reruns 1 --only-rerun "no .* within [0-9.]+ s" -rRs
 test: export PYTHONDONTWRITEBYTECODE :=
 test: setup ## the whole suite; real meshes are found through RIGID_PROTO_MESHES
 	@$(PY) requirements/wasm_tools.py linker node
+	@$(PY) -m rigid_proto_ros.page >/dev/null || echo "the page isn't built; tests that need it skip" >&2
 	$(ROS) $(PY) -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(AGAIN) -m "not stress and not bench and not soak" $(ARGS)
 
 lint: setup ## ruff and mypy
@@ -61,8 +62,10 @@ pictures: setup run ## draw the pictures of README and lessons anew (needs mesa-
 	PYTHONPATH=test $(PY) docs/page_pictures.py docs
 
 wheel: setup ## dist/: a wheel with the kernels of this machine's architecture
-	@rm -rf rigid_proto_ros/kernels/lib
+	@rm -rf rigid_proto_ros/kernels/lib rigid_proto_ros/page/lib
+	@$(PY) requirements/wasm_tools.py linker node
 	@$(PY) -m rigid_proto_ros.kernels wheel
+	@$(PY) -m rigid_proto_ros.page wheel
 	$(PY) -m pip --disable-pip-version-check wheel --quiet --no-deps --no-build-isolation -w dist .
 
 build: setup ## colcon build into build/, install/ and log/; then: source install/setup.bash
@@ -85,7 +88,7 @@ stress: setup ## long and hostile tests, those of random examples with new ones,
 	$(if $(ARGS),,$(PY) tools/bits_elsewhere.py)
 
 clean: ## everything that was made here, the environments included
-	rm -rf .venv .venv-bench build install log out dist rigid_proto_ros/kernels/lib *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage
+	rm -rf .venv .venv-bench build install log out dist rigid_proto_ros/kernels/lib rigid_proto_ros/page/lib page/node_modules *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 PINS := .venv/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate --no-header --no-emit-package pip

@@ -59,6 +59,8 @@ TEST = [
 
 LIBRARIES = "kernels/lib/*/*.so"
 """Kernels that `python -m rigid_proto_ros.kernels wheel` has built into the package."""
+PAGE = "page/lib/page.html"
+"""The page that `python -m rigid_proto_ros.page wheel` has built into the package."""
 
 
 def commands() -> dict[str, type]:
@@ -92,7 +94,7 @@ setup(
     name=NAME,
     version=VERSION,
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={f"{NAME}.bodies": ["*.obj"], NAME: [LIBRARIES]},
+    package_data={f"{NAME}.bodies": ["*.obj"], NAME: [LIBRARIES, PAGE]},
     cmdclass=commands(),
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),

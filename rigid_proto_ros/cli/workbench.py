@@ -5,19 +5,27 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import sys
 import threading
+from pathlib import Path
 
 from ..base.errors import InputError, is_missing
 
 EXAMPLES = (
     ("rigid_proto workbench hammer", "a bundled scene"),
     ("rigid_proto workbench --mesh part.obj", "your own mesh"),
+    ("rigid_proto workbench hammer --html out/hammer.html", "a page that needs nothing but a browser, as one file"),
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("scene", metavar="SCENE.yaml", nargs="?", help="scene file or bundled name (default t_handle)")
+    parser.add_argument(
+        "--html",
+        metavar="FILE",
+        help="write a page in which the scene, or a mesh given in its place, flies without a server",
+    )
     parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(
         "--port", type=int, metavar="PORT", help="port of the page (default 8080, or the next free one)"
@@ -27,7 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until Ctrl-C."""
+    """Serve until Ctrl-C, or write a file."""
+    return _write(args) if args.html else _serve(args)
+
+
+def _serve(args: argparse.Namespace) -> int:
     if importlib.util.find_spec("viser") is None:
         raise InputError("workbench", is_missing("viser", "workbench"))
     from ..parameters.declarations import Parameters
@@ -46,4 +58,23 @@ def run(args: argparse.Namespace) -> int:
     name = "" if args.mesh else scene
     wait = threading.Event().wait  # until a signal interrupts it
     serve(lambda: make_scenario(values), name, port, args.host or LOOPBACK, not args.no_browser, wait)
+    return 0
+
+
+def _write(args: argparse.Namespace) -> int:
+    from ..page.file import values_of_mesh, write_page
+    from ..scene.scene_file import scene_file, scene_values
+
+    scene, mesh = args.scene, args.mesh
+    if scene and not mesh and not scene.endswith((".yaml", ".yml")) and Path(scene).is_file():
+        scene, mesh = None, scene
+    values = scene_values(scene_file(scene)) if scene else None
+    if mesh and values is not None:
+        values["mesh"] = mesh
+    elif mesh:
+        values, note = values_of_mesh(mesh)
+        if note:
+            print(f"rigid_proto workbench: {mesh}: {note}", file=sys.stderr)
+    write_page(args.html, values)
+    print(f"wrote {args.html}: open it in a browser")
     return 0

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+//
+// Time: playing, slower, by steps, back to any moment and on from there; and the bar where one does so.
+
+import { button, icon, make } from "./panel_elements.ts";
+import type { Entry, Motion } from "./source.ts";
+import { words } from "./words.ts";
+
+const RATES = [1, 0.5, 0.25, 0.1, 0.02] as const;
+const STEP_NS = 10_000_000, BACK_NS = 2_000_000_000;
+/** [ms] of the wall clock that a picture makes up for: after a pause that nobody saw the body goes on from where it was. */
+const MOST_MS = 100;
+/** [ms] Between two readings of the time: each has the page put its bar together anew. */
+const READ_MS = 90;
+/** [s] The bar spans this, or twice, four times as much. */
+const SPAN_S = 10;
+
+const PLAY = "M7 4v16l13-8z", PAUSE = "M6 4h4.5v16H6zM13.5 4H18v16h-4.5z", STEP = "M5 4v16l11-8zM17 4h3v16h-3z";
+const RESET = "M12 5V1.5L6.5 6.5 12 11.500V8a5.500 5.500 0 1 1-5.500 5.500H3.500A8.500 8.500 0 1 0 12 5z";
+
+export class Clock {
+  paused = false;
+  rate: number = RATES[0];
+  readonly node: HTMLElement;
+  private readonly playing: HTMLButtonElement;
+  private readonly rates: HTMLSelectElement;
+  private readonly scrub: HTMLInputElement;
+  private readonly marks: HTMLElement;
+  private readonly text: HTMLElement;
+  private readonly onward: HTMLButtonElement;
+  private readonly motion: Motion;
+  private scrubbing = false;
+  private span = SPAN_S;
+  private shownText = "";
+  private stale = true;
+  private wanted: number | null = null;
+  private readMs = 0;
+
+  constructor(motion: Motion, reset: () => void) {
+    this.motion = motion;
+    this.playing = button("", () => this.setPaused(!this.paused), { class: "round play", id: "play" });
+    this.rates = make("select", { "aria-label": words.time.rate, title: words.time.rate, change: () => { this.rate = Number(this.rates.value); } },
+      ...RATES.map((rate) => make("option", { value: rate }, words.time.rates[RATES.indexOf(rate)]!)));
+    this.scrub = make("input", { type: "range", min: 0, max: 1000, step: 1, value: 0, "aria-label": words.time.scrub });
+    this.scrub.addEventListener("pointerdown", () => { this.scrubbing = true; });
+    for (const end of ["pointerup", "pointercancel", "blur"]) this.scrub.addEventListener(end, () => { this.scrubbing = false; });
+    this.scrub.addEventListener("input", () => { this.wanted = (Number(this.scrub.value) / 1000) * this.span * 1e9; });
+    // By keys one second at a time, whatever the bar spans.
+    this.scrub.addEventListener("keydown", (event) => {
+      const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -5, PageUp: 5 }[event.key];
+      const end = this.motion.history().endNs, now = this.motion.snapshot().timeNs;
+      if (by !== undefined) this.wanted = now + by * (event.shiftKey ? 1e8 : 1e9);
+      else if (event.key === "Home") this.wanted = 0;
+      else if (event.key === "End") this.wanted = end;
+      else return;
+      event.preventDefault();
+    });
+    this.marks = make("div", { class: "marks", "aria-hidden": "true" });
+    this.text = make("span", { id: "clock" });
+    this.onward = button(words.time.goOn, () => { this.motion.goOn(); this.setPaused(false); }, { id: "onward", title: words.time.goOnTitle });
+    this.node = make("div", { id: "time", role: "group", "aria-label": words.time.name },
+      button(words.time.back, () => { this.wanted = this.motion.snapshot().timeNs - BACK_NS; }, { class: "round", title: words.time.backTitle, "aria-label": words.time.backTitle }),
+      this.playing,
+      button(icon(STEP), () => this.step(), { class: "round", title: words.time.step, "aria-label": words.time.step, id: "step" }),
+      this.rates, make("div", { class: "scrub" }, this.scrub, this.marks), this.text, this.onward,
+      button(icon(RESET), reset, { class: "round reset", title: words.time.reset, "aria-label": words.time.reset, id: "reset" }));
+    this.setPaused(false);
+  }
+
+  setPaused(paused: boolean): void {
+    this.paused = paused;
+    this.playing.replaceChildren(icon(paused ? PLAY : PAUSE));
+    const name = paused ? words.time.play : words.time.pause;
+    this.playing.setAttribute("aria-label", name);
+    this.playing.title = name;
+  }
+
+  step(): void {
+    this.setPaused(true);
+    this.motion.advance(this.motion.snapshot().timeNs + STEP_NS);
+  }
+
+  /** Fly on by what the wall clock has [ms] since the picture before. */
+  advance(milliseconds: number): void {
+    if (this.wanted !== null) {
+      this.motion.goTo(Math.round(Math.max(0, Math.min(this.motion.history().endNs, this.wanted))));
+      this.wanted = null;
+      return;
+    }
+    if (this.paused || this.scrubbing) return;
+    const passedNs = Math.round(Math.min(MOST_MS, Math.max(0, milliseconds)) * 1e6 * this.rate);
+    if (passedNs > 0) this.motion.advance(this.motion.snapshot().timeNs + passedNs);
+  }
+
+  /** What was done has changed: other marks. */
+  changed(): void { this.stale = true; }
+
+  show(timeNs: number): void {
+    const clock = performance.now();
+    if (clock - this.readMs < READ_MS) return;
+    this.readMs = clock;
+    const end = this.motion.history().endNs, seconds = timeNs * 1e-9;
+    let span = SPAN_S;
+    while (span < Math.max(end, timeNs) * 1e-9) span *= 2;
+    if (span !== this.span) { this.span = span; this.stale = true; }
+    const at = String(Math.round((1000 * seconds) / span));
+    if (!this.scrubbing && this.scrub.value !== at) this.scrub.value = at;
+    this.scrub.style.setProperty("--at", `calc(12px + ${((100 * seconds) / span).toFixed(1)}% - ${((24 * seconds) / span).toFixed(1)}px)`);
+    const text = words.time.seconds(seconds);
+    if (text !== this.shownText) { this.text.textContent = this.shownText = text; this.scrub.setAttribute("aria-valuetext", text); }
+    this.onward.hidden = timeNs >= end;
+    if (this.stale) { this.stale = false; this.mark(); }
+  }
+
+  private mark(): void {
+    const { script } = this.motion.history(), marks: HTMLElement[] = [];
+    let tied: number | null = null, before = -1;
+    const at = (s: number): string => `${((100 * s) / this.span).toFixed(2)}%`;
+    const finish = (end: number): void => {
+      if (tied === null) return;
+      const mark = make("i", { class: "span" });
+      mark.style.left = at(tied);
+      mark.style.width = `max(3px, ${at(end - tied)})`;
+      marks.push(mark);
+      tied = null;
+    };
+    for (const entry of script) {
+      const t = entry.t ?? 0, kind = kindOf(entry);
+      if (kind === "pull") { tied ??= t; continue; }
+      if (kind === "release") { finish(t); continue; }
+      if (kind === "change" && (t - before) / this.span < 0.005) continue;
+      if (kind === "change") before = t;
+      const mark = make("i", { class: kind });
+      mark.style.left = at(t);
+      marks.push(mark);
+    }
+    finish(Math.min(this.span, this.motion.history().endNs * 1e-9));
+    this.marks.replaceChildren(...marks);
+  }
+}
+
+function kindOf(entry: Entry): "pull" | "release" | "change" | "poke" {
+  if ("string" in entry) return entry.string === "release" ? "release" : "pull";
+  return "set" in entry || "state" in entry ? "change" : "poke";
+}

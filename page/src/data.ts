@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+//
+// What the page has of Python's declarations (rigid_proto_ros/page/data.py): parameters, words, bodies, scenes.
+
+import type { Parameter, Value } from "./source.ts";
+
+/** Texts by what they are about, with places (numbers.ts, `filled`). */
+export interface Words {
+  readonly accepted: string;
+  readonly scale: string;
+  readonly mass: string;
+  readonly orientation: string;
+  readonly rate: readonly string[];
+  readonly magnitude: string;
+  readonly pull: string;
+  readonly integrator: string;
+  readonly needs: readonly string[];
+  readonly unresolved: Readonly<Record<string, string>>;
+  readonly tensor: Readonly<Record<string, string>>;
+  readonly failure: readonly [string, string];
+  readonly surface: Readonly<Record<string, string>>;
+  readonly atStart: string;
+}
+
+/** Numbers that kernels know things by, under Python's names. */
+export interface Constants {
+  readonly command: Readonly<Record<"HELD_WRENCH" | "PULSE" | "IMPULSE" | "CLEAR" | "TIE_STRING" | "MOVE_STRING" | "RELEASE_STRING" | "SET_STATE" | "NO_SLOT" | "UNNAMED_SLOT", number>>;
+  readonly operation: Readonly<Record<"FLY" | "BEGIN" | "CUT" | "END_DUE" | "FINISH", number>>;
+  readonly flight: Readonly<Record<"REACHED" | "NEVER", number>>;
+  readonly refusal: Readonly<Record<"NO_MOMENTS" | "SCALE" | "MASS" | "TENSOR" | "ORIENTATION" | "INTEGRATOR" | "RATE" | "MAGNITUDE" | "PULL" | "UNRESOLVED" | "OUT_OF_BOUNDS", number>>;
+  readonly load: Readonly<Record<"WORLD_AXES" | "BODY_AXES" | "NORMAL_AXES" | "AT_COM" | "AT_POINT" | "AT_VERTEX" | "ON_RAY" | "LOAD" | "LOAD_AXES" | "PLACE" | "POINT" | "FORCE" | "TORQUE" | "NORMAL" | "FORCE_WORLD" | "FORCE_BODY", number>>;
+  readonly body: Readonly<Record<"MASS" | "COM" | "INERTIA" | "MOMENTS" | "AXES" | "BODY_SCALE" | "LENGTH" | "BODY", number>>;
+  readonly string: Readonly<Record<"KNOT" | "ORIGIN" | "TARGET" | "REST" | "PUSHES", number>>;
+  readonly quantity: Readonly<Record<"KINETIC" | "POTENTIAL" | "INERTIA" | "STATE" | "CONTEXT", number>>;
+  readonly moments: Readonly<Record<"FOUND" | "ROOM", number>>;
+  readonly tensor: Readonly<Record<"NEARLY", number>>;
+  readonly scene: Readonly<Record<"MAX_BALLASTS", number>>;
+}
+
+interface Packed { readonly at: number; readonly vertices: number; readonly triangles: number; readonly digits: number }
+
+export interface Declarations {
+  readonly version: string;
+  readonly parameters: readonly Parameter[];
+  /** field of the record SCENE, by the parameter's name */
+  readonly fields: Readonly<Record<string, string>>;
+  readonly models: readonly string[];
+  readonly integrators: readonly { readonly name: string; readonly supports: readonly number[] }[];
+  /** doubles of an integrator's workspace */
+  readonly room: number;
+  readonly numbers: Constants;
+  readonly words: Words;
+  readonly bodies: Readonly<Record<string, Packed>>;
+  readonly scenes: Readonly<Record<string, { readonly title: string; readonly values: Readonly<Record<string, Value>> }>>;
+  readonly start: string;
+  /** longest side of a mesh file [mesh units] above which its unit is taken for a millimetre */
+  readonly longest: number;
+}
+
+/** The declarations, and the bundled meshes as they are asked for. */
+export class Data {
+  readonly declared: Declarations;
+  readonly #numbers: Uint8Array;
+
+  constructor(bytes: Uint8Array) {
+    const length = new DataView(bytes.buffer, bytes.byteOffset).getUint32(0, true);
+    this.declared = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length))) as Declarations;
+    this.#numbers = bytes.subarray(4 + length);
+  }
+
+  /** Vertices (3 n) and triangles (3 m) of a bundled body, as in its file. */
+  mesh(name: string): { vertices: Float64Array; triangles: Int32Array } | null {
+    const packed = this.declared.bodies[name];
+    if (packed === undefined) return null;
+    const { at, vertices: n, triangles: m, digits } = packed;
+    const whole = this.#rows(at, n), triangles = this.#rows(at + 12 * n, m);
+    const unit = 10 ** digits;
+    return { vertices: Float64Array.from(whole, (x) => x / unit), triangles };
+  }
+
+  /** Rows of three whole numbers, of the planes that data.py makes. */
+  #rows(at: number, count: number): Int32Array {
+    const all = 3 * count, rows = new Int32Array(all), bytes = this.#numbers;
+    for (let column = 0; column < 3; column++) {
+      let value = 0;
+      for (let i = 0; i < count; i++) {
+        const k = at + column * count + i;
+        const folded = (bytes[k] ?? 0) + (bytes[k + all] ?? 0) * 256 + (bytes[k + 2 * all] ?? 0) * 65536 + (bytes[k + 3 * all] ?? 0) * 16777216;
+        value += folded % 2 === 0 ? folded / 2 : -(folded + 1) / 2;
+        rows[3 * i + column] = value;
+      }
+    }
+    return rows;
+  }
+}

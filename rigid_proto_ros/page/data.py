@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+"""What the page needs of Python's declarations, as one file: parameters, words, integrators, bodies and scenes.
+
+The file: the length of the JSON text as 4 bytes, the text, then the numbers of meshes, which it tells the places of.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..base.bundled import body_names, scene_names, scene_path
+from ..base.library import stamp
+from ..base.vectors import FloatArray, IntArray
+from ..mass import INERTIA_MODELS
+from ..mass import moments as of_mesh
+from ..mass import tensor as of_tensor
+from ..mesh.reading import Mesh, load_mesh
+from ..motion import body as of_body
+from ..motion import loads as of_load
+from ..motion import string as of_string
+from ..motion.integrators import INTEGRATORS
+from ..motion.integrators.stepping import ROOM
+from ..parameters.declarations import PARAMETERS, PATTERNS, Parameter
+from ..scene.lessons import lesson
+from ..scene.scene_file import scene_values
+from ..simulation import commands, effects, flight, quantities, record, refusals
+from ..simulation.record import SCENE_PARAMETERS, field_of
+from .words import words
+
+USED = (*SCENE_PARAMETERS, "mesh", "ghost.inertia_model", "ghost.integrator")
+"""Parameters that a page has beside ballast and contacts; a scene's others don't change a motion without ROS."""
+
+HAND: dict[str, Any] = {"string.frequency": 8.0, "string.damping_ratio": 0.3, "string.timeout": 0.0}
+"""The string of a hand where a scene ties none from its start: bodies of all masses follow alike, 8 rad/s is brisk for
+a nut and a satellite, and a hand that holds still holds on.
+"""
+
+LONGEST = 10.0
+"""Longest side of a mesh [mesh units] above which its unit is taken for a millimetre: few hold what is 10 m long."""
+
+START = "t_handle"
+"""Scene of a page that is opened without one."""
+
+_MOST_DIGITS = 15
+_LEAST, _LARGEST = -(2**31), 2**31 - 1
+
+
+def page_data() -> bytes:
+    """The whole file."""
+    blob = bytearray()
+    bodies = {name: _packed(load_mesh(name), blob) for name in body_names()}
+    described = {
+        "version": page_version(),
+        "parameters": [_declared(one) for one in _declarations()],
+        "fields": {name: field_of(name) for name in SCENE_PARAMETERS},
+        "models": INERTIA_MODELS,
+        "integrators": [{"name": name, "supports": _supported(name)} for name in INTEGRATORS],
+        "room": ROOM,
+        "numbers": _constants(),
+        "words": words(),
+        "bodies": bodies,
+        "scenes": {name: {"title": lesson(name).title, "values": bundled_values(name)} for name in scene_names()},
+        "start": START,
+        "longest": LONGEST,
+    }
+    text = json.dumps(described, ensure_ascii=False, separators=(",", ":")).encode()
+    return struct.pack("<I", len(text)) + text + bytes(blob)
+
+
+def page_version() -> str:
+    """What a page says of itself and of what it makes: pages of one version have the same kernels, so the same bits."""
+    return f"{__version__}+{stamp().partition('-')[2][:7]}"
+
+
+def page_values(values: dict[str, Any]) -> dict[str, Any]:
+    """A scene's parameters as the page has them, with the string of a hand."""
+    used = {name: value for name, value in values.items() if name in USED or name.startswith(("ballast.", "contacts."))}
+    tied = used.get("string.attached", False)
+    given = any(name in used for name in ("string.frequency", "string.timeout"))
+    return used if tied or given else {**used, **HAND}
+
+
+def bundled_values(name: str) -> dict[str, Any]:
+    """The parameters of a bundled scene, as the page has them."""
+    return page_values(scene_values(scene_path(name)))
+
+
+_CONSTANTS: dict[str, tuple[Any, str]] = {
+    "command": (
+        commands,
+        "HELD_WRENCH PULSE IMPULSE CLEAR TIE_STRING MOVE_STRING RELEASE_STRING SET_STATE NO_SLOT UNNAMED_SLOT",
+    ),
+    "operation": (effects, "FLY BEGIN CUT END_DUE FINISH"),
+    "flight": (flight, "REACHED NEVER"),
+    "refusal": (
+        refusals,
+        "NO_MOMENTS SCALE MASS TENSOR ORIENTATION INTEGRATOR RATE MAGNITUDE PULL UNRESOLVED OUT_OF_BOUNDS",
+    ),
+    "load": (
+        of_load,
+        "WORLD_AXES BODY_AXES NORMAL_AXES AT_COM AT_POINT AT_VERTEX ON_RAY LOAD LOAD_AXES PLACE POINT FORCE TORQUE "
+        "NORMAL FORCE_WORLD FORCE_BODY",
+    ),
+    "body": (of_body, "MASS COM INERTIA MOMENTS AXES BODY_SCALE LENGTH BODY"),
+    "string": (of_string, "KNOT ORIGIN TARGET REST PUSHES"),
+    "quantity": (quantities, "KINETIC POTENTIAL INERTIA STATE CONTEXT"),
+    "moments": (of_mesh, "FOUND ROOM"),
+    "tensor": (of_tensor, "NEARLY"),
+    "scene": (record, "MAX_BALLASTS"),
+}
+"""Numbers that kernels know things by: of each part the module, and their names there."""
+
+
+def _constants() -> dict[str, dict[str, int]]:
+    return {part: {name: int(getattr(of, name)) for name in names.split()} for part, (of, names) in _CONSTANTS.items()}
+
+
+def _declarations() -> Iterable[Parameter]:
+    yield from (PARAMETERS[name] for name in USED)
+    yield from (PATTERNS["ballast."], PATTERNS["contacts."])
+
+
+def _declared(one: Parameter) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "type": one.type,
+        "default": one.default,
+        "description": one.description,
+        "unit": one.unit,
+        "lower": one.lower if math.isfinite(one.lower) else None,
+        "upper": one.upper if math.isfinite(one.upper) else None,
+        "above": one.above,
+        "lengths": one.lengths,
+        "choices": one.choices,
+        "changes": one.changes,
+        "accepted": one.accepted,
+    }
+
+
+def _supported(name: str) -> list[int]:
+    """Numbers of the needs (motion/loads.py, NEEDS) that an integrator meets."""
+    return [k for k, need in enumerate(of_load.NEEDS) if need in INTEGRATORS[name].supports]
+
+
+# Meshes, packed: a bundled one has a few decimals, and neighbours are near each other.
+
+
+def _packed(mesh: Mesh, blob: bytearray) -> dict[str, Any]:
+    """Append vertices and triangles as whole numbers; returns what tells them. Vertices are these over 10^digits, each
+    the nearest double. Raises ValueError for a mesh that isn't of short decimals, or has polygons.
+    """
+    whole, digits = _as_integers(mesh.vertices)
+    if mesh.polygon_starts is not None:
+        raise ValueError(f"{mesh.name} has polygons, not only triangles")
+    at = len(blob)
+    blob += _planes(whole)
+    blob += _planes(mesh.triangles)
+    return {"at": at, "vertices": len(mesh.vertices), "triangles": len(mesh.triangles), "digits": digits}
+
+
+def _as_integers(vertices: FloatArray) -> tuple[IntArray, int]:
+    for digits in range(_MOST_DIGITS):
+        whole = np.rint(vertices * 10.0**digits)
+        if (whole / 10.0**digits == vertices).all() and (np.abs(whole) < _LARGEST / 2).all():
+            if np.signbit(vertices[vertices == 0.0]).any():
+                break
+            return whole.astype(np.int64), digits
+    raise ValueError("vertices that are no decimals of a few digits")
+
+
+def _planes(rows: IntArray) -> bytes:
+    """Differences of successive rows (n, 3), column after column, their signs last, as four planes of bytes."""
+    steps = np.diff(rows, axis=0, prepend=0).T.ravel()
+    if not ((steps > _LEAST // 2) & (steps < _LARGEST // 2)).all():
+        raise ValueError("numbers too far from each other")
+    return ((steps << 1) ^ (steps >> 63)).astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()

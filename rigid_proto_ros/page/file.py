@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""The page as a file that begins with a scene, or with any mesh that Python reads."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.bundled import body_names
+from ..base.errors import InputError
+from ..base.files import whole_file
+from ..parameters.declarations import Parameters
+from ..scene.scenario import BodyMesh, load_body_mesh, make_scenario
+from .bundle import built_page
+from .data import LONGEST, page_values, page_version
+
+FORM = 1
+"""Of a take in a file or link; page/src/take.ts has the same."""
+SPIN = {"initial.angular_velocity": [0.05, 0.1, 3.0]}
+"""Of a mesh alone [rad/s], so that there is something to see."""
+_PLACE = '<script type="application/gzip" id="take"></script>'
+
+
+def write_page(file: str | Path, values: dict[str, Any] | None = None) -> None:
+    """Write the page, to begin with a scene of these parameters, by name. Raises InputError."""
+    page = built_page().read_text("utf-8")
+    if values is not None:
+        take = base64.b64encode(gzip.compress(json.dumps(take_of(values)).encode(), 9, mtime=0)).decode()
+        if _PLACE not in page:
+            raise InputError("page", "the built page has no place for a scene")
+        page = page.replace(_PLACE, f"{_PLACE.partition('></')[0]}>{take}</script>")
+    with whole_file("--html", file) as beside:
+        beside.write_text(page, "utf-8")
+
+
+def values_of_mesh(mesh: str) -> tuple[dict[str, Any], str]:
+    """Parameters with which a mesh flies alone, and what there is to say about it: its unit where it is large, and a
+    shell of 1 kg where it bounds no solid. Raises InputError.
+    """
+    values: dict[str, Any] = {"mesh": mesh, **SPIN}
+    notes = []
+    body = load_body_mesh(Parameters().replaced(values))
+    assert body is not None, mesh
+    side = float(body.numbers["extent"].max())
+    if side > LONGEST:
+        values["scale"] = [0.001] * 3
+        notes.append(f"its longest side of {side:.3g} is taken as millimetres")
+    if body.moments.no_solid:
+        values |= {"inertia_model": "shell", "mass": 1.0}
+        notes.append(f"{body.moments.no_solid.partition('; use ')[0]}; it flies as a shell of 1 kg")
+    return values, "; ".join(notes)
+
+
+def take_of(values: dict[str, Any]) -> dict[str, Any]:
+    """A take in which nothing was done yet, as page/src/take.ts reads it. Raises InputError."""
+    scenario = make_scenario(values)
+    used = page_values(_changed(scenario.parameters))
+    take: dict[str, Any] = {"form": FORM, "version": page_version(), "values": used, "script": [], "endNs": 0}
+    if scenario.body_mesh is not None and values.get("mesh", "t_handle") not in body_names():
+        used["mesh"] = f"{scenario.body_mesh.mesh.name}.obj"
+        take["mesh"] = _mesh_of(scenario.body_mesh, used["mesh"])
+    return take
+
+
+def _changed(parameters: Parameters) -> dict[str, Any]:
+    defaults = Parameters().named()
+    return {name: value for name, value in parameters.named().items() if name == "mesh" or value != defaults.get(name)}
+
+
+def _mesh_of(body: BodyMesh, name: str) -> dict[str, Any]:
+    """The numbers of a mesh. solid: its moments at unit density (mass/moments.py, MOMENTS), where Python has them."""
+    moments = body.moments
+    mesh: dict[str, Any] = {
+        "name": name,
+        "vertices": _base64(moments.vertices, "<f8"),
+        "triangles": _base64(moments.triangles, "<i4"),
+    }
+    if moments.polygon_starts is not None:
+        mesh["starts"] = _base64(moments.polygon_starts, "<i4")
+    try:
+        mesh["solid"] = _base64(np.frombuffer(moments.moments("solid").record.tobytes()), "<f8")
+    except InputError:
+        pass  # its surface bounds none, as the page will find, too
+    return mesh
+
+
+def _base64(numbers: Any, kind: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(numbers, dtype=kind).tobytes()).decode()
