@@ -157,7 +157,8 @@ COVERED = """() => {
   for (const [what, p] of places) {
     const seen = eye.target.clone().set(...p);
     eye.project(seen, seen);
-    const top = document.elementFromPoint(seen.x, seen.y);
+    const top = document.elementFromPoint(seen.x, seen.y), said = document.querySelector("#say.on")?.getBoundingClientRect();
+    if (said && seen.x > said.left && seen.x < said.right && seen.y < said.bottom) found.add(`${what} behind what is said`);
     if (top?.closest("#stage") === null || top === null) found.add(`${what} behind ${top?.closest("[id]")?.id ?? "the window's edge"}`);
   }
   return [...found];

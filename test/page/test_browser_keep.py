@@ -51,6 +51,7 @@ def test_a_mesh_of_ones_own_is_opened_judged_and_spun_and_a_broken_one_leaves_th
     said = page.locator("#say").inner_text()
     assert said and "\n" not in said
     assert "l_bracket" in opened.js("page.motion.body().name")
+    assert opened.covered() == []
 
 
 def test_a_file_that_is_dropped_on_the_picture_is_a_body(opened: Opened) -> None:
