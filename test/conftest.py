@@ -33,7 +33,17 @@ collect_ignore_glob = [file for files in MISSING.values() for file in files]
 
 
 LONG = (
-    *("msg_examples", "workbench_page", "readme", "sweep_runs", "replay_publish", "mass_exactness", "poke_client"),
+    *(
+        "browser",
+        "msg_examples",
+        "browser_keep",
+        "workbench_page",
+        "readme",
+        "sweep_runs",
+        "replay_publish",
+        "mass_exactness",
+        "poke_client",
+    ),
     *("commands_flood", "time_in_flight", "demo", "executables"),
     *("session_crash", "order_of_commands", "commands_node", "string_pendulum", "rerun_live", "rerun_slow_viewers"),
     *("snapshot", "packaging", "fitting", "rerun_crash", "conventions_of_the_node", "node_signals"),
@@ -64,6 +74,16 @@ def meshes() -> Path:
     if not path.is_dir():
         pytest.fail(f"RIGID_PROTO_MESHES: {folder} is not a folder")
     return path.resolve()
+
+
+@pytest.fixture(scope="session")
+def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What rigid_proto_ros/page/data.py writes for the page."""
+    from rigid_proto_ros.page.data import page_data
+
+    file = tmp_path_factory.mktemp("page") / "data"
+    file.write_bytes(page_data())
+    return file
 
 
 @pytest.fixture

@@ -19,7 +19,20 @@ MODULES = {
 }
 ORDER = (
     *("base", "mesh", "mass", "motion", "parameters", "simulation", "scene", "session"),
-    *("picture", "rerun_view", "export", "live", "workbench", "page", "ros", "sweep", "identify", "robots", "cli", "kernels"),
+    *(
+        "picture",
+        "rerun_view",
+        "export",
+        "live",
+        "workbench",
+        "page",
+        "ros",
+        "sweep",
+        "identify",
+        "robots",
+        "cli",
+        "kernels",
+    ),
 )
 """Folders in the order of imports: each knows only those before it."""
 STRANGERS = {
