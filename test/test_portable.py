@@ -38,11 +38,12 @@ def as_elsewhere(name, globals=None, *rest, **named):
     return SEEN.get(name) or import_module(name, globals, *rest, **named)
 
 builtins.__import__ = as_elsewhere
+from rigid_proto_ros.base.interrupts import leave
 from rigid_proto_ros.cli.main import main
 for command in sys.argv[1:]:
     status = main(command.split())
     if status:
-        sys.exit(status)
+        leave(status)  # as the installed command ends
 """
 
 
