@@ -16,6 +16,8 @@ SOURCE = Path(__file__).resolve().parent.parent
 HIDDEN = """
 import builtins, os, signal, sys
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # also where these tests run in a background that ignores it
+
 MODULES = {"fcntl", "resource", "termios", "tty", "pty", "pwd", "grp", "syslog", "posix", "rclpy", "rerun"}
 NAMES = {
     "signal": {"SIGUSR1", "SIGUSR2", "SIGHUP", "SIGALRM", "SIGQUIT", "SIGKILL", "SIGCHLD", "pthread_sigmask", "setitimer"},
