@@ -95,10 +95,8 @@ def test_who_loses_the_race_for_a_port_serves_on_the_next_one_on_loopback_only_a
             for port, asked in zip(served, taken.values(), strict=True):
                 assert asked < port < asked + ports.PORTS_TRIED
             assert b"html" in wait_for(lambda: _page(observer.web_address)).lower()
-            assert all(
-                ports.listens(pid, at)
-                for pid, at in zip((os.getpid(), observer._process.process.pid), served, strict=True)
-            )
+            pids = (os.getpid(), observer._process.process.pid)
+            assert wait_for(lambda: all(ports.listens(pid, at) for pid, at in zip(pids, served, strict=True)))
             assert all(any(address in line for line in lines) for address in addresses)
             # At another address of the same machine nobody listens.
             assert not any(answers("127.0.0.2", at) for at in served)
