@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 
 from ..base.errors import InputError
@@ -21,6 +23,9 @@ WARNING_S = 10.0
 
 REPORT_S = 1.0
 """Time between two reports on /diagnostics."""
+
+UNREAD_S = 5.0
+"""The same while nobody subscribes, for what the log says: a wake-up of rclpy's executor costs 2 ms."""
 
 REFUSAL_REASONS = (
     *("frame", "nonfinite", "magnitude", "stamp", "ray_miss"),
@@ -45,7 +50,8 @@ class Diagnostics:
         self._node = node
         self._live = live
         self._subscriber = subscriber
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        matched = PublisherEventCallbacks(matched=self._on_matched)
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10, event_callbacks=matched)
         self._before = live.call(self._values)
         self._of_this_name = 1
         self._command_types = {
@@ -54,7 +60,16 @@ class Diagnostics:
         }
         self._other_types: set[tuple[str, str]] = set()
         # Steady: the node's own clock stands still with /clock.
-        node.create_timer(REPORT_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(UNREAD_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _on_matched(self, status: Any) -> None:
+        """Somebody subscribed or left: the first one's first report is of the second before it."""
+        period_ns = int((REPORT_S if status.current_count else UNREAD_S) * 1e9)
+        if period_ns != self._timer.timer_period_ns:
+            self._timer.timer_period_ns = period_ns
+            self._timer.reset()
+            with suppress(InputError):  # it has ended
+                self._before = self._live.call(self._values)
 
     def _values(self) -> dict[str, Any]:
         """Counters and values by their keys; on the physics thread, so that they belong together."""
