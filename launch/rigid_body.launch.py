@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: MIT
 """One rigid body: the node, and when asked for a poke script and a viewer.
 
-ros2 launch rigid_proto_ros rigid_body.launch.py scene:=hammer script:=/path/to/pokes.yaml viewer:=web
+ros2 launch rigid_proto_ros rigid_body.launch.py scene:=hammer script:=/path/to/pokes.yaml viewer:=web publish_rate:=500
+
+Every parameter of the node can be given by its name.
 """
 
+from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.logging import get_logger
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
@@ -15,6 +20,7 @@ PACKAGE = "rigid_proto_ros"
 
 ARGUMENTS = (
     ("scene", "t_handle", "scene: the path of a parameter file, or the name of a bundled one"),
+    ("params_file", "", "another parameter file, whose values count before the scene's"),
     ("mesh", "", "simulate this mesh instead of the scene's: a path, a package:// URI or a bundled name"),
     ("name", "rigid_body", "name of the node, and of the body's frame"),
     ("namespace", "", "namespace of the node"),
@@ -23,6 +29,7 @@ ARGUMENTS = (
     ("viewer", "", "live view: none, web or native (Rerun), workbench (the interactive page); empty: the scene's"),
     ("record", "", "record to this .mcap file, or show it in this .rrd (Rerun), or both with a comma"),
     ("use_sim_time", "", "true: simulated time follows /clock; empty: as the scene has it"),
+    ("log_level", "info", "least severity of what the node logs: debug, info, warn, error or fatal"),
 )
 
 
@@ -43,18 +50,27 @@ def nodes(context: LaunchContext) -> list[Node]:
     from rigid_proto_ros.scene.scene_file import scene_file
 
     given = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
-    parameters = {name: given[name] for name in ("mesh", "viewer") if given[name]}
+    parameters = _parameters(context.launch_configurations)
+    parameters |= {name: given[name] for name in ("mesh", "viewer") if given[name]}
     if given["use_sim_time"]:
         parameters["use_sim_time"] = given["use_sim_time"].lower() in ("true", "1", "yes")
     target = "/".join(["", *filter(None, [given["namespace"].strip("/"), given["name"]])])
+    files = [given["scene"], *filter(None, [given["params_file"]])]
     body = Node(
         package=PACKAGE,
         executable="rigid_body_node",
         name=given["name"],
         namespace=given["namespace"],
-        parameters=[*_for_node(str(scene_file(given["scene"])), target), *filter(None, [parameters])],
+        parameters=[
+            *(p for file in files for p in _for_node(str(scene_file(file)), target)),
+            *filter(None, [parameters]),
+        ],
         # On its command line: a file of parameters records only below the working folder.
-        ros_arguments=["-p", f"record:={given['record']}"] if given["record"] else [],
+        ros_arguments=[
+            "--log-level",
+            given["log_level"],
+            *(["-p", f"record:={given['record']}"] if given["record"] else []),
+        ],
         output="screen",
         # A client that waits for it would wait for ever.
         on_exit=Shutdown(),
@@ -70,6 +86,30 @@ def nodes(context: LaunchContext) -> list[Node]:
         options.append("--reset")
     client = Node(package=PACKAGE, executable="poke_client", arguments=[script, *options], output="screen")
     return [body, client]
+
+
+def _parameters(given: Mapping[str, str]) -> dict:
+    """The node's parameters among what is given by name. Another launch file that includes this one may have set other
+    names, so that one which is nearly a parameter's is warned of, and others are left alone.
+    """
+    from rigid_proto_ros.base.errors import InputError
+    from rigid_proto_ros.parameters.declarations import PARAMETERS, parameter_named
+    from rigid_proto_ros.scene.scene_file import typed_value
+
+    found = {}
+    for name in sorted(given.keys() - {name for name, _, _ in ARGUMENTS}):
+        try:
+            declared = parameter_named(name)
+        except InputError:
+            for near in get_close_matches(name, PARAMETERS, n=1, cutoff=0.8):
+                get_logger("rigid_body.launch").warning(f"{name}:={given[name]} is no parameter; did you mean {near}?")
+            continue
+        found[name] = (
+            given[name]
+            if declared.type == "string"
+            else declared.convert(typed_value(given[name], name) if declared.type == "bool" else given[name])
+        )
+    return found
 
 
 def _for_node(scene: str, target: str) -> list:

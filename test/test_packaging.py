@@ -142,7 +142,7 @@ and no package in 24.04: numba, which builds the kernels, comes by `make setup`.
 
 ROS_PACKAGES = {
     *("diagnostic_msgs", "geometry_msgs", "nav_msgs", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs"),
-    *("launch", "launch_ros", "rclpy", "ament_index_python", "rcl_interfaces", "tf2_msgs"),
+    *("launch", "launch_ros", "rclpy", "ament_index_python", "rcl_interfaces", "tf2_msgs", "visualization_msgs"),
 }
 """Released into Jazzy under these names."""
 

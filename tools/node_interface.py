@@ -99,6 +99,13 @@ INTERFACES = (
     ),
     _topic(
         PUBLISHED,
+        "~/marker",
+        "visualization_msgs/Marker",
+        "the mesh at its pose in the world, 30 times a second of the wall clock, for RViz and Foxglove; of more than "
+        "5,000 triangles the address of its file",
+    ),
+    _topic(
+        PUBLISHED,
         "~/inertia",
         "geometry_msgs/InertiaStamped",
         "latched: mass, COM (scaled mesh coordinates) and tensor about it (mesh axes)",
@@ -130,6 +137,13 @@ INTERFACES = (
     ),
     _topic(PUBLISHED, "/clock", "rosgraph_msgs/Clock", "simulated time", "publish_clock"),
     _topic(PUBLISHED, "/tf", "tf2_msgs/TFMessage", "world to body, if tf2_msgs is installed", "publish_tf"),
+    _topic(
+        PUBLISHED,
+        "/tf_static",
+        "tf2_msgs/TFMessage",
+        "body to `<body_frame>/mesh` and `<body_frame>/<contact>`, again at every change",
+        "publish_tf",
+    ),
     _service(
         "~/reset",
         "Trigger",

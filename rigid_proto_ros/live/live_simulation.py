@@ -18,6 +18,7 @@ from functools import partial
 from typing import Any
 
 from ..base.errors import CommandRefused, InputError
+from ..motion.frames import body_names
 from ..motion.state import State
 from ..parameters.declarations import with_mass_of_density
 from ..scene.command_codec import frame_names
@@ -75,7 +76,7 @@ class LiveSimulation:
 
     def _check_contacts(self, scenario: Scenario) -> None:
         """Raises InputError for a contact that no command could name, since its name is that of a frame."""
-        for name in sorted(scenario.parameters.contacts.keys() & set(self.frames)):
+        for name in sorted(scenario.parameters.contacts.keys() & {self.frames[0], *body_names(self.frames[1])}):
             accepted = (
                 "a name that is neither that of the world's frame nor that of the body's (the node's name by default)"
             )

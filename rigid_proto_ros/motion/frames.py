@@ -72,6 +72,11 @@ def point_text(point: tuple[Any, ...]) -> str:
 
 
 @functools.lru_cache(maxsize=1024)  # the same frames recur
+def body_names(frame: str) -> tuple[str, ...]:
+    """What a body frame is called in commands: ``lab/tool`` is ``tool``, too, since topics are those of one node."""
+    return ("body", frame, frame.rpartition("/")[2])
+
+
 def parse_frame(text: str, world: str = "world", body: str = "body") -> Frame:
     """Parse a ``frame_id``. A word that can name a contact is taken as one; whether the body has it is checked later.
 
@@ -81,7 +86,8 @@ def parse_frame(text: str, world: str = "world", body: str = "body") -> Frame:
     if len(text) > MAX_FRAME_LENGTH:
         raise CommandRefused("frame", "frame_id", text[:40] + "...", f"at most {MAX_FRAME_LENGTH} characters")
     place, *options = text.split(";")
-    axes_words = {"world": "world", "body": "body", "normal": "normal", world: "world", body: "body"}
+    axes_words = {"world": "world", "body": "body", "normal": "normal", world: "world"}
+    axes_words |= dict.fromkeys(body_names(body), "body")
     if place == "":
         axes, point = "world", ("com",)
     elif "@" in place:

@@ -375,7 +375,9 @@ class Parameters:
     ghost: GhostParameters = GhostParameters()
     world_frame: str = declare("world", "Name of the world frame in published messages.", changes=READ_ONLY)
     body_frame: str = declare(
-        "", "Name of the body's frame in published messages; empty means the node's name.", changes=READ_ONLY
+        "",
+        "Name of the body's frame in published messages; empty means the node's name with its namespace.",
+        changes=READ_ONLY,
     )
     record: str = declare(
         "",

@@ -125,7 +125,7 @@ class RigidBodyNode(Node):
         scenario = make_scenario(declare_parameters(self, values))
         for warning in scenario.warnings:
             self.get_logger().warning(warning)
-        frames = frame_names(scenario.parameters, self.get_name())
+        frames = frame_names(scenario.parameters, self.get_fully_qualified_name())
         stamps = Stamps(self._followed_clock(scenario))
         events = EventPublisher(self, frames[1], stamps)
         viewer = make_viewer(scenario, self)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -20,6 +20,7 @@ from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_msgs.msg import String
+from visualization_msgs.msg import Marker
 
 from ..live.pacing import Stamps
 from ..parameters.declarations import Parameters
@@ -28,13 +29,17 @@ from ..scene.scenario_run import ScenarioRun
 from ..scene.sensor_noise import ImuNoise, imu_noise
 from ..session.messages import PROJECTIONS, applied_bytes, inertia_bytes
 from ..simulation.observer import Applied, BodyChanged, Event, Logged, Observer, Refused, SceneChanged
+from ..simulation.setup import Setup
 from . import qos
+from .marker import BodyMarker
 
 WARNING_S = 1.0
 """Between two warnings of one reason, wall time."""
 
+NOT_TURNED = (0.0, 0.0, 0.0, 1.0)
+
 Topics = list[tuple[Publisher, Callable[[ScenarioRun, int, list[float]], Any]]]
-"""A publisher, and how its message is made from what flies, time and state."""
+"""A publisher, and how its message is made from what flies, time and state; None for none now."""
 
 
 def _publisher(
@@ -54,7 +59,8 @@ def _publisher(
 
 
 class StatePublisher:
-    """Pose, twist, odometry, IMU, /clock and /tf of one body. Use ``configure`` for what parameters switch on and off.
+    """Pose, twist, odometry, IMU, marker, /clock, /tf and /tf_static of one body. Use ``configure`` for what parameters
+    switch on and off.
 
     frames: the world's and the body's. on_matched() is called on the executor's thread when a subscriber comes or goes.
     """
@@ -71,9 +77,11 @@ class StatePublisher:
             (self._publisher(TwistStamped, "twist"), partial(self._in_world, PROJECTIONS["twist"])),
             (self._publisher(Odometry, "odom"), self._odometry),
             (self._publisher(Imu, "imu"), self._imu_message),
+            (self._publisher(Marker, "marker"), BodyMarker(frames, stamps).message),
         ]
         self._clock: Publisher | None = None
         self._tf: Publisher | None = None
+        self._framed: Setup | None = None
         self._sought_tf = False
         self._tf_message: Any = None
         self._silent: tuple[Publisher | None, ...] = ()
@@ -108,6 +116,7 @@ class StatePublisher:
             return
         self._tf_message = TFMessage
         self._tf = self._node.create_publisher(TFMessage, "/tf", qos.TF, event_callbacks=self._events)
+        self._tf_static = self._node.create_publisher(TFMessage, "/tf_static", qos.own(qos.LATCHED))
         self._topics = [*self._topics, (self._tf, self._transform)]
 
     def find_subscribers(self) -> bool:
@@ -124,8 +133,9 @@ class StatePublisher:
         if self._wanted:
             state = run.simulation.state
             row = state.row.tolist()
-            for publisher, message in self._wanted:
-                publisher.publish(message(run, state.time_ns, row))
+            for publisher, make in self._wanted:
+                if (message := make(run, state.time_ns, row)) is not None:
+                    publisher.publish(message)
 
     def pack_all(self, run: ScenarioRun) -> None:
         """Make every message once and publish none, so that what they need is loaded."""
@@ -166,13 +176,26 @@ class StatePublisher:
         felt.x, felt.y, felt.z = force
         return message
 
-    def _transform(self, _: ScenarioRun, time_ns: int, row: list[float]) -> Any:
+    def _transform(self, run: ScenarioRun, time_ns: int, row: list[float]) -> Any:
+        setup = run.simulation.setup
+        if setup is not self._framed:
+            # Frames that messages name, from the centre of mass in body axes; behind those of another body.
+            self._framed, body = setup, setup.body
+            places = {"mesh": -body.center_of_mass, **{n: body.point(p) for n, p in setup.contacts.items()}}
+            fixed = [
+                self._stamped_transform(time_ns, (self._frames[1], f"{self._frames[1]}/{name}"), [*place, *NOT_TURNED])
+                for name, place in places.items()
+            ]
+            self._tf_static.publish(self._tf_message(transforms=fixed))
+        return self._tf_message(transforms=[self._stamped_transform(time_ns, self._frames, row)])
+
+    def _stamped_transform(self, time_ns: int, frames: tuple[str, str], row: Sequence[float]) -> TransformStamped:
         transform = TransformStamped()
         transform.header.stamp.sec, transform.header.stamp.nanosec = self._stamps.of(time_ns)
-        transform.header.frame_id, transform.child_frame_id = self._frames
+        transform.header.frame_id, transform.child_frame_id = frames
         t, r = transform.transform.translation, transform.transform.rotation
-        t.x, t.y, t.z, r.x, r.y, r.z, r.w = row[:7]
-        return self._tf_message(transforms=[transform])
+        t.x, t.y, t.z, r.x, r.y, r.z, r.w = map(float, row[:7])
+        return transform
 
 
 class EventPublisher(Observer):

@@ -102,3 +102,24 @@ def read_string(data: bytes) -> str:
 def time(time_ns: int) -> bytes:
     """A rosgraph_msgs/Clock."""
     return _HEADER + struct.pack("<iI", *divmod(time_ns, 1_000_000_000))
+
+
+class Layout:
+    """A message as it grows, field after field. data: its bytes so far, the header among them."""
+
+    def __init__(self) -> None:
+        self.data = bytearray(_HEADER)
+
+    def pack(self, form: str, *values: float) -> int:
+        """Append numbers of one size, as ``struct`` writes them; returns where the first is."""
+        size = struct.calcsize(f"<{form[-1]}")
+        self.data += bytes(-(len(self.data) - len(_HEADER)) % size)
+        at = len(self.data)
+        self.data += struct.pack(f"<{form}", *values)
+        return at
+
+    def string(self, text: str) -> None:
+        """Append a string."""
+        encoded = text.encode() + b"\0"
+        self.pack("I", len(encoded))
+        self.data += encoded

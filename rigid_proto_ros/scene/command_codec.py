@@ -11,7 +11,7 @@ from typing import Any
 
 from ..base.errors import CommandRefused, InputError
 from ..base.vectors import vector
-from ..motion.frames import RESERVED_WORDS, parse_frame
+from ..motion.frames import RESERVED_WORDS, body_names, parse_frame
 from ..parameters.declarations import Parameters
 from ..simulation.commands import (
     Change,
@@ -62,8 +62,9 @@ def frame_names(parameters: Parameters, node_name: str) -> Names:
     means something else in a ``frame_id``: commands would act in other axes or at another point than they say.
     """
     world = parameters.world_frame
-    body = parameters.body_frame or node_name.rpartition("/")[2] or "rigid_body"
-    for field, name, own, other in (("body_frame", body, "body", world), ("world_frame", world, "world", body)):
+    body = parameters.body_frame or node_name.strip("/") or "rigid_body"
+    short = body_names(body)[-1]
+    for field, name, own, other in (("body_frame", short, "body", world), ("world_frame", world, "world", body)):
         if name == other or (name != own and name in RESERVED_WORDS):
             words = ", ".join(sorted(RESERVED_WORDS - {own}))
             raise InputError(field, name, f"a name that isn't the other frame's, and none of {words}")
@@ -120,8 +121,8 @@ def _command(kind: str, content: Mapping[str, Any], names: Names) -> Command:
         frame = parse_frame(frame_id, world, body)
         force, torque = vector(content["force"]), vector(content["torque"])
         return WrenchCommand(kind == "wrench", frame, force, torque, frame_id, stamp_ns=stamp_ns)
-    in_world, in_body = dict.fromkeys(("world", world), "world"), dict.fromkeys(("body", body), "body")
-    in_mesh = dict.fromkeys((MESH_FRAME, f"{body}/mesh"), "mesh")
+    in_world, in_body = dict.fromkeys(("world", world), "world"), dict.fromkeys(body_names(body), "body")
+    in_mesh = dict.fromkeys((MESH_FRAME, *(f"{name}/mesh" for name in body_names(body))), "mesh")
     if kind == "string_target":
         _axes(frame_id, {"": "world", **in_world}, f"{world}: the target is a point of the world")
         return MoveString(vector(content["point"]), frame_id, stamp_ns=stamp_ns)

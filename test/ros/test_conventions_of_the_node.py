@@ -195,7 +195,7 @@ def test_two_nodes_of_one_domain_do_not_mix(rig, tmp_path):
         tool.advertise("/lab/hit")
         before = rig.counters()
         # The names of its own frames, beside the words for them.
-        for frame in ("tool@com", "map@com", "map", "tool", "world", "body@origin"):
+        for frame in ("tool@com", "map@com", "map", "lab/tool", "world", "body@origin"):
             tool.publish("/lab/hit", wrench_message(0, f"{frame};impulse", (1.0, 0.0, 0.0)))
         tool.until(lambda: len(tool.events()) == 6, "the pokes")
         report = tool.diagnostics()
@@ -203,9 +203,9 @@ def test_two_nodes_of_one_domain_do_not_mix(rig, tmp_path):
         assert report["name"] == "/lab/tool: simulation"
         assert rig.gained(before, "poke_received") == {} and rig.events() == []
         odometry = tool.until(lambda: tool.heard("odom", last=1), "odometry")[0]
-        assert (odometry["header"]["frame_id"], odometry["child_frame_id"]) == ("map", "tool")
+        assert (odometry["header"]["frame_id"], odometry["child_frame_id"]) == ("map", "lab/tool")
         inertia = tool.until(lambda: tool.heard("inertia"), "its inertia")[0]
-        assert inertia["header"]["frame_id"] == "tool/mesh"
+        assert inertia["header"]["frame_id"] == "lab/tool/mesh"
         # What a user overrides is of that topic alone.
         depths = [f"qos_overrides./lab/tool/{topic}.publisher.depth" for topic in ("pose", "twist")]
         assert list(tool.get(*depths).values()) == [3, 10]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib.util
+import logging
 import runpy
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 import rigid_proto_ros
+from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.parameters.declarations import PARAMETERS
 from rigid_proto_ros.ros.poke_client import main as poke_client
 
@@ -27,10 +29,11 @@ LAUNCH_INSTALLED = importlib.util.find_spec("launch_ros") is not None
 def launch_file(monkeypatch):
     """What the launch file defines, with stand-ins for launch."""
     keep = lambda *_, **given: SimpleNamespace(**given)  # noqa: E731
-    configuration = lambda name: SimpleNamespace(perform=lambda context: context[name])  # noqa: E731
+    configuration = lambda name: SimpleNamespace(perform=lambda context: context.launch_configurations[name])  # noqa: E731
     for name, content in {
         "launch": {"LaunchContext": dict, "LaunchDescription": keep},
         "launch.actions": dict.fromkeys(("DeclareLaunchArgument", "OpaqueFunction", "Shutdown"), keep),
+        "launch.logging": {"get_logger": logging.getLogger},
         "launch.substitutions": {"LaunchConfiguration": configuration},
         "launch_ros": {},
         "launch_ros.actions": {"Node": keep},
@@ -43,7 +46,7 @@ def launch_file(monkeypatch):
 def launched(launch_file):
     """launched(arguments): the actions."""
     defaults = {name: default for name, default, _ in launch_file.ARGUMENTS}
-    return lambda **given: launch_file.nodes({**defaults, **given})
+    return lambda **given: launch_file.nodes(SimpleNamespace(launch_configurations={**defaults, **given}))
 
 
 def test_every_argument_is_described_and_used_and_those_that_become_parameters_are_the_scenes_by_default(launch_file):
@@ -81,6 +84,24 @@ def test_a_node_of_another_name_gets_the_scene_its_own_section_and_a_mesh_beside
     shared = {"mesh": str(tmp_path / "part.obj"), "viewer": "web", "mass": 2.0}
     assert launched(scene=str(scene), name="nut")[0].parameters == [{**shared, "density": 1.0}]
     assert launched(scene=str(scene), name="nut", namespace="lab")[0].parameters == [{**shared, "density": 3.0}]
+
+
+def test_any_parameter_is_taken_by_its_name_over_a_file_of_parameters_over_the_scene(launched, tmp_path, caplog):
+    own = tmp_path / "own.yaml"
+    own.write_text("/**: {ros__parameters: {mass: 2.0}}\n")
+    given = {"publish_rate": "500", "gravity": "[0, 0, -9.81]", "publish_tf": "true", "contacts.top": "[0.0, 0.0, 0.1]"}
+    (node,) = launched(params_file=str(own), log_level="debug", integrator="rk4", **given)
+    values = {"publish_rate": 500.0, "gravity": [0.0, 0.0, -9.81], "publish_tf": True, "contacts.top": [0.0, 0.0, 0.1]}
+    assert node.parameters[1:] == [str(own), {"integrator": "rk4", **values}]
+    assert node.ros_arguments == ["--log-level", "debug"]
+    assert launched(name="nut", params_file=str(own))[0].parameters[1] == {"mass": 2.0}
+    with pytest.raises(InputError, match="publish_rate"):
+        launched(publish_rate="fast")
+    # What is nearly one is warned of; the rest may be another launch file's.
+    assert launched(publish_rat="500", world="empty")[0].parameters == launched()[0].parameters
+    assert [r.getMessage() for r in caplog.records] == [
+        "publish_rat:=500 is no parameter; did you mean 'publish_rate'?"
+    ]
 
 
 def test_a_script_is_a_file_or_the_name_of_a_bundled_one(launched, tmp_path, monkeypatch) -> None:

@@ -138,7 +138,10 @@ def test_a_script_is_sent_as_it_is_listed_each_instant_in_one_message(listed) ->
 
 def test_a_poke_in_the_frame_of_the_nodes_own_name_is_read_as_the_node_reads_it() -> None:
     content = {"stamp_ns": 0, "frame_id": "rigid_body@tip", "force": [1, 0, 0], "torque": [0, 0, 0]}
-    assert of_event("poke", content, ("world", "rigid_body")).frame == Frame("body", ("contact", "tip"))
+    for body in ("rigid_body", "lab/rigid_body"):
+        assert of_event("poke", content, ("world", body)).frame == Frame("body", ("contact", "tip"))
+    content["frame_id"] = "lab/rigid_body@tip"
+    assert of_event("poke", content, ("world", "lab/rigid_body")).frame == Frame("body", ("contact", "tip"))
 
 
 @pytest.mark.parametrize(
@@ -157,7 +160,8 @@ def test_a_frame_whose_name_means_something_else_in_a_command_is_refused(world, 
     with pytest.raises(InputError, match=f"^{refused}: "):
         frame_names(Parameters(world_frame=world, body_frame=body), node)
     assert frame_names(Parameters(world_frame="map", body_frame="body"), node) == ("map", "body")
-    assert frame_names(Parameters(), "lab/tool") == ("world", "tool")
+    # Two bodies of one name don't share a frame on /tf.
+    assert frame_names(Parameters(), "/lab/tool") == ("world", "lab/tool")
 
 
 def test_what_moves_nothing_has_no_command_and_what_is_damaged_is_named() -> None:
