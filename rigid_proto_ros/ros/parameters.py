@@ -112,7 +112,24 @@ class LiveParameters:
         self._states = states
 
     def set_together(self, parameters: list[RosParameter]) -> SetParametersResult:
-        """Convert, check together, and pass to the physics thread; after a refusal nothing is changed."""
+        """Convert, check together, and pass to the physics thread; after a refusal nothing is changed. A ballast that
+        is deleted has no mass any more.
+        """
+        gone = [p.name for p in parameters if p.type_ == RosParameter.Type.NOT_SET and self._is_ballast(p.name)]
+        given = [p for p in parameters if p.name not in gone]
+        result = self._set([*given, *(ros_parameter(name, self._without_mass(name)) for name in gone)])
+        if result.successful:
+            for name in gone:
+                self._node.undeclare_parameter(name)
+        return result
+
+    def _is_ballast(self, name: str) -> bool:
+        return name.startswith("ballast.") and self._node.has_parameter(name)
+
+    def _without_mass(self, name: str) -> list[float]:
+        return [0.0, *self._node.get_parameter(name).value[1:]]
+
+    def _set(self, parameters: list[RosParameter]) -> SetParametersResult:
         try:
             parameters = converted(parameters)
         except InputError as error:
@@ -161,7 +178,8 @@ class LiveParameters:
         """Whether it has that value: among these by name, or else as rclpy's parameter."""
         name = parameter.name
         if name not in values and not self._node.has_parameter(name):
-            return False
+            # A ballast that was deleted.
+            return name.startswith("ballast.") and parameter.value[0] == 0.0
         value = values[name] if name in values else self._node.get_parameter(name).value
         return bool(_plain(value) == _plain(parameter.value))
 

@@ -75,8 +75,7 @@ def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body
     named: set[str] = set()
     for section, parameters in _sections(name, root, ""):
         values = dict(_values(name, parameters, ""))
-        # A section without a namespace is for a node of that name in any.
-        if section != f"/{full_name.rpartition('/')[2]}" and not _section_form(section).match(full_name):
+        if not _section_form(section).match(full_name):
             scene.unused.append(section)
             continue
         scene.has_section = True

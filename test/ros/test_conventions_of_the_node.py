@@ -165,6 +165,22 @@ def test_a_dump_of_a_running_node_is_its_scene(rig, tmp_path):
         assert make_scenario(values).parameters == first.parameters
 
 
+def test_a_ballast_is_deleted_as_ros2_param_delete_does_it(rig):
+    """By a parameter without a value, as that command sends it; nothing else can be deleted."""
+    before = rig.heard("inertia", last=1)[0]["inertia"]
+    rig.set_named({"ballast.nut": [0.1, 0.0, 0.0, 0.07]})
+    rig.until(lambda: rig.heard("inertia", last=1)[0]["inertia"]["m"] == pytest.approx(before["m"] + 0.1), "the nut")
+    assert rig.set_named({"ballast.nut": None}) == [[True, ""]]
+    rig.until(lambda: rig.heard("inertia", last=1)[0]["inertia"] == before, "the body as it was")
+    assert "ballast.nut" not in rig.names()
+    rig.set_named({"mass": 2.0})  # parameters that follow don't bring it back
+    rig.until(lambda: rig.heard("inertia", last=1)[0]["inertia"]["m"] == 2.0, "the mass")
+    assert "ballast.nut" not in rig.names()
+    for name in ("mass", "contacts.tip", "ballast.nut"):
+        ((accepted, reason),) = rig.set_named({name: None})
+        assert not accepted and name in reason, (name, reason)
+
+
 def test_a_nodes_own_dump_can_be_loaded_and_what_differs_acts(rig):
     """What ros2 param load sends: one set_parameters request with all of a file, which sets one after another."""
     own = rig.get(*rig.names())

@@ -91,7 +91,9 @@ def test_a_section_is_for_the_nodes_that_rcl_gives_it_to():
         "accuracy": 0.5,
     }
     assert read_scene_text(NAMESPACED, node_name="tool").values == {"mass": 1.0}
-    assert read_scene_text("tool: {ros__parameters: {mass: 1.0}}", node_name="lab/tool").values == {"mass": 1.0}
+    alone = "tool: {ros__parameters: {mass: 1.0}}"
+    assert read_scene_text(alone, node_name="tool").values == {"mass": 1.0}
+    assert read_scene_text(alone, node_name="lab/tool").values == {}
 
 
 def test_a_file_without_a_section_for_the_node_is_warned_of(tmp_path):
