@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -128,9 +129,10 @@ def _beside(option: str, file: str | Path) -> Iterator[tuple[Path, Path]]:
     path = output_file(option, file).resolve()
     if path.exists() and not path.is_file():
         raise InputError(option, str(file), "the name of a file; this is a device or a pipe")
-    beside = path.with_name(f".{path.stem}.{os.getpid()}{Path(file).suffix}")
+    # A name that nobody can guess, and refused where something has it: a link that was planted there isn't followed.
+    beside = path.with_name(f".{path.stem}.{secrets.token_hex(8)}{Path(file).suffix}")
     try:
-        beside.touch()
+        beside.open("xb").close()
         yield beside, path
     except OSError as error:
         raise InputError(option, str(file), f"a file that can be written ({error.strerror or error})") from None

@@ -39,7 +39,7 @@ EXAMPLES = (
 
 def add_arguments(parser: Parser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("scene", metavar="SCENE.yaml", help="a ROS parameter file, or the name of a bundled scene")
+    parser.add_argument("scene", metavar="SCENE", help="a ROS parameter file, a mesh, or the name of a bundled one")
     parser.add_argument("--script", metavar="POKES.yaml", help="poke script; its times are simulated time")
     parser.add_argument(
         "--duration",

@@ -11,13 +11,13 @@ EXAMPLES = (
     ("rigid_proto up", "the T-handle, with a live view"),
     ("rigid_proto up hammer --viewer web", "another scene, shown in the browser"),
     ("rigid_proto up hammer --viewer workbench", "with the interactive page in addition to the topics"),
-    ("rigid_proto up --mesh part.obj", "your own mesh"),
+    ("rigid_proto up part.obj", "your own mesh"),
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("scene", metavar="SCENE.yaml", nargs="?", default="t_handle", help="scene file or bundled name")
+    parser.add_argument("scene", nargs="?", default="t_handle", help="scene file, mesh or bundled name")
     parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(
         "--viewer",
@@ -31,11 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the node in this process, so that signals reach it directly."""
     from ..scene.scenario import read_scene
-    from ..scene.scene_file import scene_file
+    from ..scene.scene_file import is_mesh, scene_file
     from .executables import as_typed, check_rclpy, text_parameter
 
     check_rclpy("rigid_body_node")
     overrides = text_parameter("mesh", args.mesh) if args.mesh else []
+    alone = is_mesh(args.scene)
+    body = text_parameter("mesh", args.scene) if alone else ["--params-file", str(scene_file(args.scene))]
     scenario = read_scene(args.scene, {"mesh": args.mesh} if args.mesh else {})
     viewer = args.viewer
     if viewer == "auto":
@@ -49,5 +51,5 @@ def run(args: argparse.Namespace) -> int:
     sys.stdout.flush()
     from ..ros.main import main
 
-    ros_arguments = ["--ros-args", "--params-file", str(scene_file(args.scene)), "-p", f"viewer:={viewer}", *overrides]
+    ros_arguments = ["--ros-args", *body, "-p", f"viewer:={viewer}", *overrides]
     return main(["rigid_body_node", *ros_arguments], as_job=True)

@@ -179,7 +179,7 @@ class LiveParameters:
         name = parameter.name
         if name not in values and not self._node.has_parameter(name):
             # A ballast that was deleted.
-            return name.startswith("ballast.") and parameter.value[0] == 0.0
+            return bool(name.startswith("ballast.") and parameter.value[0] == 0.0)
         value = values[name] if name in values else self._node.get_parameter(name).value
         return bool(_plain(value) == _plain(parameter.value))
 

@@ -40,7 +40,7 @@ from ..simulation.commands import nanoseconds
 from ..simulation.record import MAX_BALLASTS, MESH, SCENE, SCENE_PARAMETERS, field_of
 from ..simulation.setup import Setup, make_setup
 from ..simulation.thrusters import make_thruster
-from .scene_file import read_scene_text, scene_file, scene_values
+from .scene_file import named_values, read_scene_text
 from .yaml_text import yaml_value
 
 _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
@@ -158,12 +158,12 @@ def _of_parameters(parameters: Parameters, mesh: Mesh | None) -> Scenario:
 def read_scene(
     name: str, settings: Mapping[str, object] | None = None, warn: Callable[[str], None] = print
 ) -> Scenario:
-    """The scenario of a scene file, by path or bundled name, with ``settings`` on top.
+    """The scenario of a scene file, or of a mesh alone, by path or bundled name, with ``settings`` on top.
 
     An unknown name in a section for this node raises InputError; in ``/**`` it is warned of. A density among the
     settings sets the scene's mass, which would win, to 0, as it does in flight.
     """
-    return make_scenario({**scene_values(scene_file(name), warn), **with_mass_of_density(settings or {})})
+    return make_scenario({**named_values(name, warn), **with_mass_of_density(settings or {})})
 
 
 def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh | None:

@@ -16,9 +16,11 @@ from pathlib import Path
 
 import yaml
 
-from ..base.bundled import scene_names, scene_path
+from ..base.bundled import body_names, scene_names, scene_path
 from ..base.errors import InputError, MeshError, did_you_mean, printable
+from ..mesh.assembly import other_formats
 from ..mesh.locate import resolve_mesh
+from ..mesh.reading import FORMATS
 from ..parameters.declarations import is_ros_parameter, parameter_named
 from .yaml_text import compose_yaml, key_of, read_text, refused, typed
 
@@ -44,6 +46,21 @@ def scene_file(name: str) -> Path:
             "scene", f"there is no file and no bundled scene {name!r}; {' '.join(filter(None, [hint, known]))}"
         )
     return path
+
+
+def is_mesh(name: str) -> bool:
+    """Whether a name that stands for a scene is a mesh's: of a file in a format that is read, by path or package://
+    URI, or of a bundled body that has no scene of its name.
+    """
+    suffix = Path(name).suffix.lower().lstrip(".")
+    if suffix in ("yaml", "yml") or not (name.startswith("package://") or Path(name).is_file()):
+        return name in body_names() and name not in scene_names()
+    return suffix in FORMATS or suffix in other_formats()
+
+
+def named_values(name: str, warn: Callable[[str], None] = print) -> dict[str, object]:
+    """The parameters of a scene, or of a body alone, by path or bundled name; as ``scene_values`` has it."""
+    return {"mesh": name} if is_mesh(name) else scene_values(scene_file(name), warn)
 
 
 @dataclass
@@ -74,7 +91,13 @@ def read_scene_text(text: str, name: str = "scene", node_name: str = "rigid_body
     full_name = f"/{node_name.lstrip('/')}"
     named: set[str] = set()
     for section, parameters in _sections(name, root, ""):
-        values = dict(_values(name, parameters, ""))
+        values: dict[str, object] = {}
+        lines: dict[str, int] = {}
+        for parameter, line, value in _values(name, parameters, ""):
+            if parameter in values:
+                twice = f"{parameter} twice, here and in line {lines[parameter]}"
+                raise InputError(f"{name}, line {line}", twice, "each parameter of a section once")
+            values[parameter], lines[parameter] = value, line
         if not _section_form(section).match(full_name):
             scene.unused.append(section)
             continue
@@ -170,20 +193,20 @@ def typed_value(text: str, name: str) -> object:
     return typed(node)
 
 
-def _values(path: str, node: yaml.Node, prefix: str) -> Iterator[tuple[str, object]]:
-    """The parameters by name that stand in a mapping, those of an inner one below its name."""
+def _values(path: str, node: yaml.Node, prefix: str) -> Iterator[tuple[str, int, object]]:
+    """The parameters that stand in a mapping, those of an inner one below its name: name, line and value."""
     if not isinstance(node, yaml.MappingNode):
         raise refused(node, path, "name: value lines under ros__parameters")
     for key, value in node.value:
-        name = f"{prefix}{key_of(key, path)}"
+        name, line = f"{prefix}{key_of(key, path)}", key.start_mark.line + 1
         if isinstance(value, yaml.MappingNode):
             yield from _values(path, value, f"{name}.")
         elif isinstance(value, yaml.SequenceNode):
-            yield name, _sequence(path, value)
+            yield name, line, _sequence(path, value)
         elif not value.style and value.value == "":
             raise refused(key, path, f"a value behind {name}:")
         else:
-            yield name, typed(value)
+            yield name, line, typed(value)
 
 
 def _sequence(path: str, node: yaml.SequenceNode) -> list[object]:

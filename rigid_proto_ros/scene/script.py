@@ -31,7 +31,7 @@ from ..simulation.commands import (
     WrenchCommand,
     nanoseconds,
 )
-from .yaml_text import flow, load_json, load_yaml, plain, read_text
+from .yaml_text import flow, load_items, load_json, load_yaml, plain, read_text
 
 Stamp = dict[str, Any]
 """A command's stamp_ns and entry."""
@@ -84,7 +84,7 @@ def read_script(path: str | Path) -> list[Command]:
 
 def parse_script(text: str, name: str = "script") -> list[Command]:
     """As ``read_script``, from text."""
-    return expand_script(load_yaml(text, name), name)
+    return expand_script(load_items(text, name), name)
 
 
 def read_schedule(text: str) -> Schedule:
@@ -121,10 +121,12 @@ def expand_schedule(schedule: Schedule) -> list[Command]:
 
 
 def expand_script(entries: Any, name: str = "script", max_commands: int = MAX_ENTRIES, first: int = 1) -> list[Command]:
-    """As ``parse_script``, from what its YAML says: a list of entries, or nothing. first: number of the first entry."""
+    """As ``parse_script``, from what its YAML says: entries in a list or one after another, or nothing. first: number
+    of the first entry.
+    """
     if entries is None:
         entries = []
-    if not isinstance(entries, list):
+    if not isinstance(entries, (list, Iterator)):
         raise InputError(name, type(entries).__name__, "a list of entries such as - {t: 0.5, force: [0, 0, 1]}")
     commands: list[Command] = []
     for number, entry in enumerate(entries, first):

@@ -9,7 +9,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
@@ -49,10 +49,12 @@ def read_text(path: Path, kind: str) -> str:
         raise InputError(str(path), "the file isn't UTF-8 text") from None
 
 
-def compose_yaml(text: str, name: str) -> yaml.Node | None:
-    """The YAML tree of a text, with line numbers; raises InputError, in which ``name`` is the name of the text."""
+def _events(text: str, name: str) -> Iterator[yaml.Event]:
+    """The text's parts one after another, as far as they are YAML without aliases, not too deep; raises InputError, in
+    which ``name`` is the name of the text.
+    """
+    depth = 0
     try:
-        depth = 0
         for event in yaml.parse(text, Loader=_LOADER):
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
             problem = ""
@@ -63,12 +65,26 @@ def compose_yaml(text: str, name: str) -> yaml.Node | None:
             if problem:
                 mark: Any = event.start_mark
                 raise yaml.MarkedYAMLError(problem=problem, problem_mark=mark)
+            yield event
+    except yaml.YAMLError as error:
+        raise _no_yaml(error, name) from None
+
+
+def _no_yaml(error: yaml.YAMLError, name: str) -> InputError:
+    mark = getattr(error, "problem_mark", None)
+    problem = getattr(error, "problem", None) or (str(error).splitlines() or ["text"])[0]
+    place = f"{name}, line {mark.line + 1}" if mark else name
+    return InputError(place, problem, "valid YAML without aliases")
+
+
+def compose_yaml(text: str, name: str) -> yaml.Node | None:
+    """The YAML tree of a text, with line numbers; raises InputError, in which ``name`` is the name of the text."""
+    for _ in _events(text, name):
+        pass  # libyaml's composer ends the process where a text is too deep
+    try:
         return yaml.compose(text, Loader=_LOADER)
     except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        problem = getattr(error, "problem", None) or (str(error).splitlines() or ["text"])[0]
-        place = f"{name}, line {mark.line + 1}" if mark else name
-        raise InputError(place, problem, "valid YAML without aliases") from None
+        raise _no_yaml(error, name) from None
 
 
 def load_json(text: str) -> Any:
@@ -94,23 +110,64 @@ def load_yaml(text: str, name: str) -> Any:
     """What a text says as values, lists and mappings; raises InputError with ``name`` and the line for what is no YAML.
     Tags are left aside.
     """
+    said = load_items(text, name)
+    return list(said) if isinstance(said, Iterator) else said
+
+
+def load_items(text: str, name: str) -> Any:
+    """The same, but of a list its items one after another: a wrong one is found before a long text is read to its end."""
     if (said := load_json(text)) is not None:
         return said
-    node = compose_yaml(text, name)
-    return None if node is None else _value(node, name)
+    events = _events(text, name)
+    for event in events:
+        if isinstance(event, yaml.SequenceStartEvent):
+            return _items(events, name)
+        if isinstance(event, _CONTENT):
+            value = _value(event, events, name)
+            _end(events, name)
+            return value
+    return None
 
 
-def _value(node: yaml.Node, name: str) -> Any:
-    if isinstance(node, yaml.ScalarNode):
-        return typed(node)
-    if isinstance(node, yaml.SequenceNode):
-        return [_value(item, name) for item in node.value]
+_CONTENT = (yaml.ScalarEvent, yaml.CollectionStartEvent)
+
+
+def _items(events: Iterator[yaml.Event], name: str) -> Iterator[Any]:
+    for event in events:
+        if isinstance(event, yaml.SequenceEndEvent):
+            break
+        yield _value(event, events, name)
+    _end(events, name)
+
+
+def _end(events: Iterator[yaml.Event], name: str) -> None:
+    """Raises InputError for what isn't the end of the text."""
+    for event in events:
+        if isinstance(event, yaml.DocumentStartEvent):
+            raise InputError(_place(name, event), "another document", "one document")
+
+
+def _place(name: str, event: yaml.Event) -> str:
+    mark: Any = event.start_mark
+    return f"{name}, line {mark.line + 1}"
+
+
+def _value(event: yaml.Event, events: Iterator[yaml.Event], name: str) -> Any:
+    """What begins with an event and goes on with the next ones."""
+    if isinstance(event, yaml.ScalarEvent):
+        return typed(event)
+    if isinstance(event, yaml.SequenceStartEvent):
+        items = []
+        while not isinstance(item := next(events), yaml.SequenceEndEvent):
+            items.append(_value(item, events, name))
+        return items
     values: dict[str, Any] = {}
-    for key, item in node.value:
-        word = key_of(key, name)
-        if word in values:
-            raise InputError(f"{name}, line {key.start_mark.line + 1}", f"{word} twice in one mapping", "each key once")
-        values[word] = _value(item, name)
+    while not isinstance(key := next(events), yaml.MappingEndEvent):
+        if not isinstance(key, yaml.ScalarEvent):
+            raise InputError(_place(name, key), "a list or a mapping as a key", "a name")
+        if key.value in values:
+            raise InputError(_place(name, key), f"{key.value} twice in one mapping", "each key once")
+        values[str(key.value)] = _value(next(events), events, name)
     return values
 
 
@@ -121,7 +178,7 @@ def key_of(key: yaml.Node, name: str) -> str:
     return str(key.value)
 
 
-def typed(node: yaml.ScalarNode) -> bool | int | float | str:
+def typed(node: yaml.ScalarNode | yaml.ScalarEvent) -> bool | int | float | str:
     """A single value as rcl types it: a quoted one is text."""
     return node.value if node.style else scalar(node.value)
 

@@ -11,8 +11,10 @@ from rigid_proto_ros.base.bundled import scene_names, scene_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.ros.arguments import given_arguments
+from rigid_proto_ros.scene import yaml_text
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text, scene_values
+from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.scene.yaml_text import scalar
 
 NUMBERS = "1 -1 +1 0 007 010 0x10 -0x1F 1. 1.0 .5 -.5 +2.5 1e3 1e-3 1.5E+2 1e400 1_000 0b1 0o7 09 1e e5 --1 1:30"
@@ -155,6 +157,49 @@ def test_names_that_are_none_and_aliases_are_refused_with_their_line(text, words
     with pytest.raises(InputError) as refused:
         read_scene_text(text)
     assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("again", ["    mass: 2.0", "    string:\n      stiffness: 2.0"])
+def test_a_parameter_that_stands_twice_in_a_section_is_refused_with_both_lines(again):
+    text = "rigid_body:\n  ros__parameters:\n    mesh: hammer\n    mass: 1.0\n    string.stiffness: 1.0\n"
+    with pytest.raises(InputError) as refused:
+        read_scene_text(text + again)
+    first, second = (4, 6) if "mass" in again else (5, 7)
+    assert str(refused.value).startswith(f"scene, line {second}: ") and f"line {first}'" in str(refused.value)
+    later = "/**:\n  ros__parameters:\n    mass: 3.0\n"
+    assert read_scene_text(text + later).values["mass"] == 3.0
+
+
+def test_a_mesh_stands_for_the_scene_of_that_body_alone(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(resolve_mesh("hammer"), "part.OBJ")
+    for name in ("part.OBJ", str(tmp_path / "part.OBJ"), "package://rigid_proto_ros/bodies/hammer.obj"):
+        scenario = read_scene(name, {"density": 7850.0})
+        assert scenario.parameters.mesh == name and scenario.parameters.density == 7850.0
+        assert scenario.setup.stays_in_place_of(make_scenario({"mesh": "hammer", "density": 7850.0}).setup)
+    with pytest.raises(InputError, match="bundled scenes are"):
+        read_scene("parts.stl")
+
+
+def test_a_wrong_entry_is_told_before_the_rest_of_a_script_is_read(monkeypatch):
+    entries = "- {t: 0.0, forc: [0.0, 0.0, 1.0]}\n" + "- {t: 0.0, force: [0.0, 0.0, 1.0]}\n" * 5
+    read: list[str] = []
+    monkeypatch.setattr(yaml_text, "typed", lambda event: read.append(event.value) or scalar(event.value))
+    with pytest.raises(InputError, match="entry 1: there is no key forc"):
+        parse_script(entries)
+    monkeypatch.undo()
+    assert read == ["0.0", "0.0", "0.0", "1.0"]
+    for text, words in (
+        ("- {t: 0.0, force: [0, 0, 1]}\n---\n- {t: 2}", "another document"),
+        ("- {t: 0.0, t: 1.0, force: [0, 0, 1]}", "line 1: got 't twice in one mapping'"),
+        ("- {t: 0.0, [a]: 1.0}", "line 1"),
+        ("{t: 0.0}", "got 'dict'"),
+        ("- {t: 0.0, force: [0, 0, 1]}\n- {t: 0.0", "line 3"),
+    ):
+        with pytest.raises(InputError) as refused:
+            parse_script(text)
+        assert words in str(refused.value), text
+    assert parse_script("") == parse_script("# nothing\n") == parse_script("[]") == []
 
 
 def test_a_huge_whole_number_is_a_double():
