@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import subprocess
 import sys
@@ -101,7 +102,8 @@ def fly(observer: Observer, states: np.ndarray, setup: Setup = SETUP) -> None:
 
 def event_line(time_ns: int, kind: str) -> str:
     """A line as the event log writes it."""
-    return f'{{"time_ns": {time_ns}, "kind": "{kind}", "content": {{"force": [0.0, 3.0, 0.0]}}, "sha256": "00"}}'
+    content = {"stamp_ns": 0, "frame_id": "body@com;duration=0.2", "force": [0.0, 3.0, 0.0], "torque": [0.0, 0.0, 0.0]}
+    return json.dumps({"time_ns": time_ns, "kind": kind, "content": content, "sha256": "00"})
 
 
 WAIT_S = 180.0

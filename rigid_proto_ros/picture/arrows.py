@@ -76,6 +76,7 @@ class Loads:
         self.acting: dict[int, Acting] = {}
         self._ended: list[Acting] = []
         self._drawn: set[str] = set()
+        self._any = False
 
     def began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
         """A load begins to act."""
@@ -98,6 +99,26 @@ class Loads:
             if acting.load.point.any():
                 point = before.mesh_point(acting.load.point) * after.scale - after.center_of_mass
                 acting.load = replace(acting.load, point=point)
+
+    def totals(self, times_ns: IntArray, R: FloatArray) -> FloatArray | None:
+        """Magnitudes (n, 2) of the force [N] and of the torque about the COM [N m] that all of them give together, at
+        times (n,) and attitudes R (n, 3, 3); impulses act at an instant and don't count. None before the first load.
+        """
+        self._any |= bool(self.acting) or any(acting.load.kind != "impulse" for acting in self._ended)
+        if not self._any:
+            return None
+        forces, torques = np.zeros((2, len(times_ns), 3))
+        for acting in (*self.acting.values(), *self._ended):
+            present = (times_ns >= acting.begin_ns) & (times_ns < acting.end_ns)
+            if acting.load.kind == "impulse" or not present.any():
+                continue
+            turned, load = R[present], acting.load
+            force, torque = (np.asarray(value, dtype=float) for value in (load.force, load.torque))
+            if load.axes == "body":
+                force, torque = turned @ force, turned @ torque
+            forces[present] += force
+            torques[present] += torque + np.cross(turned @ np.asarray(load.point, dtype=float), force)
+        return np.column_stack([np.linalg.norm(forces, axis=1), np.linalg.norm(torques, axis=1)])
 
     def draw(
         self,

@@ -202,7 +202,9 @@ class Picture:
                 backend.mesh(name, mesh)
                 backend.place(name, attitudes=principal, scale=sizes)
         three = np.array([3])
-        backend.arrows(style.BODY_AXES, three, AXIS_LENGTH * shape.size * np.eye(3))
+        mesh_axes = AXIS_LENGTH * shape.size * np.eye(3)
+        backend.arrows(style.BODY_AXES, three, mesh_axes)
+        backend.labels(style.BODY_AXES, three, LABEL_BEYOND * mesh_axes, ["x", "y", "z"])
         ends = PRINCIPAL_LENGTH * shape.size * shape.axes.T
         backend.arrows(style.PRINCIPAL_AXES, three, ends)
         backend.labels(style.PRINCIPAL_AXES, three, LABEL_BEYOND * ends, ["I₁", "I₂", "I₃"])
@@ -256,6 +258,8 @@ class Picture:
             backend.points(style.COM_TRAIL, each, rows[:, 0:3])
         string = self.string.rows(times_ns, rows, R) if self.string.was_tied else None
         weight = 9.81 * body.mass
+        if self._wanted("plots") and (commanded := self.loads.totals(times_ns, R)) is not None:
+            backend.scalars(style.COMMANDED, commanded)
         self.loads.draw(backend, self._wanted, times_ns, rows, R, self.scales, self.shape.size, weight)
         if string is not None:
             self._draw_string(string, rows)

@@ -19,6 +19,7 @@ AXES_COLOURS = (RED, GREEN, BLUE)
 BODY_COLOUR = (214, 205, 190)
 GHOST_COLOUR = (120, 180, 255)
 OMEGA_COLOUR, MOMENTUM_COLOUR = (60, 190, 190), VIOLET
+FLOOR_COLOUR = (110, 110, 110)
 STRING_COLOUR, HAND_COLOUR, SLACK_COLOUR = (250, 180, 60), (250, 130, 40), GREY
 FORCE_COLOUR, TORQUE_COLOUR = (205, 25, 25), (255, 210, 120)
 LOAD_COLOURS = {"wrench": ORANGE, "poke": FORCE_COLOUR, "impulse": (255, 70, 200), "thruster": (90, 220, 255)}
@@ -35,6 +36,8 @@ PRINCIPAL_AXES = "world/body/principal_axes"
 BOUNDING_BOX = "world/body/bounding_box"
 INERTIA_BOX = "world/body/equimomental_box"
 INERTIA_ELLIPSOID = "world/body/equimomental_ellipsoid"
+FLOOR = "world/floor"
+"""Lines at rest, with their distance, so that sizes and ways can be read off."""
 CENTRE = "world/centre"
 """The COM with world axes: the place from which views follow the body without turning with it."""
 OMEGA = "world/centre/angular_velocity"
@@ -113,6 +116,8 @@ ANGULAR_VELOCITY_PRINCIPAL = "plots/angular_velocity_principal"
 POSITION = "plots/position"
 GHOST_ANGLE = "plots/ghost_angle"
 STRING_LINE_DISTANCE = "plots/string_line_distance"
+COMMANDED = "plots/commanded"
+"""What the commands that act give together: not the string's force."""
 
 ENERGY_SERIES = (("translational", BLUE), ("rotational", ORANGE), ("gravity", GREEN))
 TOTAL_ENERGY_SERIES, STRING_ENERGY_SERIES = (("total", GREY),), (("string", YELLOW),)
@@ -128,8 +133,12 @@ SERIES = {
     POSITION: (("x", RED), ("y", GREEN), ("z", BLUE)),
     GHOST_ANGLE: (("ghost to body", GHOST_COLOUR),),
     STRING_LINE_DISTANCE: (("COM to the string's line", YELLOW),),
+    COMMANDED: (("|force| [N]", RED), ("|torque| [N m]", VIOLET)),
 }
 """Per plot the names and colours of its scalars, in order. Of energies the last is there with a string alone."""
+
+WHOLES = ("|L|", "total")
+"""Scalars that are the sum or the size of others of their plot."""
 
 ROUNDING = 1e-9
 """Relative: what is smaller comes from the arithmetic, or from the digits of a mesh's coordinates."""

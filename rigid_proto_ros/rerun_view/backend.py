@@ -35,7 +35,7 @@ ROS_TIME = "ros_time"
 SCENE = "session/scene"
 """The parameters in force."""
 EVENTS = "events"
-"""Event lines as logged."""
+"""What the event log tells, in words."""
 REFUSALS = "log/refusals"
 ACCURACY = "log/accuracy"
 """Why the motion is held to less than its accuracy."""
@@ -47,6 +47,9 @@ ONE_AT_A_TIME = threading.Lock()
 """For who makes recordings and who gives closed ones back: some of these functions wait for the library's own lock
 without letting other threads of Python run, which its holder may wait for (seen once, of two files that were recorded).
 """
+
+LINE, BAND, CLEAR = 1.5, 7.0, 110
+"""Widths of plotted lines, and how opaque a whole is: a band, in which the line of a part shows that is equal to it."""
 
 INVISIBLE = 1e-9
 """A scale that nobody sees; the viewer refuses 0, which has no inverse."""
@@ -273,11 +276,11 @@ class RerunBackend(Backend):
         """Log labels as points of no size, below the part; those of loads change, others are logged once."""
         entity, changes = f"{name}/label", name.startswith(style.LOADS)
         if len(texts):
-            colour, known = style.STYLES[name].colours[0], None if changes else list(texts[: counts.max()])
+            colours, known = list(style.STYLES[name].colours), None if changes else list(texts[: counts.max()])
             self._look(
                 entity,
                 0.0,
-                lambda: rr.Points3D.from_fields(colors=colour, radii=0.0, labels=known, show_labels=True),
+                lambda: rr.Points3D.from_fields(colors=colours, radii=0.0, labels=known, show_labels=True),
             )
         labels = list(texts) if changes else None
         self.send(entity, rr.Points3D.columns(positions=positions, labels=labels).partition(counts))
@@ -288,9 +291,14 @@ class RerunBackend(Backend):
         if finite.size:
             low, high = self.plotted.get(name, (np.inf, -np.inf))
             self.plotted[name] = (min(low, float(finite.min())), max(high, float(finite.max())))
-        names, colours = zip(*style.SERIES[name][: values.shape[1]], strict=True)
-        self._look(name, len(names), lambda: rr.SeriesLines(names=names, colors=colours, widths=[1.5] * len(names)))
-        self.send(name, scalar_columns(values))
+        series = style.SERIES[name][: values.shape[1]]
+        # Bands first: what comes later is drawn on them.
+        order = sorted(range(len(series)), key=lambda k: series[k][0] not in style.WHOLES)
+        names, colours = zip(*(series[k] for k in order), strict=True)
+        widths = [BAND if name in style.WHOLES else LINE for name in names]
+        colours = [(*c, CLEAR if n in style.WHOLES else 255) for n, c in zip(names, colours, strict=True)]
+        self._look(name, len(names), lambda: rr.SeriesLines(names=names, colors=colours, widths=widths))
+        self.send(name, scalar_columns(values[:, order]))
 
 
 def _mesh_entity(name: str, number: int) -> str:

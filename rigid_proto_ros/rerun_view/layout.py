@@ -40,6 +40,9 @@ NUMBERED_TICKS_MAX = 5.0
 ROOM = 0.08
 """Of what is plotted, at both ends of an axis: no curve lies on the frame, and no number on the time axis."""
 
+FLOOR_CELLS, FLOOR_BELOW = 5, 1.0
+"""Of the floor: squares from its middle to its edge, and how far below the body it is, in the reach of the flight."""
+
 FAR_SECONDS = 3600.0
 """[simulated s] Of the path of a COM that falls: all of it."""
 
@@ -54,6 +57,7 @@ TITLES = {
     style.GHOST_ANGLE: f"{style.GHOST_ANGLE_TITLE} [{style.ANGLE_UNIT}]",
     style.POSITION: "Position of the COM [m]",
     style.STRING_LINE_DISTANCE: "Distance of the COM from the string's line [m]",
+    style.COMMANDED: "Commanded",
 }
 
 HIDDEN = (style.BOUNDING_BOX, style.INERTIA_BOX, style.INERTIA_ELLIPSOID, style.PRINCIPAL_AXES)
@@ -108,9 +112,12 @@ def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
             origin="/",
             contents=[f"/{e.EVENTS}", f"/{e.REFUSALS}", f"/{e.ACCURACY}"],
             name="Commands",
-            columns=rrb.TextLogColumns(timeline_columns=[e.SIM_TIME], text_log_columns=["loglevel", "body"]),
+            columns=rrb.TextLogColumns(timeline_columns=[e.SIM_TIME], text_log_columns=["body"]),
         )
-        flight = rrb.Vertical(flight, commands, row_shares=[5, 1])
+        below = [commands]
+        if finished is None or style.COMMANDED in finished.plotted:
+            below.append(_plot(style.COMMANDED, finished))
+        flight = rrb.Vertical(flight, rrb.Horizontal(*below), row_shares=[4, 1])
     turns_freely = subject.ghost or not (subject.dropped_term or subject.tied or subject.falls)
     poinsot = [_poinsot_view()] if turns_freely else []
     plots = [_plot(name, finished) for name in subject.plots if finished is None or name in finished.plotted]
@@ -126,6 +133,26 @@ def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,
     )
+
+
+def floor(subject: Subject, start: Vector3) -> tuple[Any, Any]:
+    """A square of lines below where the body starts (3,) [m], and the label that says how far apart they are."""
+    apart = _round_below(0.5 * subject.reach)
+    half, z = FLOOR_CELLS * apart, float(start[2]) - FLOOR_BELOW * subject.reach
+    ends = [(apart * k, sign * half) for k in range(-FLOOR_CELLS, FLOOR_CELLS + 1) for sign in (-1.0, 1.0)]
+    across = [[start[0] + u, start[1] + v, z] for u, v in ends]
+    along = [[start[0] + v, start[1] + u, z] for u, v in ends]
+    strips = [points[k : k + 2] for points in (across, along) for k in range(0, len(points), 2)]
+    corner = [[start[0] + half, start[1] - half, z]]
+    look = {"colors": [style.FLOOR_COLOUR], "radii": -0.4}  # below 0: in points of the screen
+    label = rr.Points3D(corner, colors=[style.GREY], radii=0.0, labels=[f"{apart:g} m"], show_labels=True)
+    return rr.LineStrips3D(strips, **look), label
+
+
+def _round_below(length: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that isn't longer."""
+    power = 10.0 ** math.floor(math.log10(length))
+    return next(n * power for n in (5.0, 2.0, 1.0) if n * power <= length or n == 1.0)
 
 
 def value_axis(low: float, high: float, least: float = 0.0) -> tuple[float, float]:
@@ -181,7 +208,7 @@ def _poinsot_view() -> Any:
     """The ellipsoid of inertia rolling on the invariable plane."""
     name = "Poinsot: the inertia ellipsoid rolls on the invariable plane"
     overrides = {"/" + style.POINSOT_HERPOLHODE: _last_seconds(HERPOLHODE_SECONDS)}
-    eye, target = np.array([3.2, -2.55, 1.25]), np.array([0.0, 0.0, -0.45])
+    eye, target = np.array([2.1, -1.65, 0.75]), np.array([0.0, 0.0, -0.35])
     return _view(style.POINSOT, "$origin/**", name, eye, target, overrides)
 
 

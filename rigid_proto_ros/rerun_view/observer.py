@@ -50,7 +50,8 @@ from ..simulation.observer import (
 from ..simulation.setup import Setup
 from . import backend as e
 from .backend import RerunBackend, Stream, forget_closed_recordings, last_line
-from .layout import Finished, Subject, blueprint
+from .layout import Finished, Subject, blueprint, floor
+from .words import words_of
 
 FLUSH_TIMEOUT_S = 5.0
 """A disk that takes longer than this to take half a second of data counts as lost."""
@@ -187,6 +188,11 @@ class RerunObserver(WritingObserver):
             tied=tied,
             dropped_term=not setup.scene.gyroscopic,
         )
+        if not subject.falls:
+            # Below a body that falls it would look like ground.
+            lines, label = floor(subject, setup.initial[0:3])
+            stream.log_static(style.FLOOR, lines)
+            stream.log_static(f"{style.FLOOR}/scale", label)
         stream.send_layout(blueprint(subject, finished))
 
     # What happens in it
@@ -212,7 +218,7 @@ class RerunObserver(WritingObserver):
                     self._backend.begin(np.array([time_ns]), np.array([wall_ns]))
                     self._send_scene()
                 case Logged(_, line):
-                    self._lines.setdefault(e.EVENTS, []).append((time_ns, wall_ns, line))
+                    self._lines.setdefault(e.EVENTS, []).append((time_ns, wall_ns, words_of(line)))
                 case Refused(_, reason, message):
                     self._lines.setdefault(e.REFUSALS, []).append((time_ns, wall_ns, f"refused ({reason}): {message}"))
                 case AccuracyFloor(_, floor):

@@ -33,6 +33,9 @@ NOTICE_GONE_S = 6.0
 
 DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan-drivers` draws without a graphics card"
 
+BAR = 37
+"""Rows of the window's own bar, which isn't of the flight: menu, search, and what the viewer says of the machine."""
+
 STAGES = 3
 """Of a picture: viewer started, recording loaded, drawn."""
 
@@ -53,7 +56,7 @@ def take_picture(
     check_picture(picture)
     progress(0, STAGES)
     started = time.monotonic()
-    with headless_viewer(*size) as client:
+    with headless_viewer(size[0], size[1] + BAR) as client:
         progress(1, STAGES)
         show(client, Path(recording))
         progress(2, STAGES)
@@ -63,7 +66,7 @@ def take_picture(
         if is_one_colour(pixels):
             raise InputError("--at", at_s, "a time at which the view shows something; this picture came out blank")
         with whole_file("-o", picture) as beside:
-            beside.write_bytes(pixels)
+            beside.write_bytes(_without_bar(pixels))
 
 
 def check_picture(picture: str | Path) -> None:
@@ -149,6 +152,12 @@ def _stable_picture(client: Any) -> bytes:
         if after == before and not is_one_colour(after) or time.monotonic() > deadline:
             return after
         before = after
+
+
+def _without_bar(png: bytes) -> bytes:
+    with Image.open(io.BytesIO(png)) as image:
+        image.crop((0, BAR, *image.size)).save(cropped := io.BytesIO(), "PNG")
+    return cropped.getvalue()
 
 
 def is_one_colour(png: bytes) -> bool:

@@ -115,7 +115,7 @@ def load_yaml(text: str, name: str) -> Any:
 
 
 def load_items(text: str, name: str) -> Any:
-    """The same, but of a list its items one after another: a wrong one is found before a long text is read to its end."""
+    """The same, but of a list its items one by one: a wrong one is found before a long text is read to its end."""
     if (said := load_json(text)) is not None:
         return said
     events = _events(text, name)

@@ -93,6 +93,12 @@ def test_what_cannot_be_drawn_is_refused_with_what_would_be_accepted(recording, 
         take(str(recording), *words)
 
 
+def one_colour() -> bytes:
+    """A picture in which nothing is."""
+    Image.new("RGB", (60, 60)).save(picture := io.BytesIO(), "PNG")
+    return picture.getvalue()
+
+
 @pytest.fixture
 def opened(monkeypatch):
     """Times of the states in what a viewer was given, in which nothing is drawn."""
@@ -101,7 +107,7 @@ def opened(monkeypatch):
     stand_in = {
         "headless_viewer": lambda *_: client,
         "show": lambda _, path: shown.append(flight.drawn(path)),
-        "_stable_picture": lambda _: b"",
+        "_stable_picture": lambda _: one_colour(),
         "NOTICE_GONE_S": 0,
         "is_one_colour": lambda _: False,
     }
