@@ -144,9 +144,9 @@ def floor(subject: Subject, start: Vector3) -> tuple[Any, Any]:
     along = [[start[0] + v, start[1] + u, z] for u, v in ends]
     strips = [points[k : k + 2] for points in (across, along) for k in range(0, len(points), 2)]
     corner = [[start[0] + half, start[1] - half, z]]
-    look = {"colors": [style.FLOOR_COLOUR], "radii": -0.4}  # below 0: in points of the screen
     label = rr.Points3D(corner, colors=[style.GREY], radii=0.0, labels=[f"{apart:g} m"], show_labels=True)
-    return rr.LineStrips3D(strips, **look), label
+    # A radius below 0 is in points of the screen.
+    return rr.LineStrips3D(strips, colors=[style.FLOOR_COLOUR], radii=-0.4), label
 
 
 def _round_below(length: float) -> float:

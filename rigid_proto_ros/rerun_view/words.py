@@ -18,7 +18,7 @@ _PLAIN = {
 def words_of(line: str) -> str:
     """What a line says, which is JSON."""
     event = json.loads(line)
-    kind, content = event["kind"], event["content"]
+    kind, content = str(event["kind"]), event["content"]
     match kind:
         case "wrench" | "poke":
             return _load(kind, content)
