@@ -51,15 +51,15 @@ COLUMNS = (
     "way",
     "step_s",
     "flips",
-    "energy",
-    "momentum",
+    "energy_change",
+    "momentum_change",
     "momentum_turn_deg",
     "ghost",
     "ghost_apart_rad",
     "ghost_apart_10_s_rad",
     "why",
 )
-"""energy, momentum: at the end over that at the start. momentum_turn_deg: the largest angle by which the angular momentum
+"""energy_change, momentum_change: at the end, of that at the start. momentum_turn_deg: the largest angle by which the angular momentum
 has turned. ghost_apart_rad: the largest angle between the attitudes of the engine's body and the ghost's.
 """
 
@@ -108,8 +108,8 @@ def measures(states: np.ndarray) -> dict[str, float]:
     directions = momenta / sizes[:, None]
     return {
         "flips": int((np.diff(np.sign(rates[:, 1])) != 0).sum()),
-        "energy": energies[-1] / energies[0],
-        "momentum": sizes[-1] / sizes[0],
+        "energy_change": energies[-1] / energies[0] - 1.0,
+        "momentum_change": sizes[-1] / sizes[0] - 1.0,
         "momentum_turn_deg": float(np.degrees(_angles(directions - directions[0]).max())),
     }
 

@@ -330,9 +330,9 @@ def engines() -> str:
     for engine, way in dict.fromkeys((row["engine"], row["way"]) for row in measured):
         ways = [found[engine, way, step] for step in steps]
         cells = [cell for row in ways for cell in _flown_in_engine(row)]
-        version = f"{ways[0]['version']}" if engine == "rigid_proto" else f"{ways[0]['package']} {ways[0]['version']}"
+        version = ways[0]["version"] if engine == "rigid_proto" else f"{ways[0]['package']} {ways[0]['version']}"
         rows.append((f"{engine}, {way.replace('_', ' ')}", version, *cells, _beside_ghost(ways)))
-    heads = [f"{name}, {_STEPS[step]}" for step in steps for name in ("flips", "energy ×", "L turns by up to")]
+    heads = [f"{name}, {_STEPS[step]}" for step in steps for name in ("flips", "ΔE/E", "turn of L")]
     head = ("engine", "version", *heads, "ghost of the page, and how far apart after 60 s")
     return f"{_measured_on(measured[0])}.\n\n{_table(head, rows)}"
 
@@ -343,9 +343,7 @@ _STEPS = {0.0166667: "1/60 s", 0.001: "1 ms"}
 def _flown_in_engine(row: dict) -> tuple[str, ...]:
     if row["why"]:
         return f"not run: {row['why']}", "", ""
-    off = row["energy"] - 1.0
-    energy = f"{row['energy']:.3g}" if abs(off) > 5e-3 else f"1 {'+' if off >= 0.0 else '−'} {abs(off):.0e}"
-    return f"{row['flips']:.0f}", energy, f"{row['momentum_turn_deg']:.2g}°"
+    return f"{row['flips']:.0f}", f"{row['energy_change']:+.2g}", f"{row['momentum_turn_deg']:.2g}°"
 
 
 def _beside_ghost(rows: list[dict]) -> str:
