@@ -46,7 +46,7 @@ async function licences(inputs) {
   return texts;
 }
 
-const script = await bundled("src/main.ts", { format: "esm" });
+const script = await bundled("src/main.ts", { format: "esm", loader: { ".csv": "text" } });
 const style = await bundled("src/style.css", {});
 const own = (await beside("../LICENSE")).trim();
 const texts = [`rigid_proto_ros\n\n${own}`, ...(await licences(script.inputs))];

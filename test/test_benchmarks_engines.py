@@ -4,10 +4,10 @@
 import re
 from pathlib import Path
 
-import engines
 import numpy as np
 import pytest
 
+import engines
 from result_table import read_rows
 
 ROOT = Path(engines.__file__).parent.parent

@@ -27,7 +27,7 @@ import type { Take } from "./take.ts";
 const KEEP_NS = 1_000_000_000;
 const MOST_KEPT = 128;
 
-const NO_GHOST: GhostChoice = { inertia_model: "", integrator: "", gyroscopic: true };
+const NO_GHOST: GhostChoice = { inertia_model: "", integrator: "", step: 0, gyroscopic: true };
 
 interface Done { readonly tNs: number; readonly entry: Entry }
 
@@ -210,7 +210,8 @@ export class Simulation implements Motion {
   #rewind(): void {
     this.#placed.place(this.#surfaceOf(this.#initial));
     this.#body.begin(this.#initial);
-    this.#hasGhost = this.#choice.inertia_model !== "" || this.#choice.integrator !== "" || !this.#choice.gyroscopic;
+    const { inertia_model, integrator, step, gyroscopic } = this.#choice;
+    this.#hasGhost = inertia_model !== "" || integrator !== "" || step !== 0 || !gyroscopic;
     if (this.#hasGhost) this.#ghost.begin(this.#ghostValues(this.#initial));
     this.#next = 0;
     this.#actedNs = -1;
@@ -219,11 +220,12 @@ export class Simulation implements Motion {
   }
 
   #ghostValues(values: Values): Values {
-    const { inertia_model, integrator, gyroscopic } = this.#choice;
+    const { inertia_model, integrator, step, gyroscopic } = this.#choice;
     return {
       ...values,
       inertia_model: inertia_model || (values["inertia_model"] ?? "solid"),
       integrator: integrator || (values["integrator"] ?? "auto"),
+      step: step !== 0 ? step : (values["step"] ?? 0.001),
       gyroscopic: gyroscopic && values["gyroscopic"] === true,
     };
   }
@@ -401,6 +403,7 @@ export class Simulation implements Motion {
       const chosen = { ...this.#choice, ...choice };
       this.#parameters.converted("ghost.inertia_model", chosen.inertia_model);
       this.#parameters.converted("ghost.integrator", chosen.integrator);
+      if (chosen.step !== 0) this.#parameters.converted("step", chosen.step);
       try {
         this.#choice = chosen;
         this.#rewind();
@@ -574,7 +577,7 @@ function trianglesOf(surface: Surface): Uint32Array {
 }
 
 function ghostOf(values: Values): GhostChoice {
-  return { inertia_model: String(values["ghost.inertia_model"] ?? ""), integrator: String(values["ghost.integrator"] ?? ""), gyroscopic: true };
+  return { inertia_model: String(values["ghost.inertia_model"] ?? ""), integrator: String(values["ghost.integrator"] ?? ""), step: 0, gyroscopic: true };
 }
 
 export const openMotion: OpenMotion = async (kernels, data, take) => {

@@ -61,7 +61,8 @@ def page_stamp() -> str:
     sources = [file for file in sorted((SOURCE / "src").rglob("*.*")) if file.name != GENERATED]
     sources += [SOURCE / name for name in ("page.html", "build.mjs", "package-lock.json")]
     bundled = [*map(scene_path, scene_names()), *map(resolve_mesh, body_names())]
-    for file in (*sources, *bundled, SOURCE.parent / "LICENSE"):
+    beside = [SOURCE.parent / name for name in ("LICENSE", "benchmarks/results/engines.csv")]
+    for file in (*sources, *bundled, *beside):
         digest.update(f"{file.name} ".encode() + hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()[:20]
 
