@@ -10,6 +10,8 @@ import { short } from "./words_numbers.ts";
 const NONE: GhostChoice = { inertia_model: "", integrator: "", step: 0, gyroscopic: true };
 /** [s]; 0: that of the body. 1/60 s as the parameter step rounds it. */
 const STEPS = [0, 0.016666667, 0.01, 0.001] as const;
+/** [s] Rows of the table with a step above it are shown. */
+const FINE = 0.01;
 /** Changes of energy below this are told as none. */
 const KEPT = 1e-5;
 
@@ -52,7 +54,7 @@ export function ghostCard(desk: Desk): Card {
     measured.hidden = !(kind in w.sources);
     if (kind === told) return;
     told = kind;
-    const found = kind === "gyroscopic" || kind === "mujoco" ? MEASURED.filter(({ ghost }) => ghost === NAMED[kind].beside) : [];
+    const found = kind === "gyroscopic" || kind === "mujoco" ? MEASURED.filter(({ ghost, stepS }) => ghost === NAMED[kind].beside && stepS > FINE) : [];
     source.textContent = w.sources[kind] ?? "";
     rows.replaceChildren(...found.map(measuredRow));
     date.textContent = w.measuredNote(found[0]?.date ?? "");
@@ -62,8 +64,7 @@ export function ghostCard(desk: Desk): Card {
   return { node, changed };
 }
 
-function measuredRow({ engine, version, way, stepS, flips, energyChange }: Measured): HTMLTableRowElement {
+function measuredRow({ engine, version, way, flips, energyChange }: Measured): HTMLTableRowElement {
   const w = words.ghost, energy = Math.abs(energyChange) < KEPT ? w.kept : words.percent(100 * energyChange);
-  const name = make("td", { title: version }, w.row(engine, way, short(1000 * stepS)));
-  return make("tr", {}, name, make("td", {}, Number.isFinite(flips) ? short(flips) : "–"), make("td", {}, Number.isFinite(energyChange) ? energy : w.notFlown));
+  return make("tr", {}, make("td", { title: `${version}, ${way}` }, engine), make("td", {}, Number.isFinite(flips) ? short(flips) : "–"), make("td", {}, Number.isFinite(energyChange) ? energy : w.notFlown));
 }

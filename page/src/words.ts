@@ -49,16 +49,15 @@ const english = {
   },
   ghost: {
     name: "Ghost", about: "It starts as the body does and gets the same pulls and pokes. What differs:",
-    kinds: { "": "no ghost", bounding_box: "tensor of the bounding box", solid: "true tensor", shell: "mass in the skin", points: "mass in the corners", gyroscopic: "no gyroscopic term, as Jolt, Havok, PhysX and cannon-es by default", mujoco: "MuJoCo's default method at 1/60 s", integrator: "another integrator or step" } as Record<string, string>,
+    kinds: { "": "no ghost", bounding_box: "tensor of the bounding box", solid: "true tensor", shell: "mass in the skin", points: "mass in the corners", gyroscopic: "no gyroscopic term: as Jolt, Havok, PhysX, cannon-es", mujoco: "as MuJoCo at 1/60 s", integrator: "another integrator or step" } as Record<string, string>,
     integrator: "integrator", step: "step", same: "as the body", sixtieth: "1/60 s", hundredth: "0.01 s", thousandth: "1 ms",
     apart: "beside the body", again: "It flies from the start of the take on.",
     sources: {
-      gyroscopic: "These engines keep ω where the law of motion keeps L: the term ω × Iω is left out, unless one asks for it (Jolt, PhysX).",
-      mujoco: "MuJoCo's Euler method takes new velocities from the old ones, then moves with the new: semi_implicit_euler here.",
+      gyroscopic: "By default these engines keep ω where the law of motion keeps L: they leave ω × Iω out. Jolt and PhysX have a switch for it.",
+      mujoco: "MuJoCo's default, Euler's method, takes new velocities from the old ones, then moves with the new: semi_implicit_euler here.",
     } as Record<string, string>,
-    measured: "Measured: 60 s about the middle axis; the true motion flips 9 times", heads: ["", "flips", "energy"],
-    measuredNote: (date: string) => `${date}; all engines and versions: docs/benchmarks.md, Physics engines.`,
-    row: (engine: string, way: string, ms: string) => `${engine}, ${way}, ${ms} ms`, kept: "kept", notFlown: "not flown",
+    measured: "Measured: 60 s about the middle axis, in which the true motion flips 9 times and keeps its energy", heads: ["at 1/60 s", "flips", "energy"],
+    measuredNote: (date: string) => `${date}; other engines, steps and versions: docs/benchmarks.md, Physics engines.`, kept: "kept", notFlown: "not flown",
   },
   inertia: {
     name: "Tensor", about: "[kg m²] about the centre of mass, in the axes x′ y′ z′. Turn them:", turn: ["about x", "about y", "about z"],
