@@ -132,7 +132,9 @@ def main() -> int:
     own = {(name, step): ours(ns, GHOSTS[name]) for name in GHOSTS for ns, step in zip(STEPS_NS, steps_s, strict=True)}
     within = round(BESIDE_S / EVERY_S) + 1
     for row in engines(BODY, steps_s, DURATION_S, EVERY_S):
-        kept = {name: row[name] for name in ("engine", "package", "version", "way", "step_s")} | {"why": row.get("why", "")}
+        kept = {name: row[name] for name in ("engine", "package", "version", "way", "step_s")} | {
+            "why": row.get("why", "")
+        }
         if "states" in row:
             states = np.array(row["states"])
             kept |= measures(states)

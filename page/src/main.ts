@@ -9,6 +9,7 @@ import { icon, make, say } from "./panel_elements.ts";
 import { direction } from "./panel_measure.ts";
 import { Picture, type Blow, type Shown } from "./picture.ts";
 import { Track } from "./plots.ts";
+import { herpolhode } from "./poinsot.ts";
 import { Pointer } from "./pointer.ts";
 import { openMotion } from "./simulation.ts";
 import type { Motion, Snapshot, Vec3 } from "./source.ts";
@@ -51,7 +52,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   const motionMs = performance.now(), picture = new Picture(stage, labels), drawingMs = performance.now();
 
   let track = new Track(), changed = true, gravity: Vec3 = [0, 0, 0], impulses: Impulse[] = [], moved = true;
-  const look: Look = { apart: false, boundingBox: false, inertiaBox: false, ellipsoid: false, principal: false, turned: null, trace: null, chalk: [], protractor: null, kept: null };
+  const look: Look = { apart: false, boundingBox: false, inertiaBox: false, ellipsoid: false, principal: false, poinsot: false, cones: false, turned: null, trace: null, chalk: [], protractor: null, kept: null };
   const waiting = new Map<string, () => void>();
   const told = (refusal: string | null): boolean => { if (refusal) say(refusal); return !refusal; };
   const startOver = (): void => { pointer.forget(); picture.restart(motion.snapshot()); };
@@ -110,6 +111,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
       ...look, gravity, model: String(values["inertia_model"]), ghostModel: ghost.inertia_model || String(values["inertia_model"]),
       blows: impulses.filter(({ timeNs }) => timeNs <= now.timeNs && now.timeNs < timeNs + stays),
       trace: traced ? track.trace(traced, now.timeNs, TRACE_S) : null, tracePoint: traced,
+      herpolhode: look.poinsot || look.cones ? herpolhode(track.seen, now) : [],
       protractor: ends?.[0] && ends[1] ? [ends[0], ends[1]] : null, kept: look.kept?.pose(now.timeNs) ?? null, aim: pointer.aim,
     };
   };

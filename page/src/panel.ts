@@ -23,6 +23,8 @@ export interface Look {
   boundingBox: boolean;
   inertiaBox: boolean;
   ellipsoid: boolean;
+  poinsot: boolean;
+  cones: boolean;
   principal: boolean;
   turned: readonly number[] | null;
   /** A point [mesh], or the centre of mass, whose path is drawn. */

@@ -2,7 +2,6 @@
 
 import type { Card, Desk } from "./panel.ts";
 import { button, check, make } from "./panel_elements.ts";
-import { PoinsotDrawing } from "./plots_poinsot.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
@@ -47,15 +46,13 @@ export function tensorCard(desk: Desk): Card {
     said.textContent = product < VANISHED ? w.none : w.products(short(100 * product, 2));
     said.className = product < VANISHED ? "good" : "";
   };
-  const shape = (text: string, name: "inertiaBox" | "ellipsoid" | "principal" | "boundingBox"): HTMLElement => check(text, look[name], (on) => { look[name] = on; }).node;
-  const poinsot = new PoinsotDrawing();
+  const shape = (text: string, name: "inertiaBox" | "ellipsoid" | "principal" | "boundingBox" | "poinsot" | "cones"): HTMLElement => check(text, look[name], (on) => { look[name] = on; }).node;
   const node = make("div", {}, make("p", { class: "note" }, w.about), matrix, said, make("div", { class: "sliders" }, ...turns.map(({ node: row }) => row)),
     make("div", { class: "row" }, button(w.principal, begin([])), button(w.mesh, begin(UNTURNED))),
     make("h3", {}, w.shapes), shape(w.box, "inertiaBox"), shape(w.ellipsoid, "ellipsoid"), shape(w.axes, "principal"), shape(w.bounding, "boundingBox"),
-    make("h3", {}, w.poinsot), poinsot.canvas, make("p", { class: "note" }, w.poinsotNote));
+    make("h3", {}, w.poinsot), shape(w.rolls, "poinsot"), shape(w.cones, "cones"), make("p", { class: "note" }, w.poinsotNote));
   return {
     node, changed: draw,
-    draw: (now) => poinsot.draw(now, motion.body()),
     closed: () => { look.turned = null; },
   };
 }

@@ -11,7 +11,9 @@ import { Arrow, Cord, Scales } from "./picture_arrows.ts";
 import { Eye, type Free } from "./picture_camera.ts";
 import { FlatPicture } from "./picture_flat.ts";
 import { Renderer } from "./picture_renderer.ts";
+import { PoinsotPicture } from "./picture_poinsot.ts";
 import { shadedSurface, type Surface } from "./picture_surface.ts";
+import { construction } from "./poinsot.ts";
 import type { BodyInfo, Flying, Snapshot, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
@@ -49,6 +51,10 @@ export interface Shown {
   readonly inertiaBox: boolean;
   readonly ellipsoid: boolean;
   readonly principal: boolean;
+  readonly poinsot: boolean;
+  readonly cones: boolean;
+  /** Omegas up to now while L was the same [rad/s, world]. */
+  readonly herpolhode: readonly Vec3[];
   /** Axes turned by hand, as columns, in body axes. */
   readonly turned: readonly number[] | null;
   /** Places of the trace [m, world] from the oldest on. */
@@ -104,6 +110,7 @@ export class Picture {
   private readonly boundingBox: LineSegments;
   private readonly inertiaBox: Mesh;
   private readonly ellipsoid: Mesh;
+  private readonly poinsot = new PoinsotPicture();
   private readonly principal: readonly Arrow[];
   private readonly turned: readonly Arrow[];
   private readonly trace: Line;
@@ -164,7 +171,8 @@ export class Picture {
     this.arc.renderOrder = 25;
     this.body.mesh.add(this.chalk, this.chalkDots);
     this.chalk.frustumCulled = this.chalkDots.frustumCulled = false;
-    this.body.frame.add(this.boundingBox, this.inertiaBox, this.ellipsoid);
+    this.body.frame.add(this.boundingBox, this.inertiaBox, this.ellipsoid, this.poinsot.onBody);
+    scene.add(this.poinsot.inSpace);
     for (const arrow of [this.omega, this.momentum, this.weight, ...this.principal, ...this.turned]) scene.add(arrow.node);
     scene.add(this.cord.node, this.ghostCord.node, this.trace, this.traceDots, this.arc);
 
@@ -263,7 +271,7 @@ export class Picture {
     paint(this.body, shown.model);
     paint(this.ghost, shown.ghostModel);
 
-    this.drawMotion(body, at);
+    this.drawMotion(body, at, shown);
     this.drawWeight(shown.gravity, body, at);
     this.drawLoads(body, shown.blows);
     this.drawString(this.cord, body, shown.gravity, null);
@@ -287,14 +295,18 @@ export class Picture {
       Math.max(14, Math.min(this.eye.height - 14, end.y + uy * beyond)));
   }
 
-  private drawMotion(body: Flying, at: Vector3): void {
+  private drawMotion(body: Flying, at: Vector3, shown: Shown): void {
+    const made = shown.poinsot || shown.cones ? construction(body, this.info!, this.size) : null;
+    if (made) this.poinsot.show(made, this.info!.axes, shown.herpolhode, at, this.size, shown); else this.poinsot.hide();
     const { size } = this, natural = Math.sqrt(9.81 / size), moment = (this.info!.moments[0] + this.info!.moments[1] + this.info!.moments[2]) / 3;
     const parts = [
       [this.omega, this.labels.omega, "ω", new Vector3(...body.omega), FIRST_OMEGA, natural, 0.8],
       [this.momentum, this.labels.momentum, "L", new Vector3(...body.momentum), FIRST_MOMENTUM, moment * natural, 1],
     ] as const;
     for (const [arrow, label, kind, vector, first, usual, thick] of parts) {
-      const value = vector.length(), length = this.scales.length(kind, value, first * size, LONGEST * size, usual);
+      const value = vector.length(), scaled = this.scales.length(kind, value, first * size, LONGEST * size, usual);
+      // Then omega ends where the ellipsoid touches the plane.
+      const length = made && arrow === this.omega ? made.unit * value : scaled;
       if (!length) { arrow.hide(); label.hide(); continue; }
       arrow.show(at, vector.multiplyScalar(length / value), thick * STRONG * size);
       this.tag(label, kind, at.clone().add(vector), at);

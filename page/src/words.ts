@@ -63,7 +63,8 @@ const english = {
     name: "Tensor", about: "[kg m²] about the centre of mass, in the axes x′ y′ z′. Turn them:", turn: ["about x", "about y", "about z"],
     principal: "principal axes", mesh: "axes of the mesh", products: (part: string) => `Largest product: ${part} % of the largest moment.`,
     none: "The products vanish: these are principal axes.", shapes: "In the picture", box: "inertia box", ellipsoid: "inertia ellipsoid",
-    axes: "axes I₁ I₂ I₃", bounding: "bounding box", poinsot: "Poinsot", poinsotNote: "The ellipsoid rolls on the plane; where they touch is ω. Without pulls and pokes the plane stays.",
+    axes: "axes I₁ I₂ I₃", bounding: "bounding box", poinsot: "Poinsot's construction", rolls: "ellipsoid that rolls on a plane", cones: "cones of body and space",
+    poinsotNote: "The plane stands across L, and ω ends where the ellipsoid touches it. Without pulls and pokes the plane stays, and the ellipsoid rolls on it.",
   },
   measure: {
     name: "Measure", protractor: "Protractor", between: "between", and: "and", off: "off",

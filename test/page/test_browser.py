@@ -4,30 +4,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from page_browser import Opened, chromium
+from page_browser import Opened
 
 pytestmark = pytest.mark.drawn
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
-
-
-@pytest.fixture
-def opened(browser: Any) -> Iterator[Opened]:
-    """The first screen, paused a third of a second after it began."""
-    page = Opened(browser)
-    page.pause()
-    page.fly(0.33)
-    yield page
-    page.close()
 
 
 def test_the_first_screen_moves_beside_its_ghost_and_asks_no_network(browser: Any) -> None:
@@ -137,6 +120,20 @@ def test_the_ghost_is_chosen_goes_beside_the_body_and_away(opened: Opened) -> No
     page.get_by_label("beside the body").check()
     opened.drawn(30)
     assert opened.covered() == []
+    card = page.locator("section[data-card=ghost]")
+    assert "Jolt\t0\tkept" in card.inner_text(), "what was measured of the engines stands there"
+    page.get_by_role("radio", name="as MuJoCo at 1/60 s").check()
+    opened.fly(0.1)
+    assert opened.js("page.motion.ghost().step") == 0.016666667
+    assert "MuJoCo\t9\t+121 %" in card.inner_text()
+    page.get_by_role("radio", name="another integrator or step").check()
+    page.get_by_label("step", exact=True).select_option("1/60 s")
+    assert opened.js("page.motion.ghost()") == {
+        "inertia_model": "",
+        "integrator": "euler",
+        "step": 0.016666667,
+        "gyroscopic": True,
+    }
     page.get_by_role("radio", name="no ghost").check()
     opened.drawn()
     assert opened.now["ghost"] is None and not page.locator("#angle").is_visible()
