@@ -79,12 +79,17 @@ def page_version() -> str:
     return f"{__version__}+{stamp().partition('-')[2][:7]}"
 
 
-def page_values(values: dict[str, Any]) -> dict[str, Any]:
+def is_of_page(name: str) -> bool:
+    """Whether the page has this parameter."""
+    return name in USED or name.startswith(("ballast.", "contacts."))
+
+
+def page_values(values: dict[str, Any], with_hand: bool = True) -> dict[str, Any]:
     """A scene's parameters as the page has them, with the string of a hand."""
-    used = {name: value for name, value in values.items() if name in USED or name.startswith(("ballast.", "contacts."))}
+    used = {name: value for name, value in values.items() if is_of_page(name)}
     tied = used.get("string.attached", False)
     given = any(name in used for name in ("string.frequency", "string.timeout"))
-    return used if tied or given else {**used, **HAND}
+    return used if tied or given or not with_hand else {**used, **HAND}
 
 
 def bundled_values(name: str) -> dict[str, Any]:
