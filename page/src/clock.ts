@@ -10,6 +10,8 @@ const RATES = [1, 0.5, 0.25, 0.1, 0.02] as const;
 const STEP_NS = 10_000_000, BACK_NS = 2_000_000_000;
 /** [ms] of the wall clock that a picture makes up for: after a pause that nobody saw the body goes on from where it was. */
 const MOST_MS = 100;
+/** [ns] Pictures show times that are multiples of this, less than anyone sees: a link holds the time of each thing done. */
+const GRAIN_NS = 100_000;
 /** [ms] Between two readings of the time: each has the page put its bar together anew. */
 const READ_MS = 90;
 /** [s] The bar spans this, or twice, four times as much. */
@@ -34,6 +36,7 @@ export class Clock {
   private shownText = "";
   private stale = true;
   private wanted: number | null = null;
+  private owedNs = 0;
   private readMs = 0;
 
   constructor(motion: Motion, reset: () => void) {
@@ -88,8 +91,10 @@ export class Clock {
       return;
     }
     if (this.paused || this.scrubbing) return;
-    const passedNs = Math.round(Math.min(MOST_MS, Math.max(0, milliseconds)) * 1e6 * this.rate);
-    if (passedNs > 0) this.motion.advance(this.motion.snapshot().timeNs + passedNs);
+    const nowNs = this.motion.snapshot().timeNs, passedNs = this.owedNs + Math.round(Math.min(MOST_MS, Math.max(0, milliseconds)) * 1e6 * this.rate);
+    const untilNs = Math.max(nowNs, Math.floor((nowNs + passedNs) / GRAIN_NS) * GRAIN_NS);
+    this.motion.advance(untilNs);
+    this.owedNs = nowNs + passedNs - untilNs;
   }
 
   /** What was done has changed: other marks. */

@@ -17,6 +17,8 @@ const HELD_NS = 400_000_000;
 /** [rad/s] Light and heavy bodies follow the hand alike. */
 const FREQUENCY = 8;
 const AIM_PX = 12;
+/** [px] */
+const PART_PX = 0.25;
 
 interface Hand {
   readonly id: number;
@@ -102,7 +104,11 @@ export class Pointer {
     }
   }
 
-  private target(hand: Hand): Vec3 { return this.picture.eye.at(hand.x, hand.y, hand.depth); }
+  /** Where the hand is, to a part of a pixel that nobody sees: a link holds every place of a drag. */
+  private target(hand: Hand): Vec3 {
+    const { eye } = this.picture, digits = Math.max(0, Math.min(12, Math.ceil(-Math.log10(eye.perPixel * PART_PX))));
+    return eye.at(hand.x, hand.y, hand.depth).map((x) => Number(x.toFixed(digits))) as unknown as Vec3;
+  }
 
   private told(refusal: string | null): boolean {
     if (refusal) say(refusal);

@@ -80,6 +80,8 @@ export class Simulation implements Motion {
   #before: readonly number[] = [];
   #kept: Moment[] = [];
   #info: BodyInfo | null = null;
+  /** While an open mesh flies, which bounds no solid: the values that make it a shell, and what they were before. */
+  #asShell: { readonly shell: Values; readonly before: Values } | null = null;
   #notice = "";
 
   constructor(kernels: Kernels, data: Data) {
@@ -107,7 +109,10 @@ export class Simulation implements Motion {
   openScene(name: string): string | null {
     if (!Object.hasOwn(this.#declared.scenes, name)) return this.#unknown("scene", name, Object.keys(this.#declared.scenes));
     const values = this.#sceneValues(name);
-    return this.#tried(() => this.#start(values, ghostOf(values), null, []));
+    return this.#tried(() => {
+      this.#start(values, ghostOf(values), null, []);
+      this.#asShell = null;
+    });
   }
 
   openBody(name: string): string | null {
@@ -115,7 +120,10 @@ export class Simulation implements Motion {
     // Density, contacts and start of the body's own scene, in the world that is there.
     const own = Object.entries(this.#sceneValues(name)).filter(([key]) => /^(?:density|mass|scale|contacts\.|initial\.)/.test(key));
     const values = { ...this.#withoutPoints(), ...Object.fromEntries(own), mesh: name };
-    return this.#tried(() => this.#start(values, this.#choice, null, []));
+    return this.#tried(() => {
+      this.#start(values, this.#choice, null, []);
+      this.#asShell = null;
+    });
   }
 
   openMesh(name: string, bytes: Uint8Array, scale?: number): string | null {
@@ -123,12 +131,11 @@ export class Simulation implements Motion {
       const mesh = readMesh(name, bytes, this.#kernels), surface = this.#surfaces.judged(mesh);
       const side = Math.max(...new Float64Array(surface.record.slice(8, 32).buffer));
       const unit = scale ?? (side > this.#declared.longest ? 0.001 : 1);
-      const values: Record<string, Value> = { ...this.#withoutPoints(), mesh: mesh.name, scale: [unit, unit, unit] };
-      if (!surface.closed) {
-        const mass = this.#body.flight.body[this.#declared.numbers.body.MASS] ?? 1;
-        Object.assign(values, { mass, inertia_model: "shell", inertia_model_com: "model" });
-      }
-      this.#start(values, this.#choice, mesh, []);
+      const values: Values = { ...this.#withoutPoints(), mesh: mesh.name, scale: [unit, unit, unit] };
+      const mass = this.#body.flight.body[this.#declared.numbers.body.MASS] ?? 1;
+      const shell: Values | null = surface.closed ? null : { mass, inertia_model: "shell", inertia_model_com: "model" };
+      this.#start({ ...values, ...shell }, this.#choice, mesh, []);
+      this.#asShell = shell === null ? null : { shell, before: Object.fromEntries(Object.keys(shell).map((name) => [name, values[name] ?? 0])) };
       this.#notice = [
         ...(scale === undefined && unit !== 1 ? [`its longest side of ${side.toPrecision(3)} is taken as millimetres`] : []),
         ...surface.findings.filter((each) => each.severity !== "info").map((each) => each.message),
@@ -151,6 +158,7 @@ export class Simulation implements Motion {
     });
     if (done.some((one, k) => k > 0 && one.tNs < (done[k - 1]?.tNs ?? 0))) throw new Refused("script: its entries aren't in the order of their times");
     this.#start(values, take.ghost, take.mesh, done);
+    this.#asShell = null;
     this.#endNs = Math.max(take.endNs, done.at(-1)?.tNs ?? 0);
     this.#notice = madeBy(take, this.#declared);
   }
@@ -163,10 +171,12 @@ export class Simulation implements Motion {
     return { ...this.#parameters.defaults(), ...this.#declared.scenes[name]?.values };
   }
 
-  /** The values in force but for points in the coordinates of one mesh. */
-  #withoutPoints(): Record<string, Value> {
-    const own = Object.entries(this.#body.values).filter(([name]) => !/^(?:ballast|contacts)\./.test(name) && name !== "string.attach");
-    const { "string.attach": attach = [0, 0, 0] } = this.#parameters.defaults(), model = this.#body.values["inertia_model"] ?? "solid";
+  /** The values in force but for points in the coordinates of one mesh, and for what an open mesh alone needed. */
+  #withoutPoints(): Values {
+    const { shell, before } = this.#asShell ?? { shell: {}, before: {} }, now = this.#body.values;
+    const isShell = Object.entries(shell).every(([name, value]) => now[name] === value);
+    const own = Object.entries({ ...now, ...(isShell ? before : {}) }).filter(([name]) => !/^(?:ballast|contacts)\./.test(name) && name !== "string.attach");
+    const { "string.attach": attach = [0, 0, 0] } = this.#parameters.defaults(), model = (isShell ? before : now)["inertia_model"] ?? now["inertia_model"] ?? "solid";
     return { ...Object.fromEntries(own), "string.attach": attach, "string.attached": false, inertia_model: model === "explicit" ? "solid" : model };
   }
 

@@ -115,6 +115,31 @@ test("a ghost begins as the body, at any time, and changes nothing of it", async
   assert.ok(angleToGhost < 1e-15);
 });
 
+test("after an open mesh, which flies as a shell, a closed one is what bodies were before", async () => {
+  const corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n", sides = "f 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+  const open = new TextEncoder().encode(corners + sides), closed = new TextEncoder().encode(`${corners}f 4 3 2 1\n${sides}`);
+  const names = ["inertia_model", "inertia_model_com", "mass", "density"] as const, chosen = (motion: Motion): unknown[] => names.map((name) => motion.values()[name]);
+  for (const model of ["solid", "bounding_box", "points"]) {
+    const motion = await opened();
+    motion.set({ inertia_model: model });
+    const before = chosen(motion);
+    assert.equal(motion.openMesh("open.obj", open), null);
+    assert.equal(motion.values()["inertia_model"], "shell");
+    assert.equal(motion.openMesh("again.obj", open), null);
+    assert.equal(motion.values()["inertia_model"], "shell");
+    assert.equal(motion.openMesh("closed.obj", closed), null);
+    assert.deepEqual(chosen(motion), before);
+    assert.equal(motion.openMesh("open.obj", open), null);
+    assert.equal(motion.openBody("hammer"), null);
+    assert.equal(motion.values()["inertia_model"], model);
+    // What a person chooses stays.
+    assert.equal(motion.openMesh("open.obj", open), null);
+    assert.equal(motion.set({ inertia_model: "bounding_box" }), null);
+    assert.equal(motion.openMesh("closed.obj", closed), null);
+    assert.equal(motion.values()["inertia_model"], "bounding_box");
+  }
+});
+
 test("a ghost as an engine's method at its step is the body flown so, and a take keeps it to the bit", async () => {
   const motion = await opened(), alone = await opened(), as = { integrator: "semi_implicit_euler", step: 0.016666667 };
   assert.equal(motion.setGhost(as), null);

@@ -43,6 +43,8 @@ def test_a_drag_ties_the_string_at_what_was_grabbed_and_lets_go(opened: Opened) 
     # Measured 0.00 px: the hand is where the pointer is, in the plane of what was grabbed.
     assert np.linalg.norm(opened.seen(string["end"]) - (place["x"] + 120, place["y"] - 50)) < 0.5
     assert string["tension"] > 0.0
+    # A link holds every place of a drag: no more digits than the eye sees.
+    assert all(len(repr(x)) <= 9 for x in opened.script[-1]["string"]["target"])
     before = opened.now["body"]["row"]
     opened.fly(0.2)
     mouse.up()
