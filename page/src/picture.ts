@@ -38,8 +38,14 @@ export interface Pose { readonly row: readonly number[]; readonly scale: Vec3; r
 /** A blow whose arrow still stands: impulse [N s] at a point [mesh]. */
 export interface Blow { readonly point: Vec3; readonly impulse: Vec3; readonly axes: "body" | "world" }
 
+/** A place of the body that is marked by its name. */
+export interface Mark { readonly point: Vec3; readonly text: string; readonly isCentre: boolean }
+
 /** What is drawn beside body and loads. */
 export interface Shown {
+  readonly marks: readonly Mark[];
+  /** Whether nothing may show where the centre of mass is. */
+  readonly hidesCentre: boolean;
   readonly apart: boolean;
   readonly model: string;
   readonly ghostModel: string;
@@ -114,6 +120,7 @@ export class Picture {
   private chalked: readonly number[] = [];
   private readonly labels: Record<"omega" | "momentum" | "weight" | "string" | "angle" | "one" | "two" | "three" | "ghost", Label>;
   private readonly loadLabels: Label[] = [];
+  private readonly markLabels: (readonly [Label, Label])[] = [];
   private readonly labelRoom: HTMLElement;
   private surface: Surface | null = null;
   private info: BodyInfo | null = null;
@@ -253,7 +260,8 @@ export class Picture {
     const at = new Vector3(body.row[0], body.row[1], body.row[2]), aside = this.offset.clone().multiplyScalar(2.1 * this.reach);
     const apart = shown.apart && ghost !== null;
     eye.frame(Math.max(1.03 * this.reach, FRAMED * size) * (apart ? 1.55 : 1));
-    if (!held) eye.follow(apart ? at.clone().addScaledVector(aside, 0.5) : at, seconds);
+    const middle = shown.hidesCentre ? this.onBody(this.boxMiddle()) : at;
+    if (!held) eye.follow(apart ? at.clone().addScaledVector(aside, 0.5) : middle, seconds);
     eye.place(held ? 0 : seconds);
 
     place(this.body, body, this.surface, null);
@@ -263,14 +271,15 @@ export class Picture {
     paint(this.body, shown.model);
     paint(this.ghost, shown.ghostModel);
 
-    this.drawMotion(body, at);
-    this.drawWeight(shown.gravity, body, at);
+    this.drawMotion(body, at, shown.hidesCentre);
+    this.drawWeight(shown.hidesCentre ? [0, 0, 0] : shown.gravity, body, at);
     this.drawLoads(body, shown.blows);
     this.drawString(this.cord, body, shown.gravity, null);
     this.drawString(this.ghostCord, apart ? ghost : null, shown.gravity, aside);
     this.drawShapes(shown, body, at);
     this.drawMeasures(shown, at);
-    this.drawFloor(at);
+    this.drawMarks(shown.marks, at);
+    this.drawFloor(middle);
 
     if (this.renderer) this.renderer.draw(this.scene, eye.camera);
     else this.flat?.draw(eye, this.scene);
@@ -287,14 +296,14 @@ export class Picture {
       Math.max(14, Math.min(this.eye.height - 14, end.y + uy * beyond)));
   }
 
-  private drawMotion(body: Flying, at: Vector3): void {
+  private drawMotion(body: Flying, at: Vector3, isHidden: boolean): void {
     const { size } = this, natural = Math.sqrt(9.81 / size), moment = (this.info!.moments[0] + this.info!.moments[1] + this.info!.moments[2]) / 3;
     const parts = [
       [this.omega, this.labels.omega, "ω", new Vector3(...body.omega), FIRST_OMEGA, natural, 0.8],
       [this.momentum, this.labels.momentum, "L", new Vector3(...body.momentum), FIRST_MOMENTUM, moment * natural, 1],
     ] as const;
     for (const [arrow, label, kind, vector, first, usual, thick] of parts) {
-      const value = vector.length(), length = this.scales.length(kind, value, first * size, LONGEST * size, usual);
+      const value = vector.length(), length = isHidden ? 0 : this.scales.length(kind, value, first * size, LONGEST * size, usual);
       if (!length) { arrow.hide(); label.hide(); continue; }
       arrow.show(at, vector.multiplyScalar(length / value), thick * STRONG * size);
       this.tag(label, kind, at.clone().add(vector), at);
@@ -415,6 +424,23 @@ export class Picture {
     places.needsUpdate = true;
     point.copy(at).addScaledVector(one, radius * Math.cos(0.5 * angle)).addScaledVector(side, radius * Math.sin(0.5 * angle));
     this.tag(this.labels.angle, `${((angle * 180) / Math.PI).toFixed(1)}°`, point, at, 16);
+  }
+
+  /** The middle of the mesh's box [mesh]. */
+  private boxMiddle(): Vec3 {
+    const { low, high } = this.surface!;
+    return [0, 1, 2].map((k) => 0.5 * (low[k]! + high[k]!)) as unknown as Vec3;
+  }
+
+  private drawMarks(marks: readonly Mark[], at: Vector3): void {
+    for (let k = 0; k < Math.max(marks.length, this.markLabels.length); k++) {
+      const mark = marks[k];
+      if (!mark) { for (const label of this.markLabels[k] ?? []) label.hide(); continue; }
+      const [dot, name] = (this.markLabels[k] ??= [new Label(this.labelRoom, "#1d2433"), new Label(this.labelRoom, "#1d2433")]), point = this.onBody(mark.point), seen = this.eye.project(point, new Vector3());
+      dot.node.classList.add("dot");
+      dot.show(mark.isCentre ? "⊕" : "●", seen.x, seen.y);
+      if (mark.isCentre) name.show(mark.text, seen.x, seen.y + 20); else this.tag(name, mark.text, point, at, 20);
+    }
   }
 
   private drawFloor(at: Vector3): void {
