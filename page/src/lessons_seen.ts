@@ -116,14 +116,15 @@ export const isVector = (value: readonly number[], wanted: readonly number[]): b
 
 // Pokes
 
-/** A poke: where [mesh], how strong [N s], what of the body is nearest to it and how near in parts of the size, how far
- * its line passes the centre of mass in parts of the size, and the instants before and after it. */
+/** A poke: where [mesh], how strong [N s], what of the body is nearest to it and how near, how far its line
+ * passes the centre of mass and how far that is from the place, all in parts of the size; and the instants before and after. */
 export interface Poke {
   readonly point: Vec3;
   readonly strength: number;
   readonly place: string;
   readonly away: number;
   readonly lever: number;
+  readonly fromCentre: number;
   readonly before: Seen;
   readonly after: Seen;
 }
@@ -151,7 +152,7 @@ function pokeOf({ seen }: Trial, entry: Entry, k: number): Poke | null {
     const distance = size(contact.map((c, i) => (c - point[i]!) * scale[i]!)) / whole;
     if (distance < away) { away = distance; place = name; }
   }
-  return { point, strength: size(given), place, away, lever, before, after };
+  return { point, strength: size(given), place, away, lever, fromCentre: size(arm) / whole, before, after };
 }
 
 /** Where a load acts [mesh]; null for rays. */

@@ -140,7 +140,7 @@ export const COURSES: Readonly<Record<string, Course>> = {
     marks: ["corner"], plots: ["energy"],
     steps: [
       { done: (a) => { const poked = onlyPoke(a, "corner"); return poked !== null && model(poked.before) === "solid" && spinGiven(poked) > 0; }, acts: [poke("corner", [0, -1, 0])] },
-      ...([["bounding_box", true, (w) => w.box], ["shell", false, (w) => w.shell]] as const satisfies readonly (readonly [string, boolean, Says])[]).map(([other, isFaster, says]): Step => ({
+      ...([["bounding_box", true, (w) => w.box], ["points", false, (w) => w.corners]] as const satisfies readonly (readonly [string, boolean, Says])[]).map(([other, isFaster, says]): Step => ({
         done: (a) => {
           const poked = onlyPoke(a, "corner"), before = earlier(a, "corner"), solid = a.trials.slice(0, -1).flatMap((trial) => pokes(trial)).filter(isAt("corner")).find((each) => model(each.before) === "solid");
           return poked !== null && before !== null && solid !== undefined && model(poked.before) === other && alike(poked.strength, solid.strength)
@@ -173,8 +173,8 @@ export const COURSES: Readonly<Record<string, Course>> = {
         done: (a) => {
           const seen = whole(a), first = seen[0];
           if (!first || lasted(seen) < 2) return false;
-          const isPrincipal = [0, 1, 2].some((k) => { const angle = between(omega(first), principalAxis(first, k)); return Math.min(angle, 180 - angle) < 3; });
-          return isPrincipal && seen.every((each) => between(omega(each), momentum(each)) < 3);
+          const angle = between(omega(first), principalAxis(first, 2));
+          return Math.min(angle, 180 - angle) < 3 && seen.every((each) => between(omega(each), momentum(each)) < 3);
         },
         acts: [{ kind: "start", values: (scene, { axes }) => ({ "initial.angular_velocity": [axes[2]!, axes[5]!, axes[8]!].map((x) => x * size(startSpin(scene))) }), text: (w) => w.aboutThird }],
       },
@@ -188,7 +188,7 @@ export const COURSES: Readonly<Record<string, Course>> = {
         done: ({ lines }) => lines.some((one, k) => lines.slice(0, k).some((other) => { const angle = between(one.along, other.along); return angle > 15 && angle < 165; })),
         acts: [{ kind: "tie", text: (w) => w.tie }, { kind: "chalk", text: (w) => w.chalk }],
       },
-      { done: (a) => newPokes(a).some(({ lever }) => lever < 0.08), acts: [press] },
+      { done: (a) => newPokes(a).some(({ lever, fromCentre }) => lever < 0.08 && fromCentre < 0.12), acts: [press] },
     ],
   },
   spinning_top: {
@@ -213,7 +213,7 @@ export const COURSES: Readonly<Record<string, Course>> = {
     steps: [
       watch((a) => flips(free(a), 2) > 1),
       {
-        done: (a) => newPokes(a).some((poked) => isAt("tip")(poked) && tilted(poked) > 3 && flips(since(a).filter(({ entries }) => entries >= poked.after.entries), 2) > 0),
+        done: (a) => newPokes(a).some((poked) => isAt("tip")(poked) && tilted(poked) > 3 && present(a).seen.at(-1)!.now.timeNs - poked.after.now.timeNs > 1.5e9),
         acts: [poke("tip", [1, 0, 0])],
       },
       {

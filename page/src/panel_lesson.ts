@@ -181,7 +181,7 @@ export class LessonPanel {
     else if (act.kind === "principal") look.principal = true;
     else if (act.kind === "tie") {
       stage(w.tieHow);
-      pointer.claim = ({ mesh }) => { desk.told(motion.submit({ string: { attach: mesh, target: motion.values()["string.target"] as unknown as Vec3 } })); desk.clock.setPaused(false); };
+      pointer.claim = ({ mesh }) => { desk.told(motion.set({ "string.attach": mesh })); desk.clock.setPaused(false); };
     } else this.chalk();
     if (act.kind === "poke" || act.kind === "set") desk.clock.setPaused(false);
   }

@@ -49,7 +49,7 @@ const english = {
   },
   ghost: {
     name: "Ghost", about: "It starts as the body does and gets the same pulls and pokes. What differs:",
-    kinds: { "": "no ghost", bounding_box: "tensor of the bounding box", solid: "true tensor", shell: "mass in the skin", points: "mass in the corners", gyroscopic: "no gyroscopic term", integrator: "another integrator" } as Record<string, string>,
+    kinds: { "": "no ghost", bounding_box: "tensor of the bounding box", solid: "true tensor", corners: "mass in the corners", points: "mass in the corners", gyroscopic: "no gyroscopic term", integrator: "another integrator" } as Record<string, string>,
     integrator: "integrator", apart: "beside the body", again: "It flies from the start of the take on.",
   },
   inertia: {
@@ -82,7 +82,7 @@ const english = {
     places: { tip: "tip", rim: "rim", grip: "grip", head: "head", corner: "corner", stem: "stem", spout: "spout", handle: "handle", knob: "knob", com: "centre of mass" } as Record<string, string>,
     poke: (place: string) => `poke: ${place}`, again: (place: string) => `start again, and poke: ${place}`, restart: "start again", pull: "show me how", press: "take me there", pullHow: "Drag the body with the pointer, or with G and arrow keys",
     pressHow: "Press a place of the body, or aim with arrow keys and press Enter", throwAbout: (axis: string) => `throw it about ${axis}`, withoutTerm: "term off, and start again",
-    termOn: "switch the term on", termOff: "switch the term off", box: "bounding box", truth: "true tensor", shell: "mass in the skin", stick: "stick on 30 g, and start again", unstick: "take it off",
+    termOn: "switch the term on", termOff: "switch the term off", box: "bounding box", truth: "true tensor", corners: "mass in the corners", stick: "stick on 30 g, and start again", unstick: "take it off",
     ballast: "open ballast", card: "open the card", principal: "show the axes", turn: "open the axes", aboutThird: "spin about I₃", chalk: "draw the line", tie: "tie it here", tieHow: "Press the place to tie it, or aim with arrow keys and press Enter",
     twice: "spin × 2", half: "spin × ½", noSpin: "no spin", trace: "trace the grip", weightless: "gravity off", moments: "open the table", tenfold: "mass × 10", tenth: "mass as before",
   },

@@ -73,7 +73,7 @@ export class Player {
     this.look();
   }
 
-  tie(attach: Vec3): void { this.did(this.motion.submit({ string: { attach, target: this.motion.values()["string.target"] as unknown as Vec3 } })); }
+  tie(attach: Vec3): void { this.set({ "string.attach": attach }); }
 
   /** What a button does to the motion and to what is seen. */
   press(act: Act): void {
@@ -165,7 +165,7 @@ export const WRONG: Readonly<Record<string, readonly (readonly Hand[])[]>> = {
   hollow_box: [
     [stand, still, freshPokes, at("face", [0, -1, 0]), anew({ inertia_model: "bounding_box" }, (player) => player.poke("corner", [0, -1, 0]))],
     [still, freshPokes, at("corner", [0, -1, 0]), anew({ inertia_model: "bounding_box" }), anew({ inertia_model: "bounding_box" }, (player) => { player.poke("corner", [0, -1, 0], 2); player.fly(1); }), anew({ inertia_model: "bounding_box" }, (player) => player.poke("face", [0, -1, 0]))],
-    [still, freshPokes, at("corner", [0, -1, 0]), anew({ inertia_model: "shell" }), anew({ inertia_model: "shell" }, (player) => player.poke("corner", [0, -1, 0], 0.5))],
+    [still, freshPokes, at("corner", [0, -1, 0]), anew({ inertia_model: "points" }), anew({ inertia_model: "shell" }, (player) => player.poke("corner", [0, -1, 0])), anew({ inertia_model: "points" }, (player) => player.poke("corner", [0, -1, 0], 0.5))],
   ],
   l_bracket: [
     [stand, pokes, values({ gyroscopic: false })], [still, pokes, (player) => { player.sight.turned = [1, 0, 0, 0, 1, 0, 0, 0, 1]; player.fly(2); }],
@@ -173,7 +173,7 @@ export const WRONG: Readonly<Record<string, readonly (readonly Hand[])[]>> = {
   ],
   numbers_of_a_tensor: [
     [stand, pokes], [still, pokes, (player) => { player.sight.turned = [1, 0, 0, 0, 1, 0, 0, 0, 1]; player.fly(2); }, (player) => { player.sight.turned = [0, -1, 0, 1, 0, 0, 0, 0, 1]; player.fly(2); }, (player) => { player.sight.principal = true; player.fly(1); }],
-    [still, pokes, freshPokes, spin(0, 0, 4), spin(4, 0, 0), spin(0, 4, 0)],
+    [still, pokes, freshPokes, spin(0, 0, 4), spin(4, 0, 0), spin(0, 2, 4)],
   ],
   plumb_line: [
     [stand, (player) => { player.fly(2); player.chalk(); player.fly(3); player.chalk(); }, pokes], [still, pokes, (player) => player.chalk(), (player) => { player.tie([-0.08, 0, 0]); player.fly(1.5); player.chalk(); }],
