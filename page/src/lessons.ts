@@ -72,14 +72,13 @@ export interface Step {
 }
 
 /** What a lesson needs of the page. marks: contacts, or "com", whose places are marked in the picture. rate: of time.
- * trace: of a point from the answer on. plots: in class mode. hidesCentre: from the picture, and what shows it, until the
- * last step is done; otherwise until the question is answered, where it is asked for. */
+ * trace: of a point from the answer on. plots: in class mode. hidesCentre: the centre of mass and the arrows that begin in
+ * it aren't drawn until the question is answered, or until the last step is done, where they would answer it. */
 export interface Course {
   readonly steps: readonly Step[];
   readonly marks?: readonly string[];
   readonly rate?: number;
   readonly trace?: "com";
-  readonly card?: "tensor";
   readonly plots: readonly ("energy" | "omega" | "momentum" | "angle")[];
   readonly hidesCentre?: "question" | "end";
 }

@@ -151,7 +151,7 @@ export const COURSES: Readonly<Record<string, Course>> = {
     ],
   },
   l_bracket: {
-    plots: ["omega"],
+    plots: ["omega"], hidesCentre: "question",
     steps: [
       watch((a) => hasTerm(free(a)) && free(a).some((seen) => between(omega(seen), [0, 0, 1]) > 5)),
       { done: (a) => a.sight.principal && lasted(since(a)) > 0.5, acts: [{ kind: "principal", text: (w) => w.principal }, { kind: "card", card: "tensor", mark: "principal", text: (w) => w.card }] },
@@ -162,7 +162,7 @@ export const COURSES: Readonly<Record<string, Course>> = {
     ],
   },
   numbers_of_a_tensor: {
-    plots: ["momentum"], card: "tensor",
+    plots: ["momentum"], hidesCentre: "question",
     steps: [
       watch((a) => free(a).length > 0 && lasted(free(a)) > 0.5 && unturned(present(a), a.scene) && free(a).some((seen) => between(omega(seen), momentum(seen)) > 5)),
       {

@@ -11,6 +11,7 @@ import { COURSES } from "./lessons_steps.ts";
 import { Panel, type Desk, type Look } from "./panel.ts";
 import { icon, make, say } from "./panel_elements.ts";
 import { LessonPanel } from "./panel_lesson.ts";
+import { printsSheet } from "./print.ts";
 import { direction } from "./panel_measure.ts";
 import { Picture, type Blow, type Shown } from "./picture.ts";
 import { Track } from "./plots.ts";
@@ -94,6 +95,8 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
   const drop = make("div", { id: "drop", hidden: true }, words.body.drop);
   app.append(panel.node, drop, make("div", { id: "say", role: "status", "aria-live": "polite" }));
   document.title = words.title;
+
+  printsSheet(app, picture, () => lessons.lesson);
 
   motion.watch(() => { changed = true; });
   const refresh = (): void => {

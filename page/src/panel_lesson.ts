@@ -29,7 +29,6 @@ export class LessonPanel {
   private readonly told = make("div", { class: "out", role: "status", "aria-live": "polite" });
   private drawn: Plots | null = null;
   private lookedMs = 0;
-  private shown = -1;
   private isClass = false;
 
   constructor(desk: Desk, panel: Panel, texts: Readonly<Record<string, LessonTexts>>) {
@@ -46,7 +45,7 @@ export class LessonPanel {
 
   /** Begin what the address names, or leave the lesson. Returns why not, or null. */
   async begin(name: string, isClass: boolean): Promise<string | null> {
-    const texts = this.texts[name], course = COURSES[name], { desk } = this, { motion, clock, look } = desk;
+    const texts = this.texts[name], course = COURSES[name], { desk } = this, { motion, clock, look } = desk, hadFocus = document.activeElement !== document.body;
     if (name === "") { this.leave(); return null; }
     if (!texts || !course) return words.lesson.unknown(name);
     this.leave();
@@ -65,7 +64,7 @@ export class LessonPanel {
     this.setClass(isClass);
     this.write();
     document.title = `${texts.title} – ${words.title}`;
-    this.heading()?.focus({ preventScroll: true });
+    if (hadFocus && document.activeElement === document.body) this.heading()?.focus({ preventScroll: true });
     return null;
   }
 
@@ -137,10 +136,10 @@ export class LessonPanel {
     const head = make("div", { class: "head" }, picker,
       button(icon(SCREEN), () => this.toggleClass(), { class: "close", "aria-pressed": String(this.isClass), "aria-label": w.class, title: w.classTitle, "data-key": "class" }),
       button("×", () => { location.hash = ""; }, { class: "close", "aria-label": w.leave, title: w.leave, "data-key": "leave" }));
-    const question = make("h2", { id: "question", tabindex: -1, "data-key": "question" }, texts.question);
+    const question = make("h2", { id: "question", class: lesson.answer === null ? "" : "out", tabindex: -1, "data-key": "question" }, texts.question);
     this.node.replaceChildren(head, question, ...(lesson.answer === null ? [this.choices(texts)] : this.steps(lesson, course.steps.length)), this.told);
     this.node.classList.toggle("asks", lesson.answer === null);
-    if (this.shown !== lesson.done) { this.node.scrollTop = 0; this.shown = lesson.done; }
+    if (lesson.done > 0) this.node.querySelector(".now, .end")?.scrollIntoView({ block: "nearest" }); else this.node.scrollTop = 0;
     const again = focused === undefined ? null : this.node.querySelector<HTMLElement>(`[data-key="${focused}"]`) ?? this.node.querySelector<HTMLElement>('[data-key="act0"]') ?? this.heading();
     again?.focus({ preventScroll: true });
   }
@@ -152,15 +151,17 @@ export class LessonPanel {
 
   private steps({ answer, texts, course, done, finished }: Lesson, count: number): HTMLElement[] {
     const w = words.lesson, isRight = answer === texts.answer;
-    const verdict = make("p", { class: `verdict ${isRight ? "good" : "bad"}`, tabindex: -1, "data-key": "verdict" },
-      make("b", {}, isRight ? w.right : w.wrong(w.letters[texts.answer]!, texts.choices[texts.answer]!)), " ", make("span", { class: "reason" }, texts.reason));
+    const said = make("b", {}, isRight ? w.right : w.wrong(w.letters[texts.answer]!, texts.choices[texts.answer]!)), attributes = { class: `verdict ${isRight ? "good" : "bad"}`, "data-key": "verdict" };
+    // The reason is read once; then steps have its room.
+    const verdict = done === 0 || finished ? make("div", { ...attributes, tabindex: -1 }, said, make("p", { class: "reason" }, texts.reason))
+      : make("details", attributes, make("summary", {}, said, " ", make("span", { class: "why" }, w.why)), make("p", { class: "reason" }, texts.reason));
     const list = make("ol", { class: "steps", "aria-label": w.steps }, ...Array.from({ length: count }, (_, k) => {
       const state = k < done ? "done" : k === done ? "now" : "";
       return make("li", { class: state, ...(state === "now" ? { "aria-current": "step" } : {}) },
         make("span", { class: "mark" }, k < done ? icon(TICK) : String(k + 1), k < done && make("span", { class: "out" }, w.ticked)), make("span", {}, texts.steps[k] ?? ""),
         k === done && make("div", { class: "row" }, ...(course.steps[k]?.acts ?? []).map((act, n) => button(act.text(w), () => this.act(act), { "data-key": `act${n}` }))));
     }));
-    return [verdict, list, ...(finished ? [make("p", { class: "good" }, w.finished, " ", button(w.anew, () => { void this.begin(this.lesson!.name, this.isClass); }, { "data-key": "act0" }))] : [])];
+    return [verdict, list, ...(finished ? [make("p", { class: "good end" }, w.finished, " ", button(w.anew, () => { void this.begin(this.lesson!.name, this.isClass); }, { "data-key": "act0" }))] : [])];
   }
 
   /** What a step's button does, or leads to. */

@@ -75,6 +75,8 @@ interface Copy { readonly frame: Group; readonly mesh: Mesh; readonly edges: Lin
 class Label {
   readonly node = document.createElement("span");
   private text = "";
+  /** [px], while it is shown. */
+  place: readonly [number, number] | null = null;
   constructor(into: HTMLElement, colour: string) {
     this.node.className = "label";
     this.node.style.color = colour;
@@ -83,10 +85,11 @@ class Label {
   }
   show(text: string, x: number, y: number): void {
     if (text !== this.text) this.node.textContent = this.text = text;
+    this.place = [x, y];
     this.node.style.visibility = "visible";
     this.node.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`;
   }
-  hide(): void { this.node.style.visibility = "hidden"; }
+  hide(): void { this.place = null; this.node.style.visibility = "hidden"; }
 }
 
 export class Picture {
@@ -439,8 +442,15 @@ export class Picture {
       const [dot, name] = (this.markLabels[k] ??= [new Label(this.labelRoom, "#1d2433"), new Label(this.labelRoom, "#1d2433")]), point = this.onBody(mark.point), seen = this.eye.project(point, new Vector3());
       dot.node.classList.add("dot");
       dot.show(mark.isCentre ? "⊕" : "●", seen.x, seen.y);
-      if (mark.isCentre) name.show(mark.text, seen.x, seen.y + 20); else this.tag(name, mark.text, point, at, 20);
+      if (mark.isCentre) name.hide(); // its sign stands on the body, a name would cover it
+      else if (this.isNearTip(seen)) name.show(mark.text, seen.x + 14 + 4.4 * mark.text.length, seen.y);
+      else this.tag(name, mark.text, point, at, 20);
     }
+  }
+
+  /** Whether an arrow of the motion ends near a place on the screen [px]. */
+  private isNearTip({ x, y }: Vector3): boolean {
+    return [this.labels.omega, this.labels.momentum].some(({ place }) => place !== null && Math.hypot(place[0] - x, place[1] - y) < 52);
   }
 
   private drawFloor(at: Vector3): void {
@@ -460,13 +470,15 @@ export class Picture {
     (shadow.material as MeshBasicMaterial).opacity = 0.13 * seen;
   }
 
-  /** What is drawn, with its labels, as it would be saved. */
-  async saved(background: string): Promise<Blob> {
-    const canvas = document.createElement("canvas"), ratio = 2, { width, height } = this.eye;
-    canvas.width = ratio * width;
-    canvas.height = ratio * height;
+  /** What is drawn, with its labels; of the whole window, or of what nothing covers. */
+  still(background: string, isFree = false): HTMLCanvasElement {
+    const canvas = document.createElement("canvas"), ratio = 2, { width, height } = this.eye, { free } = this;
+    const from = isFree ? { x: free.left - 10, y: free.top - 10, width: free.width + 20, height: free.height + 20 } : { x: 0, y: 0, width, height };
+    canvas.width = ratio * from.width;
+    canvas.height = ratio * from.height;
     const paper = canvas.getContext("2d")!;
     paper.scale(ratio, ratio);
+    paper.translate(-from.x, -from.y);
     paper.fillStyle = background;
     paper.fillRect(0, 0, width, height);
     if (this.renderer) this.renderer.draw(this.scene, this.eye.camera);
@@ -475,12 +487,18 @@ export class Picture {
     paper.textAlign = "center";
     paper.textBaseline = "middle";
     for (const node of this.labelRoom.querySelectorAll<HTMLElement>(".label")) {
-      if (node.style.visibility === "hidden") continue;
+      if (node.style.visibility === "hidden" || node.hidden) continue;
       const at = node.getBoundingClientRect();
-      paper.font = "700 17px system-ui, sans-serif";
+      paper.font = `700 ${getComputedStyle(node).fontSize} system-ui, sans-serif`;
       paper.fillStyle = node.style.color;
       paper.fillText(node.textContent ?? "", at.left + 0.5 * at.width, at.top + 0.5 * at.height);
     }
+    return canvas;
+  }
+
+  /** What is drawn, as it would be saved. */
+  async saved(background: string): Promise<Blob> {
+    const canvas = this.still(background);
     return new Promise((done, failed) => canvas.toBlob((blob) => (blob ? done(blob) : failed(new Error("no picture"))), "image/png"));
   }
 

@@ -106,7 +106,7 @@ export class Plots {
     };
     this.plots = kinds.flatMap((kind) => all[kind] ?? []);
     this.node = make("div", {}, ...this.plots.map(({ title, unit, curves, canvas }) => make("div", { class: "plot" },
-      make("div", { class: "title" }, `${title} [${unit}]`, make("span", {}, ...curves.map(({ name, colour }) => {
+      make("div", { class: "title" }, `${title} [${unit}]`, curves.length > 1 && make("span", {}, ...curves.map(({ name, colour }) => {
         const key = make("span", {}, ` ${name}`);
         key.style.color = colour;
         return key;
@@ -158,8 +158,9 @@ export class Plots {
       paper.lineTo(x, height);
       paper.stroke();
       paper.fillStyle = "#4b5873";
-      paper.font = "11px system-ui, sans-serif";
-      paper.fillText(short(high - room), 3, 11);
+      const size = Math.max(11, Number.parseFloat(getComputedStyle(canvas).fontSize) - 4);
+      paper.font = `${size}px system-ui, sans-serif`;
+      paper.fillText(short(high - room), 3, size);
       if (low + room < 0) paper.fillText(short(low + room), 3, height - 3);
     }
   }

@@ -10,6 +10,7 @@ const english = {
   close: "close",
   picture: {
     name: "The body. Arrow keys move the aim, Enter pokes there, G grabs and lets go; Shift and arrow keys turn the view, plus and minus zoom, 0 goes back",
+    body: "the body as it is now",
     weight: (newtons: string) => `weight ${newtons} N`,
     pull: "pull me",
     noWebGL: "This browser draws no WebGL: the picture is a plain one.",
@@ -77,7 +78,7 @@ const english = {
   lesson: {
     name: "Lesson", none: "no lesson", leave: "leave the lesson", class: "class mode", classTitle: "For a projector: large words, and nothing else to read",
     letters: ["A", "B", "C"], first: "Answer first: A, B or C", right: "Right.", wrong: (letter: string, choice: string) => `No, it is ${letter}: ${choice}`,
-    steps: "Try it", done: (k: number, all: number) => `Step ${k} of ${all} is done.`, finished: "All steps are done.", ticked: "done", now: "now", anew: "begin the lesson again",
+    why: "why?", steps: "Try it", done: (k: number, all: number) => `Step ${k} of ${all} is done.`, finished: "All steps are done.", ticked: "done", now: "now", anew: "begin the lesson again",
     unknown: (name: string) => `There is no lesson ${name}`, swings: "It still swings: wait until it hangs at rest.", untied: "No string is tied.", tied: "The string holds it: click to poke it.",
     places: { tip: "tip", rim: "rim", grip: "grip", head: "head", corner: "corner", stem: "stem", spout: "spout", handle: "handle", knob: "knob", com: "centre of mass" } as Record<string, string>,
     poke: (place: string) => `poke: ${place}`, again: (place: string) => `start again, and poke: ${place}`, restart: "start again", pull: "show me how", press: "take me there", pullHow: "Drag the body with the pointer, or with G and arrow keys",
