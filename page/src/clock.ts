@@ -2,7 +2,7 @@
 //
 // Time: playing, slower, by steps, back to any moment and on from there; and the bar where one does so.
 
-import { button, icon, make } from "./panel_elements.ts";
+import { button, icon, make, say } from "./panel_elements.ts";
 import type { Entry, Motion } from "./source.ts";
 import { words } from "./words.ts";
 
@@ -22,6 +22,8 @@ const RESET = "M12 5V1.5L6.5 6.5 12 11.500V8a5.500 5.500 0 1 1-5.500 5.500H3.500
 
 export class Clock {
   paused = false;
+  /** Why time stands and can't go on, or "". */
+  held = "";
   rate: number = RATES[0];
   readonly node: HTMLElement;
   private readonly playing: HTMLButtonElement;
@@ -71,6 +73,7 @@ export class Clock {
   }
 
   setPaused(paused: boolean): void {
+    if (this.held && !paused) { say(this.held); return; }
     this.paused = paused;
     this.playing.replaceChildren(icon(paused ? PLAY : PAUSE));
     const name = paused ? words.time.play : words.time.pause;
@@ -78,7 +81,13 @@ export class Clock {
     this.playing.title = name;
   }
 
+  setRate(rate: number): void {
+    this.rate = rate;
+    this.rates.value = String(rate);
+  }
+
   step(): void {
+    if (this.held) { say(this.held); return; }
     this.setPaused(true);
     this.motion.advance(this.motion.snapshot().timeNs + STEP_NS);
   }

@@ -44,7 +44,7 @@ export function bodyCard(desk: Desk): Card {
   const tensor = NAMES.map((name, k) => one("explicit_inertia.tensor", `I${name}`, k, "kg m²"));
   const own = make("div", {}, make("div", { class: "field" }, w.fixed, make("span", {}, ownMass.node, " kg")), make("div", { class: "field" }, w.centre, make("span", { class: "trio" }, ...centre.map(({ node: field }) => field))),
     ...[0, 3].map((from) => make("div", { class: "field" }, ...[0, 1, 2].map((k) => make("label", {}, `I${NAMES[from + k]}`, tensor[from + k]!.node)))), make("p", { class: "note" }, w.ownNote));
-  const table = make("table"), ballast = make("div");
+  const table = make("table", { "data-mark": "moments", tabindex: -1 }), ballast = make("div");
   let heavy = 0.1;
   const kilograms = numberField(w.ballast, (value) => { heavy = value; kilograms.show(value); return null; }, "kg");
   const stick = button(w.add, () => {
@@ -90,7 +90,7 @@ export function bodyCard(desk: Desk): Card {
     make("h3", {}, w.own), make("div", { class: "row" }, button(w.choose, () => file.click()), file), units.node, make("p", { class: "note" }, w.formats), verdict, facts,
     make("h3", {}, w.mass), make("div", { class: "field" }, w.fixed, make("span", {}, mass.node, " kg")), make("div", { class: "field" }, w.dense, make("span", {}, density.node, " kg/m³")), models.node, own,
     make("h3", {}, w.table), table,
-    make("h3", {}, w.ballast), make("div", { class: "field" }, make("span", {}, kilograms.node, " kg"), stick), ballast);
+    make("h3", {}, w.ballast), make("div", { class: "field", "data-mark": "ballast" }, make("span", {}, kilograms.node, " kg"), stick), ballast);
   return { node, changed, closed: () => { desk.pointer.claim = null; } };
 }
 

@@ -46,8 +46,12 @@ export function tensorCard(desk: Desk): Card {
     said.textContent = product < VANISHED ? w.none : w.products(short(100 * product, 2));
     said.className = product < VANISHED ? "good" : "";
   };
-  const shape = (text: string, name: "inertiaBox" | "ellipsoid" | "principal" | "boundingBox" | "poinsot" | "cones"): HTMLElement => check(text, look[name], (on) => { look[name] = on; }).node;
-  const node = make("div", {}, make("p", { class: "note" }, w.about), matrix, said, make("div", { class: "sliders" }, ...turns.map(({ node: row }) => row)),
+  const shape = (text: string, name: "inertiaBox" | "ellipsoid" | "principal" | "boundingBox" | "poinsot" | "cones"): HTMLElement => {
+    const { node: row } = check(text, look[name], (on) => { look[name] = on; });
+    row.dataset["mark"] = name;
+    return row;
+  };
+  const node = make("div", {}, make("p", { class: "note" }, w.about), matrix, said, make("div", { class: "sliders", "data-mark": "turn" }, ...turns.map(({ node: row }) => row)),
     make("div", { class: "row" }, button(w.principal, begin([])), button(w.mesh, begin(UNTURNED))),
     make("h3", {}, w.shapes), shape(w.box, "inertiaBox"), shape(w.ellipsoid, "ellipsoid"), shape(w.axes, "principal"), shape(w.bounding, "boundingBox"),
     make("h3", {}, w.poinsot), shape(w.rolls, "poinsot"), shape(w.cones, "cones"), make("p", { class: "note" }, w.poinsotNote));

@@ -7,6 +7,7 @@ import base64
 import gzip
 import json
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -27,16 +28,26 @@ FORM = 1
 SPIN = {"initial.angular_velocity": [0.05, 0.1, 3.0]}
 """Of a mesh alone [rad/s], so that there is something to see."""
 _PLACE = '<script type="application/gzip" id="take"></script>'
+_BEGIN = '<meta name="begin" content="">'
+"""What the page opens in if its address says nothing, as behind the # of an address."""
 
 
-def write_page(file: str | Path, values: dict[str, Any] | None = None, script: Sequence[Command] = ()) -> None:
-    """Write the page, to begin with a scene of these parameters, by name, and a script of it. Raises InputError."""
+def write_page(
+    file: str | Path, values: dict[str, Any] | None = None, script: Sequence[Command] = (), begins: str = ""
+) -> None:
+    """Write the page, to begin with a scene of these parameters, by name, and a script of it, or as with this behind the
+    # of its address (page/src/address.ts). Raises InputError.
+    """
     page = built_page().read_text("utf-8")
     if values is not None:
         take = base64.b64encode(gzip.compress(json.dumps(take_of(values, script)).encode(), 9, mtime=0)).decode()
         if _PLACE not in page:
             raise InputError("page", "the built page has no place for a scene")
         page = page.replace(_PLACE, f"{_PLACE.partition('></')[0]}>{take}</script>")
+    if begins:
+        if _BEGIN not in page:
+            raise InputError("page", "the built page has no place for what it begins with")
+        page = page.replace(_BEGIN, _BEGIN.replace('content=""', f'content="{escape(begins)}"'), 1)
     with whole_file("--html", file) as beside:
         beside.write_text(page, "utf-8")
 
