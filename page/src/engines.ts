@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
 //
-// What physics engines were measured to do with a free body (benchmarks/engines.py), and the ghosts that do the same.
+// What physics engines were measured to do with a free body (benchmarks/engines.py).
 
 import table from "../../benchmarks/results/engines.csv";
-import type { GhostChoice } from "./source.ts";
 
 /** 60 s of a body that spins nearly about its middle axis; the exact motion flips 9 times. turnDeg: of L, at most. */
 export interface Measured {
@@ -15,7 +14,7 @@ export interface Measured {
   /** of the energy at the start; NaN of one that wasn't flown */
   readonly energyChange: number;
   readonly turnDeg: number;
-  /** which of our own motions was flown beside it, or "" */
+  /** which of our own motions was flown beside it (ghosts.ts), or "" */
   readonly ghost: string;
   readonly date: string;
 }
@@ -32,11 +31,3 @@ export const MEASURED: readonly Measured[] = (() => {
     };
   });
 })();
-
-/** A ghost that does what engines do; `beside`: as the benchmark calls it. MuJoCo's step is that of a picture. */
-interface Named { readonly choice: GhostChoice; readonly beside: string }
-
-export const NAMED: Readonly<Record<"gyroscopic" | "mujoco", Named>> = {
-  gyroscopic: { choice: { inertia_model: "", integrator: "", step: 0, gyroscopic: false }, beside: "no_gyroscopic_term" },
-  mujoco: { choice: { inertia_model: "", integrator: "semi_implicit_euler", step: 0.016666667, gyroscopic: true }, beside: "semi_implicit_euler" },
-};

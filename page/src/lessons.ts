@@ -3,7 +3,7 @@
 // What a lesson is, what it takes note of, and how far it has come. Nothing here knows the page: Node plays lessons, too.
 // What each lesson's steps are about stands in lessons_steps.ts, its texts in the head of its scene.
 
-import type { BodyInfo, Entry, Motion, Snapshot, Values, Vec3 } from "./source.ts";
+import type { BodyInfo, Entry, GhostChoice, Motion, Snapshot, Values, Vec3 } from "./source.ts";
 import type { Words } from "./words.ts";
 
 /** A lesson's texts, as rigid_proto_ros/page/data.py writes them from the head of its scene. answer: number of a choice. */
@@ -38,6 +38,8 @@ export interface ChalkLine { readonly point: Vec3; readonly along: Vec3 }
 export interface Sight {
   readonly turned: readonly number[] | null;
   readonly principal: boolean;
+  readonly poinsot: boolean;
+  readonly ghost: GhostChoice;
   readonly apart: boolean;
   readonly trace: Vec3 | "com" | null;
   /** names of cards that are open */
@@ -56,13 +58,14 @@ export interface Account {
 }
 
 /** What a step's button does. poke: at a contact or "com", along [body axes]; fresh: from the start anew. start, set:
- * these values, start from the scene's start anew. card: opens it and marks the element. hand: leads to the picture. */
+ * these values, start from the scene's start anew. ghost: another one, from the start anew. card: opens it and marks the element. hand: leads to the picture. */
 export type Act = { readonly text: (words: Words["lesson"]) => string } & (
   | { readonly kind: "poke"; readonly at: string; readonly along: Vec3; readonly fresh?: boolean }
   | { readonly kind: "start" | "set"; readonly values: (scene: Values, info: BodyInfo) => Values }
-  | { readonly kind: "card"; readonly card: "body" | "tensor" | "world" | "measure" | "ghost"; readonly mark: string }
+  | { readonly kind: "card"; readonly card: "body" | "tensor" | "world" | "measure" | "ghost" | "plots"; readonly mark: string }
+  | { readonly kind: "ghost"; readonly choice: GhostChoice }
   | { readonly kind: "trace"; readonly at: string }
-  | { readonly kind: "again" | "hand" | "tie" | "chalk" | "apart" | "principal" }
+  | { readonly kind: "again" | "hand" | "tie" | "chalk" | "apart" | "principal" | "poinsot" }
 );
 
 export interface Step {

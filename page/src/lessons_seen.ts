@@ -78,6 +78,11 @@ export function flips(seen: readonly Seen[], k: number): number {
   return count;
 }
 
+/** The same instants with the ghost in the body's place; without one, none. */
+export function ofGhost(seen: readonly Seen[]): readonly Seen[] {
+  return seen.every(({ now }) => now.ghost !== null) ? seen.map((each) => ({ ...each, now: { ...each.now, body: each.now.ghost! } })) : [];
+}
+
 /** Whether an axis of the mesh has stayed along L, or against it. */
 export const steady = (seen: readonly Seen[], k: number): boolean =>
   seen.length > 0 && seen.every((each) => { const angle = between(axis(each, k), momentum(each)); return angle < 25 || angle > 155; });

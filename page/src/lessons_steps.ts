@@ -4,9 +4,10 @@
 // buttons that do it or lead to where it is done. A condition is a function of what was seen and done (lessons_seen.ts):
 // a place, a value, or an outcome, and never the press of a button.
 
+import { isSameGhost, NAMED } from "./ghosts.ts";
 import type { Account, Act, Course, Seen, Step } from "./lessons.ts";
 import {
-  alike, axis, between, earlier, flips, free, isAt, isVector, lasted, latest, minus, momentum, newPokes, omega, onlyPoke, pokes, precessed, present, since, size,
+  alike, axis, between, earlier, flips, free, isAt, isVector, lasted, latest, minus, momentum, newPokes, ofGhost, omega, onlyPoke, pokes, precessed, present, since, size,
   speedGiven, spinGiven, startSpin, steady, strayed, tilted, turns, untouched,
 } from "./lessons_seen.ts";
 import type { Values, Vec3 } from "./source.ts";
@@ -21,6 +22,7 @@ const set = (text: Says, values: Values): Act => ({ kind: "set", values: () => v
 const again: Act = { kind: "again", text: (w) => w.restart };
 const pull: Act = { kind: "hand", text: (w) => w.pull };
 const press: Act = { kind: "hand", text: (w) => w.press };
+const ghost = (name: keyof typeof NAMED): Act => ({ kind: "ghost", choice: NAMED[name].choice, text: (w) => w.ghosts[name] });
 const spun = (factor: number): ((scene: Values) => Values) => (scene) => ({ "initial.angular_velocity": startSpin(scene).map((w) => w * factor) });
 
 // What steps are about
@@ -57,6 +59,12 @@ const throws = (unsteady: 0 | 1 | 2, others: readonly [0 | 1 | 2, 0 | 1 | 2], sl
     },
   ],
 });
+
+/** The whole trial beside this ghost. */
+const besideGhost = (a: Account, name: keyof typeof NAMED): readonly Seen[] => {
+  const seen = whole(a);
+  return unturned(present(a), a.scene) && hasTerm(seen) && isSameGhost(a.sight.ghost, NAMED[name].choice) && seen.every(({ now }) => now.ghost !== null) ? seen : [];
+};
 
 const hasTerm = (seen: readonly Seen[]): boolean => seen.every(({ values }) => values["gyroscopic"] !== false);
 const model = ({ values }: Seen): string => String(values["inertia_model"]);
@@ -115,6 +123,20 @@ export const COURSES: Readonly<Record<string, Course>> = {
       {
         done: (a) => { const seen = latest(untouched(present(a), since(a)), (each) => !hasTerm([each])); return lasted(seen) > 0.5 && strayed(seen, momentum) > 5 && strayed(seen, omega) < 2; },
         acts: [set((w) => w.termOff, { gyroscopic: false })],
+      },
+    ],
+  },
+  engine: {
+    plots: ["energy", "angle"],
+    steps: [
+      watch((a) => unturned(present(a), a.scene) && flips(free(a), 2) > 1),
+      {
+        done: (a) => { const seen = besideGhost(a, "gyroscopic"), ghost = ofGhost(seen); return flips(seen, 2) > 1 && ghost.length > 0 && flips(ghost, 2) === 0; },
+        acts: [ghost("gyroscopic"), { kind: "card", card: "ghost", mark: "gyroscopic", text: (w) => w.card }],
+      },
+      {
+        done: (a) => { const seen = besideGhost(a, "mujoco"), { body, ghost } = seen[seen.length - 1]?.now ?? {}; return body !== undefined && Boolean(ghost) && ghost!.kinetic > 1.1 * body.kinetic; },
+        acts: [ghost("mujoco"), { kind: "card", card: "plots", mark: "energy", text: (w) => w.energies }, { kind: "card", card: "ghost", mark: "mujoco", text: (w) => w.card }],
       },
     ],
   },
@@ -189,6 +211,17 @@ export const COURSES: Readonly<Record<string, Course>> = {
         acts: [{ kind: "tie", text: (w) => w.tie }, { kind: "chalk", text: (w) => w.chalk }],
       },
       { done: (a) => newPokes(a).some(({ lever, fromCentre }) => lever < 0.08 && fromCentre < 0.12), acts: [press] },
+    ],
+  },
+  poinsot: {
+    plots: ["omega", "momentum"],
+    steps: [
+      watch((a) => { const seen = free(a); return unturned(present(a), a.scene) && flips(seen, 0) > 1 && strayed(seen, momentum) < 0.1 && strayed(seen, omega) > 10; }),
+      { done: (a) => a.sight.poinsot && turns(free(a)) > 2, acts: [{ kind: "poinsot", text: (w) => w.poinsot }, { kind: "card", card: "tensor", mark: "poinsot", text: (w) => w.card }] },
+      {
+        done: (a) => a.sight.poinsot && newPokes(a).some((poked) => tilted(poked) > 5 && present(a).seen.at(-1)!.now.timeNs - poked.after.now.timeNs > 1e9),
+        acts: [poke("corner", [0, 0, -1])],
+      },
     ],
   },
   spinning_top: {

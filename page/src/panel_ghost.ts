@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 
-import { MEASURED, NAMED, type Measured } from "./engines.ts";
+import { MEASURED, type Measured } from "./engines.ts";
+import { isSameGhost, NAMED, NO_GHOST } from "./ghosts.ts";
 import type { Card, Desk } from "./panel.ts";
 import { check, choice, make } from "./panel_elements.ts";
 import type { GhostChoice } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
-const NONE: GhostChoice = { inertia_model: "", integrator: "", step: 0, gyroscopic: true };
 /** [s]; 0: that of the body. 1/60 s as the parameter step rounds it. */
 const STEPS = [0, 0.016666667, 0.01, 0.001] as const;
 /** [s] Rows of the table with a step above it are shown. */
@@ -15,29 +15,26 @@ const FINE = 0.01;
 /** Changes of energy below this are told as none. */
 const KEPT = 1e-5;
 
-const sameChoice = (a: GhostChoice, b: GhostChoice): boolean =>
-  a.inertia_model === b.inertia_model && a.integrator === b.integrator && a.step === b.step && a.gyroscopic === b.gyroscopic;
-
 /** What differs of the body that flies beside. */
 export function ghostCard(desk: Desk): Card {
   const { motion, look } = desk, w = words.ghost;
   const names = motion.parameters().find(({ name }) => name === "integrator")?.choices ?? [];
   const tell = (choice: Partial<GhostChoice>): void => { desk.told(motion.setGhost(choice)); changed(); };
-  const integrator = choice(w.integrator, names.map((name) => [name, name] as const), (name) => tell({ ...NONE, integrator: name, step: motion.ghost().step }));
-  const step = choice(w.step, STEPS.map((value, k) => [String(value), [w.same, w.sixtieth, w.hundredth, w.thousandth][k] ?? ""] as const), (value) => tell({ ...NONE, integrator: motion.ghost().integrator, step: Number(value) }));
+  const integrator = choice(w.integrator, names.map((name) => [name, name] as const), (name) => tell({ ...NO_GHOST, integrator: name, step: motion.ghost().step }));
+  const step = choice(w.step, STEPS.map((value, k) => [String(value), [w.same, w.sixtieth, w.hundredth, w.thousandth][k] ?? ""] as const), (value) => tell({ ...NO_GHOST, integrator: motion.ghost().integrator, step: Number(value) }));
   const choiceOf = (kind: string): GhostChoice => {
     if (kind === "gyroscopic" || kind === "mujoco") return NAMED[kind].choice;
-    if (kind !== "integrator") return { ...NONE, inertia_model: kind };
+    if (kind !== "integrator") return { ...NO_GHOST, inertia_model: kind };
     const other = String(motion.values()["integrator"]) === "euler" ? "midpoint" : "euler";
-    return { ...NONE, integrator: names.includes(other) ? other : names[0] ?? "" };
+    return { ...NO_GHOST, integrator: names.includes(other) ? other : names[0] ?? "" };
   };
   const kindOf = (now: GhostChoice): string => {
-    const named = Object.entries(NAMED).find(([, each]) => sameChoice(each.choice, now));
+    const named = Object.entries(NAMED).find(([, each]) => isSameGhost(each.choice, now));
     return named?.[0] ?? (now.integrator || now.step ? "integrator" : now.inertia_model || (now.gyroscopic ? "" : "gyroscopic"));
   };
   const radios = Object.entries(w.kinds).map(([kind, text]) => {
     const input = make("input", { type: "radio", name: "ghost", value: kind, change: () => tell(choiceOf(kind)) });
-    return { kind, input, node: make("label", { class: "check" }, input, make("span", {}, text)) };
+    return { kind, input, node: make("label", { class: "check", "data-mark": kind || "none" }, input, make("span", {}, text)) };
   });
   const apart = check(w.apart, look.apart, (on) => { look.apart = on; desk.picture.setApart(on); });
   const source = make("p", { class: "note" }), rows = make("tbody"), date = make("p", { class: "note" });

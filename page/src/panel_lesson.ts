@@ -107,8 +107,8 @@ export class LessonPanel {
   }
 
   private sight(): Sight {
-    const { turned, principal, apart, trace } = this.desk.look;
-    return { turned, principal, apart, trace, cards: this.panel.opened() };
+    const { turned, principal, poinsot, apart, trace } = this.desk.look;
+    return { turned, principal, poinsot, apart, trace, ghost: this.desk.motion.ghost(), cards: this.panel.opened() };
   }
 
   private heading(): HTMLElement | null { return this.node.querySelector<HTMLElement>("#question"); }
@@ -180,6 +180,8 @@ export class LessonPanel {
     else if (act.kind === "trace") look.trace = motion.body().contacts[act.at] ?? null;
     else if (act.kind === "apart") { look.apart = true; desk.picture.setApart(true); }
     else if (act.kind === "principal") look.principal = true;
+    else if (act.kind === "poinsot") { look.poinsot = true; this.panel.changed(); }
+    else if (act.kind === "ghost") { if (desk.told(motion.setGhost(act.choice))) desk.restart(); }
     else if (act.kind === "tie") {
       stage(w.tieHow);
       pointer.claim = ({ mesh }) => { desk.told(motion.set({ "string.attach": mesh })); desk.clock.setPaused(false); };

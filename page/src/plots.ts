@@ -80,7 +80,7 @@ export class Track {
 }
 
 interface Curve { readonly name: string; readonly colour: string; value(seen: Seen): number }
-interface Plot { readonly title: string; readonly unit: string; readonly curves: readonly Curve[]; readonly canvas: HTMLCanvasElement }
+interface Plot { readonly kind: string; readonly title: string; readonly unit: string; readonly curves: readonly Curve[]; readonly canvas: HTMLCanvasElement }
 
 const principal = ({ now, info }: Seen, k: number): number =>
   info.axes[k]! * now.body.row[10]! + info.axes[3 + k]! * now.body.row[11]! + info.axes[6 + k]! * now.body.row[12]!;
@@ -94,18 +94,19 @@ export class Plots {
 
   constructor(track: Track, kinds: readonly string[] = ["energy", "omega", "momentum", "angle"]) {
     this.track = track;
-    const plot = (title: string, unit: string, curves: readonly Curve[]): Plot => ({ title, unit, curves, canvas: make("canvas", { role: "img", "aria-label": title }) });
+    const plot = (kind: string, title: string, unit: string, curves: readonly Curve[]): Plot => ({ kind, title, unit, curves, canvas: make("canvas", { role: "img", "aria-label": title }) });
     const energy = (name: string, colour: string, of: (e: Energies) => number): Curve => ({ name, colour, value: ({ now, gravity }) => of(energies(now.body, gravity)) });
+    const whole = (e: Energies): number => e.spin + e.move + e.string + e.height;
     const all: Readonly<Record<string, Plot>> = {
-      energy: plot(words.plots.energy, "J", [
+      energy: plot("energy", words.plots.energy, "J", [
         energy(words.energy.spin, "#7a45d1", (e) => e.spin), energy(words.energy.move, "#0b7466", (e) => e.move), energy(words.energy.string, "#d1432f", (e) => e.string),
-        energy(words.energy.all, "#6b7385", (e) => e.spin + e.move + e.string + e.height)]),
-      omega: plot(words.plots.omega, "rad/s", AXES.map((colour, k) => ({ name: `ω${"₁₂₃"[k]}`, colour, value: (seen) => principal(seen, k) }))),
-      momentum: plot(words.plots.momentum, "N m s", AXES.map((colour, k) => ({ name: `L${"xyz"[k]}`, colour, value: ({ now }) => now.body.momentum[k]! }))),
-      angle: plot(words.plots.angle, "°", [{ name: words.angle.name, colour: "#2f63ad", value: ({ now }) => (now.angleToGhost * 180) / Math.PI }]),
+        energy(words.energy.all, "#6b7385", whole), { name: words.energy.ghost, colour: "#2f7fd6", value: ({ now, gravity }) => (now.ghost ? whole(energies(now.ghost, gravity)) : NaN) }]),
+      omega: plot("omega", words.plots.omega, "rad/s", AXES.map((colour, k) => ({ name: `ω${"₁₂₃"[k]}`, colour, value: (seen) => principal(seen, k) }))),
+      momentum: plot("momentum", words.plots.momentum, "N m s", AXES.map((colour, k) => ({ name: `L${"xyz"[k]}`, colour, value: ({ now }) => now.body.momentum[k]! }))),
+      angle: plot("angle", words.plots.angle, "°", [{ name: words.angle.name, colour: "#2f63ad", value: ({ now }) => (now.angleToGhost * 180) / Math.PI }]),
     };
     this.plots = kinds.flatMap((kind) => all[kind] ?? []);
-    this.node = make("div", {}, ...this.plots.map(({ title, unit, curves, canvas }) => make("div", { class: "plot" },
+    this.node = make("div", {}, ...this.plots.map(({ kind, title, unit, curves, canvas }) => make("div", { class: "plot", "data-mark": kind },
       make("div", { class: "title" }, `${title} [${unit}]`, curves.length > 1 && make("span", {}, ...curves.map(({ name, colour }) => {
         const key = make("span", {}, ` ${name}`);
         key.style.color = colour;

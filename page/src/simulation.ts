@@ -7,6 +7,7 @@ import type { Declarations } from "./data.ts";
 import { fileWith } from "./file.ts";
 import { Flown } from "./flight.ts";
 import type { Kept } from "./flight.ts";
+import { NO_GHOST } from "./ghosts.ts";
 import { Kernels } from "./kernels.ts";
 import { readMesh } from "./meshes.ts";
 import { filled, nanoseconds, Refused, shown } from "./numbers.ts";
@@ -26,8 +27,6 @@ import type { Take } from "./take.ts";
 /** States of a take are kept every so often, to go back to: each is 30 kB. Of too many every other one is forgotten. */
 const KEEP_NS = 1_000_000_000;
 const MOST_KEPT = 128;
-
-const NO_GHOST: GhostChoice = { inertia_model: "", integrator: "", step: 0, gyroscopic: true };
 
 interface Done { readonly tNs: number; readonly entry: Entry }
 

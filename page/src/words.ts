@@ -23,7 +23,7 @@ const english = {
     name: "Body and hand", mass: "mass", sizes: ["size x", "size y", "size z"], poke: "poke", lock: "equal sizes",
     lockTitle: "Change all three sizes together",
   },
-  energy: { name: "energy", spin: "spin", move: "move", string: "string", height: "height", all: "all" },
+  energy: { name: "energy", ghost: "ghost", spin: "spin", move: "move", string: "string", height: "height", all: "all" },
   angle: { name: "angle to the ghost", kept: "angle to the kept take" },
   time: {
     name: "Time", play: "Play", pause: "Pause", step: "Step 0.01 s", back: "−2 s", backTitle: "Back 2 s", rate: "How fast time goes",
@@ -92,7 +92,7 @@ const english = {
     poke: (place: string) => `poke: ${place}`, again: (place: string) => `start again, and poke: ${place}`, restart: "start again", pull: "show me how", press: "take me there", pullHow: "Drag the body with the pointer, or with G and arrow keys",
     pressHow: "Press a place of the body, or aim with arrow keys and press Enter", throwAbout: (axis: string) => `throw it about ${axis}`, withoutTerm: "term off, and start again",
     termOn: "switch the term on", termOff: "switch the term off", box: "bounding box", truth: "true tensor", corners: "mass in the corners", stick: "stick on 30 g, and start again", unstick: "take it off",
-    ballast: "open ballast", card: "open the card", principal: "show the axes", turn: "open the axes", aboutThird: "spin about I₃", chalk: "draw the line", tie: "tie it here", tieHow: "Press the place to tie it, or aim with arrow keys and press Enter",
+    ballast: "open ballast", card: "open the card", ghosts: { gyroscopic: "ghost as in Jolt, and start again", mujoco: "ghost as in MuJoCo, and start again" }, energies: "plot the energies", poinsot: "show the ellipsoid", principal: "show the axes", turn: "open the axes", aboutThird: "spin about I₃", chalk: "draw the line", tie: "tie it here", tieHow: "Press the place to tie it, or aim with arrow keys and press Enter",
     twice: "spin × 2", half: "spin × ½", noSpin: "no spin", trace: "trace the grip", weightless: "gravity off", moments: "open the table", tenfold: "mass × 10", tenth: "mass as before",
   },
   percent: (part: number) => (Number.isFinite(part) ? `${part < 0 ? "−" : "+"}${short(Math.abs(part), 2)} %` : "–"),

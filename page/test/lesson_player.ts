@@ -3,16 +3,17 @@
 // A person at a lesson, without the page: buttons, hands and time, and how each step is done right, and wrong.
 
 import type { Data } from "../src/data.ts";
+import { NAMED, NO_GHOST } from "../src/ghosts.ts";
 import { Lesson, type Act, type Sight } from "../src/lessons.ts";
 import { COURSES } from "../src/lessons_steps.ts";
-import type { Motion, Vec3, Values } from "../src/source.ts";
+import type { GhostChoice, Motion, Vec3, Values } from "../src/source.ts";
 
 const S = 1e9;
 
 export class Player {
   readonly motion: Motion;
   readonly lesson: Lesson;
-  sight: { -readonly [K in keyof Sight]: Sight[K] } = { turned: null, principal: false, apart: false, trace: null, cards: [] };
+  sight: { -readonly [K in keyof Sight]: Sight[K] } = { turned: null, principal: false, poinsot: false, ghost: NO_GHOST, apart: false, trace: null, cards: [] };
   /** [N s] of a poke: as the page has it, .9 of the body's size a second. */
   strength: number;
 
@@ -75,6 +76,11 @@ export class Player {
 
   tie(attach: Vec3): void { this.set({ "string.attach": attach }); }
 
+  ghost(choice: GhostChoice): void {
+    this.did(this.motion.setGhost(choice));
+    this.sight.ghost = choice;
+  }
+
   /** What a button does to the motion and to what is seen. */
   press(act: Act): void {
     const { scene } = this.lesson;
@@ -85,6 +91,8 @@ export class Player {
     else if (act.kind === "trace") this.sight.trace = this.motion.body().contacts[act.at] ?? null;
     else if (act.kind === "apart") this.sight.apart = true;
     else if (act.kind === "principal") this.sight.principal = true;
+    else if (act.kind === "poinsot") this.sight.poinsot = true;
+    else if (act.kind === "ghost") { this.ghost(act.choice); this.restart(); }
     else if (act.kind === "card") this.sight.cards = [act.card];
     else if (act.kind === "chalk") this.chalk();
     this.look();
@@ -136,6 +144,7 @@ const still = wait(8);
 const spin = (...w: readonly number[]): Hand => (player) => { player.start({ "initial.angular_velocity": w }); player.fly(3); };
 const at = (place: string, along: Vec3, factor = 1): Hand => (player) => { player.restart(); player.poke(place, along, factor); player.fly(1); };
 const values = (given: Values, seconds = 3): Hand => (player) => { player.set(given); player.fly(seconds); };
+const beside = (choice: GhostChoice): Hand => (player) => { player.ghost(choice); player.restart(); player.fly(8); };
 const anew = (given: Values, then: Hand = wait(3)): Hand => (player) => { player.start(given); then(player); };
 
 /** Of each step what a wrong hand does: other places, other values, nothing, random pokes. After none of it the step is ticked. */
@@ -156,6 +165,12 @@ export const WRONG: Readonly<Record<string, readonly (readonly Hand[])[]>> = {
   dropped_term: [
     [stand, (player) => { player.set({ gyroscopic: true }); player.fly(6); }, (player) => { for (let k = 0; k < 6; k++) { player.poke("left", [1, 0, 0], 0.2); player.fly(0.02); } }],
     [still, pokes, (player) => { player.set({ gyroscopic: true }); player.fly(0.5); player.set({ gyroscopic: false }); player.fly(4); }], [still, pokes],
+  ],
+  engine: [
+    [stand, pokes, spin(12, 0, 0), anew({ gyroscopic: false }, wait(8))],
+    [still, pokes, beside(NAMED.mujoco.choice), beside({ ...NO_GHOST, inertia_model: "bounding_box" }), (player) => { player.ghost(NAMED.gyroscopic.choice); player.start({ gyroscopic: false }); player.fly(8); }, (player) => { player.ghost(NAMED.gyroscopic.choice); player.fly(8); },
+      (player) => { player.ghost(NAMED.gyroscopic.choice); player.start({ "initial.angular_velocity": [12, 0, 0] }); player.fly(8); }],
+    [still, pokes, beside(NAMED.gyroscopic.choice), beside({ ...NO_GHOST, integrator: "semi_implicit_euler" }), beside({ ...NO_GHOST, integrator: "rk4", step: 0.016666667 })],
   ],
   hammer: [
     [stand, pokes, values({ inertia_model: "bounding_box" })], [still, pokes, values({ inertia_model: "shell" })],
@@ -178,6 +193,12 @@ export const WRONG: Readonly<Record<string, readonly (readonly Hand[])[]>> = {
   plumb_line: [
     [stand, (player) => { player.fly(2); player.chalk(); player.fly(3); player.chalk(); }, pokes], [still, pokes, (player) => player.chalk(), (player) => { player.tie([-0.08, 0, 0]); player.fly(1.5); player.chalk(); }],
     [still, pokes, (player) => player.poke("corner", [0, 0, -1]), (player) => player.poke("spine", [1, 0.7, 0])],
+  ],
+  poinsot: [
+    [stand, pokes, spin(0, 5, 0), spin(0, 0, 5), anew({ gyroscopic: false }, wait(8))],
+    [still, pokes, (player) => { player.sight.principal = true; player.fly(3); }, (player) => { player.sight.cards = ["tensor"]; player.fly(3); }, (player) => { player.sight.poinsot = true; player.look(); }],
+    [still, (player) => { player.poke("com", [0, 0, -1]); player.fly(2); }, (player) => { player.poke("corner", [0, 0, -1], 0.02); player.fly(2); }, (player) => { player.sight.poinsot = false; player.poke("corner", [0, 0, -1]); player.fly(2); },
+      (player) => { player.poke("corner", [0, 0, -1]); player.fly(0.5); }],
   ],
   spinning_top: [
     [stand, still, freshPokes, at("edge", [0, 0, 1]), at("tip", [1, 0, 0]), anew({ "initial.angular_velocity": [0, 0, 60] }, (player) => player.poke("stem", [1, 0, 0]))],
