@@ -35,6 +35,7 @@ RESULTS = ROOT / "benchmarks" / "results"
 sys.path.append(str(ROOT / "benchmarks"))
 
 from result_table import read_rows
+from static_site import address
 from work_precision_ratios import time_at_error
 
 _MARKED = re.compile(r"(<!-- (?P<kind>table|lesson): (?P<name>[a-z_]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
@@ -368,8 +369,28 @@ def gallery() -> str:
     for one in lessons():
         choices = " ".join(f"**{letter}** {choice}" for letter, choice in zip("ABC", one.choices, strict=True))
         picture = f"[![{one.title}](lessons/{one.name}.png)](lessons/{one.name}.md)"
-        parts.append(f"## {one.title}\n\n{picture}\n\n{_code(one.name)}: {one.question}\\\n{choices}")
+        link = lesson_link(one.name, address())
+        parts.append(f"## {one.title}\n\n{picture}\n\n{_code(one.name)}: {one.question}\\\n{choices}\n\n{link}")
     return "\n\n".join(parts)
+
+
+def site_line(published: str) -> str:
+    """Where the page can be opened: at its address, or from a file."""
+    if published:
+        return (
+            f"The page and its lessons are at <{published}>: nothing to install, and the page can be kept as one file."
+        )
+    return (
+        "The page is one file that needs neither Python nor a network: `rigid_proto workbench --html rigid_body.html`. `make site` writes"
+        " it with a start page and one address a lesson into `site/`, for any static host."
+    )
+
+
+def lesson_link(name: str, published: str) -> str:
+    """Where a lesson can be opened: at its address, or from a file."""
+    if published:
+        return f"Open it: <{published}{name}/>"
+    return f"As a file: `rigid_proto lesson {name} --html {name}.html`"
 
 
 def lesson_to_try(name: str) -> str:
@@ -409,6 +430,7 @@ TABLES = {
     "identification": identification,
     "figures": figures,
     "engines": engines,
+    "site": lambda: site_line(address()),
 }
 
 
