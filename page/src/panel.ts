@@ -209,7 +209,7 @@ export class Panel {
 
   /** A card opens beside the picture, or closes; plots stay beside another one where there is room. */
   toggle(name: Name): void {
-    const was = this.open.has(name), room = innerHeight > 560 && innerWidth > 700;
+    const was = this.open.has(name), room = matchMedia("(min-height: 35em) and (min-width: 44em)").matches;
     for (const other of [...this.open]) if (other === name || !room || (other === "plots") === (name === "plots")) this.close(other);
     if (!was) {
       this.open.add(name);
