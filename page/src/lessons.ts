@@ -56,13 +56,13 @@ export interface Account {
 }
 
 /** What a step's button does. poke: at a contact or "com", along [body axes]; fresh: from the start anew. start, set:
- * these values, start from the scene's start anew. card: opens it and marks the element. hand: leads to the picture. */
+ * these values, start from the scene's start anew. card: opens it and marks the element. pull, press, tie: lead to the picture. */
 export type Act = { readonly text: (words: Words["lesson"]) => string } & (
   | { readonly kind: "poke"; readonly at: string; readonly along: Vec3; readonly fresh?: boolean }
   | { readonly kind: "start" | "set"; readonly values: (scene: Values, info: BodyInfo) => Values }
   | { readonly kind: "card"; readonly card: "body" | "tensor" | "world" | "measure" | "ghost"; readonly mark: string }
   | { readonly kind: "trace"; readonly at: string }
-  | { readonly kind: "again" | "hand" | "tie" | "chalk" | "apart" | "principal" }
+  | { readonly kind: "again" | "pull" | "press" | "tie" | "chalk" | "apart" | "principal" }
 );
 
 export interface Step {

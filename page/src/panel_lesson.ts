@@ -131,11 +131,11 @@ export class LessonPanel {
     const { lesson } = this, w = words.lesson;
     if (!lesson) return;
     const { texts, course } = lesson, focused = document.activeElement instanceof HTMLElement && this.node.contains(document.activeElement) ? document.activeElement.dataset["key"] : undefined;
-    const picker = make("select", { "aria-label": w.name, "data-key": "picker", change: () => { location.hash = picker.value ? hashOf({ ...addressOf(location.hash), lesson: picker.value, isClass: this.isClass, take: "" }) : ""; } },
+    const picker = make("select", { "aria-label": w.name, "data-key": "picker", change: () => { location.hash = hashOf({ language: addressOf(location.hash).language, lesson: picker.value, isClass: this.isClass && picker.value !== "" }); } },
       make("option", { value: "" }, `– ${w.none} –`), ...Object.entries(this.texts).filter(([name]) => name in COURSES).map(([name, { title }]) => make("option", { value: name, selected: name === lesson.name }, title)));
     const head = make("div", { class: "head" }, picker,
       button(icon(SCREEN), () => this.toggleClass(), { class: "close", "aria-pressed": String(this.isClass), "aria-label": w.class, title: w.classTitle, "data-key": "class" }),
-      button("×", () => { location.hash = ""; }, { class: "close", "aria-label": w.leave, title: w.leave, "data-key": "leave" }));
+      button("×", () => { location.hash = hashOf({ language: addressOf(location.hash).language }); }, { class: "close", "aria-label": w.leave, title: w.leave, "data-key": "leave" }));
     const question = make("h2", { id: "question", class: lesson.answer === null ? "" : "out", tabindex: -1, "data-key": "question" }, texts.question);
     this.node.replaceChildren(head, question, ...(lesson.answer === null ? [this.choices(texts)] : this.steps(lesson, course.steps.length)), this.told);
     this.node.classList.toggle("asks", lesson.answer === null);
@@ -176,7 +176,8 @@ export class LessonPanel {
     else if (act.kind === "start") { if (desk.told(motion.set(act.values(lesson.scene, motion.body())))) desk.restart(); }
     else if (act.kind === "again") desk.restart();
     else if (act.kind === "card") this.panel.lead(act.card, act.mark);
-    else if (act.kind === "hand") stage(pointer.pulls && act.text(w) === w.pull ? w.pullHow : w.pressHow);
+    else if (act.kind === "pull") stage(w.pullHow);
+    else if (act.kind === "press") stage(w.pressHow);
     else if (act.kind === "trace") look.trace = motion.body().contacts[act.at] ?? null;
     else if (act.kind === "apart") { look.apart = true; desk.picture.setApart(true); }
     else if (act.kind === "principal") look.principal = true;

@@ -92,7 +92,7 @@ export class Player {
 
   /** The buttons of the step one after the other, but those that lead to a card or the picture, then time. */
   buttons(seconds = 12): void {
-    for (const act of COURSES[this.lesson.name]!.steps[this.done]!.acts) if (act.kind !== "card" && act.kind !== "hand" && act.kind !== "again") this.press(act);
+    for (const act of COURSES[this.lesson.name]!.steps[this.done]!.acts) if (act.kind !== "card" && act.kind !== "pull" && act.kind !== "press" && act.kind !== "again") this.press(act);
     this.fly(seconds, true);
   }
 }
