@@ -132,6 +132,7 @@ export class Lesson {
       this.#trials.shift();
       this.#trial = Math.max(0, this.#trial - 1);
     }
+    this.note();
   }
 
   /** Answer the question: steps count from now on. Returns whether it is right. */
@@ -148,9 +149,8 @@ export class Lesson {
     this.#from = Math.max(0, this.#trials[this.#trial]!.seen.length - 1);
   }
 
-  /** Take note of this instant; more often than pictures is never needed. Returns whether a step is done now. */
-  look(sight: Sight): boolean {
-    this.#note();
+  /** Whether a step is done now. */
+  check(sight: Sight): boolean {
     const step = this.course.steps[this.done];
     if (this.answer === null || !step) return false;
     const account: Account = { scene: this.scene, trials: this.#trials, trial: this.#trial, from: this.#from, lines: this.lines, sight };
@@ -170,7 +170,8 @@ export class Lesson {
     });
   }
 
-  #note(): void {
+  /** Take note of this instant; more often than pictures is never needed. */
+  note(): void {
     const motion = this.#motion, now = motion.snapshot(), { script, endNs } = motion.history(), trial = this.#trials[this.#trials.length - 1]!, { seen } = trial;
     // What came after was dropped: it is another flight from there on.
     while (seen.length && seen[seen.length - 1]!.now.timeNs > endNs) seen.pop();

@@ -92,7 +92,6 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
   const named = Object.entries(texts).filter(([name]) => name in COURSES).map(([name, { title }]) => ({ name, title }));
   const desk: Desk = { motion, picture, pointer, clock, look, restart, lessons: named, track: () => track, later: (name, act) => { waiting.set(name, act); }, told, open, lively };
   const panel = new Panel(desk, () => { moved = true; }), lessons = new LessonPanel(desk, panel, texts);
-  panel.node.append(lessons.plots);
   const drop = make("div", { id: "drop", hidden: true }, words.body.drop);
   app.append(panel.node, drop, make("div", { id: "say", role: "status", "aria-live": "polite" }));
   document.title = words.title;

@@ -168,7 +168,7 @@ export class Panel {
     this.angle = make("div", { class: "value" }, "–");
     this.angleCard = make("div", { id: "angle", class: "card" }, make("div", { class: "name" }, words.angle.name), this.angle);
 
-    this.node = make("div", { id: "panes" }, tensor, this.side, this.free, hand, energy, desk.clock.node, this.angleCard);
+    this.node = make("main", { id: "panes" }, tensor, this.side, this.free, hand, energy, desk.clock.node, this.angleCard);
     document.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !this.open.size || !this.side.contains(document.activeElement)) return;
       this.toggle([...this.open][this.open.size - 1]!);

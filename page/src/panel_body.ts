@@ -73,7 +73,7 @@ export function bodyCard(desk: Desk): Card {
     centre.forEach((field, k) => field.show(numbers("explicit_inertia.center_of_mass")[k]!));
     tensor.forEach((field, k) => field.show(numbers("explicit_inertia.tensor")[k]!));
     const truth = info.models.find(({ model }) => model === "solid");
-    table.replaceChildren(make("tr", {}, make("th"), ...["I₁", "I₂", "I₃"].map((name) => make("th", { scope: "col" }, name))), ...info.models.filter(({ refusal, model }) => !refusal && (model !== "explicit" || values["inertia_model"] === "explicit")).flatMap((model) => rows(model, truth)));
+    table.replaceChildren(make("tr", {}, make("td"), ...["I₁", "I₂", "I₃"].map((name) => make("th", { scope: "col" }, name))), ...info.models.filter(({ refusal, model }) => !refusal && (model !== "explicit" || values["inertia_model"] === "explicit")).flatMap((model) => rows(model, truth)));
     const stuck = Object.entries(values).filter(([name, value]) => name.startsWith(BALLAST) && Array.isArray(value) && value[0] !== 0);
     ballast.replaceChildren(...stuck.map(([name, value]) => make("div", { class: "field" }, `${short((value as readonly number[])[0]!)} kg`,
       button(w.remove, () => desk.told(motion.set({ [name]: [0, ...((value as readonly number[]).slice(1) as unknown as Vec3)] }))))));

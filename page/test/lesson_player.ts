@@ -24,12 +24,12 @@ export class Player {
     this.lesson = new Lesson(name, data.declared.lessons[name]!, course, motion);
     const { massKg, length } = motion.body();
     this.strength = Number((1.8 * massKg * length).toPrecision(1));
-    this.lesson.look(this.sight);
+    this.look();
   }
 
   get done(): number { return this.lesson.done; }
 
-  look(): void { this.lesson.look(this.sight); }
+  look(): void { this.lesson.note(); this.lesson.check(this.sight); }
 
   answer(): void { this.lesson.choose(this.lesson.texts.answer); this.look(); }
 
