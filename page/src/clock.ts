@@ -119,7 +119,7 @@ export class Clock {
     if (span !== this.span) { this.span = span; this.stale = true; }
     const at = String(Math.round((1000 * seconds) / span));
     if (!this.scrubbing && this.scrub.value !== at) this.scrub.value = at;
-    this.scrub.style.setProperty("--at", `calc(12px + ${((100 * seconds) / span).toFixed(1)}% - ${((24 * seconds) / span).toFixed(1)}px)`);
+    this.scrub.style.setProperty("--at", `calc(0.75rem + ${((100 * seconds) / span).toFixed(1)}% - ${((1.5 * seconds) / span).toFixed(3)}rem)`);
     const text = words.time.seconds(seconds);
     if (text !== this.shownText) { this.text.textContent = this.shownText = text; this.scrub.setAttribute("aria-valuetext", text); }
     this.onward.hidden = timeNs >= end;

@@ -58,14 +58,15 @@ export interface Account {
 }
 
 /** What a step's button does. poke: at a contact or "com", along [body axes]; fresh: from the start anew. start, set:
- * these values, start from the scene's start anew. ghost: another one, from the start anew. card: opens it and marks the element. hand: leads to the picture. */
+ * these values, start from the scene's start anew. ghost: another one, from the start anew. card: opens it and marks the
+ * element. pull, press, tie: lead to the picture. */
 export type Act = { readonly text: (words: Words["lesson"]) => string } & (
   | { readonly kind: "poke"; readonly at: string; readonly along: Vec3; readonly fresh?: boolean }
   | { readonly kind: "start" | "set"; readonly values: (scene: Values, info: BodyInfo) => Values }
   | { readonly kind: "card"; readonly card: "body" | "tensor" | "world" | "measure" | "ghost" | "plots"; readonly mark: string }
   | { readonly kind: "ghost"; readonly choice: GhostChoice }
   | { readonly kind: "trace"; readonly at: string }
-  | { readonly kind: "again" | "hand" | "tie" | "chalk" | "apart" | "principal" | "poinsot" }
+  | { readonly kind: "again" | "pull" | "press" | "tie" | "chalk" | "apart" | "principal" | "poinsot" }
 );
 
 export interface Step {
@@ -135,6 +136,7 @@ export class Lesson {
       this.#trials.shift();
       this.#trial = Math.max(0, this.#trial - 1);
     }
+    this.note();
   }
 
   /** Answer the question: steps count from now on. Returns whether it is right. */
@@ -151,9 +153,8 @@ export class Lesson {
     this.#from = Math.max(0, this.#trials[this.#trial]!.seen.length - 1);
   }
 
-  /** Take note of this instant; more often than pictures is never needed. Returns whether a step is done now. */
-  look(sight: Sight): boolean {
-    this.#note();
+  /** Whether a step is done now. */
+  check(sight: Sight): boolean {
     const step = this.course.steps[this.done];
     if (this.answer === null || !step) return false;
     const account: Account = { scene: this.scene, trials: this.#trials, trial: this.#trial, from: this.#from, lines: this.lines, sight };
@@ -173,7 +174,8 @@ export class Lesson {
     });
   }
 
-  #note(): void {
+  /** Take note of this instant; more often than pictures is never needed. */
+  note(): void {
     const motion = this.#motion, now = motion.snapshot(), { script, endNs } = motion.history(), trial = this.#trials[this.#trials.length - 1]!, { seen } = trial;
     // What came after was dropped: it is another flight from there on.
     while (seen.length && seen[seen.length - 1]!.now.timeNs > endNs) seen.pop();

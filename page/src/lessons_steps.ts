@@ -20,8 +20,8 @@ const afresh = (at: string, along: Vec3): Act => ({ kind: "poke", at, along, fre
 const start = (text: Says, values: (scene: Values) => Values): Act => ({ kind: "start", values, text });
 const set = (text: Says, values: Values): Act => ({ kind: "set", values: () => values, text });
 const again: Act = { kind: "again", text: (w) => w.restart };
-const pull: Act = { kind: "hand", text: (w) => w.pull };
-const press: Act = { kind: "hand", text: (w) => w.press };
+const pull: Act = { kind: "pull", text: (w) => w.pull };
+const press: Act = { kind: "press", text: (w) => w.press };
 const ghost = (name: keyof typeof NAMED): Act => ({ kind: "ghost", choice: NAMED[name].choice, text: (w) => w.ghosts[name] });
 const spun = (factor: number): ((scene: Values) => Values) => (scene) => ({ "initial.angular_velocity": startSpin(scene).map((w) => w * factor) });
 

@@ -6,20 +6,21 @@ import { addressOf } from "./address.ts";
 import { Clock } from "./clock.ts";
 import { Data } from "./data.ts";
 import { inside } from "./file.ts";
+import { LANGUAGES } from "./languages.ts";
 import type { LessonTexts } from "./lessons.ts";
 import { COURSES } from "./lessons_steps.ts";
 import { Panel, type Desk, type Look } from "./panel.ts";
 import { icon, make, say } from "./panel_elements.ts";
 import { LessonPanel } from "./panel_lesson.ts";
-import { printsSheet } from "./print.ts";
 import { direction } from "./panel_measure.ts";
 import { Picture, type Blow, type Shown } from "./picture.ts";
 import { Track } from "./plots.ts";
 import { herpolhode } from "./poinsot.ts";
 import { Pointer } from "./pointer.ts";
+import { printsSheet } from "./print.ts";
 import { openMotion } from "./simulation.ts";
 import type { Motion, Snapshot, Vec3 } from "./source.ts";
-import { words } from "./words.ts";
+import { language, words } from "./words.ts";
 
 /** [ns simulated], [s of the wall clock]: an impulse acts at an instant; its arrow stays so long that it can be seen. */
 const BLOW_NS = 150_000_000, BLOW_S = 0.5;
@@ -92,10 +93,10 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
   const named = Object.entries(texts).filter(([name]) => name in COURSES).map(([name, { title }]) => ({ name, title }));
   const desk: Desk = { motion, picture, pointer, clock, look, restart, lessons: named, track: () => track, later: (name, act) => { waiting.set(name, act); }, told, open, lively };
   const panel = new Panel(desk, () => { moved = true; }), lessons = new LessonPanel(desk, panel, texts);
-  panel.node.append(lessons.plots);
   const drop = make("div", { id: "drop", hidden: true }, words.body.drop);
   app.append(panel.node, drop, make("div", { id: "say", role: "status", "aria-live": "polite" }));
   document.title = words.title;
+  document.documentElement.lang = language;
 
   printsSheet(app, picture, () => lessons.lesson);
 
@@ -143,7 +144,8 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
     event.preventDefault();
   });
   const openAddress = async (hash: string): Promise<void> => {
-    const { lesson, isClass, take } = addressOf(hash);
+    const { lesson, isClass, take, language: asked } = addressOf(hash);
+    if (asked && asked !== language && (asked === "en" || asked in LANGUAGES)) { location.reload(); return; }
     if (take) { lessons.leave(); await open(() => motion.openLink(take)); } else told(await lessons.begin(lesson, isClass));
   };
   addEventListener("hashchange", () => { void openAddress(location.hash); });
@@ -231,7 +233,7 @@ async function start(): Promise<void> {
     const refusal = asked.take ? await motion.openLink(asked.take) : null;
     // Who was sent nothing sees what a box in place of the truth does.
     if (!take && !asked.take) motion.setGhost({ inertia_model: "bounding_box" });
-    const probe = begin(motion, new Data(data).declared.lessons, address, app, scriptMs);
+    const probe = begin(motion, { ...new Data(data).declared.lessons, ...LANGUAGES[language]?.lessons }, address, app, scriptMs);
     if (refusal ?? motion.notice()) say(refusal ?? motion.notice(), 12);
     Object.assign(window, { page: probe });
   } catch (error) {

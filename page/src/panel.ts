@@ -170,7 +170,7 @@ export class Panel {
     this.angle = make("div", { class: "value" }, "–");
     this.angleCard = make("div", { id: "angle", class: "card" }, make("div", { class: "name" }, words.angle.name), this.angle);
 
-    this.node = make("div", { id: "panes" }, tensor, this.side, this.free, hand, energy, desk.clock.node, this.angleCard);
+    this.node = make("main", { id: "panes" }, tensor, this.side, this.free, hand, energy, desk.clock.node, this.angleCard);
     document.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !this.open.size || !this.side.contains(document.activeElement)) return;
       this.toggle([...this.open][this.open.size - 1]!);
@@ -211,7 +211,7 @@ export class Panel {
 
   /** A card opens beside the picture, or closes; plots stay beside another one where there is room. */
   toggle(name: Name): void {
-    const was = this.open.has(name), room = innerHeight > 560 && innerWidth > 700;
+    const was = this.open.has(name), room = matchMedia("(min-height: 35em) and (min-width: 44em)").matches;
     for (const other of [...this.open]) if (other === name || !room || (other === "plots") === (name === "plots")) this.close(other);
     if (!was) {
       this.open.add(name);

@@ -13,7 +13,7 @@ import { Plots } from "./plots.ts";
 import type { Snapshot, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 
-/** [ms] Between two looks at what was done: conditions go through all that was seen. */
+/** [ms] Between two looks at whether a step is done: conditions go through all that was seen. */
 const LOOK_MS = 100;
 const TICK = "M9 16.200 4.800 12l-1.400 1.400L9 19 21 7l-1.400-1.400z", SCREEN = "M3 4h18v13H3zM5 6v9h14V6zM8 19h8v2H8z";
 
@@ -26,7 +26,7 @@ export class LessonPanel {
   private readonly panel: Panel;
   private readonly texts: Readonly<Record<string, LessonTexts>>;
   /** What was just done, for those who don't see it. */
-  private readonly told = make("div", { class: "out", role: "status", "aria-live": "polite" });
+  private readonly told = make("div", { id: "told", class: "out", role: "status", "aria-live": "polite" });
   private drawn: Plots | null = null;
   private lookedMs = 0;
   private isClass = false;
@@ -35,6 +35,7 @@ export class LessonPanel {
     this.desk = desk;
     this.panel = panel;
     this.texts = texts;
+    panel.node.append(this.plots, this.told);
     addEventListener("keydown", (event) => {
       const choice = "abc".indexOf(event.key.toLowerCase());
       if (choice < 0 || !this.lesson || this.lesson.answer !== null || event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test((event.target as HTMLElement).tagName)) return;
@@ -96,12 +97,13 @@ export class LessonPanel {
   }
 
   /** An instant, each picture. */
-  look(now: Snapshot): void {
-    const { lesson } = this, ms = performance.now();
+  look(now: Snapshot, ms = performance.now()): void {
+    const { lesson } = this;
+    lesson?.note();
     if (!lesson || ms - this.lookedMs < LOOK_MS) return;
     this.lookedMs = ms;
     if (this.isClass) this.drawn?.draw(now.timeNs);
-    if (!lesson.look(this.sight())) return;
+    if (!lesson.check(this.sight())) return;
     this.write();
     this.told.textContent = `${words.lesson.done(lesson.done, lesson.course.steps.length)} ${lesson.finished ? words.lesson.finished : lesson.texts.steps[lesson.done] ?? ""}`;
   }
@@ -131,13 +133,13 @@ export class LessonPanel {
     const { lesson } = this, w = words.lesson;
     if (!lesson) return;
     const { texts, course } = lesson, focused = document.activeElement instanceof HTMLElement && this.node.contains(document.activeElement) ? document.activeElement.dataset["key"] : undefined;
-    const picker = make("select", { "aria-label": w.name, "data-key": "picker", change: () => { location.hash = picker.value ? hashOf({ ...addressOf(location.hash), lesson: picker.value, isClass: this.isClass, take: "" }) : ""; } },
+    const picker = make("select", { "aria-label": w.name, "data-key": "picker", change: () => { location.hash = hashOf({ language: addressOf(location.hash).language, lesson: picker.value, isClass: this.isClass && picker.value !== "" }); } },
       make("option", { value: "" }, `– ${w.none} –`), ...Object.entries(this.texts).filter(([name]) => name in COURSES).map(([name, { title }]) => make("option", { value: name, selected: name === lesson.name }, title)));
     const head = make("div", { class: "head" }, picker,
       button(icon(SCREEN), () => this.toggleClass(), { class: "close", "aria-pressed": String(this.isClass), "aria-label": w.class, title: w.classTitle, "data-key": "class" }),
-      button("×", () => { location.hash = ""; }, { class: "close", "aria-label": w.leave, title: w.leave, "data-key": "leave" }));
+      button("×", () => { location.hash = hashOf({ language: addressOf(location.hash).language }); }, { class: "close", "aria-label": w.leave, title: w.leave, "data-key": "leave" }));
     const question = make("h2", { id: "question", class: lesson.answer === null ? "" : "out", tabindex: -1, "data-key": "question" }, texts.question);
-    this.node.replaceChildren(head, question, ...(lesson.answer === null ? [this.choices(texts)] : this.steps(lesson, course.steps.length)), this.told);
+    this.node.replaceChildren(head, question, ...(lesson.answer === null ? [this.choices(texts)] : this.steps(lesson, course.steps.length)));
     this.node.classList.toggle("asks", lesson.answer === null);
     if (lesson.done > 0) this.node.querySelector(".now, .end")?.scrollIntoView({ block: "nearest" }); else this.node.scrollTop = 0;
     const again = focused === undefined ? null : this.node.querySelector<HTMLElement>(`[data-key="${focused}"]`) ?? this.node.querySelector<HTMLElement>('[data-key="act0"]') ?? this.heading();
@@ -176,7 +178,8 @@ export class LessonPanel {
     else if (act.kind === "start") { if (desk.told(motion.set(act.values(lesson.scene, motion.body())))) desk.restart(); }
     else if (act.kind === "again") desk.restart();
     else if (act.kind === "card") this.panel.lead(act.card, act.mark);
-    else if (act.kind === "hand") stage(pointer.pulls && act.text(w) === w.pull ? w.pullHow : w.pressHow);
+    else if (act.kind === "pull") stage(w.pullHow);
+    else if (act.kind === "press") stage(w.pressHow);
     else if (act.kind === "trace") look.trace = motion.body().contacts[act.at] ?? null;
     else if (act.kind === "apart") { look.apart = true; desk.picture.setApart(true); }
     else if (act.kind === "principal") look.principal = true;

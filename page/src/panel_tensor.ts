@@ -31,7 +31,7 @@ export function tensorCard(desk: Desk): Card {
       const part = (Number(input.value) + 180) / 360;
       node.querySelector(".unit")!.textContent = `${input.value}°`.replace("-", "−");
       input.setAttribute("aria-valuetext", `${input.value}°`);
-      input.style.setProperty("--at", `calc(12px + ${100 * part}% - ${24 * part}px)`);
+      input.style.setProperty("--at", `calc(0.75rem + ${100 * part}% - ${1.5 * part}rem)`);
     });
     look.turned = turned;
     const there = times(transposed(turned), times(motion.body().inertia, turned)), largest = Math.max(there[0]!, there[4]!, there[8]!);

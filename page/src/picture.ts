@@ -31,6 +31,8 @@ const FRAMED = 0.69;
 const STRONG = 0.0135, PLAIN = 0.009, CORD = 0.0075;
 const LIGHT = new Vector3(-0.35, -0.5, 1);
 const MOST_TRACE = 4000;
+/** Size of labels, unless the reader has chosen a larger one. */
+const LETTER_PX = 17;
 /** What lies behind everything; lighter round the middle where that costs nothing. */
 const SKY = 0xf1f4f9, LIGHT_SKY = "#ffffff", DARK_SKY = "#dfe5f0";
 
@@ -137,6 +139,8 @@ export class Picture {
   private free: Free = { left: 0, top: 0, width: 1, height: 1 };
   private offset = new Vector3();
   private size = 1;
+  /** Of labels, times the usual size. */
+  private letter = 1;
   private reach = 0.5;
 
   constructor(stage: HTMLElement, labelRoom: HTMLElement) {
@@ -250,6 +254,7 @@ export class Picture {
 
   fit(width: number, height: number, free: Free): void {
     this.sky();
+    this.letter = Number.parseFloat(getComputedStyle(this.labels.omega.node).fontSize) / LETTER_PX;
     this.free = free;
     this.eye.fit(width, height, free);
     this.renderer?.resize(width, height);
@@ -301,10 +306,10 @@ export class Picture {
     const end = this.eye.project(tip, new Vector3()), start = this.eye.project(from, new Vector3());
     const dx = end.x - start.x, dy = end.y - start.y, length = Math.hypot(dx, dy);
     const [ux, uy] = length > 1 ? [dx / length, dy / length] : [0, -1];
-    const room = 9 + 4.4 * text.length;
+    const { letter } = this, room = 9 + 4.4 * letter * text.length;
     label.show(text,
-      Math.max(room, Math.min(this.eye.width - room, end.x + ux * (beyond + Math.abs(ux) * 4 * text.length))),
-      Math.max(14, Math.min(this.eye.height - 14, end.y + uy * beyond)));
+      Math.max(room, Math.min(this.eye.width - room, end.x + ux * (beyond + Math.abs(ux) * 4 * text.length) * letter)),
+      Math.max(14 * letter, Math.min(this.eye.height - 14 * letter, end.y + uy * beyond * letter)));
   }
 
   private drawMotion(body: Flying, at: Vector3, shown: Shown): void {
@@ -455,14 +460,14 @@ export class Picture {
       dot.node.classList.add("dot");
       dot.show(mark.isCentre ? "⊕" : "●", seen.x, seen.y);
       if (mark.isCentre) name.hide(); // its sign stands on the body, a name would cover it
-      else if (this.isNearTip(seen)) name.show(mark.text, seen.x + 14 + 4.4 * mark.text.length, seen.y);
+      else if (this.isNearTip(seen)) name.show(mark.text, seen.x + (14 + 4.4 * mark.text.length) * this.letter, seen.y);
       else this.tag(name, mark.text, point, at, 20);
     }
   }
 
   /** Whether an arrow of the motion ends near a place on the screen [px]. */
   private isNearTip({ x, y }: Vector3): boolean {
-    return [this.labels.omega, this.labels.momentum].some(({ place }) => place !== null && Math.hypot(place[0] - x, place[1] - y) < 52);
+    return [this.labels.omega, this.labels.momentum].some(({ place }) => place !== null && Math.hypot(place[0] - x, place[1] - y) < 52 * this.letter);
   }
 
   private drawFloor(at: Vector3): void {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 //
-// Everything that the page says, once. Another language is another catalogue of this shape.
+// Everything that the page says, once. Another language is another catalogue of this shape (languages.ts).
 
+import { addressOf } from "./address.ts";
+import { LANGUAGES } from "./languages.ts";
 import { short } from "./words_numbers.ts";
 
-const english = {
+export const english = {
   title: "One rigid body",
   notANumber: (text: string) => `${text.trim() || "Nothing"} isn't a number`,
   close: "close",
@@ -31,6 +33,9 @@ const english = {
     goOnTitle: "Forget what came after this moment, and fly on", seconds: (s: number) => `${s.toFixed(2)} s`,
   },
   cards: { lessons: "lessons", body: "body", world: "gravity", ghost: "ghost", tensor: "tensor", measure: "measure", plots: "plots", keep: "keep" },
+  bodies: {
+    book: "book", hammer: "hammer", hollow_box: "hollow box", l_bracket: "l bracket", spinning_top: "spinning top", t_handle: "t handle", teapot: "teapot", tennis_racket: "tennis racket",
+  } as Record<string, string>,
   body: {
     name: "Body", bundled: "Ready-made", scenes: "Flights", own: "Your own", choose: "choose a file",
     drop: "Drop the file here", formats: ".obj, .stl, .ply or .glb, up to 50 MB. It stays on this machine.", unit: "one unit is",
@@ -99,4 +104,13 @@ const english = {
 };
 
 export type Words = typeof english;
-export const words: Words = english;
+
+/** The code of the language that the address names, or the first of the reader's that is there. */
+function spoken(): string {
+  if (typeof location === "undefined") return "en";
+  const asked = addressOf(location.hash).language, wanted = asked ? [asked] : navigator.languages;
+  return wanted.map((code) => code.toLowerCase().split("-")[0]!).find((code) => code === "en" || code in LANGUAGES) ?? "en";
+}
+
+export const language = spoken();
+export const words: Words = LANGUAGES[language]?.words ?? english;

@@ -25,12 +25,12 @@ export class Player {
     this.lesson = new Lesson(name, data.declared.lessons[name]!, course, motion);
     const { massKg, length } = motion.body();
     this.strength = Number((1.8 * massKg * length).toPrecision(1));
-    this.lesson.look(this.sight);
+    this.look();
   }
 
   get done(): number { return this.lesson.done; }
 
-  look(): void { this.lesson.look(this.sight); }
+  look(): void { this.lesson.note(); this.lesson.check(this.sight); }
 
   answer(): void { this.lesson.choose(this.lesson.texts.answer); this.look(); }
 
@@ -100,7 +100,7 @@ export class Player {
 
   /** The buttons of the step one after the other, but those that lead to a card or the picture, then time. */
   buttons(seconds = 12): void {
-    for (const act of COURSES[this.lesson.name]!.steps[this.done]!.acts) if (act.kind !== "card" && act.kind !== "hand" && act.kind !== "again") this.press(act);
+    for (const act of COURSES[this.lesson.name]!.steps[this.done]!.acts) if (act.kind !== "card" && act.kind !== "pull" && act.kind !== "press" && act.kind !== "again") this.press(act);
     this.fly(seconds, true);
   }
 }
