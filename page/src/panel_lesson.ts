@@ -58,6 +58,7 @@ export class LessonPanel {
     clock.setPaused(true);
     clock.held = words.lesson.first;
     look.trace = null;
+    look.poinsot = look.cones = false;
     desk.pointer.pulls = motion.values()["string.attached"] !== true;
     this.drawn = new Plots(desk.track(), course.plots);
     this.plots.replaceChildren(this.drawn.node);
@@ -182,7 +183,7 @@ export class LessonPanel {
     else if (act.kind === "press") stage(w.pressHow);
     else if (act.kind === "trace") look.trace = motion.body().contacts[act.at] ?? null;
     else if (act.kind === "apart") { look.apart = true; desk.picture.setApart(true); }
-    else if (act.kind === "principal") look.principal = true;
+    else if (act.kind === "principal") { look.principal = true; this.panel.changed(); }
     else if (act.kind === "poinsot") { look.poinsot = true; this.panel.changed(); }
     else if (act.kind === "ghost") { if (desk.told(motion.setGhost(act.choice))) desk.restart(); }
     else if (act.kind === "tie") {

@@ -46,9 +46,11 @@ export function tensorCard(desk: Desk): Card {
     said.textContent = product < VANISHED ? w.none : w.products(short(100 * product, 2));
     said.className = product < VANISHED ? "good" : "";
   };
+  const shapes: (() => void)[] = [];
   const shape = (text: string, name: "inertiaBox" | "ellipsoid" | "principal" | "boundingBox" | "poinsot" | "cones"): HTMLElement => {
-    const { node: row } = check(text, look[name], (on) => { look[name] = on; });
+    const { node: row, show } = check(text, look[name], (on) => { look[name] = on; });
     row.dataset["mark"] = name;
+    shapes.push(() => show(look[name]));
     return row;
   };
   const node = make("div", {}, make("p", { class: "note" }, w.about), matrix, said, make("div", { class: "sliders", "data-mark": "turn" }, ...turns.map(({ node: row }) => row)),
@@ -56,7 +58,7 @@ export function tensorCard(desk: Desk): Card {
     make("h3", {}, w.shapes), shape(w.box, "inertiaBox"), shape(w.ellipsoid, "ellipsoid"), shape(w.axes, "principal"), shape(w.bounding, "boundingBox"),
     make("h3", {}, w.poinsot), shape(w.rolls, "poinsot"), shape(w.cones, "cones"), make("p", { class: "note" }, w.poinsotNote));
   return {
-    node, changed: draw,
+    node, changed: () => { draw(); for (const each of shapes) each(); },
     closed: () => { look.turned = null; },
   };
 }
