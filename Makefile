@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 .DEFAULT_GOAL := help
-.PHONY: always help setup kernels run up workbench test lint pictures wheel build bench stress soak clean pins
+.PHONY: always help setup kernels run up workbench test lint pictures site wheel build bench stress soak clean pins
 SHELL := /bin/bash
 # A make that a test starts has its own jobs.
 unexport MAKEFLAGS MFLAGS
@@ -61,6 +61,10 @@ pictures: setup run ## draw the pictures of README and lessons anew (needs mesa-
 	$(PY) docs/lessons/pictures.py
 	PYTHONPATH=test $(PY) docs/page_pictures.py docs
 
+site: setup ## site/: the page with a start page and one address a lesson, for any static host
+	@$(PY) requirements/wasm_tools.py linker node
+	@$(PY) tools/static_site.py site
+
 wheel: setup ## dist/: a wheel with the kernels of this machine's architecture
 	@rm -rf rigid_proto_ros/kernels/lib rigid_proto_ros/page/lib
 	@$(PY) requirements/wasm_tools.py linker node
@@ -72,6 +76,7 @@ build: setup ## colcon build into build/, install/ and log/; then: source instal
 	$(ROS) $(PY) -m colcon build --packages-select rigid_proto_ros
 
 bench: .venv-bench/.pins ## comparison with other tools; CSV with date, commit, CPU and versions
+	@.venv-bench/bin/python requirements/wasm_tools.py node
 	@for file in $$(grep -l '^if __name__ == "__main__"' benchmarks/*.py | grep -vE 'references|soak|clients'); do echo "$$file"; .venv-bench/bin/python "$$file" || exit 1; done
 
 .venv-bench/.pins: benchmarks/requirements.txt $(wildcard requirements/*) | $(READY)
@@ -88,7 +93,7 @@ stress: setup ## long and hostile tests, those of random examples with new ones,
 	$(if $(ARGS),,$(PY) tools/bits_elsewhere.py)
 
 clean: ## everything that was made here, the environments included
-	rm -rf .venv .venv-bench build install log out dist rigid_proto_ros/kernels/lib rigid_proto_ros/page/lib page/node_modules *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage
+	rm -rf .venv .venv-bench build install log out dist site rigid_proto_ros/kernels/lib rigid_proto_ros/page/lib page/node_modules benchmarks/engines/node_modules *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 PINS := .venv/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate --no-header --no-emit-package pip

@@ -35,6 +35,7 @@ RESULTS = ROOT / "benchmarks" / "results"
 sys.path.append(str(ROOT / "benchmarks"))
 
 from result_table import read_rows
+from static_site import address
 from work_precision_ratios import time_at_error
 
 _MARKED = re.compile(r"(<!-- (?P<kind>table|lesson): (?P<name>[a-z_]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
@@ -321,6 +322,38 @@ def identification() -> str:
     return f"{_measured_on(first)}.\n\n{_table(head, rows)}"
 
 
+def engines() -> str:
+    """A torque-free body near its middle axis in physics engines, from the last benchmark's own numbers."""
+    measured = read_rows(RESULTS / "engines.csv")
+    steps = list(dict.fromkeys(row["step_s"] for row in measured))
+    found = {(row["engine"], row["way"], row["step_s"]): row for row in measured}
+    rows = []
+    for engine, way in dict.fromkeys((row["engine"], row["way"]) for row in measured):
+        ways = [found[engine, way, step] for step in steps]
+        cells = [cell for row in ways for cell in _flown_in_engine(row)]
+        version = ways[0]["version"] if engine == "rigid_proto" else f"{ways[0]['package']} {ways[0]['version']}"
+        rows.append((f"{engine}, {way.replace('_', ' ')}", version, *cells, _beside_ghost(ways)))
+    heads = [f"{name}, {_STEPS[step]}" for step in steps for name in ("flips", "ΔE/E", "turn of L")]
+    head = ("engine", "version", *heads, "ghost of the page, and how far apart after 60 s")
+    return f"{_measured_on(measured[0])}.\n\n{_table(head, rows)}"
+
+
+_STEPS = {0.0166667: "1/60 s", 0.001: "1 ms"}
+
+
+def _flown_in_engine(row: dict) -> tuple[str, ...]:
+    if row["why"]:
+        return f"not run: {row['why']}", "", ""
+    return f"{row['flips']:.0f}", f"{row['energy_change']:+.2g}", f"{row['momentum_turn_deg']:.2g}°"
+
+
+def _beside_ghost(rows: list[dict]) -> str:
+    if not rows[0]["ghost"]:
+        return ""
+    angles = " and ".join(f"{row['ghost_apart_rad']:.0e}" for row in rows)
+    return f"{rows[0]['ghost'].replace('_', ' ')}: {angles} rad"
+
+
 def _measured_on(row: dict) -> str:
     return f"Measured {row['date'][:10]} on one {row['cpu']}"
 
@@ -336,8 +369,28 @@ def gallery() -> str:
     for one in lessons():
         choices = " ".join(f"**{letter}** {choice}" for letter, choice in zip("ABC", one.choices, strict=True))
         picture = f"[![{one.title}](lessons/{one.name}.png)](lessons/{one.name}.md)"
-        parts.append(f"## {one.title}\n\n{picture}\n\n{_code(one.name)}: {one.question}\\\n{choices}")
+        link = lesson_link(one.name, address())
+        parts.append(f"## {one.title}\n\n{picture}\n\n{_code(one.name)}: {one.question}\\\n{choices}\n\n{link}")
     return "\n\n".join(parts)
+
+
+def site_line(published: str) -> str:
+    """Where the page can be opened: at its address, or from a file."""
+    if published:
+        return (
+            f"The page and its lessons are at <{published}>: nothing to install, and the page can be kept as one file."
+        )
+    return (
+        "The page is one file that needs neither Python nor a network: `rigid_proto workbench --html rigid_body.html`. `make site` writes"
+        " it with a start page and one address a lesson into `site/`, for any static host."
+    )
+
+
+def lesson_link(name: str, published: str) -> str:
+    """Where a lesson can be opened: at its address, or from a file."""
+    if published:
+        return f"Open it: <{published}{name}/>"
+    return f"As a file: `rigid_proto lesson {name} --html {name}.html`"
 
 
 def lesson_to_try(name: str) -> str:
@@ -376,6 +429,8 @@ TABLES = {
     "skipped": skipped_work,
     "identification": identification,
     "figures": figures,
+    "engines": engines,
+    "site": lambda: site_line(address()),
 }
 
 

@@ -2,7 +2,7 @@
 //
 // Time: playing, slower, by steps, back to any moment and on from there; and the bar where one does so.
 
-import { button, icon, make } from "./panel_elements.ts";
+import { button, icon, make, say } from "./panel_elements.ts";
 import type { Entry, Motion } from "./source.ts";
 import { words } from "./words.ts";
 
@@ -10,6 +10,8 @@ const RATES = [1, 0.5, 0.25, 0.1, 0.02] as const;
 const STEP_NS = 10_000_000, BACK_NS = 2_000_000_000;
 /** [ms] of the wall clock that a picture makes up for: after a pause that nobody saw the body goes on from where it was. */
 const MOST_MS = 100;
+/** [ns] Pictures show times that are multiples of this, less than anyone sees: a link holds the time of each thing done. */
+const GRAIN_NS = 100_000;
 /** [ms] Between two readings of the time: each has the page put its bar together anew. */
 const READ_MS = 90;
 /** [s] The bar spans this, or twice, four times as much. */
@@ -20,6 +22,8 @@ const RESET = "M12 5V1.5L6.5 6.5 12 11.500V8a5.500 5.500 0 1 1-5.500 5.500H3.500
 
 export class Clock {
   paused = false;
+  /** Why time stands and can't go on, or "". */
+  held = "";
   rate: number = RATES[0];
   readonly node: HTMLElement;
   private readonly playing: HTMLButtonElement;
@@ -34,6 +38,7 @@ export class Clock {
   private shownText = "";
   private stale = true;
   private wanted: number | null = null;
+  private owedNs = 0;
   private readMs = 0;
 
   constructor(motion: Motion, reset: () => void) {
@@ -68,6 +73,7 @@ export class Clock {
   }
 
   setPaused(paused: boolean): void {
+    if (this.held && !paused) { say(this.held); return; }
     this.paused = paused;
     this.playing.replaceChildren(icon(paused ? PLAY : PAUSE));
     const name = paused ? words.time.play : words.time.pause;
@@ -75,7 +81,13 @@ export class Clock {
     this.playing.title = name;
   }
 
+  setRate(rate: number): void {
+    this.rate = rate;
+    this.rates.value = String(rate);
+  }
+
   step(): void {
+    if (this.held) { say(this.held); return; }
     this.setPaused(true);
     this.motion.advance(this.motion.snapshot().timeNs + STEP_NS);
   }
@@ -88,8 +100,10 @@ export class Clock {
       return;
     }
     if (this.paused || this.scrubbing) return;
-    const passedNs = Math.round(Math.min(MOST_MS, Math.max(0, milliseconds)) * 1e6 * this.rate);
-    if (passedNs > 0) this.motion.advance(this.motion.snapshot().timeNs + passedNs);
+    const nowNs = this.motion.snapshot().timeNs, passedNs = this.owedNs + Math.round(Math.min(MOST_MS, Math.max(0, milliseconds)) * 1e6 * this.rate);
+    const untilNs = Math.max(nowNs, Math.floor((nowNs + passedNs) / GRAIN_NS) * GRAIN_NS);
+    this.motion.advance(untilNs);
+    this.owedNs = nowNs + passedNs - untilNs;
   }
 
   /** What was done has changed: other marks. */
@@ -105,7 +119,7 @@ export class Clock {
     if (span !== this.span) { this.span = span; this.stale = true; }
     const at = String(Math.round((1000 * seconds) / span));
     if (!this.scrubbing && this.scrub.value !== at) this.scrub.value = at;
-    this.scrub.style.setProperty("--at", `calc(12px + ${((100 * seconds) / span).toFixed(1)}% - ${((24 * seconds) / span).toFixed(1)}px)`);
+    this.scrub.style.setProperty("--at", `calc(0.75rem + ${((100 * seconds) / span).toFixed(1)}% - ${((1.5 * seconds) / span).toFixed(3)}rem)`);
     const text = words.time.seconds(seconds);
     if (text !== this.shownText) { this.text.textContent = this.shownText = text; this.scrub.setAttribute("aria-valuetext", text); }
     this.onward.hidden = timeNs >= end;

@@ -12,7 +12,7 @@ const TRIANGLES = 4;
 const QUANTIZED = "KHR_mesh_quantization";
 /** Names of extensions that change no triangle begin so. */
 const LOOKS = ["KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_"];
-const WIDTHS: Readonly<Record<string, number>> = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
+const WIDTHS = { SCALAR: 1, VEC3: 3 } as const;
 const SIZES: Readonly<Record<number, number>> = { 5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4 };
 const MOST_TRIANGLES = 20_000_000;
 
@@ -63,22 +63,23 @@ class Document {
     return content.subarray(start, start + length);
   }
 
-  /** Rows of an accessor, one after the other, and how wide each is. */
-  numbers(number: unknown): { numbers: Float64Array; width: number } {
+  /** Rows of an accessor of this kind, by its name in the specification, one after the other. */
+  numbers(number: unknown, kind: keyof typeof WIDTHS): Float64Array {
     const accessor = this.item("accessors", number);
     for (const [key, told] of [["sparse", "is sparse"], ["normalized", "is of normalized integers"]] as const) {
       if (accessor[key]) throw new Refused(`${this.name}: got accessor ${String(number)} ${told}; accepted: a file exported without compression`);
     }
-    const kind = Number(accessor["componentType"]), size = SIZES[kind], width = WIDTHS[String(accessor["type"])];
-    if (size === undefined || width === undefined) throw new Refused(`${this.name}: accessor ${String(number)} has a type that no mesh has`);
+    if (accessor["type"] !== kind) throw new Refused(`${this.name}: accessor ${String(number)} is ${String(accessor["type"])}, where ${kind} belongs`);
+    const type = Number(accessor["componentType"]), size = SIZES[type], width = WIDTHS[kind];
+    if (size === undefined) throw new Refused(`${this.name}: accessor ${String(number)} has a type that no mesh has`);
     const content = this.#view(accessor["bufferView"]), count = Number(accessor["count"]), start = Number(accessor["byteOffset"] ?? 0);
     const stride = Number(this.item("bufferViews", accessor["bufferView"])["byteStride"] ?? 0) || size * width;
     if (!(count >= 0) || (count > 0 && !(start >= 0 && start + stride * (count - 1) + size * width <= content.length))) throw new Refused(`${this.name}: an accessor reads beyond bufferView ${String(accessor["bufferView"])}`);
     const view = new DataView(content.buffer, content.byteOffset, content.length), numbers = new Float64Array(count * width);
     for (let row = 0; row < count; row++) {
-      for (let k = 0; k < width; k++) numbers[row * width + k] = component(view, kind, start + row * stride + k * size);
+      for (let k = 0; k < width; k++) numbers[row * width + k] = component(view, type, start + row * stride + k * size);
     }
-    return { numbers, width };
+    return numbers;
   }
 }
 
@@ -164,19 +165,13 @@ function triangles(document: Document, primitive: Fields): Part | null {
   const mode = Number(primitive["mode"] ?? TRIANGLES), { name } = document;
   if (mode < TRIANGLES) return null;
   if ("KHR_draco_mesh_compression" in ((primitive["extensions"] as Fields | undefined) ?? {})) throw new Refused(`${name}: got its meshes are compressed with Draco; accepted: a file exported without compression`);
-  const { numbers: vertices, width } = document.numbers((primitive["attributes"] as Fields)["POSITION"]);
-  if (width !== 3) throw new Refused(`${name}: its positions aren't three numbers each`);
-  const corners = "indices" in primitive ? indices(document, primitive["indices"]) : Int32Array.from({ length: vertices.length / 3 }, (_, k) => k);
+  const vertices = document.numbers((primitive["attributes"] as Fields)["POSITION"], "VEC3");
+  const corners = "indices" in primitive ? Int32Array.from(document.numbers(primitive["indices"], "SCALAR")) : Int32Array.from({ length: vertices.length / 3 }, (_, k) => k);
   if (mode !== TRIANGLES) throw new Refused(`${name}: got it has triangle strips or fans; accepted: a file exported as triangles`);
   if (corners.length % 3 !== 0) throw new Refused(`${name}: ${corners.length} corners of triangles, which isn't a multiple of 3`);
   const wrong = corners.find((corner) => corner < 0 || corner >= vertices.length / 3);
   if (wrong !== undefined) throw new Refused(`${name}: a part uses vertex ${wrong}, but it has only ${vertices.length / 3}`);
   return { vertices, triangles: corners };
-}
-
-function indices(document: Document, accessor: unknown): Int32Array {
-  const { numbers, width } = document.numbers(accessor);
-  return Int32Array.from({ length: numbers.length / width }, (_, row) => numbers[row * width] ?? 0);
 }
 
 /** A part in the scene's axes, wound the other way if its matrix mirrors. */

@@ -7,6 +7,7 @@ import type { Declarations } from "./data.ts";
 import { fileWith } from "./file.ts";
 import { Flown } from "./flight.ts";
 import type { Kept } from "./flight.ts";
+import { NO_GHOST } from "./ghosts.ts";
 import { Kernels } from "./kernels.ts";
 import { readMesh } from "./meshes.ts";
 import { filled, nanoseconds, Refused, shown } from "./numbers.ts";
@@ -26,8 +27,6 @@ import type { Take } from "./take.ts";
 /** States of a take are kept every so often, to go back to: each is 30 kB. Of too many every other one is forgotten. */
 const KEEP_NS = 1_000_000_000;
 const MOST_KEPT = 128;
-
-const NO_GHOST: GhostChoice = { inertia_model: "", integrator: "", gyroscopic: true };
 
 interface Done { readonly tNs: number; readonly entry: Entry }
 
@@ -80,6 +79,8 @@ export class Simulation implements Motion {
   #before: readonly number[] = [];
   #kept: Moment[] = [];
   #info: BodyInfo | null = null;
+  /** While an open mesh flies, which bounds no solid: the values that make it a shell, and what they were before. */
+  #asShell: { readonly shell: Values; readonly before: Values } | null = null;
   #notice = "";
 
   constructor(kernels: Kernels, data: Data) {
@@ -107,7 +108,10 @@ export class Simulation implements Motion {
   openScene(name: string): string | null {
     if (!Object.hasOwn(this.#declared.scenes, name)) return this.#unknown("scene", name, Object.keys(this.#declared.scenes));
     const values = this.#sceneValues(name);
-    return this.#tried(() => this.#start(values, ghostOf(values), null, []));
+    return this.#tried(() => {
+      this.#start(values, ghostOf(values), null, []);
+      this.#asShell = null;
+    });
   }
 
   openBody(name: string): string | null {
@@ -115,7 +119,10 @@ export class Simulation implements Motion {
     // Density, contacts and start of the body's own scene, in the world that is there.
     const own = Object.entries(this.#sceneValues(name)).filter(([key]) => /^(?:density|mass|scale|contacts\.|initial\.)/.test(key));
     const values = { ...this.#withoutPoints(), ...Object.fromEntries(own), mesh: name };
-    return this.#tried(() => this.#start(values, this.#choice, null, []));
+    return this.#tried(() => {
+      this.#start(values, this.#choice, null, []);
+      this.#asShell = null;
+    });
   }
 
   openMesh(name: string, bytes: Uint8Array, scale?: number): string | null {
@@ -123,12 +130,11 @@ export class Simulation implements Motion {
       const mesh = readMesh(name, bytes, this.#kernels), surface = this.#surfaces.judged(mesh);
       const side = Math.max(...new Float64Array(surface.record.slice(8, 32).buffer));
       const unit = scale ?? (side > this.#declared.longest ? 0.001 : 1);
-      const values: Record<string, Value> = { ...this.#withoutPoints(), mesh: mesh.name, scale: [unit, unit, unit] };
-      if (!surface.closed) {
-        const mass = this.#body.flight.body[this.#declared.numbers.body.MASS] ?? 1;
-        Object.assign(values, { mass, inertia_model: "shell", inertia_model_com: "model" });
-      }
-      this.#start(values, this.#choice, mesh, []);
+      const values: Values = { ...this.#withoutPoints(), mesh: mesh.name, scale: [unit, unit, unit] };
+      const mass = this.#body.flight.body[this.#declared.numbers.body.MASS] ?? 1;
+      const shell: Values | null = surface.closed ? null : { mass, inertia_model: "shell", inertia_model_com: "model" };
+      this.#start({ ...values, ...shell }, this.#choice, mesh, []);
+      this.#asShell = shell === null ? null : { shell, before: Object.fromEntries(Object.keys(shell).map((name) => [name, values[name] ?? 0])) };
       this.#notice = [
         ...(scale === undefined && unit !== 1 ? [`its longest side of ${side.toPrecision(3)} is taken as millimetres`] : []),
         ...surface.findings.filter((each) => each.severity !== "info").map((each) => each.message),
@@ -151,6 +157,7 @@ export class Simulation implements Motion {
     });
     if (done.some((one, k) => k > 0 && one.tNs < (done[k - 1]?.tNs ?? 0))) throw new Refused("script: its entries aren't in the order of their times");
     this.#start(values, take.ghost, take.mesh, done);
+    this.#asShell = null;
     this.#endNs = Math.max(take.endNs, done.at(-1)?.tNs ?? 0);
     this.#notice = madeBy(take, this.#declared);
   }
@@ -163,10 +170,12 @@ export class Simulation implements Motion {
     return { ...this.#parameters.defaults(), ...this.#declared.scenes[name]?.values };
   }
 
-  /** The values in force but for points in the coordinates of one mesh. */
-  #withoutPoints(): Record<string, Value> {
-    const own = Object.entries(this.#body.values).filter(([name]) => !/^(?:ballast|contacts)\./.test(name) && name !== "string.attach");
-    const { "string.attach": attach = [0, 0, 0] } = this.#parameters.defaults(), model = this.#body.values["inertia_model"] ?? "solid";
+  /** The values in force but for points in the coordinates of one mesh, and for what an open mesh alone needed. */
+  #withoutPoints(): Values {
+    const { shell, before } = this.#asShell ?? { shell: {}, before: {} }, now = this.#body.values;
+    const isShell = Object.entries(shell).every(([name, value]) => now[name] === value);
+    const own = Object.entries({ ...now, ...(isShell ? before : {}) }).filter(([name]) => !/^(?:ballast|contacts)\./.test(name) && name !== "string.attach");
+    const { "string.attach": attach = [0, 0, 0] } = this.#parameters.defaults(), model = (isShell ? before : now)["inertia_model"] ?? now["inertia_model"] ?? "solid";
     return { ...Object.fromEntries(own), "string.attach": attach, "string.attached": false, inertia_model: model === "explicit" ? "solid" : model };
   }
 
@@ -210,7 +219,8 @@ export class Simulation implements Motion {
   #rewind(): void {
     this.#placed.place(this.#surfaceOf(this.#initial));
     this.#body.begin(this.#initial);
-    this.#hasGhost = this.#choice.inertia_model !== "" || this.#choice.integrator !== "" || !this.#choice.gyroscopic;
+    const { inertia_model, integrator, step, gyroscopic } = this.#choice;
+    this.#hasGhost = inertia_model !== "" || integrator !== "" || step !== 0 || !gyroscopic;
     if (this.#hasGhost) this.#ghost.begin(this.#ghostValues(this.#initial));
     this.#next = 0;
     this.#actedNs = -1;
@@ -219,11 +229,12 @@ export class Simulation implements Motion {
   }
 
   #ghostValues(values: Values): Values {
-    const { inertia_model, integrator, gyroscopic } = this.#choice;
+    const { inertia_model, integrator, step, gyroscopic } = this.#choice;
     return {
       ...values,
       inertia_model: inertia_model || (values["inertia_model"] ?? "solid"),
       integrator: integrator || (values["integrator"] ?? "auto"),
+      step: step !== 0 ? step : (values["step"] ?? 0.001),
       gyroscopic: gyroscopic && values["gyroscopic"] === true,
     };
   }
@@ -401,6 +412,7 @@ export class Simulation implements Motion {
       const chosen = { ...this.#choice, ...choice };
       this.#parameters.converted("ghost.inertia_model", chosen.inertia_model);
       this.#parameters.converted("ghost.integrator", chosen.integrator);
+      if (chosen.step !== 0) this.#parameters.converted("step", chosen.step);
       try {
         this.#choice = chosen;
         this.#rewind();
@@ -574,7 +586,7 @@ function trianglesOf(surface: Surface): Uint32Array {
 }
 
 function ghostOf(values: Values): GhostChoice {
-  return { inertia_model: String(values["ghost.inertia_model"] ?? ""), integrator: String(values["ghost.integrator"] ?? ""), gyroscopic: true };
+  return { inertia_model: String(values["ghost.inertia_model"] ?? ""), integrator: String(values["ghost.integrator"] ?? ""), step: 0, gyroscopic: true };
 }
 
 export const openMotion: OpenMotion = async (kernels, data, take) => {

@@ -175,10 +175,12 @@ export interface Hit {
   readonly normal: Vec3;
 }
 
-/** How the ghost differs from the body: "" and true mean as the body. Any of it makes a ghost. */
+/** How the ghost differs from the body: "", 0 and true mean as the body. Any of it makes a ghost. step: [s] of an
+ * integrator with fixed steps. */
 export interface GhostChoice {
   readonly inertia_model: string;
   readonly integrator: string;
+  readonly step: number;
   readonly gyroscopic: boolean;
 }
 

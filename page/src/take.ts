@@ -69,7 +69,7 @@ export function takeOf(bytes: Uint8Array): Take {
   if (form !== FORM) throw new Refused(`this take is of form ${String(form)}, made by version ${String(version)}; this page reads form ${FORM}`);
   const known = typeof values === "object" && values !== null && Array.isArray(script) && script.length <= MOST_ENTRIES;
   if (!known || !Number.isSafeInteger(endNs) || endNs < 0) throw new Refused("the take is damaged: values, script and endNs are missing");
-  const own = { inertia_model: String(ghost?.inertia_model ?? values["ghost.inertia_model"] ?? ""), integrator: String(ghost?.integrator ?? values["ghost.integrator"] ?? ""), gyroscopic: ghost?.gyroscopic !== false };
+  const own = { inertia_model: String(ghost?.inertia_model ?? values["ghost.inertia_model"] ?? ""), integrator: String(ghost?.integrator ?? values["ghost.integrator"] ?? ""), step: Number(ghost?.step ?? 0), gyroscopic: ghost?.gyroscopic !== false };
   return { form, version: String(version), values, ghost: own, script, endNs, mesh: mesh === undefined ? null : meshOf(mesh) };
 }
 
@@ -107,8 +107,8 @@ export async function takeOfLink(text: string): Promise<Take> {
 /** The files of a take, with which `simulate` repeats it. name: of its scene, without an ending. */
 export function takeFiles(take: Take, parameters: Parameters, name: string): TakeFiles {
   const durationS = take.endNs / 1e9;
-  const { inertia_model, integrator } = take.ghost;
-  const ghost: Record<string, Value> = { ...(inertia_model === "" ? {} : { "ghost.inertia_model": inertia_model }), ...(integrator === "" ? {} : { "ghost.integrator": integrator }) };
+  const { inertia_model, integrator, step } = take.ghost;
+  const ghost: Record<string, Value> = { ...(inertia_model === "" ? {} : { "ghost.inertia_model": inertia_model }), ...(integrator === "" || step !== 0 ? {} : { "ghost.integrator": integrator }) };
   const own = Object.entries(take.values).filter(([key]) => !key.startsWith("ghost."));
   const lines = [...own, ...Object.entries(ghost)].map(([key, value]) => `    ${key}: ${yamlValue(typed(key, value, parameters))}\n`);
   return {

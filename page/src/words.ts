@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: MIT
 //
-// Everything that the page says, once. Another language is another catalogue of this shape.
+// Everything that the page says, once. Another language is another catalogue of this shape (languages.ts).
 
+import { addressOf } from "./address.ts";
+import { LANGUAGES } from "./languages.ts";
 import { short } from "./words_numbers.ts";
 
-const english = {
+export const english = {
   title: "One rigid body",
   notANumber: (text: string) => `${text.trim() || "Nothing"} isn't a number`,
   close: "close",
   picture: {
     name: "The body. Arrow keys move the aim, Enter pokes there, G grabs and lets go; Shift and arrow keys turn the view, plus and minus zoom, 0 goes back",
+    body: "the body as it is now",
     weight: (newtons: string) => `weight ${newtons} N`,
     pull: "pull me",
     noWebGL: "This browser draws no WebGL: the picture is a plain one.",
@@ -22,14 +25,17 @@ const english = {
     name: "Body and hand", mass: "mass", sizes: ["size x", "size y", "size z"], poke: "poke", lock: "equal sizes",
     lockTitle: "Change all three sizes together",
   },
-  energy: { name: "energy", spin: "spin", move: "move", string: "string", height: "height", all: "all" },
+  energy: { name: "energy", ghost: "ghost", spin: "spin", move: "move", string: "string", height: "height", all: "all" },
   angle: { name: "angle to the ghost", kept: "angle to the kept take" },
   time: {
     name: "Time", play: "Play", pause: "Pause", step: "Step 0.01 s", back: "−2 s", backTitle: "Back 2 s", rate: "How fast time goes",
     rates: ["1 ×", "½ ×", "¼ ×", "⅒ ×", "1⁄50 ×"], scrub: "Moment of the take", reset: "Start again", goOn: "go on from here",
     goOnTitle: "Forget what came after this moment, and fly on", seconds: (s: number) => `${s.toFixed(2)} s`,
   },
-  cards: { body: "body", world: "gravity", ghost: "ghost", tensor: "tensor", measure: "measure", plots: "plots", keep: "keep" },
+  cards: { lessons: "lessons", body: "body", world: "gravity", ghost: "ghost", tensor: "tensor", measure: "measure", plots: "plots", keep: "keep" },
+  bodies: {
+    book: "book", hammer: "hammer", hollow_box: "hollow box", l_bracket: "l bracket", spinning_top: "spinning top", t_handle: "t handle", teapot: "teapot", tennis_racket: "tennis racket",
+  } as Record<string, string>,
   body: {
     name: "Body", bundled: "Ready-made", scenes: "Flights", own: "Your own", choose: "choose a file",
     drop: "Drop the file here", formats: ".obj, .stl, .ply or .glb, up to 50 MB. It stays on this machine.", unit: "one unit is",
@@ -49,14 +55,22 @@ const english = {
   },
   ghost: {
     name: "Ghost", about: "It starts as the body does and gets the same pulls and pokes. What differs:",
-    kinds: { "": "no ghost", bounding_box: "tensor of the bounding box", solid: "true tensor", shell: "mass in the skin", points: "mass in the corners", gyroscopic: "no gyroscopic term", integrator: "another integrator" } as Record<string, string>,
-    integrator: "integrator", apart: "beside the body", again: "It flies from the start of the take on.",
+    kinds: { "": "no ghost", bounding_box: "tensor of the bounding box", solid: "true tensor", shell: "mass in the skin", points: "mass in the corners", gyroscopic: "no gyroscopic term: as Jolt, Havok, PhysX, cannon-es", mujoco: "as MuJoCo at 1/60 s", integrator: "another integrator or step" } as Record<string, string>,
+    integrator: "integrator", step: "step", same: "as the body", sixtieth: "1/60 s", hundredth: "0.01 s", thousandth: "1 ms",
+    apart: "beside the body", again: "It flies from the start of the take on.",
+    sources: {
+      gyroscopic: "By default these engines keep ω where the law of motion keeps L: they leave ω × Iω out. Jolt and PhysX have a switch for it.",
+      mujoco: "MuJoCo's default, Euler's method, takes new velocities from the old ones, then moves with the new: semi_implicit_euler here.",
+    } as Record<string, string>,
+    measured: "Measured: 60 s about the middle axis, in which the true motion flips 9 times and keeps its energy", heads: ["at 1/60 s", "flips", "energy"],
+    measuredNote: (date: string) => `${date}; other engines, steps and versions: docs/benchmarks.md, Physics engines.`, kept: "kept", notFlown: "not flown",
   },
   inertia: {
     name: "Tensor", about: "[kg m²] about the centre of mass, in the axes x′ y′ z′. Turn them:", turn: ["about x", "about y", "about z"],
     principal: "principal axes", mesh: "axes of the mesh", products: (part: string) => `Largest product: ${part} % of the largest moment.`,
     none: "The products vanish: these are principal axes.", shapes: "In the picture", box: "inertia box", ellipsoid: "inertia ellipsoid",
-    axes: "axes I₁ I₂ I₃", bounding: "bounding box", poinsot: "Poinsot", poinsotNote: "The ellipsoid rolls on the plane; where they touch is ω. Without pulls and pokes the plane stays.",
+    axes: "axes I₁ I₂ I₃", bounding: "bounding box", poinsot: "Poinsot's construction", rolls: "ellipsoid that rolls on a plane", cones: "cones of body and space",
+    poinsotNote: "The plane stands across L, and ω ends where the ellipsoid touches it. Without pulls and pokes the plane stays, and the ellipsoid rolls on it.",
   },
   measure: {
     name: "Measure", protractor: "Protractor", between: "between", and: "and", off: "off",
@@ -73,8 +87,30 @@ const english = {
     keepTake: "keep this take", keepNote: "It flies on as a grey body beside the next one.", forget: "forget it", kept: (s: number) => `Kept: ${s.toFixed(1)} s`,
     apart: (degrees: string) => `${degrees}° apart now`,
   },
+  lessons: { name: "Lessons", about: "Each begins with a question. The body stands until you answer." },
+  lesson: {
+    name: "Lesson", none: "no lesson", leave: "leave the lesson", class: "class mode", classTitle: "For a projector: large words, and nothing else to read",
+    letters: ["A", "B", "C"], first: "Answer first: A, B or C", right: "Right.", wrong: (letter: string, choice: string) => `No, it is ${letter}: ${choice}`,
+    why: "why?", steps: "Try it", done: (k: number, all: number) => `Step ${k} of ${all} is done.`, finished: "All steps are done.", ticked: "done", now: "now", anew: "begin the lesson again",
+    unknown: (name: string) => `There is no lesson ${name}`, swings: "It still swings: wait until it hangs at rest.", untied: "No string is tied.", tied: "The string holds it: click to poke it.",
+    places: { tip: "tip", rim: "rim", grip: "grip", head: "head", corner: "corner", stem: "stem", spout: "spout", handle: "handle", knob: "knob", com: "centre of mass" } as Record<string, string>,
+    poke: (place: string) => `poke: ${place}`, again: (place: string) => `start again, and poke: ${place}`, restart: "start again", pull: "show me how", press: "take me there", pullHow: "Drag the body with the pointer, or with G and arrow keys",
+    pressHow: "Press a place of the body, or aim with arrow keys and press Enter", throwAbout: (axis: string) => `throw it about ${axis}`, withoutTerm: "term off, and start again",
+    termOn: "switch the term on", termOff: "switch the term off", box: "bounding box", truth: "true tensor", corners: "mass in the corners", stick: "stick on 30 g, and start again", unstick: "take it off",
+    ballast: "open ballast", card: "open the card", ghosts: { gyroscopic: "ghost as in Jolt, and start again", mujoco: "ghost as in MuJoCo, and start again" }, energies: "plot the energies", poinsot: "show the ellipsoid", principal: "show the axes", turn: "open the axes", aboutThird: "spin about I₃", chalk: "draw the line", tie: "tie it here", tieHow: "Press the place to tie it, or aim with arrow keys and press Enter",
+    twice: "spin × 2", half: "spin × ½", noSpin: "no spin", trace: "trace the grip", weightless: "gravity off", moments: "open the table", tenfold: "mass × 10", tenth: "mass as before",
+  },
   percent: (part: number) => (Number.isFinite(part) ? `${part < 0 ? "−" : "+"}${short(Math.abs(part), 2)} %` : "–"),
 };
 
 export type Words = typeof english;
-export const words: Words = english;
+
+/** The code of the language that the address names, or the first of the reader's that is there. */
+function spoken(): string {
+  if (typeof location === "undefined") return "en";
+  const asked = addressOf(location.hash).language, wanted = asked ? [asked] : navigator.languages;
+  return wanted.map((code) => code.toLowerCase().split("-")[0]!).find((code) => code === "en" || code in LANGUAGES) ?? "en";
+}
+
+export const language = spoken();
+export const words: Words = LANGUAGES[language]?.words ?? english;

@@ -19,7 +19,7 @@ interface Asked {
   readonly untilNs?: number;
 }
 const asked = JSON.parse(readFileSync(0, "utf8")) as Asked;
-const ghost: GhostChoice = { inertia_model: "", integrator: "", gyroscopic: true };
+const ghost: GhostChoice = { inertia_model: "", integrator: "", step: 0, gyroscopic: true };
 
 async function refusal(values: Values, entry: Entry | null): Promise<string | null> {
   try {

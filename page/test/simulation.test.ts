@@ -7,7 +7,7 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { openMotion } from "../src/simulation.ts";
 import type { Motion, Snapshot, Vec3 } from "../src/source.ts";
-import { linkText, takeBytes, takeOf } from "../src/take.ts";
+import { linkText, takeBytes, takeOf, takeOfLink } from "../src/take.ts";
 import type { Take } from "../src/take.ts";
 
 const bytes = (name: string): Uint8Array<ArrayBuffer> => new Uint8Array(readFileSync(process.env[name] ?? ""));
@@ -113,6 +113,63 @@ test("a ghost begins as the body, at any time, and changes nothing of it", async
   const { body, ghost, angleToGhost } = motion.snapshot();
   assert.deepEqual(ghost?.row, body.row);
   assert.ok(angleToGhost < 1e-15);
+});
+
+test("after an open mesh, which flies as a shell, a closed one is what bodies were before", async () => {
+  const corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n", sides = "f 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+  const open = new TextEncoder().encode(corners + sides), closed = new TextEncoder().encode(`${corners}f 4 3 2 1\n${sides}`);
+  const names = ["inertia_model", "inertia_model_com", "mass", "density"] as const, chosen = (motion: Motion): unknown[] => names.map((name) => motion.values()[name]);
+  for (const model of ["solid", "bounding_box", "points"]) {
+    const motion = await opened();
+    motion.set({ inertia_model: model });
+    const before = chosen(motion);
+    assert.equal(motion.openMesh("open.obj", open), null);
+    assert.equal(motion.values()["inertia_model"], "shell");
+    assert.equal(motion.openMesh("again.obj", open), null);
+    assert.equal(motion.values()["inertia_model"], "shell");
+    assert.equal(motion.openMesh("closed.obj", closed), null);
+    assert.deepEqual(chosen(motion), before);
+    assert.equal(motion.openMesh("open.obj", open), null);
+    assert.equal(motion.openBody("hammer"), null);
+    assert.equal(motion.values()["inertia_model"], model);
+    // What a person chooses stays.
+    assert.equal(motion.openMesh("open.obj", open), null);
+    assert.equal(motion.set({ inertia_model: "bounding_box" }), null);
+    assert.equal(motion.openMesh("closed.obj", closed), null);
+    assert.equal(motion.values()["inertia_model"], "bounding_box");
+  }
+});
+
+test("a ghost as an engine's method at its step is the body flown so, and a take keeps it to the bit", async () => {
+  const motion = await opened(), alone = await opened(), as = { integrator: "semi_implicit_euler", step: 0.016666667 };
+  assert.equal(motion.setGhost(as), null);
+  assert.equal(alone.set(as), null);
+  alone.reset();
+  for (const one of [motion, alone]) {
+    one.advance(2 * S);
+    one.submit({ at: { point: [0, 0.05, 0] }, impulse: [0.01, 0, 0] });
+    one.advance(4 * S + 1);
+  }
+  const { ghost, body } = motion.snapshot();
+  assert.deepEqual(ghost?.row, row(alone.snapshot()));
+  assert.ok((ghost?.kinetic ?? 0) > 1.02 * body.kinetic); // this method gains energy
+  const link = await motion.link(), again = await opened();
+  assert.equal(await again.openLink(link), null);
+  again.advance(4 * S + 1);
+  assert.deepEqual(again.ghost(), motion.ghost());
+  assert.deepEqual(again.snapshot(), motion.snapshot());
+  assert.doesNotMatch(again.take().scene, /ghost/); // the command line's ghost has the body's step
+});
+
+test("a ghost's step that is none is refused, also in a take", async () => {
+  const motion = await opened();
+  for (const step of [-1, NaN, Infinity, 1e9]) assert.match(motion.setGhost({ step }) ?? "", /step/, String(step));
+  assert.equal(motion.snapshot().ghost, null);
+  for (const step of [-1, "wide", 1e9]) {
+    const take = { ...(await takeOfLink(await motion.link())), ghost: { ...motion.ghost(), step } };
+    assert.notEqual(await motion.openLink(await linkText(take as Take)), null, String(step));
+  }
+  assert.equal(motion.setGhost({ step: 0.1, integrator: "rk4" }), null);
 });
 
 test("a mesh of one's own flies, is told with what is wrong with it, and goes into the file", async () => {

@@ -15,6 +15,10 @@ EXAMPLES = (
     ("rigid_proto workbench hammer", "a bundled scene"),
     ("rigid_proto workbench --mesh part.obj", "your own mesh"),
     ("rigid_proto workbench hammer --html out/hammer.html", "a page that needs nothing but a browser, as one file"),
+    (
+        "rigid_proto workbench --script msg_examples/flip_and_poke.yaml --html out/poked.html",
+        "the same, and it plays a poke script",
+    ),
 )
 
 
@@ -26,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write a page in which the scene, or a mesh given in its place, flies without a server",
     )
+    parser.add_argument("--script", metavar="SCRIPT.yaml", help="with --html: a poke script that the page plays")
     parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(
         "--port", type=int, metavar="PORT", help="port of the page (default 8080, or the next free one)"
@@ -36,6 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C, or write a file."""
+    if args.script and not args.html:
+        raise InputError("--script", args.script, "with --html; poke_client plays scripts to a running body")
     return _write(args) if args.html else _serve(args)
 
 
@@ -64,17 +71,19 @@ def _serve(args: argparse.Namespace) -> int:
 def _write(args: argparse.Namespace) -> int:
     from ..page.file import values_of_mesh, write_page
     from ..scene.scene_file import scene_file, scene_values
+    from ..scene.script import read_script
 
     scene, mesh = args.scene, args.mesh
     if scene and not mesh and not scene.endswith((".yaml", ".yml")) and Path(scene).is_file():
         scene, mesh = None, scene
-    values = scene_values(scene_file(scene)) if scene else None
+    script = read_script(args.script) if args.script else []
+    values = scene_values(scene_file(scene or "t_handle")) if scene or script and not mesh else None
     if mesh and values is not None:
         values["mesh"] = mesh
     elif mesh:
         values, note = values_of_mesh(mesh)
         if note:
             print(f"rigid_proto workbench: {mesh}: {note}", file=sys.stderr)
-    write_page(args.html, values)
+    write_page(args.html, values, script)
     print(f"wrote {args.html}: open it in a browser")
     return 0

@@ -21,7 +21,7 @@ from .assembly import Assembly, multiply_matrices, node_matrix
 
 TRIANGLES = 4
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_WIDTHS = {"SCALAR": 1, "VEC3": 3}
 _READ = "KHR_mesh_quantization"
 _LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_")
 """Prefixes of the names of extensions that change no triangle."""
@@ -79,13 +79,15 @@ class _Document:
             raise MeshError(self.name, f"buffer {index} ends before bufferView {number}; the file may be truncated")
         return content[start : start + view["byteLength"]]
 
-    def numbers(self, accessor_number: int) -> NDArray[Any]:
-        """The rows (n, k) of an accessor."""
+    def numbers(self, accessor_number: int, kind: str) -> NDArray[Any]:
+        """The rows (n, k) of an accessor of this kind, by its name in the specification."""
         accessor = self.item("accessors", accessor_number)
-        for key, kind in (("sparse", "is sparse"), ("normalized", "is of normalized integers")):
+        for key, told in (("sparse", "is sparse"), ("normalized", "is of normalized integers")):
             if accessor.get(key):
-                raise MeshError(self.name, f"accessor {accessor_number} {kind}", "a file exported without compression")
-        dtype, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
+                raise MeshError(self.name, f"accessor {accessor_number} {told}", "a file exported without compression")
+        if accessor["type"] != kind:
+            raise MeshError(self.name, f"accessor {accessor_number} is {accessor['type']}, where {kind} belongs")
+        dtype, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[kind]
         count, start = accessor["count"], accessor.get("byteOffset", 0)
         content = self.view(accessor["bufferView"])
         stride = self.item("bufferViews", accessor["bufferView"]).get("byteStride") or dtype.itemsize * width
@@ -114,9 +116,9 @@ def _triangles(document: _Document, primitive: dict[str, Any]) -> tuple[NDArray[
         return np.empty((0, 3)), np.empty((0, 3), np.int64)
     if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
         raise MeshError(document.name, "its meshes are compressed with Draco", "a file exported without compression")
-    vertices = document.numbers(primitive["attributes"]["POSITION"])
+    vertices = document.numbers(primitive["attributes"]["POSITION"], "VEC3")
     if "indices" in primitive:
-        corners = document.numbers(primitive["indices"])[:, 0].astype(np.int64)
+        corners = document.numbers(primitive["indices"], "SCALAR")[:, 0].astype(np.int64)
     else:
         corners = np.arange(len(vertices))
     if mode != TRIANGLES:

@@ -61,7 +61,8 @@ def page_stamp() -> str:
     sources = [file for file in sorted((SOURCE / "src").rglob("*.*")) if file.name != GENERATED]
     sources += [SOURCE / name for name in ("page.html", "build.mjs", "package-lock.json")]
     bundled = [*map(scene_path, scene_names()), *map(resolve_mesh, body_names())]
-    for file in (*sources, *bundled, SOURCE.parent / "LICENSE"):
+    beside = [SOURCE.parent / name for name in ("LICENSE", "benchmarks/results/engines.csv")]
+    for file in (*sources, *bundled, *beside):
         digest.update(f"{file.name} ".encode() + hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()[:20]
 
@@ -78,16 +79,16 @@ def _build(page: Path) -> None:
         _run([node, SOURCE / "build.mjs", kernels.split()[-1], data, made])
 
 
-def installed_node() -> str:
-    """Node, with the packages that the page is built of in the source tree. Raises InputError."""
+def installed_node(folder: Path = SOURCE) -> str:
+    """Node, with the packages of a folder's lock file in it: those that the page is built of. Raises InputError."""
     node, npm = _node()
-    lock = hashlib.sha256((SOURCE / "package-lock.json").read_bytes()).hexdigest()
-    mark = SOURCE / "node_modules" / ".installed"
-    with open(SOURCE / ".installing", "w") as alone:
+    lock = hashlib.sha256((folder / "package-lock.json").read_bytes()).hexdigest()
+    mark = folder / "node_modules" / ".installed"
+    with open(folder / ".installing", "w") as alone:
         fcntl.flock(alone, fcntl.LOCK_EX)
         if not mark.is_file() or mark.read_text() != lock:
-            print("installing what the page is built with into page/node_modules ...", file=sys.stderr, flush=True)
-            _run([*npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=SOURCE)
+            print(f"installing packages into {folder.name}/node_modules ...", file=sys.stderr, flush=True)
+            _run([*npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=folder)
             mark.write_text(lock)
     return node
 

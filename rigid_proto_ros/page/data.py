@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..base.bundled import body_names, scene_names, scene_path
+from ..base.bundled import body_names, scene_path
 from ..base.library import stamp
 from ..base.vectors import FloatArray, IntArray
 from ..mass import INERTIA_MODELS
@@ -28,7 +28,7 @@ from ..motion import string as of_string
 from ..motion.integrators import INTEGRATORS
 from ..motion.integrators.stepping import ROOM
 from ..parameters.declarations import PARAMETERS, PATTERNS, Parameter
-from ..scene.lessons import lesson
+from ..scene.lessons import Lesson, lessons
 from ..scene.scene_file import scene_values
 from ..simulation import commands, effects, flight, quantities, record, refusals
 from ..simulation.record import SCENE_PARAMETERS, field_of
@@ -66,7 +66,8 @@ def page_data() -> bytes:
         "numbers": _constants(),
         "words": words(),
         "bodies": bodies,
-        "scenes": {name: {"title": lesson(name).title, "values": bundled_values(name)} for name in scene_names()},
+        "scenes": {one.name: {"title": one.title, "values": bundled_values(one.name)} for one in lessons()},
+        "lessons": {one.name: _texts(one) for one in lessons()},
         "start": START,
         "longest": LONGEST,
     }
@@ -79,17 +80,34 @@ def page_version() -> str:
     return f"{__version__}+{stamp().partition('-')[2][:7]}"
 
 
-def page_values(values: dict[str, Any]) -> dict[str, Any]:
+def is_of_page(name: str) -> bool:
+    """Whether the page has this parameter."""
+    return name in USED or name.startswith(("ballast.", "contacts."))
+
+
+def page_values(values: dict[str, Any], with_hand: bool = True) -> dict[str, Any]:
     """A scene's parameters as the page has them, with the string of a hand."""
-    used = {name: value for name, value in values.items() if name in USED or name.startswith(("ballast.", "contacts."))}
+    used = {name: value for name, value in values.items() if is_of_page(name)}
     tied = used.get("string.attached", False)
     given = any(name in used for name in ("string.frequency", "string.timeout"))
-    return used if tied or given else {**used, **HAND}
+    return used if tied or given or not with_hand else {**used, **HAND}
 
 
 def bundled_values(name: str) -> dict[str, Any]:
     """The parameters of a bundled scene, as the page has them."""
     return page_values(scene_values(scene_path(name)))
+
+
+def _texts(one: Lesson) -> dict[str, Any]:
+    """A lesson, as page/src/lessons.ts reads it."""
+    return {
+        "title": one.title,
+        "question": one.question,
+        "choices": one.choices,
+        "answer": one.answer,
+        "steps": one.sentences,
+        "reason": one.reason,
+    }
 
 
 _CONSTANTS: dict[str, tuple[Any, str]] = {

@@ -6,6 +6,8 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -16,24 +18,36 @@ from ..base.errors import InputError
 from ..base.files import whole_file
 from ..parameters.declarations import Parameters
 from ..scene.scenario import BodyMesh, load_body_mesh, make_scenario
+from ..scene.script import entry_of
+from ..simulation.commands import Change, Command, MoveString, ThrusterCommand, TieString
 from .bundle import built_page
-from .data import LONGEST, page_values, page_version
+from .data import LONGEST, is_of_page, page_values, page_version
 
 FORM = 1
 """Of a take in a file or link; page/src/take.ts has the same."""
 SPIN = {"initial.angular_velocity": [0.05, 0.1, 3.0]}
 """Of a mesh alone [rad/s], so that there is something to see."""
 _PLACE = '<script type="application/gzip" id="take"></script>'
+_BEGIN = '<meta name="begin" content="">'
+"""What the page opens in if its address says nothing, as behind the # of an address."""
 
 
-def write_page(file: str | Path, values: dict[str, Any] | None = None) -> None:
-    """Write the page, to begin with a scene of these parameters, by name. Raises InputError."""
+def write_page(
+    file: str | Path, values: dict[str, Any] | None = None, script: Sequence[Command] = (), begins: str = ""
+) -> None:
+    """Write the page, to begin with a scene of these parameters, by name, and a script of it, or as with this behind the
+    # of its address (page/src/address.ts). Raises InputError.
+    """
     page = built_page().read_text("utf-8")
     if values is not None:
-        take = base64.b64encode(gzip.compress(json.dumps(take_of(values)).encode(), 9, mtime=0)).decode()
+        take = base64.b64encode(gzip.compress(json.dumps(take_of(values, script)).encode(), 9, mtime=0)).decode()
         if _PLACE not in page:
             raise InputError("page", "the built page has no place for a scene")
         page = page.replace(_PLACE, f"{_PLACE.partition('></')[0]}>{take}</script>")
+    if begins:
+        if _BEGIN not in page:
+            raise InputError("page", "the built page has no place for what it begins with")
+        page = page.replace(_BEGIN, _BEGIN.replace('content=""', f'content="{escape(begins)}"'), 1)
     with whole_file("--html", file) as beside:
         beside.write_text(page, "utf-8")
 
@@ -56,15 +70,35 @@ def values_of_mesh(mesh: str) -> tuple[dict[str, Any], str]:
     return values, "; ".join(notes)
 
 
-def take_of(values: dict[str, Any]) -> dict[str, Any]:
-    """A take in which nothing was done yet, as page/src/take.ts reads it. Raises InputError."""
+def take_of(values: dict[str, Any], script: Sequence[Command] = ()) -> dict[str, Any]:
+    """A take in which nothing but a script was done yet, as page/src/take.ts reads it. Raises InputError."""
     scenario = make_scenario(values)
-    used = page_values(_changed(scenario.parameters))
-    take: dict[str, Any] = {"form": FORM, "version": page_version(), "values": used, "script": [], "endNs": 0}
+    ties = any(isinstance(command, TieString | MoveString) for command in script)
+    used = page_values(_changed(scenario.parameters), with_hand=not ties)
+    take: dict[str, Any] = {
+        "form": FORM,
+        "version": page_version(),
+        "values": used,
+        "script": [_entry(command) for command in script],
+        "endNs": max((command.stamp_ns for command in script), default=0),
+    }
     if scenario.body_mesh is not None and values.get("mesh", "t_handle") not in body_names():
         used["mesh"] = f"{scenario.body_mesh.mesh.name}.obj"
         take["mesh"] = _mesh_of(scenario.body_mesh, used["mesh"])
     return take
+
+
+def _entry(command: Command) -> dict[str, Any]:
+    """The entry of a take. Raises InputError for what the page can't do."""
+    if isinstance(command, ThrusterCommand):
+        raise InputError("--script", "thrusters", "what the page can do: it has no thrusters")
+    if isinstance(command, Change):
+        unknown = [name for name in command.content if not is_of_page(name)]
+        if unknown:
+            raise InputError(
+                "--script, set", unknown[0], "a parameter that the page has; others stay as they are there"
+            )
+    return {"t": command.stamp_ns / 1e9, **entry_of(command)}
 
 
 def _changed(parameters: Parameters) -> dict[str, Any]:

@@ -350,7 +350,8 @@ class LessonPanel:
 
     def _where(self, step: int) -> str:
         """The tab in which the step sets or shows something, or empty."""
-        whats = [what for what in self.course.steps[step] if what.startswith(("set ", "show "))]
+        steps = self.course.steps
+        whats = [what for what in (steps[step] if step < len(steps) else ()) if what.startswith(("set ", "show "))]
         if not whats:
             return ""
         tab = "Show" if whats[0].startswith("show ") else "Body" if whats[0] in IN_BODY else "Forces"

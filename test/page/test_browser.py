@@ -4,30 +4,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from page_browser import Opened, chromium
+from page_browser import Opened
 
 pytestmark = pytest.mark.drawn
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
-
-
-@pytest.fixture
-def opened(browser: Any) -> Iterator[Opened]:
-    """The first screen, paused a third of a second after it began."""
-    page = Opened(browser)
-    page.pause()
-    page.fly(0.33)
-    yield page
-    page.close()
 
 
 def test_the_first_screen_moves_beside_its_ghost_and_asks_no_network(browser: Any) -> None:
@@ -60,6 +43,8 @@ def test_a_drag_ties_the_string_at_what_was_grabbed_and_lets_go(opened: Opened) 
     # Measured 0.00 px: the hand is where the pointer is, in the plane of what was grabbed.
     assert np.linalg.norm(opened.seen(string["end"]) - (place["x"] + 120, place["y"] - 50)) < 0.5
     assert string["tension"] > 0.0
+    # A link holds every place of a drag: no more digits than the eye sees.
+    assert all(len(repr(x)) <= 9 for x in opened.script[-1]["string"]["target"])
     before = opened.now["body"]["row"]
     opened.fly(0.2)
     mouse.up()
@@ -137,6 +122,20 @@ def test_the_ghost_is_chosen_goes_beside_the_body_and_away(opened: Opened) -> No
     page.get_by_label("beside the body").check()
     opened.drawn(30)
     assert opened.covered() == []
+    card = page.locator("section[data-card=ghost]")
+    assert "Jolt\t0\tkept" in card.inner_text(), "what was measured of the engines stands there"
+    page.get_by_role("radio", name="as MuJoCo at 1/60 s").check()
+    opened.fly(0.1)
+    assert opened.js("page.motion.ghost().step") == 0.016666667
+    assert "MuJoCo\t9\t+121 %" in card.inner_text()
+    page.get_by_role("radio", name="another integrator or step").check()
+    page.get_by_label("step", exact=True).select_option("1/60 s")
+    assert opened.js("page.motion.ghost()") == {
+        "inertia_model": "",
+        "integrator": "euler",
+        "step": 0.016666667,
+        "gyroscopic": True,
+    }
     page.get_by_role("radio", name="no ghost").check()
     opened.drawn()
     assert opened.now["ghost"] is None and not page.locator("#angle").is_visible()

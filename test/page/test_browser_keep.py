@@ -3,33 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from page_browser import Opened, chromium, page_address
+from page_browser import Opened, page_address
 
 from rigid_proto_ros.base.bundled import PACKAGE_FOLDER
 
 pytestmark = pytest.mark.drawn
 BRACKET = PACKAGE_FOLDER / "bodies" / "l_bracket.obj"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
-
-
-@pytest.fixture
-def opened(browser: Any) -> Iterator[Opened]:
-    page = Opened(browser)
-    page.pause()
-    page.fly(0.33)
-    yield page
-    page.close()
 
 
 def test_a_mesh_of_ones_own_is_opened_judged_and_spun_and_a_broken_one_leaves_the_body_that_flew(
@@ -198,6 +182,35 @@ def test_axes_turned_by_hand_have_products_until_they_are_principal(opened: Open
     assert opened.js(
         "[page.picture.inertiaBox, page.picture.ellipsoid, page.picture.boundingBox].every(({ visible }) => visible)"
     )
+
+
+def test_poinsots_ellipsoid_rolls_on_its_plane_where_omega_ends(opened: Opened) -> None:
+    page = opened.page
+    page.locator("[data-card=tensor]").click()
+    page.get_by_label("ellipsoid that rolls on a plane").check()
+    page.get_by_label("cones of body and space").check()
+    for _ in range(4):
+        opened.fly(0.3)
+    seen = opened.js(
+        """() => {
+          const { picture, motion } = page, { poinsot } = picture, { body } = motion.snapshot(), V = picture.eye.target.constructor;
+          const tip = poinsot.inSpace.position.clone(), L = new V(...body.momentum).normalize(), omega = new V(...body.omega);
+          const head = picture.omega.heads[0], end = new V(0, head.position.y + head.scale.y, 0);
+          picture.omega.node.updateMatrixWorld(true);
+          end.applyMatrix4(picture.omega.node.matrixWorld).sub(tip);
+          return {
+            shown: poinsot.inSpace.visible && poinsot.onBody.visible, size: motion.body().length,
+            off: end.dot(L) - poinsot.plane.position.length(), angle: end.angleTo(omega),
+            places: poinsot.herpolhode.line.geometry.drawRange.count,
+          };
+        }"""
+    )
+    assert seen["shown"] and seen["places"] > 4
+    # Measured 1e-8 of the size, of arrows in single precision: the tip of omega lies on the plane.
+    assert abs(seen["off"]) < 1e-6 * seen["size"] and seen["angle"] < 1e-6
+    opened.js("page.motion.set({ 'initial.angular_velocity': [0, 0, 0] }), page.motion.reset()")
+    opened.drawn(4)
+    assert not opened.js("page.picture.poinsot.inSpace.visible"), "nothing rolls at rest"
 
 
 def test_protractor_stopwatch_and_trace_measure(opened: Opened) -> None:

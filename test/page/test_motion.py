@@ -16,12 +16,14 @@ import pytest
 from mass_solids import box, moved, together
 from page_tools import TESTS, kernels, node, packages, run_node
 
+from rigid_proto_ros.base.bundled import example_names, example_path, scene_path
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.page.bundle import SOURCE
 from rigid_proto_ros.page.file import take_of
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
-from rigid_proto_ros.scene.script import expand_script
+from rigid_proto_ros.scene.scene_file import scene_values
+from rigid_proto_ros.scene.script import expand_script, parse_script, read_script
 from rigid_proto_ros.scene.yaml_text import yaml_value
 from rigid_proto_ros.simulation.commands import nanoseconds
 
@@ -154,6 +156,46 @@ def test_a_mesh_of_one_s_own_flies_as_python_flies_it(page_file: Path, tmp_path:
         assert told["hash"] == run.simulation.state.sha256(), name
         # And so do the files that the page saves.
         assert told["hash"] == hash_of(saved / "scene.yaml", 1.5), name
+
+
+SCRIPTED = {
+    "ballast_in_flight": ("ballast_stops_flip", 8.0),
+    "com_or_rim": ("com_or_rim", 6.0),
+    "flip_and_poke": ("t_handle", 9.0),
+    "heavier_in_flight": ("t_handle", 7.0),
+    "pull_on_string": ("t_handle", 8.0),
+    "same_force_three_ways": ("t_handle", 8.5),
+    "weigh_at_com": ("weigh_by_throwing", 3.0),
+    "weigh_by_throwing": ("weigh_by_throwing", 3.0),
+}
+"""Of each example script the scene that it is for, and seconds."""
+
+
+@pytest.mark.slow
+def test_every_example_script_plays_in_the_page_as_python_plays_it(page_file: Path) -> None:
+    assert sorted(SCRIPTED) == sorted(example_names())
+    for name, (scene, seconds) in SCRIPTED.items():
+        script, values = read_script(example_path(name)), scene_values(scene_path(scene))
+        take = take_of(values, script)
+        assert len(take["script"]) == len(script)
+        told = flown(take, page_file, seconds)
+        run = OfflineRun(read_scene(scene), script)
+        run.advance(nanoseconds(seconds))
+        assert told["hash"] == run.simulation.state.sha256(), name
+
+
+def test_a_script_of_what_the_page_cant_do_is_refused_in_one_line() -> None:
+    values = scene_values(scene_path("t_handle"))
+    repeated = parse_script("- {t: 1.0, at: tip, impulse: [0, 0, 1.0e-3], repeat: 3, every: 0.5, jitter: 0.1}")
+    times = [entry["t"] for entry in take_of(values, repeated)["script"]]
+    assert len(times) == 3 and times == [command.stamp_ns / 1e9 for command in repeated]
+    for text, word in (
+        ("- {t: 0, thrusters: [1.0]}", "thrusters"),
+        ("- {t: 0, set: {publish_rate: 10.0}}", "publish_rate"),
+    ):
+        with pytest.raises(InputError, match=word) as refused:
+            take_of(values, parse_script(text))
+        assert "\n" not in str(refused.value)
 
 
 @pytest.mark.slow

@@ -188,3 +188,32 @@ def test_l_bracket_wobbles_at_once_and_without_the_gyroscopic_term_not_at_all() 
     calm = fly("l_bracket", 10.0, gyroscopic=False)
     assert degrees_between(calm.spin, Z).max() < 1e-3
     assert degrees_between(calm.momentum, calm.momentum[0]).max() > 5.0
+
+
+def test_the_handle_turns_over_as_it_does_nowhere_without_the_term_and_gains_energy_with_long_steps() -> None:
+    assert np.allclose(fly("engine", 10.0).flips(axis=2), [1.62, 4.33, 7.04, 9.76], atol=0.02)
+    without = fly("engine", 60.0, gyroscopic=False, interval_s=0.05)
+    assert len(without.flips(axis=2)) == 0
+    assert math.isclose(degrees_between(without.momentum, without.momentum[0]).max(), 0.43, abs_tol=0.005)
+    long_steps, short_steps = (
+        fly("engine", 10.0, integrator="semi_implicit_euler", step=step) for step in (0.016666667, 0.001)
+    )
+    assert np.allclose(long_steps.flips(axis=2), [1.7, 4.4, 7.2, 9.9], atol=0.06)
+    energy = long_steps.energy / long_steps.energy[0]
+    assert math.isclose(long_steps.time[np.argmax(energy > 1.1)], 1.7, abs_tol=0.05)
+    assert math.isclose(energy[-1], 2.13, abs_tol=0.01)
+    assert math.isclose(short_steps.energy[-1] / short_steps.energy[0], 1.04, abs_tol=0.001)
+
+
+def test_omega_wanders_round_l_in_a_plane_while_l_stays() -> None:
+    flight = fly("poinsot", 12.0)
+    assert np.allclose(flight.flips(axis=0), [1.0, 3.8, 6.6, 9.4], atol=0.06)
+    assert degrees_between(flight.momentum, flight.momentum[0]).max() < 1e-5
+    upright = flight.momentum[0] / np.linalg.norm(flight.momentum[0])
+    along = flight.spin @ upright
+    assert np.ptp(along) < 1e-13 * along[0]  # measured 2e-15
+    away = degrees_between(flight.spin, upright)
+    assert math.isclose(away.min(), 2.3, abs_tol=0.1) and math.isclose(away.max(), 28.4, abs_tol=0.1)
+    steady = fly("poinsot", 12.0, initial__angular_velocity=[0.4, 0.8, 5.0])
+    away = degrees_between(steady.spin, steady.momentum[0] / np.linalg.norm(steady.momentum[0]))
+    assert len(steady.flips(axis=2)) == 0 and 3.0 < away.min() and away.max() < 6.5

@@ -36,7 +36,6 @@ from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
-from rigid_proto_ros.workbench import lesson_file
 
 pytestmark = [pytest.mark.drawn, pytest.mark.skipif(CHROMIUM is None, reason=NO_CHROMIUM)]
 
@@ -413,44 +412,3 @@ def test_an_open_mesh_is_refused_and_from_a_closed_one_to_an_animation_it_takes_
         act(page.page.get_by_role("button", name="Save as glTF", exact=True).click)
     assert actions == 5
     assert Path(download.value.path()).read_bytes()[:4] == b"glTF"
-
-
-def test_a_lesson_as_one_file_moves_without_a_server_and_the_network_and_is_printed_on_a_page(
-    browser, tmp_path, monkeypatch
-) -> None:
-    file = tmp_path / "lesson.html"
-    assert main(["lesson", "t_handle", "--html", str(file), "--duration", "2"]) == 0
-    page = browser.new_page(viewport={"width": 700, "height": 320})
-    page.add_init_script(f"({RARELY_DRAWN})({DRAWN_MS})")
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
-    page.goto(file.as_uri())
-    slider = page.frame_locator("iframe").locator("[role=slider]").first
-    slider.wait_for(state="attached", timeout=1e3 * PATIENCE_S)
-    player, words = page.locator("iframe"), page.locator("aside")
-    page.frames[1].add_style_tag(content=SEE_THROUGH)
-    box = player.bounding_box()
-
-    def looks() -> np.ndarray:
-        page.frames[1].evaluate(NEXT_PICTURE)
-        return seen_on(page)[: int(box["height"]) - 60, : int(box["width"])]  # without slider and words
-
-    def body(picture: np.ndarray) -> np.ndarray:
-        """Where the body is: its colour is warm, those of ground and sky are cold."""
-        return (picture[..., 0] - picture[..., 2] > 2) & (picture[..., 0] > 110)
-
-    until(lambda: body(looks()).mean() > 0.005, "lit body")
-    first = looks()
-    # A light body on a light ground: steps of colour are small, and those of the compression none.
-    until(lambda: (np.abs(looks() - first).max(axis=2) > 15).mean() > 0.01, "motion")
-    assert float(slider.get_attribute("aria-valuemax")) == pytest.approx(2.0, abs=0.01)
-    # A narrow window that is wider than high has player and words side by side.
-    assert box["height"] == 320 and words.bounding_box()["x"] >= box["x"] + box["width"]
-    page.emulate_media(media="print")
-    assert words.evaluate("aside => aside.scrollHeight - aside.clientHeight") <= 0, "words that paper cuts off"
-    assert pages(page.pdf(format="A4")) == 1
-    monkeypatch.setattr(lesson_file, "_recorded", lambda *_: "")
-    page.set_content(lesson_file.lesson_html(lesson("thrown_hammer"), FlightRecord()))
-    assert pages(page.pdf(format="A4", landscape=True)) == 1
-    page.close()
-    assert {url.partition(":")[0] for url in asked} <= {"file", "data", "blob", "about"}, asked

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+//
+// Poinsot's construction: the ellipsoid of a torque-free body's omegas of one energy rolls, without slipping, on the plane
+// L . omega = 2 T. The touching point's path on the ellipsoid is the polhode, that on the plane the herpolhode. Rays from
+// the centre through them make two cones, of the body and of space; the first rolls on the second.
+
+import type { BodyInfo, Flying, Snapshot, Vec3 } from "./source.ts";
+
+/** Relative change of L beyond which another herpolhode begins. */
+const SAME = 2e-3;
+/** Instants of a herpolhode. */
+const MOST = 3000;
+/** Of the body's size: the ellipsoid's mean semi-axis, and its longest one at most. */
+const MEAN = 0.45, LONGEST = 0.62;
+
+export interface Construction {
+  /** [m] that stand for 1 rad/s */
+  readonly unit: number;
+  /** semi-axes [m] about the principal axes */
+  readonly semi: Vec3;
+  /** of L, world axes, and [m] along it from the centre to the plane */
+  readonly upright: Vec3;
+  readonly depth: number;
+  /** the closed curve through omega [rad/s, principal axes] */
+  readonly polhode: readonly Vec3[];
+}
+
+const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+/** Of a body at one instant, drawn beside a body of this size [m]; null where it doesn't spin. */
+export function construction({ row, omega, momentum }: Flying, { moments, axes }: BodyInfo, size: number): Construction | null {
+  const twice = dot(omega, momentum), l = Math.hypot(...momentum), [I1, I2] = moments;
+  if (!(twice > 0 && l > 0 && I1 > 0)) return null;
+  const w = [0, 1, 2].map((k) => axes[k]! * row[10]! + axes[3 + k]! * row[11]! + axes[6 + k]! * row[12]!) as unknown as Vec3;
+  const mean = Math.sqrt(I1 * I2), longest = MEAN * Math.sqrt(mean / I1), scale = size * (longest > LONGEST ? LONGEST / longest : 1) * MEAN;
+  const unit = scale * Math.sqrt(mean / twice);
+  return {
+    unit, semi: moments.map((I) => scale * Math.sqrt(mean / I)) as unknown as Vec3,
+    upright: momentum.map((x) => x / l) as unknown as Vec3, depth: (unit * twice) / l, polhode: polhode(moments, w),
+  };
+}
+
+/** The closed curve through omega on which T and |L| are the same, in principal axes with ascending moments: round the axis
+ * of the largest moment, or of the smallest. One point where omega stays where it is. */
+export function polhode([I1, I2, I3]: Vec3, w: Vec3): Vec3[] {
+  const I = [I1, I2, I3], squares = w.map((x) => x * x);
+  const [pole, first, second] = I3 * (I3 - I2) * squares[2]! >= I1 * (I2 - I1) * squares[0]! ? [2, 0, 1] : [0, 1, 2];
+  const one = I[first]! * Math.abs(I[pole]! - I[first]!), two = I[second]! * Math.abs(I[pole]! - I[second]!);
+  if (Math.min(one, two) <= 1e-9 * I3 * I3) return [w];
+  const radius2 = one * squares[first]! + two * squares[second]!, twice = I1 * squares[0]! + I2 * squares[1]! + I3 * squares[2]!;
+  return [...Array(121).keys()].map((k) => {
+    const angle = (2 * Math.PI * k) / 120, point: [number, number, number] = [0, 0, 0];
+    point[first] = Math.sqrt(radius2 / one) * Math.cos(angle);
+    point[second] = Math.sqrt(radius2 / two) * Math.sin(angle);
+    const rest = twice - I[first]! * point[first]! ** 2 - I[second]! * point[second]! ** 2;
+    point[pole] = Math.sign(w[pole]! || 1) * Math.sqrt(Math.max(rest, 0) / I[pole]!);
+    return point;
+  });
+}
+
+/** Omegas [rad/s, world axes] up to now, from the last time on at which something changed L: the herpolhode. seen: instants
+ * in the order of their times. */
+export function herpolhode(seen: readonly { readonly now: Snapshot }[], now: Snapshot): Vec3[] {
+  const { momentum, omega } = now.body, l = Math.hypot(...momentum), found: Vec3[] = [omega];
+  let k = seen.length - 1;
+  while (k >= 0 && seen[k]!.now.timeNs >= now.timeNs) k--;
+  for (; k >= 0 && found.length < MOST; k--) {
+    const then = seen[k]!.now.body, apart = then.momentum.map((x, i) => x - momentum[i]!);
+    if (Math.hypot(...apart) > SAME * l) break;
+    found.push(then.omega);
+  }
+  return found;
+}
