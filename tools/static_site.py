@@ -94,7 +94,11 @@ network: <a href="{PAGE}" download>keep it</a>, and <a href="{PAGE}">open</a> it
 def lesson_page(one: Lesson) -> str:
     """NAME/index.html: leads to the lesson, and tells its title and picture to those who show links."""
     target = f"../{PAGE}#lesson={one.name}"
-    described = [("og:title", one.title), ("og:description", one.question), ("og:image", f"{address() or '../'}{one.name}.png")]
+    described = [
+        ("og:title", one.title),
+        ("og:description", one.question),
+        ("og:image", f"{address() or '../'}{one.name}.png"),
+    ]
     head = [f'<meta property="{name}" content="{escape(text, quote=True)}">' for name, text in described]
     head.append(f'<meta http-equiv="refresh" content="0; url={target}">')
     return _html(one.title, f'<p><a href="{target}">{escape(one.title)}</a></p>', "\n".join(head))

@@ -73,7 +73,7 @@ def draw(page: Opened) -> list[Image.Image]:
             at, switched, pressed_s = switch, True, t
             press(mouse, at)
         mouse.move(*at)
-        page.js(MOVE, [*at, held or (0.0 <= pressed_s and t - pressed_s < PRESSED_S)])
+        page.js(MOVE, [*at, held or (pressed_s >= 0.0 and t - pressed_s < PRESSED_S)])
         page.drawn(2)
         shot = page.page.screenshot(animations="disabled")
         pictures.append(Image.open(io.BytesIO(shot)).convert("RGB").resize(SIZE, Image.Resampling.LANCZOS))
@@ -114,7 +114,9 @@ def main() -> None:
         pictures = draw(page)
         page.close()
     first, *others = pictures
-    first.save(args.file, save_all=True, append_images=others, duration=round(1000 / RATE), loop=0, quality=QUALITY, method=6)
+    first.save(
+        args.file, save_all=True, append_images=others, duration=round(1000 / RATE), loop=0, quality=QUALITY, method=6
+    )
     print(f"{args.file}: {len(pictures)} pictures, {args.file.stat().st_size / 1e6:.2f} MB")
 
 
