@@ -97,8 +97,8 @@ export class LessonPanel {
   }
 
   /** An instant, each picture. */
-  look(now: Snapshot, ms = performance.now()): void {
-    const { lesson } = this;
+  look(now: Snapshot): void {
+    const { lesson } = this, ms = performance.now();
     lesson?.note();
     if (!lesson || ms - this.lookedMs < LOOK_MS) return;
     this.lookedMs = ms;
