@@ -306,9 +306,8 @@ def check_lesson(browser: Any, name: str, shots: Path | None = None) -> None:
     page.close()
 
 
-@pytest.mark.parametrize("name", ["teapot", "spinning_top"])
-def test_a_lesson_is_played_with_the_mouse_and_with_numbers(browser: Any, name: str) -> None:
-    check_lesson(browser, name)
+def test_a_lesson_is_played_with_the_mouse(browser: Any) -> None:
+    check_lesson(browser, "teapot")
 
 
 @pytest.mark.stress
@@ -317,20 +316,39 @@ def test_every_lesson_is_played_in_the_browser(browser: Any, name: str, tmp_path
     check_lesson(browser, name, tmp_path)
 
 
+ELSEWHERE = """([x, y]) => {
+  const { motion, lessons, picture: { eye } } = page, info = motion.body(), { origin, direction } = eye.ray(x, y), hit = motion.firstHit(origin, direction);
+  if (!hit) return true;
+  const whole = 2 * info.length, R = motion.snapshot().body.rotation;
+  const near = (lessons.lesson.course.marks ?? []).some((name) => name in info.contacts && Math.hypot(...info.contacts[name].map((c, k) => (c - hit.mesh[k]) * info.scale[k])) < 0.14 * whole);
+  const n = [0, 1, 2].map((k) => R[k] * hit.normal[0] + R[3 + k] * hit.normal[1] + R[6 + k] * hit.normal[2]), p = hit.body;
+  const lever = Math.hypot(p[1] * n[2] - p[2] * n[1], p[2] * n[0] - p[0] * n[2], p[0] * n[1] - p[1] * n[0]) / whole;
+  return !near && lever > 0.1;
+}"""
+"""Whether a place on the screen is none that a step may name."""
+
+
 @pytest.mark.stress
 @pytest.mark.parametrize("name", [one.name for one in lessons()])
-def test_no_step_of_any_lesson_is_ticked_by_random_pokes_and_changes(browser: Any, name: str) -> None:
+def test_no_step_of_any_lesson_is_ticked_by_pokes_elsewhere(browser: Any, name: str) -> None:
     page = Taught(browser, name)
     page.answer((page.lesson.answer + 1) % 3)
+    # What is only watched may have happened before time stood.
+    first = page.done
+    assert first <= (1 if page.js("page.lessons.lesson.course.steps[0].acts[0].kind") == "again" else 0)
     random = np.random.default_rng(sum(map(ord, name)))
     box = page.page.locator("#free").bounding_box()
     assert box is not None
-    for _ in range(12):
+    pokes = 0
+    for _ in range(60):
         x, y = box["x"] + box["width"] * random.random(), box["y"] + box["height"] * random.random()
-        page.page.mouse.click(x, y)
-        page.fly(0.15, False)
-    # A flip, a fall or a turn may come of itself; what a step asks a hand to do doesn't.
-    assert page.done <= 1
+        if pokes < 10 and page.js(ELSEWHERE, [x, y]):
+            pokes += 1
+            if pokes % 2:
+                page.again()
+            page.page.mouse.click(x, y)
+            page.fly(0.4, False)
+    assert pokes == 10 and page.done == first
     page.close()
 
 
@@ -377,6 +395,7 @@ def test_a_whole_lesson_is_done_by_keys_alone_and_the_focus_is_always_seen(brows
     page.close()
 
 
+@pytest.mark.stress
 def test_a_finger_plays_a_lesson_on_a_phone(browser: Any) -> None:
     page = Taught(browser, "teapot", size=PHONE, touch=True)
     assert page.covered() == []
@@ -452,7 +471,8 @@ AXE = """() => axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wc
 CARDS = ("lessons", "body", "world", "ghost", "tensor", "measure", "plots", "keep")
 
 
-def test_start_page_cards_lesson_class_and_phone_meet_wcag_aa(browser: Any) -> None:
+@pytest.mark.parametrize("cards", [(), pytest.param(CARDS, marks=pytest.mark.stress)], ids=["few", "all"])
+def test_start_page_cards_lesson_class_and_phone_meet_wcag_aa(browser: Any, cards: tuple[str, ...]) -> None:
     tool = SOURCE / "node_modules" / "axe-core" / "axe.min.js"
     if not tool.is_file():
         pytest.skip("axe-core isn't installed")
@@ -466,7 +486,7 @@ def test_start_page_cards_lesson_class_and_phone_meet_wcag_aa(browser: Any) -> N
     page.pause()
     page.js(rules)
     check(page)
-    for card in CARDS:
+    for card in cards:
         page.page.locator(f"button[data-card={card}]").click()
         check(page)
         page.page.locator(f"button[data-card={card}]").click()
@@ -491,7 +511,7 @@ CUT = """() => [...document.querySelectorAll("#app button, #app h2, #app p, #app
 }).map((node) => node.id || node.textContent)"""
 
 
-@pytest.mark.parametrize("size", [WINDOW, (780, 1688)])
+@pytest.mark.parametrize("size", [WINDOW, pytest.param((780, 1688), marks=pytest.mark.stress)])
 def test_with_letters_twice_as_large_nothing_is_cut_or_covered(browser: Any, size: tuple[int, int]) -> None:
     page = Opened(browser, size)
     tools = page.context.new_cdp_session(page.page)
@@ -508,6 +528,7 @@ def test_with_letters_twice_as_large_nothing_is_cut_or_covered(browser: Any, siz
     page.close()
 
 
+@pytest.mark.stress
 def test_a_file_that_was_written_for_a_lesson_opens_in_it_and_two_of_them_share_nothing(
     browser: Any, tmp_path: Path
 ) -> None:

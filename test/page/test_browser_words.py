@@ -41,7 +41,27 @@ SHOWN = """() => {
 }"""
 """Every text of the page, shown or not, and every name for those who don't see it."""
 
-PLAIN = {"kg", "rad", "rpm", "Lx", "Ly", "Lz", "xx", "xy", "xz", "yy", "yz", "zz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", *INTEGRATORS}
+PLAIN = {
+    "kg",
+    "rad",
+    "rpm",
+    "Lx",
+    "Ly",
+    "Lz",
+    "xx",
+    "xy",
+    "xz",
+    "yy",
+    "yz",
+    "zz",
+    "Ixx",
+    "Ixy",
+    "Ixz",
+    "Iyy",
+    "Iyz",
+    "Izz",
+    *INTEGRATORS,
+}
 """Units, symbols and names that all languages share."""
 
 
