@@ -30,6 +30,7 @@ export class LessonPanel {
   private drawn: Plots | null = null;
   private lookedMs = 0;
   private isClass = false;
+  private isOpening = false;
 
   constructor(desk: Desk, panel: Panel, texts: Readonly<Record<string, LessonTexts>>) {
     this.desk = desk;
@@ -51,7 +52,9 @@ export class LessonPanel {
     if (!texts || !course) return words.lesson.unknown(name);
     this.leave();
     let refusal: string | null = null;
+    this.isOpening = true;
     await desk.open(() => (refusal = motion.openScene(name)));
+    this.isOpening = false;
     if (refusal) return refusal;
     this.lesson = new Lesson(name, texts, course, motion);
     clock.setRate(course.rate ?? 1);
@@ -81,6 +84,13 @@ export class LessonPanel {
     document.title = words.title;
   }
 
+  /** Another take was opened: a lesson is about the scene that it began with. */
+  opened(): void {
+    if (this.isOpening || !this.lesson) return;
+    this.leave();
+    history.replaceState(null, "", hashOf({ language: addressOf(location.hash).language }));
+  }
+
   /** The motion begins anew. */
   restarted(): void { this.lesson?.restarted(); }
 
@@ -98,8 +108,8 @@ export class LessonPanel {
   }
 
   /** An instant, each picture. */
-  look(now: Snapshot, ms = performance.now()): void {
-    const { lesson } = this;
+  look(now: Snapshot): void {
+    const { lesson } = this, ms = performance.now();
     lesson?.note();
     if (!lesson || ms - this.lookedMs < LOOK_MS) return;
     this.lookedMs = ms;
