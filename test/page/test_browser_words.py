@@ -73,6 +73,8 @@ def page_in_marks(page_file: Path, tmp_path_factory: pytest.TempPathFactory) -> 
     shutil.copytree(SOURCE, page, ignore=shutil.ignore_patterns("node_modules", ".install*"))
     os.symlink(packages(), page / "node_modules")
     shutil.copy(SOURCE.parent / "LICENSE", folder)
+    (folder / "benchmarks" / "results").mkdir(parents=True)
+    shutil.copy(SOURCE.parent / "benchmarks" / "results" / "engines.csv", folder / "benchmarks" / "results")
     texts = {}
     for one in lessons():
         fields = asdict(one)
