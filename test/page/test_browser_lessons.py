@@ -311,6 +311,28 @@ def test_a_lesson_is_played_with_the_mouse(browser: Any) -> None:
 
 
 @pytest.mark.stress
+@pytest.mark.parametrize("name", ["t_handle", "hollow_box", "numbers_of_a_tensor"])
+def test_a_lesson_is_played_before_a_class(browser: Any, name: str, tmp_path: Path) -> None:
+    page = Taught(browser, name, "&class", size=CLASS)
+    page.answer()
+    page.again()
+    by_buttons(page)
+    page.look(tmp_path / f"{name}.png")
+    page.close()
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("name", ["hammer", "ballast_stops_flip", "weigh_by_throwing"])
+def test_a_lesson_is_played_on_a_phone(browser: Any, name: str, tmp_path: Path) -> None:
+    page = Taught(browser, name, size=PHONE, touch=True)
+    page.answer()
+    page.again()
+    by_buttons(page)
+    page.look(tmp_path / f"{name}.png")
+    page.close()
+
+
+@pytest.mark.stress
 @pytest.mark.parametrize("name", [one.name for one in lessons()])
 def test_every_lesson_is_played_in_the_browser(browser: Any, name: str, tmp_path: Path) -> None:
     check_lesson(browser, name, tmp_path)
