@@ -192,7 +192,6 @@ export class LessonPanel {
     else if (act.kind === "pull") stage(w.pullHow);
     else if (act.kind === "press") stage(w.pressHow);
     else if (act.kind === "trace") look.trace = motion.body().contacts[act.at] ?? null;
-    else if (act.kind === "apart") { look.apart = true; desk.picture.setApart(true); }
     else if (act.kind === "principal") { look.principal = true; this.panel.changed(); }
     else if (act.kind === "poinsot") { look.poinsot = true; this.panel.changed(); }
     else if (act.kind === "ghost") { if (desk.told(motion.setGhost(act.choice))) desk.restart(); }
