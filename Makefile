@@ -60,6 +60,7 @@ pictures: setup run ## draw the pictures of README and lessons anew (needs mesa-
 	.venv/bin/rigid_proto snapshot out/session.mcap --at 4.05 -o docs/flight.png
 	$(PY) docs/lessons/pictures.py
 	PYTHONPATH=test $(PY) docs/page_pictures.py docs
+	PYTHONPATH=test:test/page $(PY) tools/toy_picture.py docs/flight.webp
 
 site: setup ## site/: the page with a start page and one address a lesson, for any static host
 	@$(PY) requirements/wasm_tools.py linker node

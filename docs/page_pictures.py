@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The page's own pictures, drawn anew in headless Chromium: ``PYTHONPATH=test python docs/page_pictures.py docs`` writes
-flight.gif, workbench.png and true_against_box.png there.
+workbench.png and true_against_box.png there.
 
 Time stands between two pictures, and isn't said to: a browser without a graphics card takes seconds for each.
 """
@@ -20,7 +20,7 @@ from rigid_proto_ros.scene.lessons import Lesson, lesson
 from rigid_proto_ros.workbench.flight import Flight
 from rigid_proto_ros.workbench.panel import motion_words
 
-SIZE, MOVING_SIZE = (1400, 800), (800, 450)
+SIZE = 1400, 800
 RATE = 10
 """[1/s] Pictures of the moving one, and of simulated time, which is shown as fast as it is."""
 
@@ -39,9 +39,7 @@ def main() -> None:
     )
     try:
         with chromium() as started:
-            page = Browser(started, flown, MOVING_SIZE)
-            draw_moving(page, args.folder / "flight.gif")
-            page.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
+            page = Browser(started, flown, SIZE)
             begin(page, lesson("true_or_box_tensor"))
             answer(page)
             play(page, 3.0)
@@ -111,33 +109,6 @@ def pull(page: Browser, steps: int) -> list[Image.Image]:
         time.sleep(0.6)  # a page says at most every 0.05 s where the pointer is, and a slow one seldom
         pictures += play(page, 1.0 / RATE)
     return pictures
-
-
-def draw_moving(page: Browser, file: Path) -> None:
-    """The T-handle turns over, its ghost with the box's tensor doesn't; then a poke, and a pull on the string."""
-    begin(page, lesson("t_handle"), "bounding_box")
-    answer(page)
-    page.flown.live.set_parameters({"string.frequency": 3.0, "poke_duration": 0.3})
-    pictures = play(page, 2.2, 22)
-    page.click(*com(page))
-    time.sleep(0.3)
-    pictures += play(page, 0.6, 6)
-    pictures += pull(page, steps=10)
-    page.release()
-    time.sleep(0.3)
-    pictures += play(page, 0.6, 6)
-    # Colours of all that is seen at some time.
-    width, height = pictures[0].size
-    chosen = pictures[::5]
-    sheet = Image.new("RGB", (width, height * len(chosen)))
-    for k, each in enumerate(chosen):
-        sheet.paste(each, (0, k * height))
-    # Most colours by their number, some by their range: arrow and string are few pixels.
-    common, rare = sheet.quantize(208), sheet.quantize(48, Image.Quantize.MAXCOVERAGE)
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([*common.getpalette()[: 3 * 208], *rare.getpalette()[: 3 * 48]])
-    frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
-    frames[0].save(file, save_all=True, append_images=frames[1:], duration=round(1000 / RATE), loop=0, optimize=True)
 
 
 if __name__ == "__main__":

@@ -277,7 +277,7 @@ def test_readme_is_short_and_its_first_screen_has_the_picture_and_the_two_comman
     lines = README.read_text("utf-8").splitlines()
     assert len(lines) <= 160
     text = "\n".join(lines[:20])
-    assert text.index("docs/flight.gif") < text.index("make run") < text.index("make test")
+    assert text.index("docs/flight.webp") < text.index("make run") < text.index("make test")
 
 
 @pytest.mark.parametrize("name", example_names())
@@ -342,7 +342,7 @@ def test_a_table_that_is_behind_is_written_anew() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "head", "largest"), [("flight.png", b"\x89PNG", 300_000), ("flight.gif", b"GIF89a", 2_000_000)]
+    ("name", "head", "largest"), [("flight.png", b"\x89PNG", 300_000), ("flight.webp", b"RIFF", 2_000_000)]
 )
 def test_pictures_of_the_documents_are_small(name, head, largest) -> None:
     data = (SOURCE / "docs" / name).read_bytes()

@@ -38,7 +38,8 @@ ul { list-style: none; margin: 0; padding: 0; display: grid; gap: 1.2rem; grid-t
 li a { display: block; height: 100%; border-radius: 14px; overflow: hidden; background: #fff; box-shadow: 0 2px 12px #1d243314; color: inherit;
   text-decoration: none; }
 li a:hover, li a:focus-visible, .toy:hover, .toy:focus-visible { outline: 3px solid #3355c8; }
-li img { display: block; width: 100%; aspect-ratio: 16 / 10; object-fit: cover; background: #101218; }
+li i { display: block; aspect-ratio: 16 / 11; overflow: hidden; background: #0d0f12; }
+li img { display: block; width: 166%; margin: -12% 0 0; } /* of a recording's picture the motion, without what stands beside it */
 li b, li span { display: block; padding: .7rem 1rem 0; }
 li span { padding: .2rem 1rem 1rem; font-size: .95rem; color: #4b5873; }
 """
@@ -72,7 +73,7 @@ def _picture(one: Lesson) -> Path:
 def start_page() -> str:
     """index.html: the toy, and every lesson with its picture."""
     cards = "\n".join(
-        f'<li><a href="{one.name}/"><img src="{one.name}.png" alt="" loading="lazy"><b>{escape(one.title)}</b>'
+        f'<li><a href="{one.name}/"><i><img src="{one.name}.png" alt="" loading="lazy"></i><b>{escape(one.title)}</b>'
         f"<span>{escape(one.question)}</span></a></li>"
         for one in lessons()
     )
@@ -94,7 +95,11 @@ network: <a href="{PAGE}" download>keep it</a>, and <a href="{PAGE}">open</a> it
 def lesson_page(one: Lesson) -> str:
     """NAME/index.html: leads to the lesson, and tells its title and picture to those who show links."""
     target = f"../{PAGE}#lesson={one.name}"
-    described = [("og:title", one.title), ("og:description", one.question), ("og:image", f"{address() or '../'}{one.name}.png")]
+    described = [
+        ("og:title", one.title),
+        ("og:description", one.question),
+        ("og:image", f"{address() or '../'}{one.name}.png"),
+    ]
     head = [f'<meta property="{name}" content="{escape(text, quote=True)}">' for name, text in described]
     head.append(f'<meta http-equiv="refresh" content="0; url={target}">')
     return _html(one.title, f'<p><a href="{target}">{escape(one.title)}</a></p>', "\n".join(head))

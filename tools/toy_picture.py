@@ -21,8 +21,8 @@ from PIL import Image
 SCREEN, SIZE = (1280, 720), (800, 450)
 RATE, SECONDS = 12, 6.0
 """[1/s] pictures, of the time that they show."""
-GRAB_S, PULLED_S, POKE_S, SWITCH_S, PRESSED_S = 0.4, 1.9, 2.6, 3.6, 0.3
-SIDE, TIP = (0.0, 0.045, 0.0), (0.0, 0.0, 0.055)
+GRAB_S, PULLED_S, POKE_S, SWITCH_S, PRESSED_S = 0.4, 1.4, 2.4, 3.5, 0.3
+GRABBED, POKED = (0.0, 0.0, 0.06), (0.0, 0.0, 0.05)
 """Points of the mesh [m] that the hand grabs and pokes."""
 QUALITY = 62
 
@@ -48,23 +48,23 @@ def draw(page: Opened) -> list[Image.Image]:
     for frame in range(round(RATE * SECONDS)):
         t = frame / RATE
         if t < GRAB_S:
-            at = between(at, seen(page, SIDE), (t / GRAB_S) ** 2)
+            at = between(at, seen(page, GRABBED), (t / GRAB_S) ** 2)
         elif t < PULLED_S:
             if not held:
-                at = start = seen(page, SIDE)
+                at = start = seen(page, GRABBED)
                 mouse.move(*at)
                 mouse.down()
                 held = True
             part = (t - GRAB_S) / (PULLED_S - GRAB_S)
             away = math.sin(math.pi * part) ** 2
-            at = start[0] + 150.0 * away, start[1] - 90.0 * away + 45.0 * math.sin(2.0 * math.pi * part)
+            at = start[0] - 130.0 * away, start[1] + 30.0 * away
         elif t < POKE_S:
             if held:
                 mouse.up()
                 held = False
-            at = between(at, seen(page, TIP), ((t - PULLED_S) / (POKE_S - PULLED_S)) ** 2)
+            at = between(at, seen(page, POKED), ((t - PULLED_S) / (POKE_S - PULLED_S)) ** 2)
         elif not poked:
-            at, poked, pressed_s = seen(page, TIP), True, t
+            at, poked, pressed_s = seen(page, POKED), True, t
             press(mouse, at)
         elif t < SWITCH_S:
             if t > POKE_S + PRESSED_S:
@@ -73,7 +73,7 @@ def draw(page: Opened) -> list[Image.Image]:
             at, switched, pressed_s = switch, True, t
             press(mouse, at)
         mouse.move(*at)
-        page.js(MOVE, [*at, held or (0.0 <= pressed_s and t - pressed_s < PRESSED_S)])
+        page.js(MOVE, [*at, held or (pressed_s >= 0.0 and t - pressed_s < PRESSED_S)])
         page.drawn(2)
         shot = page.page.screenshot(animations="disabled")
         pictures.append(Image.open(io.BytesIO(shot)).convert("RGB").resize(SIZE, Image.Resampling.LANCZOS))
@@ -114,7 +114,9 @@ def main() -> None:
         pictures = draw(page)
         page.close()
     first, *others = pictures
-    first.save(args.file, save_all=True, append_images=others, duration=round(1000 / RATE), loop=0, quality=QUALITY, method=6)
+    first.save(
+        args.file, save_all=True, append_images=others, duration=round(1000 / RATE), loop=0, quality=QUALITY, method=4
+    )
     print(f"{args.file}: {len(pictures)} pictures, {args.file.stat().st_size / 1e6:.2f} MB")
 
 

@@ -66,7 +66,7 @@ export type Act = { readonly text: (words: Words["lesson"]) => string } & (
   | { readonly kind: "card"; readonly card: "body" | "tensor" | "world" | "measure" | "ghost" | "plots"; readonly mark: string }
   | { readonly kind: "ghost"; readonly choice: GhostChoice }
   | { readonly kind: "trace"; readonly at: string }
-  | { readonly kind: "again" | "pull" | "press" | "tie" | "chalk" | "apart" | "principal" | "poinsot" }
+  | { readonly kind: "again" | "pull" | "press" | "tie" | "chalk" | "principal" | "poinsot" }
 );
 
 export interface Step {

@@ -30,6 +30,7 @@ export class LessonPanel {
   private drawn: Plots | null = null;
   private lookedMs = 0;
   private isClass = false;
+  private isOpening = false;
 
   constructor(desk: Desk, panel: Panel, texts: Readonly<Record<string, LessonTexts>>) {
     this.desk = desk;
@@ -51,7 +52,9 @@ export class LessonPanel {
     if (!texts || !course) return words.lesson.unknown(name);
     this.leave();
     let refusal: string | null = null;
+    this.isOpening = true;
     await desk.open(() => (refusal = motion.openScene(name)));
+    this.isOpening = false;
     if (refusal) return refusal;
     this.lesson = new Lesson(name, texts, course, motion);
     clock.setRate(course.rate ?? 1);
@@ -81,6 +84,13 @@ export class LessonPanel {
     document.title = words.title;
   }
 
+  /** Another take was opened: a lesson is about the scene that it began with. */
+  opened(): void {
+    if (this.isOpening || !this.lesson) return;
+    this.leave();
+    history.replaceState(null, "", hashOf({ language: addressOf(location.hash).language }));
+  }
+
   /** The motion begins anew. */
   restarted(): void { this.lesson?.restarted(); }
 
@@ -98,8 +108,8 @@ export class LessonPanel {
   }
 
   /** An instant, each picture. */
-  look(now: Snapshot, ms = performance.now()): void {
-    const { lesson } = this;
+  look(now: Snapshot): void {
+    const { lesson } = this, ms = performance.now();
     lesson?.note();
     if (!lesson || ms - this.lookedMs < LOOK_MS) return;
     this.lookedMs = ms;
@@ -182,7 +192,6 @@ export class LessonPanel {
     else if (act.kind === "pull") stage(w.pullHow);
     else if (act.kind === "press") stage(w.pressHow);
     else if (act.kind === "trace") look.trace = motion.body().contacts[act.at] ?? null;
-    else if (act.kind === "apart") { look.apart = true; desk.picture.setApart(true); }
     else if (act.kind === "principal") { look.principal = true; this.panel.changed(); }
     else if (act.kind === "poinsot") { look.poinsot = true; this.panel.changed(); }
     else if (act.kind === "ghost") { if (desk.told(motion.setGhost(act.choice))) desk.restart(); }

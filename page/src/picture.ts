@@ -380,7 +380,12 @@ export class Picture {
     if (aside) { hand.add(aside); knot.add(aside); }
     if (down.length() > 0) down.normalize(); else down.set(0, 0, -1);
     cord.show(hand, knot, string.restLength, down, CORD * this.size * (aside ? 0.6 : 1));
-    if (label) this.tag(label, `${short(string.tension)} N`, hand, knot, 24);
+    if (!label) return;
+    const text = `${short(string.tension)} N`, seen = this.eye.project(hand, new Vector3());
+    if (this.inFree(seen.x, seen.y)) { this.tag(label, text, hand, knot, 24); return; }
+    // A nail that isn't seen: beside the string, near the body.
+    const at = this.eye.project(knot, new Vector3()), away = Math.hypot(seen.x - at.x, seen.y - at.y) || 1, up = 70 * this.letter;
+    label.show(text, at.x + (up * (seen.x - at.x)) / away + (16 + 4.4 * text.length) * this.letter, at.y + (up * (seen.y - at.y)) / away);
   }
 
   private drawShapes(shown: Shown, body: Flying, at: Vector3): void {

@@ -74,7 +74,7 @@ export class Pointer {
     stage.addEventListener("contextmenu", (event) => event.preventDefault());
     stage.addEventListener("dblclick", (event) => event.preventDefault());
     stage.addEventListener("keydown", (event) => this.key(event));
-    stage.addEventListener("blur", () => { this.aim = null; });
+    stage.addEventListener("blur", () => { this.aim = null; stage.classList.remove("by-pointer"); });
   }
 
   /** Whether a string is held: then the eye stays where it is. */
@@ -124,6 +124,8 @@ export class Pointer {
 
   private down(event: PointerEvent): void {
     if (event.button > 0 && event.pointerType === "mouse") { this.turnFrom(event); return; }
+    // The focus that a pointer gives isn't shown: browsers take it for one of the keyboard's, since a script gives it.
+    this.stage.classList.add("by-pointer");
     this.stage.focus({ preventScroll: true });
     this.aim = null;
     this.touched();
@@ -241,6 +243,7 @@ export class Pointer {
 
   private key(event: KeyboardEvent): void {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
+    this.stage.classList.remove("by-pointer");
     const { eye } = this.picture, steps: Record<string, readonly [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
     const step = steps[event.key];
     if (step) {

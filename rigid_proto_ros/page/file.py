@@ -35,8 +35,8 @@ _BEGIN = '<meta name="begin" content="">'
 def write_page(
     file: str | Path, values: dict[str, Any] | None = None, script: Sequence[Command] = (), begins: str = ""
 ) -> None:
-    """Write the page, to begin with a scene of these parameters, by name, and a script of it, or as with this behind the
-    # of its address (page/src/address.ts). Raises InputError.
+    """Write the page, to begin with a scene of these parameters, by name, and a script of it, or as with ``begins``
+    behind the # of its address (page/src/address.ts). Raises InputError.
     """
     page = built_page().read_text("utf-8")
     if values is not None:

@@ -18,22 +18,14 @@ pytest.importorskip("playwright.sync_api", reason="playwright is not installed: 
 from mesh_files import CUBE_QUADS, obj
 from workbench_page import (
     CHROMIUM,
-    DRAWN_MS,
-    NEXT_PICTURE,
     NO_CHROMIUM,
     PATIENCE_S,
     QUICK,
-    RARELY_DRAWN,
-    SEE_THROUGH,
     Browser,
     Flown,
     chromium,
-    seen_on,
-    until,
 )
 
-from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.export.flight_record import FlightRecord
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.scene.lessons import lesson
 
