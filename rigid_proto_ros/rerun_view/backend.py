@@ -10,6 +10,7 @@ and memory of closed recordings are kept until the process ends.
 
 from __future__ import annotations
 
+import hashlib
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -58,14 +59,16 @@ INVISIBLE = 1e-9
 class Stream:
     """A Rerun recording: one run of the simulation, with simulated time from 0.
 
-    meshes: by part the mesh that it was sent last, and how many it was sent. styled: by entity what its look was sent
-    for. arranged: it was sent a layout. behind: what was sent hasn't been taken yet, so
+    meshes: by part what it was sent, each once: it is never forgotten, neither here nor by viewers. shown: by part the
+    number of the mesh that is seen, from 1; 0 for none. styled: by entity what its look was sent for. arranged: it was
+    sent a layout. behind: what was sent hasn't been taken yet, so
     that nothing more should be; missed: something was left out meanwhile.
     """
 
     def __init__(self, sink: Any, recording_id: str, name: str, application_id: str = APPLICATION_ID) -> None:
         self.application_id = application_id
-        self.meshes: dict[str, tuple[int, DrawnMesh]] = {}
+        self.meshes: dict[str, list[bytes]] = {}
+        self.shown: dict[str, int] = {}
         self.styled: dict[str, float] = {}
         self.arranged = self.behind = self.missed = False
         with ONE_AT_A_TIME:
@@ -199,21 +202,24 @@ class RerunBackend(Backend):
         self._size = size
 
     def mesh(self, name: str, surface: DrawnMesh | None) -> None:
-        """Log a mesh once a run, and hide the one before from now on."""
+        """Log a mesh once a run, and hide the one before from now on; ``place`` follows."""
         stream = self.stream
         if stream is None:
             return
-        number, known = stream.meshes.get(name, (0, None))
-        if known is surface:
+        before, known = stream.shown.get(name, 0), stream.meshes.setdefault(name, [])
+        content = b"" if surface is None else _content(surface)
+        number = known.index(content) + 1 if content in known else len(known) + 1 if content else 0
+        if number == before:
             return
+        stream.shown[name] = number
         nowhere = rr.Transform3D.columns(translation=[[0.0, 0.0, 0.0]], scale=[[INVISIBLE] * 3])
-        if known is not None:
-            stream.send(_mesh_entity(name, number), self._times, nowhere)
-        if surface is None:
+        if before:
+            stream.send(_mesh_entity(name, before), self._times, nowhere)
+        if surface is None or number <= len(known):
             return
-        stream.meshes[name] = number + 1, surface
-        entity, own = _mesh_entity(name, number + 1), style.STYLES[name]
-        if number:
+        known.append(content)
+        entity, own = _mesh_entity(name, number), style.STYLES[name]
+        if number > 1:
             stream.send(entity, time_columns(np.zeros(1, np.int64), self._begun), nowhere)
         drawn = rr.Mesh3D(
             vertex_positions=surface.vertices,
@@ -233,8 +239,8 @@ class RerunBackend(Backend):
         """Log transforms."""
         scales = None if scale is None else np.tile(scale, (self._count, 1))
         columns = rr.Transform3D.columns(translation=positions, quaternion=attitudes, scale=scales)
-        number, _ = (1, None) if self.stream is None else self.stream.meshes.get(name, (1, None))
-        self.send(_mesh_entity(name, number), columns)
+        number = 1 if self.stream is None else self.stream.shown.get(name, 1)
+        self.send(_mesh_entity(name, number or 1), columns)
 
     def _look(self, entity: str, known: float, look: Callable[[], Any]) -> None:
         """Log how an entity looks, where the stream doesn't know that. known: a size, or how many columns it has."""
@@ -299,6 +305,12 @@ class RerunBackend(Backend):
         colours = [(*c, CLEAR if n in style.WHOLES else 255) for n, c in zip(names, colours, strict=True)]
         self._look(name, len(names), lambda: rr.SeriesLines(names=names, colors=colours, widths=widths))
         self.send(name, scalar_columns(values[:, order]))
+
+
+def _content(surface: DrawnMesh) -> bytes:
+    """Equal for equal meshes."""
+    parts = (np.ascontiguousarray(part).tobytes() for part in (surface.vertices, surface.triangles))
+    return hashlib.sha256(b"".join(parts)).digest()
 
 
 def _mesh_entity(name: str, number: int) -> str:

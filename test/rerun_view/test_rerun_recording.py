@@ -156,6 +156,26 @@ def test_another_mesh_in_flight_takes_the_place_of_the_first(tmp_path, states):
     assert second[0] <= first[0]
 
 
+def test_a_mesh_that_comes_again_is_not_logged_again(tmp_path, states):
+    """A viewer forgets no mesh: a node whose mesh is changed for an hour would fill it."""
+    path = tmp_path / "again.rrd"
+    observer = FileRecorder(str(path))
+    flight.fly(observer, states[:20])
+    for k in range(20, 30):
+        sides, sha256 = (2.0, "ab" * 32) if k % 2 == 0 else (1.0, flight.SHA256)
+        observer.on(MeshChanged(k * flight.PERIOD_NS, sides * flight.VERTICES, flight.TRIANGLES, sha256))
+        observer.on(BodyChanged(k * flight.PERIOD_NS, flight.SETUP))
+        observer.on(Published(k * flight.PERIOD_NS, states[k]))
+    observer.close()
+    assert flight.meshes(path) == 2
+    shown, hidden = flight.SCALE.tolist(), [1e-9] * 3
+    for entity, first in ((style.BODY_MESH, True), (style.BODY_MESH + "_2", False)):
+        times, scales = cells(path, entity, "Transform3D:scale")
+        assert times == [0, *(k * flight.PERIOD_NS for k in range(20, 30))]
+        turns = [[shown if (k % 2 == 0) == first else hidden] for k in range(11)]
+        assert np.allclose(scales, turns)
+
+
 def test_each_principal_axis_has_its_own_label(recording):
     texts = [
         batch.column("Points3D:labels").to_pylist()

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: MIT
 """What robot people expect beside pose and twist: /tf, /tf_static and a marker."""
 
+import json
+import re
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 
 pytest.importorskip("rclpy")
 
@@ -120,3 +124,13 @@ def test_markers_are_made_thirty_times_a_second_and_none_without_a_mesh(monkeypa
     assert 60 <= count <= 61
     bare = {"mesh": "", "inertia_model": "explicit", "explicit_inertia.tensor": (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)}
     assert BodyMarker(("world", "body"), Stamps()).message(OfflineRun(make_scenario(bare)), 0, row) is None
+
+
+@pytest.mark.parametrize("name", ["rigid_body.rviz", "foxglove_layout.json"])
+def test_arrangements_for_other_viewers_show_topics_that_the_node_has(name):
+    source = Path(__file__).parent.parent.parent
+    text = (source / "config" / name).read_text("utf-8")
+    (json.loads if name.endswith("json") else yaml.safe_load)(text)
+    shown = set(re.findall(r"/rigid_body/([a-z]+)", text))
+    listed = (source / "test" / "interface.txt").read_text("utf-8")
+    assert {"marker", "pose"} <= shown <= set(re.findall(r"^published ~/(\w+)", listed, re.MULTILINE))
