@@ -59,10 +59,11 @@ INVISIBLE = 1e-9
 class Stream:
     """A Rerun recording: one run of the simulation, with simulated time from 0.
 
-    meshes: by part what it was sent, each once: it is never forgotten, neither here nor by viewers. shown: by part the
-    number of the mesh that is seen, from 1; 0 for none. styled: by entity what its look was sent for. arranged: it was
-    sent a layout. behind: what was sent hasn't been taken yet, so
-    that nothing more should be; missed: something was left out meanwhile.
+    meshes: by part what it was sent, each once: viewers forget none. shown: by part the number of the mesh that is
+    seen, from 1; 0 for none. forgets: who takes it drops what is oldest, but never what holds at all times, so that
+    meshes are of a time and told again with all else that ``describe`` tells. styled: by entity what its look was sent
+    for. arranged: it was sent a layout. behind: what was sent hasn't been taken yet, so that nothing more should be;
+    missed: something was left out meanwhile.
     """
 
     def __init__(self, sink: Any, recording_id: str, name: str, application_id: str = APPLICATION_ID) -> None:
@@ -70,7 +71,7 @@ class Stream:
         self.meshes: dict[str, list[bytes]] = {}
         self.shown: dict[str, int] = {}
         self.styled: dict[str, float] = {}
-        self.arranged = self.behind = self.missed = False
+        self.arranged = self.behind = self.missed = self.forgets = False
         with ONE_AT_A_TIME:
             self.recording = rr.RecordingStream(application_id, recording_id=recording_id)
         rr.set_sinks(sink, recording=self.recording)
@@ -89,8 +90,12 @@ class Stream:
         """Log a value that holds at all times. It arrives before what is sent after it: rr.log would put it aside
         until a flush, and columns would overtake it.
         """
+        self.log(entity, [], value)
+
+    def log(self, entity: str, times: list[Any], value: Any) -> None:
+        """Log a value at one time, in time columns."""
         batches = value.as_component_batches()
-        self.send(entity, [], [batch.partition([len(batch.as_arrow_array())]) for batch in batches])
+        self.send(entity, times, [batch.partition([len(batch.as_arrow_array())]) for batch in batches])
 
     def send_layout(self, layout: Any) -> None:
         """Make a viewer open with this blueprint."""
@@ -209,17 +214,19 @@ class RerunBackend(Backend):
         before, known = stream.shown.get(name, 0), stream.meshes.setdefault(name, [])
         content = b"" if surface is None else _content(surface)
         number = known.index(content) + 1 if content in known else len(known) + 1 if content else 0
-        if number == before:
+        if number == before and not stream.forgets:
             return
         stream.shown[name] = number
         nowhere = rr.Transform3D.columns(translation=[[0.0, 0.0, 0.0]], scale=[[INVISIBLE] * 3])
-        if before:
+        if before and number != before:
             stream.send(_mesh_entity(name, before), self._times, nowhere)
-        if surface is None or number <= len(known):
+        is_new = number > len(known)
+        if surface is None or not (is_new or stream.forgets):
             return
-        known.append(content)
+        if is_new:
+            known.append(content)
         entity, own = _mesh_entity(name, number), style.STYLES[name]
-        if number > 1:
+        if is_new and number > 1:
             stream.send(entity, time_columns(np.zeros(1, np.int64), self._begun), nowhere)
         drawn = rr.Mesh3D(
             vertex_positions=surface.vertices,
@@ -227,7 +234,7 @@ class RerunBackend(Backend):
             vertex_normals=surface.normals,
             albedo_factor=(*own.colours[0], round(255 * own.opacity)),
         )
-        stream.log_static(entity, drawn)
+        stream.log(entity, self._times if stream.forgets else [], drawn)
 
     def place(
         self,

@@ -88,6 +88,7 @@ class LiveView(RerunObserver):
 
     def _open_next(self, before: Stream, run_id: str, name: str) -> Stream:
         stream = Stream(rr.GrpcSink(self.live_address), run_id, name)
+        stream.forgets = True
         stream.arranged = before.arranged  # viewers keep their layout
         if before is not self._host:  # whose server stays
             before.leave()
@@ -125,6 +126,7 @@ def host(port: int, recording_id: str, name: str) -> tuple[Stream, str]:
     send and viewers come. Raises PortTakenError where another process listens on the port.
     """
     stream = Stream(rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=LIVE_MEMORY_LIMIT), recording_id, name)
+    stream.forgets = True
     deadline = time.monotonic() + START_TIMEOUT_S
     try:
         # A server that can't listen says so to nobody but who waits for what was sent, and not at once.
