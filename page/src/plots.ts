@@ -87,6 +87,9 @@ const principal = ({ now, info }: Seen, k: number): number =>
 const AXES = ["#c93a27", "#16803f", "#2f63ad"] as const;
 
 /** Curves over the last seconds of the take, and where now is. */
+/** Of the largest value: a smaller one of the other sign is nothing at the end of an axis. */
+const SEEN = 1e-3;
+
 export class Plots {
   readonly node: HTMLElement;
   private readonly plots: readonly Plot[];
@@ -134,6 +137,9 @@ export class Plots {
       });
       let low = 0, high = 0;
       for (const { places } of lines) for (const [, value] of places) { low = Math.min(low, value); high = Math.max(high, value); }
+      // What rounding leaves is no value to read.
+      if (-low < SEEN * high) low = 0;
+      if (high < -SEEN * low) high = 0;
       const room = 0.08 * (high - low || 1);
       low -= room;
       high += room;
