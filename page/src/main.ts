@@ -4,8 +4,10 @@
 
 import { Clock } from "./clock.ts";
 import { inside } from "./file.ts";
+import { isLive, openLive } from "./live.ts";
 import { Panel, type Desk, type Look } from "./panel.ts";
 import { icon, make, say } from "./panel_elements.ts";
+import { HandPane } from "./panel_hand.ts";
 import { direction } from "./panel_measure.ts";
 import { Picture, type Blow, type Shown } from "./picture.ts";
 import { Track } from "./plots.ts";
@@ -55,7 +57,12 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   const waiting = new Map<string, () => void>();
   const told = (refusal: string | null): boolean => { if (refusal) say(refusal); return !refusal; };
   const startOver = (): void => { pointer.forget(); picture.restart(motion.snapshot()); };
-  const clock = new Clock(motion, () => { motion.reset(); startOver(); clock.setPaused(false); });
+  const clock = new Clock(motion, () => {
+    motion.reset();
+    if (motion.node) return; // it says when it has begun anew
+    startOver();
+    clock.setPaused(false);
+  });
   const pointer: Pointer = new Pointer(stage, motion, picture, () => panel.impulse);
   const open = async (how: () => string | null | Promise<string | null>): Promise<void> => {
     let refusal: string | null;
@@ -74,7 +81,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   // A body that comes at rest shows nothing: it spins about its middle axis, nearly, and so turns over.
   const lively = (refusal: string | null): string | null => {
     const spin = motion.values()["initial.angular_velocity"] as readonly number[] | undefined;
-    if (refusal || !spin || spin.some((w) => w !== 0)) return refusal;
+    if (refusal || motion.node || !spin || spin.some((w) => w !== 0)) return refusal;
     const { axes } = motion.body(), R = motion.snapshot().body.rotation, own = [0, 1, 2].map((k) => SPIN * (axes[3 * k + 1]! + 0.02 * axes[3 * k]!));
     const refused = motion.set({ "initial.angular_velocity": [0, 1, 2].map((k) => R[3 * k]! * own[0]! + R[3 * k + 1]! * own[1]! + R[3 * k + 2]! * own[2]!) });
     motion.reset();
@@ -84,8 +91,11 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   const panel = new Panel(desk, () => { moved = true; });
   const drop = make("div", { id: "drop", hidden: true }, words.body.drop);
   app.append(panel.node, drop, make("div", { id: "say", role: "status", "aria-live": "polite" }));
-  document.title = words.title;
+  document.title = motion.node ? `${motion.node.name} – ${words.title}` : words.title;
+  const handPane = motion.node && new HandPane(motion.node);
+  if (handPane) panel.node.querySelector("#hand")!.prepend(handPane.node);
 
+  motion.hear((line) => say(line));
   motion.watch(() => { changed = true; });
   const refresh = (): void => {
     changed = false;
@@ -100,6 +110,17 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     });
     clock.changed();
     panel.changed();
+    handPane?.changed();
+  };
+  // A node begins anew by whose hand ever.
+  let began = motion.node?.began ?? 0, flown = motion.body().vertices;
+  const beganAnew = (): void => {
+    began = motion.node?.began ?? 0;
+    track.seen.length = 0;
+    startOver();
+    if (motion.body().vertices === flown) return;
+    flown = motion.body().vertices;
+    panel.begin();
   };
   const shownNow = (now: Snapshot): Shown => {
     const values = motion.values(), info = motion.body(), stays = Math.max(BLOW_NS * Math.min(1, clock.rate), BLOW_S * clock.rate * 1e9);
@@ -166,6 +187,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     pointer.act();
     clock.advance(passed);
     if (changed) refresh();
+    if (motion.node && (motion.node.began !== began || motion.body().vertices !== flown)) beganAnew();
     if (moved) fit();
     const now = motion.snapshot();
     drawnNs = now.timeNs;
@@ -193,7 +215,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   panel.begin();
   fit();
   picture.restart(motion.snapshot());
-  if (still) clock.setPaused(true);
+  if (still && !motion.node) clock.setPaused(true);
   if (!picture.renderer) say(words.picture.noWebGL, 12);
   requestAnimationFrame(draw);
   return probe;
@@ -204,10 +226,10 @@ async function start(): Promise<void> {
   try {
     const [kernels, data, take] = await Promise.all([inside("kernels"), inside("data"), inside("take")]);
     if (!kernels || !data) throw new Error(words.picture.incomplete);
-    const motion = await openMotion(kernels, data, take);
+    const motion = isLive() ? await openLive(kernels, data) : await openMotion(kernels, data, take);
     const shared = location.hash.slice(1), refusal = shared ? await motion.openLink(shared) : null;
     // Who was sent nothing sees what a box in place of the truth does.
-    if (!take && !shared) motion.setGhost({ inertia_model: "bounding_box" });
+    if (!take && !shared && !motion.node) motion.setGhost({ inertia_model: "bounding_box" });
     const probe = begin(motion, app, scriptMs);
     if (refusal ?? motion.notice()) say(refusal ?? motion.notice(), 12);
     Object.assign(window, { page: probe });

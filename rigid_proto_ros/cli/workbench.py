@@ -1,31 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto workbench``: a body and its interactive page in one process, until Ctrl-C."""
+"""``rigid_proto workbench``: the page on a scene or mesh, served until Ctrl-C or written as one file."""
 
 from __future__ import annotations
 
 import argparse
 import importlib.util
+import os
 import sys
 import threading
+import webbrowser
 from pathlib import Path
+from typing import Any
 
 from ..base.errors import InputError, is_missing
 
 EXAMPLES = (
     ("rigid_proto workbench hammer", "a bundled scene"),
-    ("rigid_proto workbench --mesh part.obj", "your own mesh"),
-    ("rigid_proto workbench hammer --html out/hammer.html", "a page that needs nothing but a browser, as one file"),
+    ("rigid_proto workbench part.obj", "your own mesh"),
+    ("rigid_proto workbench hammer --html out/hammer.html", "as one file, which needs nothing but a browser"),
+    ("rigid_proto workbench --host 0.0.0.0", "for a class: whoever opens it has a body of their own"),
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("scene", metavar="SCENE.yaml", nargs="?", help="scene file or bundled name (default t_handle)")
-    parser.add_argument(
-        "--html",
-        metavar="FILE",
-        help="write a page in which the scene, or a mesh given in its place, flies without a server",
-    )
+    parser.add_argument("scene", metavar="SCENE", nargs="?", help="scene file, bundled name or mesh file (default: t_handle)")
+    parser.add_argument("--html", metavar="FILE", help="write the page as a file, and serve nothing")
     parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(
         "--port", type=int, metavar="PORT", help="port of the page (default 8080, or the next free one)"
@@ -36,36 +36,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C, or write a file."""
-    return _write(args) if args.html else _serve(args)
+    from ..page.file import page_text, write_page
 
+    values = _values(args.scene, args.mesh)
+    if args.html:
+        write_page(args.html, values)
+        print(f"wrote {args.html}: open it in a browser")
+        return 0
+    if importlib.util.find_spec("websockets") is None:
+        raise InputError("workbench", is_missing("websockets", "workbench"))
+    from ..page.server import LOOPBACK, serve_page
+    from ..parameters.declarations import PARAMETERS
 
-def _serve(args: argparse.Namespace) -> int:
-    if importlib.util.find_spec("viser") is None:
-        raise InputError("workbench", is_missing("viser", "workbench"))
-    from ..parameters.declarations import Parameters
-    from ..rerun_view.ports import LOOPBACK
-    from ..scene.scenario import make_scenario
-    from ..scene.scene_file import check_record, scene_file, scene_values
-    from ..workbench.main import serve
-
-    scene = args.scene or "t_handle"
-    values = {**scene_values(scene_file(scene)), **({"mesh": args.mesh} if args.mesh else {})}
-    check_record(values.get("record"))
-    port = args.port
-    asked = Parameters().replaced(values).workbench_port
-    if port is None and asked != Parameters().workbench_port:
-        port = asked
-    name = "" if args.mesh else scene
-    wait = threading.Event().wait  # until a signal interrupts it
-    serve(lambda: make_scenario(values), name, port, args.host or LOOPBACK, not args.no_browser, wait)
+    default = PARAMETERS["workbench_port"].default
+    own, others = serve_page(page_text(values).encode(), args.port, default, args.host or LOOPBACK)
+    print(f"The workbench is at {own}   (Ctrl-C ends it)", flush=True)
+    if others:
+        print(f"Others open {others}: each has a body of their own, and nothing of this machine", flush=True)
+    if not args.no_browser and _has_display():
+        webbrowser.open(own)
+    threading.Event().wait()  # until a signal interrupts it
     return 0
 
 
-def _write(args: argparse.Namespace) -> int:
-    from ..page.file import values_of_mesh, write_page
+def _values(scene: str | None, mesh: str | None) -> dict[str, Any] | None:
+    """The parameters that the page begins with; None for its own start."""
+    from ..page.file import values_of_mesh
     from ..scene.scene_file import scene_file, scene_values
 
-    scene, mesh = args.scene, args.mesh
     if scene and not mesh and not scene.endswith((".yaml", ".yml")) and Path(scene).is_file():
         scene, mesh = None, scene
     values = scene_values(scene_file(scene)) if scene else None
@@ -75,6 +73,8 @@ def _write(args: argparse.Namespace) -> int:
         values, note = values_of_mesh(mesh)
         if note:
             print(f"rigid_proto workbench: {mesh}: {note}", file=sys.stderr)
-    write_page(args.html, values)
-    print(f"wrote {args.html}: open it in a browser")
-    return 0
+    return values
+
+
+def _has_display() -> bool:
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

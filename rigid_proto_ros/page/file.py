@@ -28,14 +28,20 @@ _PLACE = '<script type="application/gzip" id="take"></script>'
 
 def write_page(file: str | Path, values: dict[str, Any] | None = None) -> None:
     """Write the page, to begin with a scene of these parameters, by name. Raises InputError."""
-    page = built_page().read_text("utf-8")
-    if values is not None:
-        take = base64.b64encode(gzip.compress(json.dumps(take_of(values)).encode(), 9, mtime=0)).decode()
-        if _PLACE not in page:
-            raise InputError("page", "the built page has no place for a scene")
-        page = page.replace(_PLACE, f"{_PLACE.partition('></')[0]}>{take}</script>")
+    page = page_text(values)
     with whole_file("--html", file) as beside:
         beside.write_text(page, "utf-8")
+
+
+def page_text(values: dict[str, Any] | None = None) -> str:
+    """The page, to begin with a scene of these parameters, by name. Raises InputError."""
+    page = built_page().read_text("utf-8")
+    if values is None:
+        return page
+    take = base64.b64encode(gzip.compress(json.dumps(take_of(values)).encode(), 9, mtime=0)).decode()
+    if _PLACE not in page:
+        raise InputError("page", "the built page has no place for a scene")
+    return page.replace(_PLACE, f"{_PLACE.partition('></')[0]}>{take}</script>")
 
 
 def values_of_mesh(mesh: str) -> tuple[dict[str, Any], str]:
@@ -63,7 +69,7 @@ def take_of(values: dict[str, Any]) -> dict[str, Any]:
     take: dict[str, Any] = {"form": FORM, "version": page_version(), "values": used, "script": [], "endNs": 0}
     if scenario.body_mesh is not None and values.get("mesh", "t_handle") not in body_names():
         used["mesh"] = f"{scenario.body_mesh.mesh.name}.obj"
-        take["mesh"] = _mesh_of(scenario.body_mesh, used["mesh"])
+        take["mesh"] = mesh_numbers(scenario.body_mesh, used["mesh"])
     return take
 
 
@@ -72,7 +78,7 @@ def _changed(parameters: Parameters) -> dict[str, Any]:
     return {name: value for name, value in parameters.named().items() if name == "mesh" or value != defaults.get(name)}
 
 
-def _mesh_of(body: BodyMesh, name: str) -> dict[str, Any]:
+def mesh_numbers(body: BodyMesh, name: str) -> dict[str, Any]:
     """The numbers of a mesh. solid: its moments at unit density (mass/moments.py, MOMENTS), where Python has them."""
     moments = body.moments
     mesh: dict[str, Any] = {
