@@ -248,8 +248,8 @@ class LivePage:
         ghost = scenario.ghost
         of_ghost = base64.b64encode(ghost.scene.tobytes()).decode() if ghost is not None else ""
         scene = {"number": self._scene_number, "form": FORM, "values": values, "record": record, "ghost": of_ghost}
-        self._tell("scene", scene)
         self._watch_ghost(ghost is not None)
+        self._tell("scene", scene)
 
     def _watch_ghost(self, on: bool) -> None:
         if on == self._watches_ghost:

@@ -43,6 +43,8 @@ MOST_QUEUED = 4
 """Messages of a client that wait."""
 OPENING_S = 20.0
 """Within which a client says what it wants, and has got the page."""
+CLOSING_S = 2.0
+"""For the goodbye of a page's socket."""
 
 LINE_S = 1.0
 """[s] Between two lines about clients."""
@@ -65,6 +67,7 @@ def forbidden(served_as: str, host: str, origin: str | None) -> str:
     shows in ``Origin``, the second in ``Host``, which must be an address in numbers, localhost, or the name by which
     the server was told to listen.
     """
+    name = ""
     try:
         name = urlsplit(f"//{host}").hostname or ""
         ipaddress.ip_address(name)
@@ -198,10 +201,13 @@ class PageServer:
         kind, _, token = request.path.partition("?")[0].lstrip("/").partition("/")
         if token == "" and kind == "favicon.ico":
             return _response(http.HTTPStatus.NOT_FOUND, b"", {})
-        if not any(hmac.compare_digest(token.encode(), known.encode()) and kind == of for known, of in self._tokens.items()):
+        given = token.encode(errors="surrogateescape")
+        known = [hmac.compare_digest(given, one.encode()) for one, of in self._tokens.items() if of == kind]
+        if not any(known):
             return self._refuse(connection, http.HTTPStatus.FORBIDDEN, "its address lacks the token")
         if "Upgrade" in request.headers:
             if kind == "live" and self._on_socket is not None:
+                connection.close_timeout = CLOSING_S
                 return None
             return self._refuse(connection, http.HTTPStatus.NOT_FOUND, "this page has no socket")
         if self._sending >= MOST_PAGES:
@@ -225,7 +231,8 @@ class PageServer:
         assert self._on_socket is not None and connection.request is not None
         await self._on_socket(connection, connection.request.path.partition("?")[0].rpartition("/")[2])
         await connection.close()
-        ended = _ENDED.get(connection.close_code or 1000)
+        sent = connection.protocol.close_sent  # by whom ever it was ended, what this server had to say
+        ended = _ENDED.get(sent.code) if sent is not None else None
         if ended:
             self.lines(connection, f"ended, {ended}")
 
