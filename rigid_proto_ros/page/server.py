@@ -137,7 +137,8 @@ def _is_own(address: str) -> bool:
 
 class PageServer:
     """Listens once ``begin`` is awaited. page: the file. tokens: of the addresses that are answered, each with what
-    stands before it, ``page`` or ``live``. on_socket(connection, token) handles a WebSocket until it ends.
+    stands before it, ``page`` or ``live``. on_socket(connection, token) handles a WebSocket, and returns the code that it is
+    to be closed with.
     """
 
     def __init__(
@@ -146,7 +147,7 @@ class PageServer:
         tokens: dict[str, str],
         host: str,
         say: Callable[[str], None],
-        on_socket: Callable[[ServerConnection, str], Awaitable[None]] | None = None,
+        on_socket: Callable[[ServerConnection, str], Awaitable[int]] | None = None,
     ) -> None:
         self._page, self._packed = page, gzip.compress(page, 6)
         self._tokens, self._host, self._on_socket = tokens, host, on_socket
@@ -229,8 +230,8 @@ class PageServer:
 
     async def _handle(self, connection: ServerConnection) -> None:
         assert self._on_socket is not None and connection.request is not None
-        await self._on_socket(connection, connection.request.path.partition("?")[0].rpartition("/")[2])
-        await connection.close()
+        code = await self._on_socket(connection, connection.request.path.partition("?")[0].rpartition("/")[2])
+        await connection.close(code)
         sent = connection.protocol.close_sent  # by whom ever it was ended, what this server had to say
         ended = _ENDED.get(sent.code) if sent is not None else None
         if ended:
@@ -250,7 +251,7 @@ _ENDED = {
     1008: "messages that no page sends",
     1009: f"a message of more than {MOST_MESSAGE // 1024} kB",
     1011: "it answered no more",
-    1013: "it read too slowly",
+    1013: "it read too slowly, or too many look",
 }
 """Why this server ends a connection, by the code of its end."""
 

@@ -151,11 +151,11 @@ class Watchers:
 
     # Pages
 
-    async def watch(self, connection: ServerConnection, token: str) -> None:
-        """A page, until it ends."""
+    async def watch(self, connection: ServerConnection, token: str) -> int:
+        """A page, until it ends; returns the code to close it with."""
         if len(self._all) >= MOST_WATCHERS:
-            await connection.close(1008, f"{MOST_WATCHERS} pages look at this node already, and no more can")
-            return
+            await connection.close(1013, f"{MOST_WATCHERS} pages look at this node already, and no more can")
+            return 1013
         self._opened += 1
         watcher = self._all[self._opened] = Watcher(self._opened, connection, token == self._owner)
         watcher.tell(_json({"hello": {**self._about, "owner": watcher.owner}}))
@@ -167,9 +167,10 @@ class Watchers:
         sending = asyncio.ensure_future(self._send(watcher))
         try:
             async for message in connection:
-                if not isinstance(message, str) or watcher.is_too_fast() or not self._take(watcher, message):
-                    await connection.close(1003 if isinstance(message, bytes) else 1008)
-                    break
+                if not isinstance(message, str):
+                    return 1003
+                if watcher.is_too_fast() or not self._take(watcher, message):
+                    return 1008
         except ConnectionClosed:
             pass
         finally:
@@ -180,6 +181,7 @@ class Watchers:
             self._let_go(watcher)
             self._tell_hands()
             self._look()
+        return 1000
 
     async def _send(self, watcher: Watcher) -> None:
         shown = b""
