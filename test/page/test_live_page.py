@@ -176,6 +176,9 @@ def check_recorded_takes(tmp_path: Path, count: int) -> None:
         with beside({"record": str(file), "publish_rate": 200.0}) as flown:
             with Page(flown.page.address) as page:
                 assert random_take(page, chance, 1.5) > 10
+            # To a time at which nothing was done: a state is told as it was before.
+            flown.live.pause(False)
+            time.sleep(0.1)
             flown.live.pause(True)
             last = flown.live.state
         (session,) = read_runs(file)
