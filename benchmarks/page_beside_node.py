@@ -25,6 +25,7 @@ FOLDER = Path(__file__).parent
 sys.path[:0] = [str(FOLDER), str(FOLDER.parent), str(FOLDER.parent / "test"), str(FOLDER.parent / "test" / "page")]
 
 from live_rig import Beside, Page, until
+
 from result_table import ResultTable
 
 ROUNDS, ROUND_S = 5, 6.0
@@ -52,7 +53,9 @@ def drive(address: str, watchers: int) -> None:
 
 @contextmanager
 def opened(address: str, watchers: int = 0) -> Iterator[None]:
-    page = subprocess.Popen([sys.executable, __file__, "--drive", address, "--watchers", str(watchers)], stdout=subprocess.PIPE)
+    page = subprocess.Popen(
+        [sys.executable, __file__, "--drive", address, "--watchers", str(watchers)], stdout=subprocess.PIPE
+    )
     assert page.stdout is not None
     page.stdout.readline()
     time.sleep(1.0)
@@ -112,7 +115,10 @@ def memory_mb(flown: Beside, minutes: float) -> list[tuple[float, float]]:
     for k in range(10):
         hands(flown, began + 60.0 * minutes * (k + 1) / 10, chance)
         found.append((psutil.Process().memory_info().rss / 1e6, flown.child.memory_info().rss / 1e6))
-        print(f"memory after {minutes * (k + 1) / 10:.1f} min: {found[-1][0]:.1f} MB here, {found[-1][1]:.1f} MB in the page's process", flush=True)
+        print(
+            f"memory after {minutes * (k + 1) / 10:.1f} min: {found[-1][0]:.1f} MB here, {found[-1][1]:.1f} MB in the page's process",
+            flush=True,
+        )
     return found
 
 
@@ -163,7 +169,11 @@ def main() -> None:
             flown.live.set_parameters({"publish_rate": 100.0})
             sizes = memory_mb(flown, args.minutes)
             for side, where in enumerate(("the node's process", "the page's process")):
-                tell(f"memory [MB] of {where}, middle and end of {args.minutes:g} minutes", sizes[4][side], sizes[-1][side])
+                tell(
+                    f"memory [MB] of {where}, middle and end of {args.minutes:g} minutes",
+                    sizes[4][side],
+                    sizes[-1][side],
+                )
     finally:
         flown.end()
     table.write()

@@ -47,7 +47,7 @@ async function licences(inputs) {
 }
 
 const script = await bundled("src/main.ts", { format: "esm" });
-const style = await bundled("src/style.css", {});
+const styles = await Promise.all(["src/style.css", "src/style_lesson.css"].map((file) => bundled(file, {})));
 const own = (await beside("../LICENSE")).trim();
 const texts = [`rigid_proto_ros\n\n${own}`, ...(await licences(script.inputs))];
 const parts = [
@@ -57,7 +57,7 @@ const parts = [
   '<script type="application/gzip" id="take"></script>',
 ];
 const whole = (await beside("page.html"))
-  .replace("/*STYLE*/", () => inside(style.text, "style"))
+  .replace("/*STYLE*/", () => inside(styles.map(({ text }) => text).join(""), "style"))
   .replace("<!--DATA-->", () => parts.join("\n"))
   .replace("/*SCRIPT*/", () => inside(script.text, "script"));
 await writeFile(page, whole);

@@ -2,7 +2,7 @@
 //
 // Time: playing, slower, by steps, back to any moment and on from there; and the bar where one does so.
 
-import { button, icon, make } from "./panel_elements.ts";
+import { button, icon, make, say } from "./panel_elements.ts";
 import type { Entry, Motion } from "./source.ts";
 import { words } from "./words.ts";
 
@@ -20,6 +20,8 @@ const RESET = "M12 5V1.5L6.5 6.5 12 11.500V8a5.500 5.500 0 1 1-5.500 5.500H3.500
 
 export class Clock {
   paused = false;
+  /** Why time stands and can't go on, or "". */
+  held = "";
   rate: number = RATES[0];
   readonly node: HTMLElement;
   private readonly playing: HTMLButtonElement;
@@ -74,6 +76,7 @@ export class Clock {
   }
 
   setPaused(paused: boolean): void {
+    if (this.held && !paused) { say(this.held); return; }
     if (this.motion.node) this.motion.node.setPaused(paused); else this.showPaused(paused);
   }
 
@@ -85,7 +88,13 @@ export class Clock {
     this.playing.title = name;
   }
 
+  setRate(rate: number): void {
+    this.rate = rate;
+    this.rates.value = String(rate);
+  }
+
   step(): void {
+    if (this.held) { say(this.held); return; }
     const { node } = this.motion;
     if (node) { if (!node.paused) node.setPaused(true); node.step(); return; }
     this.setPaused(true);
@@ -126,7 +135,7 @@ export class Clock {
     if (span !== this.span) { this.span = span; this.stale = true; }
     const at = String(Math.round((1000 * seconds) / span));
     if (!this.scrubbing && this.scrub.value !== at) this.scrub.value = at;
-    this.scrub.style.setProperty("--at", `calc(12px + ${((100 * seconds) / span).toFixed(1)}% - ${((24 * seconds) / span).toFixed(1)}px)`);
+    this.scrub.style.setProperty("--at", `calc(0.75rem + ${((100 * seconds) / span).toFixed(1)}% - ${((1.5 * seconds) / span).toFixed(3)}rem)`);
     const text = words.time.seconds(seconds);
     if (text !== this.shownText) { this.text.textContent = this.shownText = text; this.scrub.setAttribute("aria-valuetext", text); }
     this.onward.hidden = timeNs >= end;

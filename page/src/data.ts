@@ -2,6 +2,7 @@
 //
 // What the page has of Python's declarations (rigid_proto_ros/page/data.py): parameters, words, bodies, scenes.
 
+import type { LessonTexts } from "./lessons.ts";
 import type { Parameter, Value } from "./source.ts";
 
 /** Texts by what they are about, with places (numbers.ts, `filled`). */
@@ -52,6 +53,7 @@ export interface Declarations {
   readonly words: Words;
   readonly bodies: Readonly<Record<string, Packed>>;
   readonly scenes: Readonly<Record<string, { readonly title: string; readonly values: Readonly<Record<string, Value>> }>>;
+  readonly lessons: Readonly<Record<string, LessonTexts>>;
   readonly start: string;
   /** longest side of a mesh file [mesh units] above which its unit is taken for a millimetre */
   readonly longest: number;

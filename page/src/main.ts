@@ -2,19 +2,26 @@
 //
 // The page: a motion, its picture, hands and panel, and the loop that joins them.
 
+import { addressOf } from "./address.ts";
 import { Clock } from "./clock.ts";
+import { Data } from "./data.ts";
 import { inside } from "./file.ts";
+import { LANGUAGES } from "./languages.ts";
+import type { LessonTexts } from "./lessons.ts";
+import { COURSES } from "./lessons_steps.ts";
 import { isLive, openLive } from "./live.ts";
 import { Panel, type Desk, type Look } from "./panel.ts";
 import { icon, make, say } from "./panel_elements.ts";
 import { HandPane } from "./panel_hand.ts";
+import { LessonPanel } from "./panel_lesson.ts";
 import { direction } from "./panel_measure.ts";
 import { Picture, type Blow, type Shown } from "./picture.ts";
 import { Track } from "./plots.ts";
 import { Pointer } from "./pointer.ts";
+import { printsSheet } from "./print.ts";
 import { openMotion } from "./simulation.ts";
 import type { Motion, Snapshot, Vec3 } from "./source.ts";
-import { words } from "./words.ts";
+import { language, words } from "./words.ts";
 
 /** [ns simulated], [s of the wall clock]: an impulse acts at an instant; its arrow stays so long that it can be seen. */
 const BLOW_NS = 150_000_000, BLOW_S = 0.5;
@@ -36,6 +43,7 @@ export interface Probe {
   readonly picture: Picture;
   readonly clock: Clock;
   readonly pointer: Pointer;
+  readonly lessons: LessonPanel;
   /** [ms] when the script began, the motion was there, what draws was there, and the first and the first moving picture
    * were drawn. */
   readonly times: { readonly script: number; readonly motion: number; drawing: number; first: number; moving: number };
@@ -44,7 +52,7 @@ export interface Probe {
   readonly drags: number[];
 }
 
-function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
+function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, address: string, app: HTMLElement, scriptMs: number): Probe {
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
   const stage = make("div", { id: "stage", tabindex: 0, role: "application", "aria-label": words.picture.name }), labels = make("div", { id: "labels", "aria-hidden": "true" });
   const aim = make("div", { class: "label", hidden: true }, "⊕"), hint = make("div", { id: "hint", "aria-hidden": "true" }, icon(HAND), words.picture.pull);
@@ -56,13 +64,14 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   const look: Look = { apart: false, boundingBox: false, inertiaBox: false, ellipsoid: false, principal: false, turned: null, trace: null, chalk: [], protractor: null, kept: null };
   const waiting = new Map<string, () => void>();
   const told = (refusal: string | null): boolean => { if (refusal) say(refusal); return !refusal; };
-  const startOver = (): void => { pointer.forget(); picture.restart(motion.snapshot()); };
-  const clock = new Clock(motion, () => {
+  const startOver = (): void => { pointer.forget(); picture.restart(motion.snapshot()); lessons.restarted(); };
+  const restart = (): void => {
     motion.reset();
     if (motion.node) return; // it says when it has begun anew
     startOver();
-    clock.setPaused(false);
-  });
+    if (!clock.held) clock.setPaused(false);
+  };
+  const clock = new Clock(motion, restart);
   const pointer: Pointer = new Pointer(stage, motion, picture, () => panel.impulse);
   const open = async (how: () => string | null | Promise<string | null>): Promise<void> => {
     let refusal: string | null;
@@ -87,13 +96,18 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     motion.reset();
     return refused;
   };
-  const desk: Desk = { motion, picture, pointer, clock, look, track: () => track, later: (name, act) => { waiting.set(name, act); }, told, open, lively };
-  const panel = new Panel(desk, () => { moved = true; });
+  // A lesson is a take of one's own: beside a node there is none.
+  const named = Object.entries(motion.node ? {} : texts).filter(([name]) => name in COURSES).map(([name, { title }]) => ({ name, title }));
+  const desk: Desk = { motion, picture, pointer, clock, look, restart, lessons: named, track: () => track, later: (name, act) => { waiting.set(name, act); }, told, open, lively };
+  const panel = new Panel(desk, () => { moved = true; }), lessons = new LessonPanel(desk, panel, texts);
   const drop = make("div", { id: "drop", hidden: true }, words.body.drop);
   app.append(panel.node, drop, make("div", { id: "say", role: "status", "aria-live": "polite" }));
   document.title = motion.node ? `${motion.node.name} – ${words.title}` : words.title;
+  document.documentElement.lang = language;
   const handPane = motion.node && new HandPane(motion.node);
   if (handPane) panel.node.querySelector("#hand")!.prepend(handPane.node);
+
+  printsSheet(app, picture, () => lessons.lesson);
 
   motion.hear((line) => say(line));
   motion.watch(() => { changed = true; });
@@ -125,10 +139,10 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   const shownNow = (now: Snapshot): Shown => {
     const values = motion.values(), info = motion.body(), stays = Math.max(BLOW_NS * Math.min(1, clock.rate), BLOW_S * clock.rate * 1e9);
     const first = track.seen[0]?.now.body.momentum ?? null, ends = look.protractor?.map((thing) => direction(thing, now, info.axes, first));
-    const traced: Vec3 | null = look.trace === "com" ? (info.com.map((c, k) => c / info.scale[k]!) as unknown as Vec3) : look.trace;
+    const traced: Vec3 | null = lessons.hidesCentre && look.trace === "com" ? null : look.trace === "com" ? (info.com.map((c, k) => c / info.scale[k]!) as unknown as Vec3) : look.trace;
     const ghost = motion.ghost();
     return {
-      ...look, gravity, model: String(values["inertia_model"]), ghostModel: ghost.inertia_model || String(values["inertia_model"]),
+      ...look, ...(lessons.hidesCentre ? { principal: false, ellipsoid: false, inertiaBox: false, turned: null } : {}), marks: lessons.marks(now), hidesCentre: lessons.hidesCentre, gravity, model: String(values["inertia_model"]), ghostModel: ghost.inertia_model || String(values["inertia_model"]),
       blows: impulses.filter(({ timeNs }) => timeNs <= now.timeNs && now.timeNs < timeNs + stays),
       trace: traced ? track.trace(traced, now.timeNs, TRACE_S) : null, tracePoint: traced,
       protractor: ends?.[0] && ends[1] ? [ends[0], ends[1]] : null, kept: look.kept?.pose(now.timeNs) ?? null, aim: pointer.aim,
@@ -149,7 +163,12 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     clock.setPaused(!clock.paused);
     event.preventDefault();
   });
-  addEventListener("hashchange", () => { const shared = location.hash.slice(1); if (shared) void open(() => motion.openLink(shared)); });
+  const openAddress = async (hash: string): Promise<void> => {
+    const { lesson, isClass, take, language: asked } = addressOf(hash);
+    if (asked && asked !== language && (asked === "en" || asked in LANGUAGES)) { location.reload(); return; }
+    if (take) { lessons.leave(); await open(() => motion.openLink(take)); } else told(await lessons.begin(lesson, isClass));
+  };
+  addEventListener("hashchange", () => { void openAddress(location.hash); });
   for (const kind of ["dragenter", "dragover"] as const) addEventListener(kind, (event) => { event.preventDefault(); drop.hidden = false; });
   addEventListener("dragleave", (event) => { if (!event.relatedTarget) drop.hidden = true; });
   addEventListener("drop", (event) => {
@@ -163,7 +182,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   let hintS = HINT_S;
   pointer.touched = () => { hintS = 0; };
   const showHint = (now: Snapshot, seconds: number): void => {
-    hintS -= seconds;
+    hintS = lessons.lesson ? 0 : hintS - seconds;
     hint.hidden = hintS <= 0;
     if (hint.hidden) return;
     const { row } = now.body, at = picture.eye.project(picture.eye.target.clone().set(row[0]!, row[1]!, row[2]!), picture.eye.target.clone());
@@ -171,7 +190,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     hint.style.transform = `translate(${(at.x - 6 + sway).toFixed(1)}px, ${(at.y + 4 - 0.5 * sway).toFixed(1)}px)`;
   };
 
-  const probe: Probe = { motion, picture, clock, pointer, times: { script: scriptMs, motion: motionMs, drawing: drawingMs, first: 0, moving: 0 }, pictures: [], drags: [] };
+  const probe: Probe = { motion, picture, clock, pointer, lessons, times: { script: scriptMs, motion: motionMs, drawing: drawingMs, first: 0, moving: 0 }, pictures: [], drags: [] };
   // While time stands and nobody does anything, nothing is drawn anew.
   let last = 0, failure = "", awakeMs = Infinity, drawnNs = -1;
   const wake = (): void => { awakeMs = performance.now() + AWAKE_MS; };
@@ -195,6 +214,7 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
     picture.draw(now, shownNow(now), still ? 1 : seconds, pointer.holding);
     clock.show(now.timeNs);
     panel.show(now, gravity, seconds);
+    lessons.look(now);
     showHint(now, seconds);
     aim.hidden = pointer.aim === null;
     if (pointer.aim) aim.style.transform = `translate(${pointer.aim[0]}px, ${pointer.aim[1]}px) translate(-50%, -50%)`;
@@ -216,6 +236,8 @@ function begin(motion: Motion, app: HTMLElement, scriptMs: number): Probe {
   fit();
   picture.restart(motion.snapshot());
   if (still && !motion.node) clock.setPaused(true);
+  const { lesson, isClass } = addressOf(address);
+  if (lesson && !motion.node) void lessons.begin(lesson, isClass).then(told);
   if (!picture.renderer) say(words.picture.noWebGL, 12);
   requestAnimationFrame(draw);
   return probe;
@@ -227,10 +249,12 @@ async function start(): Promise<void> {
     const [kernels, data, take] = await Promise.all([inside("kernels"), inside("data"), inside("take")]);
     if (!kernels || !data) throw new Error(words.picture.incomplete);
     const motion = isLive() ? await openLive(kernels, data) : await openMotion(kernels, data, take);
-    const shared = location.hash.slice(1), refusal = shared ? await motion.openLink(shared) : null;
+    // A file that was written for a lesson opens in it.
+    const address = location.hash || (take ? "" : document.querySelector<HTMLMetaElement>("meta[name=begin]")?.content ?? ""), asked = addressOf(address);
+    const refusal = asked.take ? await motion.openLink(asked.take) : null;
     // Who was sent nothing sees what a box in place of the truth does.
-    if (!take && !shared && !motion.node) motion.setGhost({ inertia_model: "bounding_box" });
-    const probe = begin(motion, app, scriptMs);
+    if (!take && !asked.take && !motion.node) motion.setGhost({ inertia_model: "bounding_box" });
+    const probe = begin(motion, { ...new Data(data).declared.lessons, ...LANGUAGES[language]?.lessons }, address, app, scriptMs);
     if (refusal ?? motion.notice()) say(refusal ?? motion.notice(), 12);
     Object.assign(window, { page: probe });
   } catch (error) {

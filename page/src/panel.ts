@@ -7,13 +7,14 @@ import { bodyCard } from "./panel_body.ts";
 import { button, icon, make, say, slider, type Slider } from "./panel_elements.ts";
 import { ghostCard } from "./panel_ghost.ts";
 import { keepCard } from "./panel_keep.ts";
+import { lessonsCard } from "./panel_lessons.ts";
 import { measureCard } from "./panel_measure.ts";
 import { tensorCard } from "./panel_tensor.ts";
 import { worldCard } from "./panel_world.ts";
 import type { Picture } from "./picture.ts";
 import { energies, Plots, type Track } from "./plots.ts";
 import type { Pointer } from "./pointer.ts";
-import type { Motion, Snapshot, Vec3 } from "./source.ts";
+import type { Bundled, Motion, Snapshot, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
@@ -40,6 +41,7 @@ export interface Desk {
   readonly pointer: Pointer;
   readonly clock: Clock;
   readonly look: Look;
+  readonly lessons: readonly Bundled[];
   track(): Track;
   /** Do this before the next picture; what was asked for under the same name before then isn't done. */
   later(name: string, act: () => void): void;
@@ -47,6 +49,8 @@ export interface Desk {
   told(refusal: string | null): boolean;
   /** A body that was just opened, unless it was refused, gets a spin where it has none. */
   lively(refusal: string | null): string | null;
+  /** Begin anew with the parameters in force, and fly. */
+  restart(): void;
   /** Another take: a function that opens one, said if it is refused. */
   open(how: () => string | null | Promise<string | null>): Promise<void>;
 }
@@ -97,6 +101,7 @@ export class Panel {
   private shownMs = 0;
   private passedS = 0;
   private shownAngle = "";
+  private held: HTMLElement | null = null;
 
   constructor(desk: Desk, resized: () => void) {
     this.desk = desk;
@@ -138,6 +143,7 @@ export class Panel {
     this.lock.append(drawn, words.hand.lock);
 
     this.makers = {
+      lessons: () => lessonsCard(desk),
       body: () => bodyCard(desk), world: () => worldCard(desk), ghost: () => ghostCard(desk), tensor: () => tensorCard(desk), measure: () => measureCard(desk),
       plots: () => {
         const plots = new Plots(desk.track());
@@ -146,7 +152,8 @@ export class Panel {
       keep: () => keepCard(desk),
     };
     const chip = (name: Name): HTMLButtonElement => button(words.cards[name], () => this.toggle(name), { "aria-expanded": "false", "data-card": name });
-    this.chips = { body: chip("body"), world: chip("world"), ghost: chip("ghost"), tensor: chip("tensor"), measure: chip("measure"), plots: chip("plots"), keep: chip("keep") };
+    this.chips = { lessons: chip("lessons"), body: chip("body"), world: chip("world"), ghost: chip("ghost"), tensor: chip("tensor"), measure: chip("measure"), plots: chip("plots"), keep: chip("keep") };
+    this.chips.lessons.hidden = !desk.lessons.length;
     const hand = make("div", { id: "hand", class: "card", role: "group", "aria-label": words.hand.name },
       make("div", { class: "sliders" }, mass.node, this.sliders.x.node, this.sliders.y.node, this.sliders.z.node, poke.node),
       make("div", { class: "chips" }, this.lock, ...Object.values(this.chips)));
@@ -162,16 +169,48 @@ export class Panel {
     this.angle = make("div", { class: "value" }, "–");
     this.angleCard = make("div", { id: "angle", class: "card" }, make("div", { class: "name" }, words.angle.name), this.angle);
 
-    this.node = make("div", { id: "panes" }, tensor, this.side, this.free, hand, energy, desk.clock.node, this.angleCard);
+    this.node = make("main", { id: "panes" }, tensor, this.side, this.free, hand, energy, desk.clock.node, this.angleCard);
     document.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !this.open.size || !this.side.contains(document.activeElement)) return;
       this.toggle([...this.open][this.open.size - 1]!);
     });
   }
 
+  /** The card that stays at the top of those that open, or none. */
+  hold(node: HTMLElement | null): void {
+    for (const name of [...this.open]) this.close(name);
+    this.held?.remove();
+    this.held = node;
+    if (node) this.side.prepend(node);
+    this.changedSize();
+  }
+
+  opened(): readonly string[] { return [...this.open]; }
+
+  /** Open a card, and mark and focus what a lesson leads to in it. */
+  lead(name: Name, mark: string): void {
+    if (!this.open.has(name)) this.toggle(name);
+    const found = this.side.querySelector<HTMLElement>(`section[data-card=${name}] [data-mark="${mark}"]`);
+    if (!found) return;
+    const control = found.matches("button, input, select") ? found : found.querySelector<HTMLElement>("button, input, select") ?? found;
+    for (const other of this.side.querySelectorAll(".led")) other.classList.remove("led");
+    found.classList.add("led");
+    found.scrollIntoView({ block: "nearest" });
+    control.focus({ preventScroll: true });
+  }
+
+  changedSize(): void {
+    this.node.classList.toggle("taught", this.held !== null);
+    this.node.classList.toggle("open", this.open.size > 0 || this.held !== null);
+    this.node.classList.toggle("carded", this.open.size > 0);
+    this.node.classList.toggle("plotted", this.open.has("plots"));
+    this.shownMs = 0;
+    this.resized();
+  }
+
   /** A card opens beside the picture, or closes; plots stay beside another one where there is room. */
   toggle(name: Name): void {
-    const was = this.open.has(name), room = innerHeight > 560 && innerWidth > 700;
+    const was = this.open.has(name), room = matchMedia("(min-height: 35em) and (min-width: 44em)").matches;
     for (const other of [...this.open]) if (other === name || !room || (other === "plots") === (name === "plots")) this.close(other);
     if (!was) {
       this.open.add(name);
@@ -184,10 +223,7 @@ export class Panel {
       card.changed();
       node.querySelector<HTMLElement>("h2")!.focus({ preventScroll: true });
     } else this.chips[name].focus({ preventScroll: true });
-    this.shownMs = 0;
-    this.node.classList.toggle("open", this.open.size > 0);
-    this.node.classList.toggle("plotted", this.open.has("plots"));
-    this.resized();
+    this.changedSize();
   }
 
   private close(name: Name): void {

@@ -16,7 +16,7 @@ export function bodyCard(desk: Desk): Card {
   const { motion } = desk, w = words.body;
   let unit: number | undefined, added = 0;
   const bodies = make("div", { class: "row" });
-  const scenes = choice(w.scenes, [["", "–"], ...motion.scenes.map(({ name, title }) => [name, title] as const)], (name) => { if (name) void desk.open(() => motion.openScene(name)); });
+  const scenes = choice(w.scenes, [["", "–"], ...motion.scenes.map(({ name, title }) => [name, desk.lessons.find((one) => one.name === name)?.title ?? title] as const)], (name) => { if (name) void desk.open(() => motion.openScene(name)); });
   const file = make("input", { type: "file", accept: ".obj,.stl,.ply,.glb", class: "out", tabindex: -1, "aria-hidden": "true", change: () => {
     const [chosen] = file.files ?? [];
     file.value = "";
@@ -44,7 +44,7 @@ export function bodyCard(desk: Desk): Card {
   const tensor = NAMES.map((name, k) => one("explicit_inertia.tensor", `I${name}`, k, "kg m²"));
   const own = make("div", {}, make("div", { class: "field" }, w.fixed, make("span", {}, ownMass.node, " kg")), make("div", { class: "field" }, w.centre, make("span", { class: "trio" }, ...centre.map(({ node: field }) => field))),
     ...[0, 3].map((from) => make("div", { class: "field" }, ...[0, 1, 2].map((k) => make("label", {}, `I${NAMES[from + k]}`, tensor[from + k]!.node)))), make("p", { class: "note" }, w.ownNote));
-  const table = make("table"), ballast = make("div");
+  const table = make("table", { "data-mark": "moments", tabindex: -1 }), ballast = make("div");
   let heavy = 0.1;
   const kilograms = numberField(w.ballast, (value) => { heavy = value; kilograms.show(value); return null; }, "kg");
   const stick = button(w.add, () => {
@@ -59,7 +59,7 @@ export function bodyCard(desk: Desk): Card {
 
   const changed = (): void => {
     const info = motion.body(), values = motion.values();
-    bodies.replaceChildren(...motion.bodies.map(({ name, title }) => button(title, () => void desk.open(() => desk.lively(motion.openBody(name))), { "aria-pressed": String(name === info.name) })));
+    bodies.replaceChildren(...motion.bodies.map(({ name, title }) => button(words.bodies[name] ?? title, () => void desk.open(() => desk.lively(motion.openBody(name))), { "aria-pressed": String(name === info.name) })));
     const sayings = info.findings.filter(({ severity }) => severity !== "info");
     verdict.replaceChildren(...(sayings.length
       ? sayings.map(({ message, severity }) => make("p", { class: severity === "error" ? "bad" : "" }, message))
@@ -73,7 +73,7 @@ export function bodyCard(desk: Desk): Card {
     centre.forEach((field, k) => field.show(numbers("explicit_inertia.center_of_mass")[k]!));
     tensor.forEach((field, k) => field.show(numbers("explicit_inertia.tensor")[k]!));
     const truth = info.models.find(({ model }) => model === "solid");
-    table.replaceChildren(make("tr", {}, make("th"), ...["I₁", "I₂", "I₃"].map((name) => make("th", { scope: "col" }, name))), ...info.models.filter(({ refusal, model }) => !refusal && (model !== "explicit" || values["inertia_model"] === "explicit")).flatMap((model) => rows(model, truth)));
+    table.replaceChildren(make("tr", {}, make("td"), ...["I₁", "I₂", "I₃"].map((name) => make("th", { scope: "col" }, name))), ...info.models.filter(({ refusal, model }) => !refusal && (model !== "explicit" || values["inertia_model"] === "explicit")).flatMap((model) => rows(model, truth)));
     const stuck = Object.entries(values).filter(([name, value]) => name.startsWith(BALLAST) && Array.isArray(value) && value[0] !== 0);
     ballast.replaceChildren(...stuck.map(([name, value]) => make("div", { class: "field" }, `${short((value as readonly number[])[0]!)} kg`,
       button(w.remove, () => desk.told(motion.set({ [name]: [0, ...((value as readonly number[]).slice(1) as unknown as Vec3)] }))))));
@@ -90,7 +90,7 @@ export function bodyCard(desk: Desk): Card {
     ...(motion.can.openFiles ? [make("h3", {}, w.own), make("div", { class: "row" }, button(w.choose, () => file.click()), file), units.node, make("p", { class: "note" }, w.formats)] : []), verdict, facts,
     make("h3", {}, w.mass), make("div", { class: "field" }, w.fixed, make("span", {}, mass.node, " kg")), make("div", { class: "field" }, w.dense, make("span", {}, density.node, " kg/m³")), models.node, own,
     make("h3", {}, w.table), table,
-    make("h3", {}, w.ballast), make("div", { class: "field" }, make("span", {}, kilograms.node, " kg"), stick), ballast);
+    make("h3", {}, w.ballast), make("div", { class: "field", "data-mark": "ballast" }, make("span", {}, kilograms.node, " kg"), stick), ballast);
   return { node, changed, closed: () => { desk.pointer.claim = null; } };
 }
 

@@ -81,7 +81,7 @@ export function slider(name: string, kind: string, unit: string, bounds: () => r
   const paint = (): void => {
     const part = Number(range.value) / steps;
     // The thumb's middle isn't at the part of the width: it stays within.
-    range.style.setProperty("--at", `calc(12px + ${(100 * part).toFixed(2)}% - ${(24 * part).toFixed(2)}px)`);
+    range.style.setProperty("--at", `calc(0.75rem + ${(100 * part).toFixed(2)}% - ${(1.5 * part).toFixed(3)}rem)`);
   };
   let shown = "", held = false;
   const told = (value: number): void => range.setAttribute("aria-valuetext", `${short(value)} ${unit}`);

@@ -27,7 +27,7 @@ export function keepCard(desk: Desk): Card {
     void motion.hash().then((hash) => { hashed.textContent = hash; }, failed);
   };
   const command = make("code", { hidden: true }), hashed = make("code");
-  command.style.cssText = hashed.style.cssText = "font-size: 12px; overflow-wrap: anywhere; user-select: all";
+  command.style.cssText = hashed.style.cssText = "font-size: 0.75rem; overflow-wrap: anywhere; user-select: all";
   const compared = make("p");
   const keep = button(w.keepTake, () => {
     const kept = new Track();

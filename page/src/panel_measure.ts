@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 
+import { chalked } from "./chalk.ts";
 import type { Card, Desk } from "./panel.ts";
 import { button, choice, make, say } from "./panel_elements.ts";
 import type { Snapshot, Vec3 } from "./source.ts";
@@ -50,15 +51,12 @@ export function measureCard(desk: Desk): Card {
   const press = (which: number): void => traces.forEach((node, k) => node.setAttribute("aria-pressed", String(k === which)));
   press(look.trace === null ? 0 : look.trace === "com" ? 2 : 1);
 
-  // Chalk lies a little above the surface, where it is seen.
   let from: Vec3 = [0, 0, 0];
   const chalk = button(w.draw, () => {
     const on = desk.pointer.chalk === null;
     chalk.setAttribute("aria-pressed", String(on));
-    desk.pointer.chalk = !on ? null : ({ body, normal }, begins) => {
-      const { rotation: R } = motion.snapshot().body, info = motion.body(), up = 0.004 * info.length;
-      const out = [0, 1, 2].map((k) => R[k]! * normal[0] + R[3 + k]! * normal[1] + R[6 + k]! * normal[2]);
-      const place = body.map((c, k) => (c + info.com[k]! + up * out[k]!) / info.scale[k]!) as unknown as Vec3;
+    desk.pointer.chalk = !on ? null : (hit, begins) => {
+      const place = chalked(motion, hit);
       if (begins) from = place;
       look.chalk = [...look.chalk, ...from, ...place];
       from = place;
@@ -72,7 +70,7 @@ export function measureCard(desk: Desk): Card {
   const node = make("div", {},
     make("h3", {}, w.protractor), one.node, two.node, make("p", {}, angle),
     make("h3", {}, w.watch), make("div", { class: "row" }, watch, go, clear),
-    make("h3", {}, w.trace), make("div", { class: "row", role: "group", "aria-label": w.trace }, ...traces),
+    make("h3", {}, w.trace), make("div", { class: "row", role: "group", "aria-label": w.trace, "data-mark": "trace" }, ...traces),
     make("h3", {}, w.chalk), make("div", { class: "row" }, chalk, wipe),
     make("h3", {}, w.readings), readings);
   return {

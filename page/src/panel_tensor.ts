@@ -32,7 +32,7 @@ export function tensorCard(desk: Desk): Card {
       const part = (Number(input.value) + 180) / 360;
       node.querySelector(".unit")!.textContent = `${input.value}°`.replace("-", "−");
       input.setAttribute("aria-valuetext", `${input.value}°`);
-      input.style.setProperty("--at", `calc(12px + ${100 * part}% - ${24 * part}px)`);
+      input.style.setProperty("--at", `calc(0.75rem + ${100 * part}% - ${1.5 * part}rem)`);
     });
     look.turned = turned;
     const there = times(transposed(turned), times(motion.body().inertia, turned)), largest = Math.max(there[0]!, there[4]!, there[8]!);
@@ -47,9 +47,13 @@ export function tensorCard(desk: Desk): Card {
     said.textContent = product < VANISHED ? w.none : w.products(short(100 * product, 2));
     said.className = product < VANISHED ? "good" : "";
   };
-  const shape = (text: string, name: "inertiaBox" | "ellipsoid" | "principal" | "boundingBox"): HTMLElement => check(text, look[name], (on) => { look[name] = on; }).node;
+  const shape = (text: string, name: "inertiaBox" | "ellipsoid" | "principal" | "boundingBox"): HTMLElement => {
+    const { node: row } = check(text, look[name], (on) => { look[name] = on; });
+    row.dataset["mark"] = name;
+    return row;
+  };
   const poinsot = new PoinsotDrawing();
-  const node = make("div", {}, make("p", { class: "note" }, w.about), matrix, said, make("div", { class: "sliders" }, ...turns.map(({ node: row }) => row)),
+  const node = make("div", {}, make("p", { class: "note" }, w.about), matrix, said, make("div", { class: "sliders", "data-mark": "turn" }, ...turns.map(({ node: row }) => row)),
     make("div", { class: "row" }, button(w.principal, begin([])), button(w.mesh, begin(UNTURNED))),
     make("h3", {}, w.shapes), shape(w.box, "inertiaBox"), shape(w.ellipsoid, "ellipsoid"), shape(w.axes, "principal"), shape(w.bounding, "boundingBox"),
     make("h3", {}, w.poinsot), poinsot.canvas, make("p", { class: "note" }, w.poinsotNote));

@@ -32,6 +32,7 @@ export function worldCard(desk: Desk): Card {
     step.show(Number(values["step"]));
     stepField.hidden = values["integrator"] === "auto";
   };
+  gyroscopic.node.dataset["mark"] = "gyroscopic";
   const node = make("div", {},
     make("h3", {}, w.gravity), places, make("div", { class: "field" }, w.down, make("span", {}, down.node, " m/s²")),
     make("h3", {}, w.damping), make("div", { class: "field" }, w.linear, make("span", {}, linear.node, " N s/m")), make("div", { class: "field" }, w.angular, make("span", {}, angular.node, " N m s")),

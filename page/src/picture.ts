@@ -29,6 +29,8 @@ const FRAMED = 0.69;
 const STRONG = 0.0135, PLAIN = 0.009, CORD = 0.0075;
 const LIGHT = new Vector3(-0.35, -0.5, 1);
 const MOST_TRACE = 4000;
+/** Size of labels, unless the reader has chosen a larger one. */
+const LETTER_PX = 17;
 /** What lies behind everything; lighter round the middle where that costs nothing. */
 const SKY = 0xf1f4f9, LIGHT_SKY = "#ffffff", DARK_SKY = "#dfe5f0";
 
@@ -38,8 +40,14 @@ export interface Pose { readonly row: readonly number[]; readonly scale: Vec3; r
 /** A blow whose arrow still stands: impulse [N s] at a point [mesh]. */
 export interface Blow { readonly point: Vec3; readonly impulse: Vec3; readonly axes: "body" | "world" }
 
+/** A place of the body that is marked by its name. */
+export interface Mark { readonly point: Vec3; readonly text: string; readonly isCentre: boolean }
+
 /** What is drawn beside body and loads. */
 export interface Shown {
+  readonly marks: readonly Mark[];
+  /** Whether nothing may show where the centre of mass is. */
+  readonly hidesCentre: boolean;
   readonly apart: boolean;
   readonly model: string;
   readonly ghostModel: string;
@@ -69,6 +77,8 @@ interface Copy { readonly frame: Group; readonly mesh: Mesh; readonly edges: Lin
 class Label {
   readonly node = document.createElement("span");
   private text = "";
+  /** [px], while it is shown. */
+  place: readonly [number, number] | null = null;
   constructor(into: HTMLElement, colour: string) {
     this.node.className = "label";
     this.node.style.color = colour;
@@ -77,10 +87,11 @@ class Label {
   }
   show(text: string, x: number, y: number): void {
     if (text !== this.text) this.node.textContent = this.text = text;
+    this.place = [x, y];
     this.node.style.visibility = "visible";
     this.node.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`;
   }
-  hide(): void { this.node.style.visibility = "hidden"; }
+  hide(): void { this.place = null; this.node.style.visibility = "hidden"; }
 }
 
 export class Picture {
@@ -114,12 +125,15 @@ export class Picture {
   private chalked: readonly number[] = [];
   private readonly labels: Record<"omega" | "momentum" | "weight" | "string" | "angle" | "one" | "two" | "three" | "ghost", Label>;
   private readonly loadLabels: Label[] = [];
+  private readonly markLabels: (readonly [Label, Label])[] = [];
   private readonly labelRoom: HTMLElement;
   private surface: Surface | null = null;
   private info: BodyInfo | null = null;
   private free: Free = { left: 0, top: 0, width: 1, height: 1 };
   private offset = new Vector3();
   private size = 1;
+  /** Of labels, times the usual size. */
+  private letter = 1;
   private reach = 0.5;
 
   constructor(stage: HTMLElement, labelRoom: HTMLElement) {
@@ -232,6 +246,7 @@ export class Picture {
 
   fit(width: number, height: number, free: Free): void {
     this.sky();
+    this.letter = Number.parseFloat(getComputedStyle(this.labels.omega.node).fontSize) / LETTER_PX;
     this.free = free;
     this.eye.fit(width, height, free);
     this.renderer?.resize(width, height);
@@ -253,7 +268,8 @@ export class Picture {
     const at = new Vector3(body.row[0], body.row[1], body.row[2]), aside = this.offset.clone().multiplyScalar(2.1 * this.reach);
     const apart = shown.apart && ghost !== null;
     eye.frame(Math.max(1.03 * this.reach, FRAMED * size) * (apart ? 1.55 : 1));
-    if (!held) eye.follow(apart ? at.clone().addScaledVector(aside, 0.5) : at, seconds);
+    const middle = shown.hidesCentre ? this.onBody(this.boxMiddle()) : at;
+    if (!held) eye.follow(apart ? at.clone().addScaledVector(aside, 0.5) : middle, seconds);
     eye.place(held ? 0 : seconds);
 
     place(this.body, body, this.surface, null);
@@ -263,14 +279,15 @@ export class Picture {
     paint(this.body, shown.model);
     paint(this.ghost, shown.ghostModel);
 
-    this.drawMotion(body, at);
-    this.drawWeight(shown.gravity, body, at);
+    this.drawMotion(body, at, shown.hidesCentre);
+    this.drawWeight(shown.hidesCentre ? [0, 0, 0] : shown.gravity, body, at);
     this.drawLoads(body, shown.blows);
     this.drawString(this.cord, body, shown.gravity, null);
     this.drawString(this.ghostCord, apart ? ghost : null, shown.gravity, aside);
     this.drawShapes(shown, body, at);
     this.drawMeasures(shown, at);
-    this.drawFloor(at);
+    this.drawMarks(shown.marks, at);
+    this.drawFloor(middle);
 
     if (this.renderer) this.renderer.draw(this.scene, eye.camera);
     else this.flat?.draw(eye, this.scene);
@@ -281,20 +298,20 @@ export class Picture {
     const end = this.eye.project(tip, new Vector3()), start = this.eye.project(from, new Vector3());
     const dx = end.x - start.x, dy = end.y - start.y, length = Math.hypot(dx, dy);
     const [ux, uy] = length > 1 ? [dx / length, dy / length] : [0, -1];
-    const room = 9 + 4.4 * text.length;
+    const { letter } = this, room = 9 + 4.4 * letter * text.length;
     label.show(text,
-      Math.max(room, Math.min(this.eye.width - room, end.x + ux * (beyond + Math.abs(ux) * 4 * text.length))),
-      Math.max(14, Math.min(this.eye.height - 14, end.y + uy * beyond)));
+      Math.max(room, Math.min(this.eye.width - room, end.x + ux * (beyond + Math.abs(ux) * 4 * text.length) * letter)),
+      Math.max(14 * letter, Math.min(this.eye.height - 14 * letter, end.y + uy * beyond * letter)));
   }
 
-  private drawMotion(body: Flying, at: Vector3): void {
+  private drawMotion(body: Flying, at: Vector3, isHidden: boolean): void {
     const { size } = this, natural = Math.sqrt(9.81 / size), moment = (this.info!.moments[0] + this.info!.moments[1] + this.info!.moments[2]) / 3;
     const parts = [
       [this.omega, this.labels.omega, "ω", new Vector3(...body.omega), FIRST_OMEGA, natural, 0.8],
       [this.momentum, this.labels.momentum, "L", new Vector3(...body.momentum), FIRST_MOMENTUM, moment * natural, 1],
     ] as const;
     for (const [arrow, label, kind, vector, first, usual, thick] of parts) {
-      const value = vector.length(), length = this.scales.length(kind, value, first * size, LONGEST * size, usual);
+      const value = vector.length(), length = isHidden ? 0 : this.scales.length(kind, value, first * size, LONGEST * size, usual);
       if (!length) { arrow.hide(); label.hide(); continue; }
       arrow.show(at, vector.multiplyScalar(length / value), thick * STRONG * size);
       this.tag(label, kind, at.clone().add(vector), at);
@@ -351,7 +368,12 @@ export class Picture {
     if (aside) { hand.add(aside); knot.add(aside); }
     if (down.length() > 0) down.normalize(); else down.set(0, 0, -1);
     cord.show(hand, knot, string.restLength, down, CORD * this.size * (aside ? 0.6 : 1));
-    if (label) this.tag(label, `${short(string.tension)} N`, hand, knot, 24);
+    if (!label) return;
+    const text = `${short(string.tension)} N`, seen = this.eye.project(hand, new Vector3());
+    if (this.inFree(seen.x, seen.y)) { this.tag(label, text, hand, knot, 24); return; }
+    // A nail that isn't seen: beside the string, near the body.
+    const at = this.eye.project(knot, new Vector3()), away = Math.hypot(seen.x - at.x, seen.y - at.y) || 1, up = 70 * this.letter;
+    label.show(text, at.x + (up * (seen.x - at.x)) / away + (16 + 4.4 * text.length) * this.letter, at.y + (up * (seen.y - at.y)) / away);
   }
 
   private drawShapes(shown: Shown, body: Flying, at: Vector3): void {
@@ -417,6 +439,30 @@ export class Picture {
     this.tag(this.labels.angle, `${((angle * 180) / Math.PI).toFixed(1)}°`, point, at, 16);
   }
 
+  /** The middle of the mesh's box [mesh]. */
+  private boxMiddle(): Vec3 {
+    const { low, high } = this.surface!;
+    return [0, 1, 2].map((k) => 0.5 * (low[k]! + high[k]!)) as unknown as Vec3;
+  }
+
+  private drawMarks(marks: readonly Mark[], at: Vector3): void {
+    for (let k = 0; k < Math.max(marks.length, this.markLabels.length); k++) {
+      const mark = marks[k];
+      if (!mark) { for (const label of this.markLabels[k] ?? []) label.hide(); continue; }
+      const [dot, name] = (this.markLabels[k] ??= [new Label(this.labelRoom, "#1d2433"), new Label(this.labelRoom, "#1d2433")]), point = this.onBody(mark.point), seen = this.eye.project(point, new Vector3());
+      dot.node.classList.add("dot");
+      dot.show(mark.isCentre ? "⊕" : "●", seen.x, seen.y);
+      if (mark.isCentre) name.hide(); // its sign stands on the body, a name would cover it
+      else if (this.isNearTip(seen)) name.show(mark.text, seen.x + (14 + 4.4 * mark.text.length) * this.letter, seen.y);
+      else this.tag(name, mark.text, point, at, 20);
+    }
+  }
+
+  /** Whether an arrow of the motion ends near a place on the screen [px]. */
+  private isNearTip({ x, y }: Vector3): boolean {
+    return [this.labels.omega, this.labels.momentum].some(({ place }) => place !== null && Math.hypot(place[0] - x, place[1] - y) < 52 * this.letter);
+  }
+
   private drawFloor(at: Vector3): void {
     const { floor, shadow, eye } = this, cell = niceCell(0.3 * this.size), below = 1.06 * this.reach;
     // Floors lie one below the other: one that falls passes them.
@@ -434,13 +480,15 @@ export class Picture {
     (shadow.material as MeshBasicMaterial).opacity = 0.13 * seen;
   }
 
-  /** What is drawn, with its labels, as it would be saved. */
-  async saved(background: string): Promise<Blob> {
-    const canvas = document.createElement("canvas"), ratio = 2, { width, height } = this.eye;
-    canvas.width = ratio * width;
-    canvas.height = ratio * height;
+  /** What is drawn, with its labels; of the whole window, or of what nothing covers. */
+  still(background: string, isFree = false): HTMLCanvasElement {
+    const canvas = document.createElement("canvas"), ratio = 2, { width, height } = this.eye, { free } = this;
+    const from = isFree ? { x: free.left - 10, y: free.top - 10, width: free.width + 20, height: free.height + 20 } : { x: 0, y: 0, width, height };
+    canvas.width = ratio * from.width;
+    canvas.height = ratio * from.height;
     const paper = canvas.getContext("2d")!;
     paper.scale(ratio, ratio);
+    paper.translate(-from.x, -from.y);
     paper.fillStyle = background;
     paper.fillRect(0, 0, width, height);
     if (this.renderer) this.renderer.draw(this.scene, this.eye.camera);
@@ -449,12 +497,18 @@ export class Picture {
     paper.textAlign = "center";
     paper.textBaseline = "middle";
     for (const node of this.labelRoom.querySelectorAll<HTMLElement>(".label")) {
-      if (node.style.visibility === "hidden") continue;
+      if (node.style.visibility === "hidden" || node.hidden) continue;
       const at = node.getBoundingClientRect();
-      paper.font = "700 17px system-ui, sans-serif";
+      paper.font = `700 ${getComputedStyle(node).fontSize} system-ui, sans-serif`;
       paper.fillStyle = node.style.color;
       paper.fillText(node.textContent ?? "", at.left + 0.5 * at.width, at.top + 0.5 * at.height);
     }
+    return canvas;
+  }
+
+  /** What is drawn, as it would be saved. */
+  async saved(background: string): Promise<Blob> {
+    const canvas = this.still(background);
     return new Promise((done, failed) => canvas.toBlob((blob) => (blob ? done(blob) : failed(new Error("no picture"))), "image/png"));
   }
 

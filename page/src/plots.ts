@@ -92,20 +92,21 @@ export class Plots {
   private readonly plots: readonly Plot[];
   private readonly track: Track;
 
-  constructor(track: Track) {
+  constructor(track: Track, kinds: readonly string[] = ["energy", "omega", "momentum", "angle"]) {
     this.track = track;
     const plot = (title: string, unit: string, curves: readonly Curve[]): Plot => ({ title, unit, curves, canvas: make("canvas", { role: "img", "aria-label": title }) });
     const energy = (name: string, colour: string, of: (e: Energies) => number): Curve => ({ name, colour, value: ({ now, gravity }) => of(energies(now.body, gravity)) });
-    this.plots = [
-      plot(words.plots.energy, "J", [
+    const all: Readonly<Record<string, Plot>> = {
+      energy: plot(words.plots.energy, "J", [
         energy(words.energy.spin, "#7a45d1", (e) => e.spin), energy(words.energy.move, "#0b7466", (e) => e.move), energy(words.energy.string, "#d1432f", (e) => e.string),
         energy(words.energy.all, "#6b7385", (e) => e.spin + e.move + e.string + e.height)]),
-      plot(words.plots.omega, "rad/s", AXES.map((colour, k) => ({ name: `ω${"₁₂₃"[k]}`, colour, value: (seen) => principal(seen, k) }))),
-      plot(words.plots.momentum, "N m s", AXES.map((colour, k) => ({ name: `L${"xyz"[k]}`, colour, value: ({ now }) => now.body.momentum[k]! }))),
-      plot(words.plots.angle, "°", [{ name: words.angle.name, colour: "#2f63ad", value: ({ now }) => (now.angleToGhost * 180) / Math.PI }]),
-    ];
+      omega: plot(words.plots.omega, "rad/s", AXES.map((colour, k) => ({ name: `ω${"₁₂₃"[k]}`, colour, value: (seen) => principal(seen, k) }))),
+      momentum: plot(words.plots.momentum, "N m s", AXES.map((colour, k) => ({ name: `L${"xyz"[k]}`, colour, value: ({ now }) => now.body.momentum[k]! }))),
+      angle: plot(words.plots.angle, "°", [{ name: words.angle.name, colour: "#2f63ad", value: ({ now }) => (now.angleToGhost * 180) / Math.PI }]),
+    };
+    this.plots = kinds.flatMap((kind) => all[kind] ?? []);
     this.node = make("div", {}, ...this.plots.map(({ title, unit, curves, canvas }) => make("div", { class: "plot" },
-      make("div", { class: "title" }, `${title} [${unit}]`, make("span", {}, ...curves.map(({ name, colour }) => {
+      make("div", { class: "title" }, `${title} [${unit}]`, curves.length > 1 && make("span", {}, ...curves.map(({ name, colour }) => {
         const key = make("span", {}, ` ${name}`);
         key.style.color = colour;
         return key;
@@ -157,8 +158,9 @@ export class Plots {
       paper.lineTo(x, height);
       paper.stroke();
       paper.fillStyle = "#4b5873";
-      paper.font = "11px system-ui, sans-serif";
-      paper.fillText(short(high - room), 3, 11);
+      const size = Math.max(11, Number.parseFloat(getComputedStyle(canvas).fontSize) - 4);
+      paper.font = `${size}px system-ui, sans-serif`;
+      paper.fillText(short(high - room), 3, size);
       if (low + room < 0) paper.fillText(short(low + room), 3, height - 3);
     }
   }

@@ -17,7 +17,7 @@ export class PoinsotDrawing {
   private trail: Vector3[] = [];
   private drawn: readonly [number, number, number] = [0, 0, 0];
 
-  constructor() { this.canvas.style.cssText = "width: 100%; height: 210px; display: block; border-radius: 8px; background: #f6f8fc"; }
+  constructor() { this.canvas.style.cssText = "width: 100%; height: 13rem; display: block; border-radius: 8px; background: #f6f8fc"; }
 
   draw({ body, timeNs }: Snapshot, { moments, axes }: BodyInfo): void {
     const { canvas } = this, ratio = Math.min(2, devicePixelRatio || 1), width = canvas.clientWidth, height = canvas.clientHeight;

@@ -42,6 +42,8 @@ export class Pointer {
   claim: ((hit: Hit) => void) | null = null;
   /** Who is told of each place of the body that is drawn over, instead of a drag; begins: of a stroke. */
   chalk: ((hit: Hit, begins: boolean) => void) | null = null;
+  /** Whether a drag ties the string; otherwise the scene's own one holds the body. */
+  pulls = true;
   private drawing: number | null = null;
   /** Where the keyboard aims [px]. */
   aim: [number, number] | null = null;
@@ -165,6 +167,7 @@ export class Pointer {
   }
 
   private tie(hand: Hand): void {
+    if (!this.pulls) { this.forget(); say(words.lesson.tied); return; }
     const values = this.motion.values();
     // A stiffness that the scene doesn't choose is chosen for the hand: 50 N/m throws a nut and doesn't move a satellite.
     if (values["string.frequency"] === 0 && values["string.stiffness"] === 50) this.told(this.motion.set({ "string.frequency": FREQUENCY }));
@@ -250,7 +253,8 @@ export class Pointer {
 
   private aimed(): [number, number] {
     if (!this.aim) {
-      const row = this.motion.snapshot().body.row, at = this.picture.eye.target.clone().set(row[0]!, row[1]!, row[2]!), seen = this.picture.eye.project(at, at);
+      // Not at the centre of mass where a string holds the body: to find it may be the task.
+      const { row, string } = this.motion.snapshot().body, from = string?.knot ?? [row[0]!, row[1]!, row[2]!], at = this.picture.eye.target.clone().set(...from), seen = this.picture.eye.project(at, at);
       this.aim = [seen.x, seen.y];
     }
     return this.aim;

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: MIT
 //
-// Everything that the page says, once. Another language is another catalogue of this shape.
+// Everything that the page says, once. Another language is another catalogue of this shape (languages.ts).
 
+import { addressOf } from "./address.ts";
+import { LANGUAGES } from "./languages.ts";
 import { short } from "./words_numbers.ts";
 
-const english = {
+export const english = {
   title: "One rigid body",
   notANumber: (text: string) => `${text.trim() || "Nothing"} isn't a number`,
   close: "close",
   picture: {
     name: "The body. Arrow keys move the aim, Enter pokes there, G grabs and lets go; Shift and arrow keys turn the view, plus and minus zoom, 0 goes back",
+    body: "the body as it is now",
     weight: (newtons: string) => `weight ${newtons} N`,
     pull: "pull me",
     noWebGL: "This browser draws no WebGL: the picture is a plain one.",
@@ -39,7 +42,10 @@ const english = {
     recorded: "What a node does is recorded there: its parameter record, and rigid_proto replay",
     step: "Step to the next publication", rate: (rate: number) => (rate === 0 ? "as fast as it goes" : `${rate} ×`),
   },
-  cards: { body: "body", world: "gravity", ghost: "ghost", tensor: "tensor", measure: "measure", plots: "plots", keep: "keep" },
+  cards: { lessons: "lessons", body: "body", world: "gravity", ghost: "ghost", tensor: "tensor", measure: "measure", plots: "plots", keep: "keep" },
+  bodies: {
+    book: "book", hammer: "hammer", hollow_box: "hollow box", l_bracket: "l bracket", spinning_top: "spinning top", t_handle: "t handle", teapot: "teapot", tennis_racket: "tennis racket",
+  } as Record<string, string>,
   body: {
     name: "Body", bundled: "Ready-made", scenes: "Flights", own: "Your own", choose: "choose a file",
     drop: "Drop the file here", formats: ".obj, .stl, .ply or .glb, up to 50 MB. It stays on this machine.", unit: "one unit is",
@@ -59,7 +65,7 @@ const english = {
   },
   ghost: {
     name: "Ghost", about: "It starts as the body does and gets the same pulls and pokes. What differs:",
-    kinds: { "": "no ghost", bounding_box: "tensor of the bounding box", solid: "true tensor", shell: "mass in the skin", points: "mass in the corners", gyroscopic: "no gyroscopic term", integrator: "another integrator" } as Record<string, string>,
+    kinds: { "": "no ghost", bounding_box: "tensor of the bounding box", solid: "true tensor", corners: "mass in the corners", points: "mass in the corners", gyroscopic: "no gyroscopic term", integrator: "another integrator" } as Record<string, string>,
     integrator: "integrator", apart: "beside the body", again: "It flies from the start of the take on.",
   },
   inertia: {
@@ -83,8 +89,30 @@ const english = {
     keepTake: "keep this take", keepNote: "It flies on as a grey body beside the next one.", forget: "forget it", kept: (s: number) => `Kept: ${s.toFixed(1)} s`,
     apart: (degrees: string) => `${degrees}° apart now`,
   },
+  lessons: { name: "Lessons", about: "Each begins with a question. The body stands until you answer." },
+  lesson: {
+    name: "Lesson", none: "no lesson", leave: "leave the lesson", class: "class mode", classTitle: "For a projector: large words, and nothing else to read",
+    letters: ["A", "B", "C"], first: "Answer first: A, B or C", right: "Right.", wrong: (letter: string, choice: string) => `No, it is ${letter}: ${choice}`,
+    why: "why?", steps: "Try it", done: (k: number, all: number) => `Step ${k} of ${all} is done.`, finished: "All steps are done.", ticked: "done", now: "now", anew: "begin the lesson again",
+    unknown: (name: string) => `There is no lesson ${name}`, swings: "It still swings: wait until it hangs at rest.", untied: "No string is tied.", tied: "The string holds it: click to poke it.",
+    places: { tip: "tip", rim: "rim", grip: "grip", head: "head", corner: "corner", stem: "stem", spout: "spout", handle: "handle", knob: "knob", com: "centre of mass" } as Record<string, string>,
+    poke: (place: string) => `poke: ${place}`, again: (place: string) => `start again, and poke: ${place}`, restart: "start again", pull: "show me how", press: "take me there", pullHow: "Drag the body with the pointer, or with G and arrow keys",
+    pressHow: "Press a place of the body, or aim with arrow keys and press Enter", throwAbout: (axis: string) => `throw it about ${axis}`, withoutTerm: "term off, and start again",
+    termOn: "switch the term on", termOff: "switch the term off", box: "bounding box", truth: "true tensor", corners: "mass in the corners", stick: "stick on 30 g, and start again", unstick: "take it off",
+    ballast: "open ballast", card: "open the card", principal: "show the axes", turn: "open the axes", aboutThird: "spin about I₃", chalk: "draw the line", tie: "tie it here", tieHow: "Press the place to tie it, or aim with arrow keys and press Enter",
+    twice: "spin × 2", half: "spin × ½", noSpin: "no spin", trace: "trace the grip", weightless: "gravity off", moments: "open the table", tenfold: "mass × 10", tenth: "mass as before",
+  },
   percent: (part: number) => (Number.isFinite(part) ? `${part < 0 ? "−" : "+"}${short(Math.abs(part), 2)} %` : "–"),
 };
 
 export type Words = typeof english;
-export const words: Words = english;
+
+/** The code of the language that the address names, or the first of the reader's that is there. */
+function spoken(): string {
+  if (typeof location === "undefined") return "en";
+  const asked = addressOf(location.hash).language, wanted = asked ? [asked] : navigator.languages;
+  return wanted.map((code) => code.toLowerCase().split("-")[0]!).find((code) => code === "en" || code in LANGUAGES) ?? "en";
+}
+
+export const language = spoken();
+export const words: Words = LANGUAGES[language]?.words ?? english;

@@ -24,7 +24,7 @@ COMMANDS = {
     "replay": "show, verify, convert, publish or branch a recorded session",
     "identify": "mass properties from recorded motion, and which of them the motion identifies",
     "snapshot": "write a picture of a recorded session, without a display",
-    "lesson": "write a lesson as one file that opens in a browser, without a server",
+    "lesson": "write the page as one file that opens in a lesson, without a server",
     "demo": "start the node, send scripted pokes, record, and exit",
     "up": "start the node with a live view, until Ctrl-C",
     "workbench": "simulate a body and serve its interactive page, until Ctrl-C; needs no ROS",

@@ -24,7 +24,9 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("scene", metavar="SCENE", nargs="?", help="scene file, bundled name or mesh file (default: t_handle)")
+    parser.add_argument(
+        "scene", metavar="SCENE", nargs="?", help="scene file, bundled name or mesh file (default: t_handle)"
+    )
     parser.add_argument("--html", metavar="FILE", help="write the page as a file, and serve nothing")
     parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..base.bundled import body_names, scene_names, scene_path
+from ..base.bundled import body_names, scene_path
 from ..base.library import stamp
 from ..base.vectors import FloatArray, IntArray
 from ..mass import INERTIA_MODELS
@@ -28,7 +28,7 @@ from ..motion import string as of_string
 from ..motion.integrators import INTEGRATORS
 from ..motion.integrators.stepping import ROOM
 from ..parameters.declarations import PARAMETERS, PATTERNS, Parameter
-from ..scene.lessons import lesson
+from ..scene.lessons import Lesson, lessons
 from ..scene.scene_file import scene_values
 from ..simulation import commands, effects, flight, quantities, record, refusals
 from ..simulation.record import SCENE_PARAMETERS, field_of
@@ -66,7 +66,8 @@ def page_data() -> bytes:
         "numbers": _constants(),
         "words": words(),
         "bodies": bodies,
-        "scenes": {name: {"title": lesson(name).title, "values": bundled_values(name)} for name in scene_names()},
+        "scenes": {one.name: {"title": one.title, "values": bundled_values(one.name)} for one in lessons()},
+        "lessons": {one.name: _texts(one) for one in lessons()},
         "start": START,
         "longest": LONGEST,
     }
@@ -90,6 +91,18 @@ def page_values(values: dict[str, Any]) -> dict[str, Any]:
 def bundled_values(name: str) -> dict[str, Any]:
     """The parameters of a bundled scene, as the page has them."""
     return page_values(scene_values(scene_path(name)))
+
+
+def _texts(one: Lesson) -> dict[str, Any]:
+    """A lesson, as page/src/lessons.ts reads it."""
+    return {
+        "title": one.title,
+        "question": one.question,
+        "choices": one.choices,
+        "answer": one.answer,
+        "steps": one.sentences,
+        "reason": one.reason,
+    }
 
 
 _CONSTANTS: dict[str, tuple[Any, str]] = {

@@ -6,6 +6,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +25,19 @@ FORM = 1
 SPIN = {"initial.angular_velocity": [0.05, 0.1, 3.0]}
 """Of a mesh alone [rad/s], so that there is something to see."""
 _PLACE = '<script type="application/gzip" id="take"></script>'
+_BEGIN = '<meta name="begin" content="">'
+"""What the page opens in if its address says nothing, as behind the # of an address."""
 
 
-def write_page(file: str | Path, values: dict[str, Any] | None = None) -> None:
-    """Write the page, to begin with a scene of these parameters, by name. Raises InputError."""
+def write_page(file: str | Path, values: dict[str, Any] | None = None, begins: str = "") -> None:
+    """Write the page, to begin with a scene of these parameters, by name, or as with this behind the # of its address
+    (page/src/address.ts). Raises InputError.
+    """
     page = page_text(values)
+    if begins:
+        if _BEGIN not in page:
+            raise InputError("page", "the built page has no place for what it begins with")
+        page = page.replace(_BEGIN, _BEGIN.replace('content=""', f'content="{escape(begins)}"'), 1)
     with whole_file("--html", file) as beside:
         beside.write_text(page, "utf-8")
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The page of a running node. Files and sockets are a child process's (watchers.py), which shares neither interpreter nor
-fate with the physics thread: that copies a state when it is asked for one, about thirty times a second while somebody
-looks, and notes what has happened. Whatever is slow behind it, a pipe, the child or a browser, waits on threads of its own.
+"""The page of a running node. Files and sockets are a child process's (watchers.py), which shares neither interpreter
+nor fate with the physics thread: that copies a state when it is asked for one, about thirty times a second while
+somebody looks, and notes what has happened. Whatever is slow behind it, a pipe, the child or a browser, waits on
+threads of its own.
 
-A picture: scene number, loads of the body, whether there is a ghost, loads of the ghost (4 numbers of 4 bytes), then the
-body's FLIGHT (simulation/flight.py) and its acting loads, LOAD_ROW each, and the ghost's. The page has the same kernels and
-so the same records, and makes of them what it shows.
+A picture: scene number, loads of the body, whether there is a ghost, loads of the ghost (4 numbers of 4 bytes), then
+the body's FLIGHT (simulation/flight.py) and its acting loads, LOAD_ROW each, and the ghost's. The page has the same
+kernels and so the same records, and makes of them what it shows.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ MOST_NOTED = 1024
 """Events that wait for the pages; of more the oldest are left out."""
 
 SETTABLE = frozenset({*USED, "real_time_factor"})
-"""What a page may set, beside ballast: none of them names a file, but for ``mesh``, of which it may set bundled ones."""
+"""What a page may set, beside ballast: none of them names a file but ``mesh``, which it may set to bundled ones."""
 
 KEPT = ("record", "publish_rate", "publish_clock", "publish_tf", "imu_contact", "schedule_horizon", "real_time_factor")
 """Parameters that another scene leaves as they are: how one looks at the motion, not the motion."""
@@ -375,7 +376,9 @@ def check_values(values: Mapping[str, Any], mesh: str) -> None:
         if name not in SETTABLE and not name.startswith(("ballast.", "contacts.")):
             raise InputError(name, value, "a parameter of body and motion; others are set at the node")
         if name == "mesh" and value not in ("", mesh, *body_names()):
-            raise InputError(name, value, f"a bundled body, one of {', '.join(body_names())}; files are opened at the node")
+            raise InputError(
+                name, value, f"a bundled body, one of {', '.join(body_names())}; files are opened at the node"
+            )
 
 
 def _is_shown(name: str) -> bool:

@@ -53,7 +53,7 @@ LINE_S = 1.0
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline'; "
-    "img-src data: blob:; connect-src 'self' ws: data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    "img-src data: blob:; connect-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
 
@@ -139,8 +139,8 @@ def _is_own(address: str) -> bool:
 
 class PageServer:
     """Listens once ``begin`` is awaited. page: the file. tokens: of the addresses that are answered, each with what
-    stands before it, ``page`` or ``live``. on_socket(connection, token) handles a WebSocket, and returns the code that it is
-    to be closed with.
+    stands before it, ``page`` or ``live``. on_socket(connection, token) handles a WebSocket, and returns the code that
+    it is to be closed with.
     """
 
     def __init__(
@@ -214,7 +214,9 @@ class PageServer:
                 return None
             return self._refuse(connection, http.HTTPStatus.NOT_FOUND, "this page has no socket")
         if self._sending >= MOST_PAGES:
-            return self._refuse(connection, http.HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are being sent; try again")
+            return self._refuse(
+                connection, http.HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are being sent; try again"
+            )
         self._sending += 1
         asyncio.ensure_future(self._until_gone(connection))
         packed = "gzip" in request.headers.get("Accept-Encoding", "")

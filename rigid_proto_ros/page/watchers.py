@@ -4,12 +4,16 @@ node that ends when its stdin does, however the node has ended.
 
 Between node and child go frames: length (4 bytes, little-endian), kind (1 byte), content. From the node: the settings
 first, then what all pages are told (texts, JSON objects; a key that is in KEPT is told to pages that open later, too),
-pictures (binary, passed on as they are), and answers. From a page come JSON objects: ``{"id": n, "entry": {...}}``, an
-entry of a poke script without its time; ``{"id": n, "time": "pause" | "resume" | "step" | "reset"}``; ``{"id": n,
-"begin": {parameter: value}}``; ``{"hand": "ask" | "give" | "take" | "lock" | "unlock"}``; ``{"looking": true | false}``.
+pictures (binary, passed on as they are), and answers. From a page come JSON objects:
 
-One page at a time has the hand. Who does something while nobody has it gets it; who has done nothing for IDLE_S loses it
-to the next who does something. The owner, who has the address that the terminal shows, can take it and lock it.
+    {"id": n, "entry": {...}}                                         an entry of a poke script without its time
+    {"id": n, "time": "pause" | "resume" | "step" | "reset"}
+    {"id": n, "begin": {parameter: value}}                            another scene
+    {"hand": "ask" | "give" | "take" | "lock" | "unlock"}
+    {"looking": true | false}
+
+One page at a time has the hand. Who does something while nobody has it gets it; who has done nothing for IDLE_S loses
+it to the next who does something. The owner, who has the address that the terminal shows, can take it and lock it.
 """
 
 from __future__ import annotations
@@ -288,7 +292,9 @@ class Watchers:
         waiting = sum(watcher.asks for watcher in self._all.values())
         for watcher in self._all.values():
             state = {"yours": self._hand is watcher, "taken": self._hand is not None, "locked": self._locked}
-            watcher.tell(_json({"hand": {**state, "asking": waiting, "asked": watcher.asks, "watchers": len(self._all)}}))
+            watcher.tell(
+                _json({"hand": {**state, "asking": waiting, "asked": watcher.asks, "watchers": len(self._all)}})
+            )
 
 
 def _json(value: Any) -> bytes:
@@ -309,7 +315,7 @@ async def _pieces(text: bytes) -> AsyncIterator[str]:
 
 
 class _Child:
-    """Reads frames on a thread of its own, since pipes are waited for in another way on each system, and writes them."""
+    """Reads and writes frames on threads of their own: each system waits for pipes in another way."""
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()

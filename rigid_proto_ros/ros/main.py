@@ -188,14 +188,15 @@ def make_viewer(scenario: Scenario, node: Node) -> Observer | None:
     be shown or recorded with it.
     """
     parameters = scenario.parameters
-    if parameters.viewer in ("none", "workbench"):
+    viewer = parameters.viewer.partition(",")[0]
+    if viewer in ("none", "workbench"):
         return None
     if importlib.util.find_spec("rerun") is None:
         raise InputError("viewer", is_missing("rerun-sdk", "rerun"))
     from ..rerun_view.live_view import LiveView
 
     return LiveView(
-        parameters.viewer,
+        viewer,
         rerun_port=_asked_for("rerun_port", parameters.rerun_port),
         web_port=_asked_for("web_port", parameters.web_port),
         name=node.get_name(),
@@ -207,7 +208,7 @@ def make_viewer(scenario: Scenario, node: Node) -> Observer | None:
 def open_page(node: RigidBodyNode) -> Callable[[], None]:
     """The interactive page, where it is asked for; returns what closes it."""
     parameters = node.live.scenario.parameters
-    if parameters.viewer != "workbench":
+    if "workbench" not in parameters.viewer:
         return lambda: None
     if importlib.util.find_spec("websockets") is None:
         raise InputError("viewer", is_missing("websockets", "workbench"))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Lessons: the bundled scenes, each with a title, a question to answer first, three sentences of what to try and what
-to see, and why.
+"""Lessons: the bundled scenes, each with a title, a question to answer first, steps to try, a sentence each, and why.
+Nothing before the reason gives the answer away.
 
 All of it stands in the comment at the head of the scene's file, in paragraphs: the licence, the title, the question
-with its choices A, B, C and the answer's letter, the three sentences, the reason, and how to run it. Pages and
+with its choices A, B, C and the answer's letter, the steps, the reason, and how to run it. Pages and
 documents take it from there.
 """
 
@@ -21,7 +21,7 @@ _QUESTION = re.compile(r"Question: (.+\?) A: (.+) B: (.+) C: (.+) Answer: ([ABC]
 @dataclass(frozen=True)
 class Lesson:
     """name: of the scene. question: what is asked first, with its choices; answer: the number of the right one.
-    sentences: what to try and what to see. reason: why, in a paragraph. commands: how to run it. script: name of the
+    sentences: the steps to try. reason: why, in a paragraph. commands: how to run it. script: name of the
     bundled example that goes with it, or empty. duration_s: of the first command.
     """
 

@@ -57,17 +57,31 @@ def test_what_a_hand_sets_and_does_is_told_to_all_and_refusals_to_it_alone() -> 
         other.until(lambda: other.told["scene"]["values"]["mass"] == 0.25, "other's mass")
         assert other.told["scene"]["values"]["ballast.nut"] == [0.1, 0.0, 0.0, 0.0]
         done = other.until(lambda: [e for told in other.all for e in told.get("done", []) if "impulse" in e], "impulse")
-        assert done[0]["at"] == {"point": [0.0, 0.0, 0.0]} and done[0]["impulse"] == [0.0, 0.0, 0.01] and done[0]["t"] > 0
+        assert (
+            done[0]["at"] == {"point": [0.0, 0.0, 0.0]} and done[0]["impulse"] == [0.0, 0.0, 0.01] and done[0]["t"] > 0
+        )
         assert not any("refusal" in told for told in other.all)
         # What others than pages do is seen, too.
         flown.live.set_parameters({"gravity": [0.0, 0.0, -1.62]})
         flown.live.pause(True)
-        hand.until(lambda: hand.told["scene"]["values"]["gravity"] == [0.0, 0.0, -1.62] and hand.told["time"]["paused"], "gravity")
+        hand.until(
+            lambda: hand.told["scene"]["values"]["gravity"] == [0.0, 0.0, -1.62] and hand.told["time"]["paused"],
+            "gravity",
+        )
 
 
 def test_another_body_begins_with_its_scene_and_a_ghost_flies_beside() -> None:
     with beside() as flown, Page(flown.page.address) as page:
-        assert page.do(begin={"mesh": "hammer", "ghost.inertia_model": "bounding_box", "initial.angular_velocity": [0.1, 5.0, 0.1]}) is None
+        assert (
+            page.do(
+                begin={
+                    "mesh": "hammer",
+                    "ghost.inertia_model": "bounding_box",
+                    "initial.angular_velocity": [0.1, 5.0, 0.1],
+                }
+            )
+            is None
+        )
         page.until(lambda: page.told.get("scene", {}).get("values", {}).get("mesh") == "hammer", "hammer")
         assert page.do(time="reset") is None
         page.until(lambda: page.picture and np.frombuffer(page.picture, np.uint32, 4)[2] == 1, "ghost")
@@ -132,7 +146,9 @@ def test_the_page_ends_with_its_process_and_the_body_flies_on_released() -> None
 def test_the_pages_process_ends_when_the_nodes_is_killed(how: signal.Signals) -> None:
     code = "from live_rig import Beside; import time; b = Beside({'mesh': 't_handle'}); print(b.child.pid, flush=True); time.sleep(100)"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(TEST.parent), str(TEST), str(TEST / "page")])}
-    node = subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    node = subprocess.Popen(
+        [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
     child = psutil.Process(int(node.stdout.readline()))
     assert child.is_running()
     node.send_signal(how)
@@ -157,7 +173,13 @@ def random_take(page: Page, chance: random.Random, seconds: float) -> int:
             page.do(entry={"string": "release"})
             continue
         command = (
-            {"entry": {"at": {"point": vector(0.02)}, "impulse": vector(0.01), "axes": chance.choice(["world", "body"])}},
+            {
+                "entry": {
+                    "at": {"point": vector(0.02)},
+                    "impulse": vector(0.01),
+                    "axes": chance.choice(["world", "body"]),
+                }
+            },
             {"entry": {"at": "com", "force": vector(0.1), "torque": vector(0.001)}},
             {"entry": {"set": {"mass": chance.uniform(0.05, 0.5)}}},
             {"entry": {"set": {"scale": [chance.uniform(0.5, 2.0) for _ in range(3)]}}},

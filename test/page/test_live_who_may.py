@@ -72,10 +72,19 @@ def test_the_page_comes_with_headers_that_forbid_frames_and_other_sites(flown: B
     ],
 )
 @pytest.mark.parametrize("upgrade", [False, True])
-def test_whoever_rebinds_a_name_comes_from_another_site_or_lacks_the_token_is_refused(flown, path, lines, upgrade) -> None:
+def test_whoever_rebinds_a_name_comes_from_another_site_or_lacks_the_token_is_refused(
+    flown, path, lines, upgrade
+) -> None:
     names = {"path": flown.path, "port": flown.port, "page": flown.path.replace("live", "page")}
-    extra = ["Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA=="]
-    status, _, body = asked(flown.port, path.format(**names), *(line.format(**names) for line in lines), *(extra if upgrade else []))
+    extra = [
+        "Upgrade: websocket",
+        "Connection: Upgrade",
+        "Sec-WebSocket-Version: 13",
+        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
+    ]
+    status, _, body = asked(
+        flown.port, path.format(**names), *(line.format(**names) for line in lines), *(extra if upgrade else [])
+    )
     assert status in (0, 400, 403) and b"<!doctype" not in body
 
 
@@ -197,13 +206,19 @@ def test_a_string_is_released_when_its_hand_goes_or_loses_it(flown: Beside) -> N
 
 def messages(chance: random.Random):
     """What no page sends."""
+
     def value(depth=0):
         kind = chance.randrange(9)
         if kind < 5 or depth > 3:
-            return chance.choice([None, True, -1, 1e308, 1 << 70, "", "x" * chance.randrange(200), "\x1b[31m\x07", "\u202e", [], {}])
+            return chance.choice(
+                [None, True, -1, 1e308, 1 << 70, "", "x" * chance.randrange(200), "\x1b[31m\x07", "\u202e", [], {}]
+            )
         if kind < 7:
             return [value(depth + 1) for _ in range(chance.randrange(4))]
-        return {chance.choice(["id", "entry", "time", "begin", "hand", "looking", "set", "at", "\x00"]): value(depth + 1) for _ in range(chance.randrange(4))}
+        return {
+            chance.choice(["id", "entry", "time", "begin", "hand", "looking", "set", "at", "\x00"]): value(depth + 1)
+            for _ in range(chance.randrange(4))
+        }
 
     kind = chance.randrange(8)
     if kind == 0:
@@ -219,7 +234,9 @@ def messages(chance: random.Random):
     if kind == 5:
         return '{"id": 1, "entry": {"force": [NaN, Infinity, 1]}}'
     if kind == 6:
-        return json.dumps({"id": 1, "entry": {chance.choice(["wrench", "string", "set", "state", "service", "at", "force"]): value()}})
+        return json.dumps(
+            {"id": 1, "entry": {chance.choice(["wrench", "string", "set", "state", "service", "at", "force"]): value()}}
+        )
     return json.dumps(value())
 
 
@@ -261,7 +278,13 @@ def test_ten_thousand_malformed_messages(flown: Beside, capfd) -> None:
 def plain_socket(flown: Beside) -> socket.socket:
     """A WebSocket by hand."""
     plain = socket.create_connection(("127.0.0.1", flown.port), 10.0)
-    lines = [f"GET {flown.path} HTTP/1.1", host(flown), "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13"]
+    lines = [
+        f"GET {flown.path} HTTP/1.1",
+        host(flown),
+        "Upgrade: websocket",
+        "Connection: Upgrade",
+        "Sec-WebSocket-Version: 13",
+    ]
     plain.sendall("\r\n".join([*lines, "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==", "", ""]).encode())
     assert b"101" in plain.recv(100)
     return plain

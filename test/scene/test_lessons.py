@@ -188,3 +188,19 @@ def test_l_bracket_wobbles_at_once_and_without_the_gyroscopic_term_not_at_all() 
     calm = fly("l_bracket", 10.0, gyroscopic=False)
     assert degrees_between(calm.spin, Z).max() < 1e-3
     assert degrees_between(calm.momentum, calm.momentum[0]).max() > 5.0
+
+
+def test_numbers_of_a_tensor_a_spin_about_z_gives_l_a_part_along_x_and_one_about_a_principal_axis_none() -> None:
+    flight = fly("numbers_of_a_tensor", 2.0)
+    inertia = flight.body.inertia
+    assert np.allclose(flight.momentum[0], inertia[:, 2] * 4.0)
+    assert inertia[0, 2] / inertia[2, 2] == pytest.approx(0.266, abs=1e-3)
+    assert degrees_between(flight.spin, Z).max() > 5.0
+    moments, axes = np.linalg.eigh(inertia)
+    assert np.abs(axes.T @ inertia @ axes - np.diag(moments)).max() < 1e-17
+    steady = fly("numbers_of_a_tensor", 2.0, initial__angular_velocity=(4.0 * axes[:, 2]).tolist())
+    assert degrees_between(steady.momentum, steady.spin[0]).max() < 1e-3
+    assert degrees_between(steady.spin, steady.spin[0]).max() < 1e-3
+    about_y = fly("numbers_of_a_tensor", 2.0, initial__angular_velocity=[0.0, 4.0, 0.0])
+    assert math.degrees(math.acos(abs(axes[1, 2]))) == pytest.approx(2.4, abs=0.05)
+    assert degrees_between(about_y.spin, [0.0, 1.0, 0.0]).max() < 10.0

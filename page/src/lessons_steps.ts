@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: MIT
+//
+// The lessons' steps, by the name of the scene, as many as the head of the scene has sentences: what each is about, and the
+// buttons that do it or lead to where it is done. A condition is a function of what was seen and done (lessons_seen.ts):
+// a place, a value, or an outcome, and never the press of a button.
+
+import type { Account, Act, Course, Seen, Step } from "./lessons.ts";
+import {
+  alike, axis, between, earlier, flips, free, isAt, isVector, lasted, latest, minus, momentum, newPokes, omega, onlyPoke, pokes, precessed, present, since, size,
+  speedGiven, spinGiven, startSpin, steady, strayed, tilted, turns, untouched,
+} from "./lessons_seen.ts";
+import type { Values, Vec3 } from "./source.ts";
+
+// Buttons
+
+type Says = Act["text"];
+const poke = (at: string, along: Vec3): Act => ({ kind: "poke", at, along, text: (w) => w.poke(w.places[at] ?? at) });
+const afresh = (at: string, along: Vec3): Act => ({ kind: "poke", at, along, fresh: true, text: (w) => w.again(w.places[at] ?? at) });
+const start = (text: Says, values: (scene: Values) => Values): Act => ({ kind: "start", values, text });
+const set = (text: Says, values: Values): Act => ({ kind: "set", values: () => values, text });
+const again: Act = { kind: "again", text: (w) => w.restart };
+const pull: Act = { kind: "pull", text: (w) => w.pull };
+const press: Act = { kind: "press", text: (w) => w.press };
+const spun = (factor: number): ((scene: Values) => Values) => (scene) => ({ "initial.angular_velocity": startSpin(scene).map((w) => w * factor) });
+
+// What steps are about
+
+const watch = (done: Step["done"]): Step => ({ done, acts: [again] });
+const unturned = (trial: { readonly start: Values }, scene: Values): boolean => isVector(startSpin(trial.start), startSpin(scene));
+
+/** The whole present trial from its start on, none of it if somebody touched the body. */
+function whole(account: Account): readonly Seen[] {
+  const { script, seen } = present(account);
+  return seen[0]?.now.timeNs === 0 && script.every((entry) => "set" in entry) ? seen : [];
+}
+
+/** A throw about an axis of the mesh, at the lesson's speed. */
+function thrown(account: Account, k: number): readonly Seen[] {
+  const spin = startSpin(present(account).start), all = size(startSpin(account.scene));
+  return Math.abs(spin[k]!) > 0.99 * size(spin) && alike(size(spin), all, 0.2) ? whole(account) : [];
+}
+
+const throwAbout = (k: 0 | 1 | 2, slow: number): Act => start((w) => w.throwAbout("xyz"[k]!), (scene) => {
+  const all = Math.max(...startSpin(scene).map(Math.abs));
+  return { "initial.angular_velocity": [0, 1, 2].map((i) => (i === k ? all : slow)) };
+});
+
+/** A book or racket: unstable about one axis of the mesh, steady about the others, and about none without the term. */
+const throws = (unsteady: 0 | 1 | 2, others: readonly [0 | 1 | 2, 0 | 1 | 2], slow: number): Course => ({
+  plots: ["omega"],
+  steps: [
+    { done: (a) => flips(free(a), unsteady) > 0, acts: [again] },
+    ...others.map((k): Step => ({ done: (a) => { const seen = thrown(a, k); return lasted(seen) > 2.5 && steady(seen, k) && hasTerm(seen); }, acts: [throwAbout(k, slow)] })),
+    {
+      done: (a) => { const seen = thrown(a, unsteady); return lasted(seen) > 2.5 && seen.every(({ values }) => values["gyroscopic"] === false) && flips(seen, unsteady) === 0; },
+      acts: [start((w) => w.withoutTerm, (scene) => ({ gyroscopic: false, "initial.angular_velocity": startSpin(scene) }))],
+    },
+  ],
+});
+
+const hasTerm = (seen: readonly Seen[]): boolean => seen.every(({ values }) => values["gyroscopic"] !== false);
+const model = ({ values }: Seen): string => String(values["inertia_model"]);
+
+/** [kg] of ballast near a contact. */
+function ballastAt(seen: Seen, place: string): number {
+  const { info: { contacts, scale, length } } = seen, contact = contacts[place]!;
+  return Object.entries(seen.values).reduce((mass, [name, value]) => {
+    if (!name.startsWith("ballast.") || !Array.isArray(value)) return mass;
+    const [kg, ...point] = value as number[], away = size(point.map((p, i) => (p - contact[i]!) * scale[i]!)) / (2 * length);
+    return mass + (away < 0.12 ? kg! : 0);
+  }, 0);
+}
+
+const ballast = (seen: Seen): number => Object.entries(seen.values).reduce((mass, [name, value]) => mass + (name.startsWith("ballast.") && Array.isArray(value) ? (value as number[])[0]! : 0), 0);
+
+/** The same push as before, at this place, from rest, gives the same speed. */
+const push = (place: string, along: Vec3, before: string | null): Step => ({
+  done: (a) => {
+    const poked = onlyPoke(a, place), other = before ? earlier(a, before) : null;
+    if (!poked || size(omega(poked.before)) > 1e-6) return false;
+    if (place === "com" && spinGiven(poked) * poked.before.info.length > 0.5 * speedGiven(poked)) return false;
+    return !before || (other !== null && alike(poked.strength, other.strength) && alike(speedGiven(poked), speedGiven(other)));
+  },
+  acts: [before ? afresh(place, along) : poke(place, along)],
+});
+
+export const COURSES: Readonly<Record<string, Course>> = {
+  ballast_stops_flip: {
+    marks: ["tip"], plots: ["omega"],
+    steps: [
+      watch((a) => free(a).every((seen) => ballast(seen) === 0) && flips(free(a), 2) > 0),
+      {
+        done: (a) => { const seen = latest(untouched(present(a), since(a)), (each) => alike(ballastAt(each, "tip"), 0.03)); return lasted(seen) > 5 && flips(seen, 2) === 0 && steady(seen, 2); },
+        acts: [start((w) => w.stick, () => ({ "ballast.tip": [0.03, 0, 0, 0.07] })), { kind: "card", card: "body", mark: "ballast", text: (w) => w.ballast }],
+      },
+      {
+        done: (a) => flips(latest(untouched(present(a), since(a)), (each) => ballast(each) === 0), 2) > 0,
+        acts: [set((w) => w.unstick, { "ballast.tip": [0, 0, 0, 0.07] })],
+      },
+    ],
+  },
+  book: throws(0, [1, 2], 0.05),
+  com_or_rim: {
+    marks: ["com", "rim", "grip"], plots: ["energy"],
+    steps: [push("com", [0, 0, -1], null), push("rim", [0, 0, -1], "com"), push("grip", [0, 0, -1], "com")],
+  },
+  dropped_term: {
+    plots: ["momentum"],
+    steps: [
+      watch((a) => { const seen = free(a); return seen.every((each) => !hasTerm([each])) && strayed(seen, momentum) > 10; }),
+      {
+        done: (a) => { const seen = latest(untouched(present(a), since(a)), (each) => hasTerm([each])); return lasted(seen) > 1.5 && strayed(seen, momentum) < 1 && strayed(seen, omega) > 5; },
+        acts: [set((w) => w.termOn, { gyroscopic: true }), { kind: "card", card: "world", mark: "gyroscopic", text: (w) => w.card }],
+      },
+      {
+        done: (a) => { const seen = latest(untouched(present(a), since(a)), (each) => !hasTerm([each])); return lasted(seen) > 0.5 && strayed(seen, momentum) > 5 && strayed(seen, omega) < 2; },
+        acts: [set((w) => w.termOff, { gyroscopic: false })],
+      },
+    ],
+  },
+  hammer: {
+    marks: ["head", "grip"], plots: ["omega"], hidesCentre: "question",
+    steps: [
+      watch((a) => free(a).every((each) => model(each) === "solid") && turns(free(a)) > 1),
+      {
+        done: (a) => turns(latest(untouched(present(a), since(a)), (each) => model(each) === "bounding_box")) > 1,
+        acts: [set((w) => w.box, { inertia_model: "bounding_box" })],
+      },
+      {
+        done: (a) => {
+          const found = [...a.trials.slice(a.trial, -1).flatMap((trial) => pokes(trial)), ...newPokes(a)].filter(({ before }) => model(before) === "solid");
+          const head = found.filter(isAt("head")), grip = found.filter(isAt("grip"));
+          return head.some((one) => grip.some((two) => alike(one.strength, two.strength) && alike(speedGiven(one), speedGiven(two)) && spinGiven(two) > 2 * spinGiven(one)));
+        },
+        acts: [set((w) => w.truth, { inertia_model: "solid" }), poke("head", [1, 0, 0]), poke("grip", [1, 0, 0])],
+      },
+    ],
+  },
+  hollow_box: {
+    marks: ["corner"], plots: ["energy"],
+    steps: [
+      { done: (a) => { const poked = onlyPoke(a, "corner"); return poked !== null && model(poked.before) === "solid" && spinGiven(poked) > 0; }, acts: [poke("corner", [0, -1, 0])] },
+      ...([["bounding_box", true, (w) => w.box], ["points", false, (w) => w.corners]] as const satisfies readonly (readonly [string, boolean, Says])[]).map(([other, isFaster, says]): Step => ({
+        done: (a) => {
+          const poked = onlyPoke(a, "corner"), before = earlier(a, "corner"), solid = a.trials.slice(0, -1).flatMap((trial) => pokes(trial)).filter(isAt("corner")).find((each) => model(each.before) === "solid");
+          return poked !== null && before !== null && solid !== undefined && model(poked.before) === other && alike(poked.strength, solid.strength)
+            && (isFaster ? spinGiven(poked) > 1.1 * spinGiven(solid) : spinGiven(poked) < 0.95 * spinGiven(solid));
+        },
+        acts: [start(says, () => ({ inertia_model: other })), poke("corner", [0, -1, 0])],
+      })),
+    ],
+  },
+  l_bracket: {
+    plots: ["omega"], hidesCentre: "question",
+    steps: [
+      watch((a) => hasTerm(free(a)) && free(a).some((seen) => between(omega(seen), [0, 0, 1]) > 5)),
+      { done: (a) => a.sight.principal && lasted(since(a)) > 0.5, acts: [{ kind: "principal", text: (w) => w.principal }, { kind: "card", card: "tensor", mark: "principal", text: (w) => w.card }] },
+      {
+        done: (a) => { const seen = whole(a); return present(a).start["gyroscopic"] === false && !seen.some((each) => hasTerm([each])) && strayed(seen, omega) < 1 && strayed(seen, momentum) > 4; },
+        acts: [start((w) => w.withoutTerm, () => ({ gyroscopic: false }))],
+      },
+    ],
+  },
+  numbers_of_a_tensor: {
+    plots: ["momentum"], hidesCentre: "question",
+    steps: [
+      watch((a) => free(a).length > 0 && lasted(free(a)) > 0.5 && unturned(present(a), a.scene) && free(a).some((seen) => between(omega(seen), momentum(seen)) > 5)),
+      {
+        done: ({ sight: { turned }, trials }) => turned !== null && strayedAxes(turned) > 5 && product(turned, trials[trials.length - 1]!.seen.at(-1)?.info.inertia) < 0.02,
+        acts: [{ kind: "card", card: "tensor", mark: "turn", text: (w) => w.turn }],
+      },
+      {
+        done: (a) => {
+          const seen = whole(a), first = seen[0];
+          if (!first || lasted(seen) < 2) return false;
+          const angle = between(omega(first), principalAxis(first, 2));
+          return Math.min(angle, 180 - angle) < 3 && seen.every((each) => between(omega(each), momentum(each)) < 3);
+        },
+        acts: [{ kind: "start", values: (scene, { axes }) => ({ "initial.angular_velocity": [axes[2]!, axes[5]!, axes[8]!].map((x) => x * size(startSpin(scene))) }), text: (w) => w.aboutThird }],
+      },
+    ],
+  },
+  plumb_line: {
+    plots: ["energy"], hidesCentre: "end",
+    steps: [
+      { done: ({ lines }) => lines.length > 0, acts: [{ kind: "chalk", text: (w) => w.chalk }] },
+      {
+        done: ({ lines }) => lines.some((one, k) => lines.slice(0, k).some((other) => { const angle = between(one.along, other.along); return angle > 15 && angle < 165; })),
+        acts: [{ kind: "tie", text: (w) => w.tie }, { kind: "chalk", text: (w) => w.chalk }],
+      },
+      { done: (a) => newPokes(a).some(({ lever, fromCentre }) => lever < 0.08 && fromCentre < 0.12), acts: [press] },
+    ],
+  },
+  spinning_top: {
+    marks: ["stem"], plots: ["omega"],
+    steps: [
+      { done: (a) => unturned(present(a), a.scene) && isTilt(onlyPoke(a, "stem"), 0.5, 45), acts: [poke("stem", [1, 0, 0])] },
+      {
+        done: (a) => {
+          const poked = onlyPoke(a, "stem"), before = earlier(a, "stem");
+          return isVector(startSpin(present(a).start), startSpin(a.scene).map((w) => 2 * w)) && poked !== null && before !== null && alike(poked.strength, before.strength) && isTilt(poked, 0.25, 0.8 * tilted(before));
+        },
+        acts: [start((w) => w.twice, spun(2)), poke("stem", [1, 0, 0])],
+      },
+      {
+        done: (a) => size(startSpin(present(a).start)) < 0.01 * size(startSpin(a.scene)) && onlyPoke(a, "stem") !== null && strayed(present(a).seen, (seen) => axis(seen, 2)) > 60,
+        acts: [start((w) => w.noSpin, spun(0)), poke("stem", [1, 0, 0])],
+      },
+    ],
+  },
+  t_handle: {
+    marks: ["tip"], plots: ["omega"],
+    steps: [
+      watch((a) => flips(free(a), 2) > 1),
+      {
+        done: (a) => newPokes(a).some((poked) => isAt("tip")(poked) && tilted(poked) > 3 && present(a).seen.at(-1)!.now.timeNs - poked.after.now.timeNs > 1.5e9),
+        acts: [poke("tip", [1, 0, 0])],
+      },
+      {
+        done: (a) => {
+          const seen = since(a), last = seen[seen.length - 1], held = seen.filter(({ now: { body } }) => body.string !== null), let_go = held[held.length - 1];
+          const before = seen[seen.indexOf(held[0]!) - 1] ?? seen[0];
+          return let_go !== undefined && before !== undefined && last !== undefined && last.now.body.string === null
+            && size(minus(momentum(let_go), momentum(before))) > 0.1 * size(momentum(before)) && last.now.timeNs - let_go.now.timeNs > 1e9;
+        },
+        acts: [pull],
+      },
+    ],
+  },
+  teapot: {
+    marks: ["spout", "handle", "knob", "com"], plots: ["energy"],
+    steps: [push("spout", [0, 1, 0], null), push("handle", [0, 1, 0], "spout"), push("knob", [0, 1, 0], "spout"), push("com", [0, 1, 0], "spout")],
+  },
+  tennis_racket: throws(1, [0, 2], 0.03),
+  thrown_hammer: {
+    marks: ["grip"], plots: ["energy"], rate: 0.25, trace: "com", hidesCentre: "question",
+    steps: [
+      watch((a) => back(a) && unturned(present(a), a.scene)),
+      {
+        done: (a) => {
+          const { trace } = a.sight, last = present(a).seen.at(-1);
+          if (trace === null || trace === "com" || !last) return false;
+          const { contacts, scale, length } = last.info;
+          return size(trace.map((p, i) => (p - contacts["grip"]![i]!) * scale[i]!)) < 0.12 * 2 * length && lasted(since(a)) > 0.3;
+        },
+        acts: [{ kind: "trace", at: "grip", text: (w) => w.trace }, { kind: "card", card: "measure", mark: "trace", text: (w) => w.card }],
+      },
+      { done: (a) => back(a) && size(minus(startSpin(present(a).start), startSpin(a.scene))) > 0.1 * size(startSpin(a.scene)), acts: [start((w) => w.twice, spun(2))] },
+      {
+        done: (a) => { const seen = latest(since(a), ({ values }) => size(values["gravity"] as readonly number[]) === 0); return lasted(seen) > 0.2 && seen[0]!.now.timeNs > 0 && untouched(present(a), seen).length === seen.length; },
+        acts: [set((w) => w.weightless, { gravity: [0, 0, 0] })],
+      },
+    ],
+  },
+  top_on_string: {
+    plots: ["momentum"],
+    steps: [
+      watch((a) => unturned(present(a), a.scene) && precessed(free(a), 2) > 90),
+      {
+        done: (a) => {
+          const seen = whole(a);
+          return isVector(startSpin(present(a).start), startSpin(a.scene).map((w) => 0.5 * w)) && lasted(seen) > 1 && precessed(seen, 2) / lasted(seen) > 150 && isLevel(seen);
+        },
+        acts: [start((w) => w.half, spun(0.5))],
+      },
+      { done: (a) => size(startSpin(present(a).start)) < 0.01 * size(startSpin(a.scene)) && !isLevel(whole(a)), acts: [start((w) => w.noSpin, spun(0))] },
+    ],
+  },
+  true_or_box_tensor: {
+    plots: ["angle"],
+    steps: [
+      watch((a) => free(a).every((each) => model(each) === "solid") && free(a).some(({ now }) => now.angleToGhost > 1)),
+      {
+        done: (a) => { const seen = whole(a); return lasted(seen) > 2 && seen.every((each) => model(each) === "bounding_box" && each.now.angleToGhost < 0.01); },
+        acts: [start((w) => w.box, () => ({ inertia_model: "bounding_box" }))],
+      },
+      { done: (a) => a.sight.cards.includes("body"), acts: [{ kind: "card", card: "body", mark: "moments", text: (w) => w.moments }] },
+    ],
+  },
+  weigh_by_throwing: {
+    marks: ["corner"], plots: ["omega"],
+    steps: [
+      {
+        done: (a) => { const seen = whole(a); return lasted(seen) > 2 && seen.every((each) => alike(each.info.massKg, 10 * firstMass(a))); },
+        acts: [start((w) => w.tenfold, (scene) => ({ density: 10 * Number(scene["density"]) }))],
+      },
+      { done: (a) => newPokes(a).some((poked) => isAt("corner")(poked) && alike(poked.before.info.massKg, 10 * firstMass(a))), acts: [poke("corner", [-1, 0, 0])] },
+      {
+        done: (a) => {
+          const poked = onlyPoke(a, "corner"), heavy = earlier(a, "corner");
+          return poked !== null && heavy !== null && alike(poked.before.info.massKg, firstMass(a)) && alike(poked.strength, heavy.strength) && alike(speedGiven(poked), 10 * speedGiven(heavy), 0.1);
+        },
+        acts: [start((w) => w.tenth, (scene) => ({ density: Number(scene["density"]) })), poke("corner", [-1, 0, 0])],
+      },
+    ],
+  },
+};
+
+const isTilt = (poked: ReturnType<typeof onlyPoke>, least: number, most: number): boolean => poked !== null && tilted(poked) > least && tilted(poked) < most;
+const firstMass = (account: Account): number => Number(account.scene["density"]) * (account.trials[0]?.seen[0]?.info.volume ?? NaN);
+const isLevel = (seen: readonly Seen[]): boolean => seen.every((each) => Math.abs(90 - between(axis(each, 2), [0, 0, 1])) < 45);
+
+/** Whether the body is back at the height of its throw, untouched. */
+function back(account: Account): boolean {
+  const seen = whole(account), first = seen[0], last = seen[seen.length - 1];
+  return first !== undefined && last !== undefined && seen.some(({ now }) => now.body.row[2]! > first.now.body.row[2]! + 0.5)
+    && last.now.body.row[2]! <= first.now.body.row[2]! && seen.every(({ values }) => size(values["gravity"] as readonly number[]) > 0);
+}
+
+function principalAxis({ info: { axes }, now: { body: { rotation: R } } }: Seen, k: number): Vec3 {
+  return [0, 1, 2].map((i) => R[3 * i]! * axes[k]! + R[3 * i + 1]! * axes[3 + k]! + R[3 * i + 2]! * axes[6 + k]!) as unknown as Vec3;
+}
+
+/** [degrees] by which axes (columns) are turned from those of the mesh. */
+function strayedAxes(turned: readonly number[]): number {
+  return (Math.acos(Math.max(-1, Math.min(1, 0.5 * (turned[0]! + turned[4]! + turned[8]! - 1)))) * 180) / Math.PI;
+}
+
+/** The largest product of a tensor in these axes (columns), in parts of the largest moment. */
+function product(axes: readonly number[], inertia: readonly number[] | undefined): number {
+  if (!inertia) return Infinity;
+  const column = (k: number): Vec3 => [axes[k]!, axes[3 + k]!, axes[6 + k]!];
+  const element = (i: number, j: number): number => { const u = column(i), v = column(j); return u.reduce((sum, x, r) => sum + x * (inertia[3 * r]! * v[0] + inertia[3 * r + 1]! * v[1] + inertia[3 * r + 2]! * v[2]), 0); };
+  return Math.max(Math.abs(element(0, 1)), Math.abs(element(0, 2)), Math.abs(element(1, 2))) / Math.max(element(0, 0), element(1, 1), element(2, 2));
+}
