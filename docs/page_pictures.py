@@ -37,6 +37,8 @@ def main() -> None:
         with beside(scene_values(scene_file("t_handle"))) as flown:
             page = Opened(browser, SIZE, address=flown.page.address, bypass_csp=True)
             page.drawn(20)
+            flown.live.pause(True)  # what is aimed at stays there
+            page.drawn(4)
             place = page.on_body(40)
             page.page.mouse.move(place["x"], place["y"])
             page.page.mouse.down()

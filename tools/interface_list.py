@@ -103,8 +103,8 @@ def bundled_files() -> Iterator[str]:
 def page_words() -> Iterator[str]:
     """Names of the page's cards and of what stands in its first screen, as its English catalogue has them."""
     text = (Path(__file__).resolve().parent.parent / "page" / "src" / "words.ts").read_text("utf-8")
-    for group in ("cards", "hand", "tensor", "live"):
-        found = re.search(rf"^  {group}: {{(.*?)^?  }},?$", text, re.MULTILINE | re.DOTALL)
+    for group in ("cards", "hand", "tensor"):
+        found = re.search(rf"^  {group}: {{(.*?)}},\n(?=  \w+: )", text, re.MULTILINE | re.DOTALL)
         assert found, group
         yield from (f"page {group} {name}" for name in re.findall(r'\b\w+: "([^"]+)"', found[1]))
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -22,6 +23,8 @@ from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.simulation.flight import FLIGHT, LOAD_ROW
 
 PATIENCE_S = 30.0
+
+logging.getLogger("websockets.client").setLevel(logging.CRITICAL)  # which tells of sockets that tests cut off
 
 
 def until(condition: Callable[[], Any], what: str, patience_s: float = PATIENCE_S) -> Any:
