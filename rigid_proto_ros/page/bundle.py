@@ -27,7 +27,7 @@ from .data import page_data
 try:
     import fcntl
 except ImportError:  # not POSIX: two processes that build at once both do, and the last one's file stays
-    fcntl = None  # type: ignore[assignment]
+    fcntl = None  # type: ignore[assignment]  # it is asked for before use
 
 SOURCE = PACKAGE_FOLDER.parent / "page"
 CARRIED = Path(__file__).with_name("lib") / "page.html"
