@@ -62,7 +62,7 @@ export type Act = { readonly text: (words: Words["lesson"]) => string } & (
   | { readonly kind: "start" | "set"; readonly values: (scene: Values, info: BodyInfo) => Values }
   | { readonly kind: "card"; readonly card: "body" | "tensor" | "world" | "measure" | "ghost"; readonly mark: string }
   | { readonly kind: "trace"; readonly at: string }
-  | { readonly kind: "again" | "pull" | "press" | "tie" | "chalk" | "apart" | "principal" }
+  | { readonly kind: "again" | "pull" | "press" | "tie" | "chalk" | "principal" }
 );
 
 export interface Step {

@@ -77,6 +77,7 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
     let refusal: string | null;
     try { refusal = await how(); } catch (error) { refusal = error instanceof Error ? error.message : String(error); }
     if (!told(refusal)) return;
+    lessons.opened();
     track.seen.length = 0;
     look.kept = null;
     look.chalk = [];

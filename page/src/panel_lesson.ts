@@ -30,6 +30,7 @@ export class LessonPanel {
   private drawn: Plots | null = null;
   private lookedMs = 0;
   private isClass = false;
+  private isOpening = false;
 
   constructor(desk: Desk, panel: Panel, texts: Readonly<Record<string, LessonTexts>>) {
     this.desk = desk;
@@ -51,7 +52,9 @@ export class LessonPanel {
     if (!texts || !course) return words.lesson.unknown(name);
     this.leave();
     let refusal: string | null = null;
+    this.isOpening = true;
     await desk.open(() => (refusal = motion.openScene(name)));
+    this.isOpening = false;
     if (refusal) return refusal;
     this.lesson = new Lesson(name, texts, course, motion);
     clock.setRate(course.rate ?? 1);
@@ -78,6 +81,13 @@ export class LessonPanel {
     this.panel.hold(null);
     this.setClass(false);
     document.title = words.title;
+  }
+
+  /** Another take was opened: a lesson is about the scene that it began with. */
+  opened(): void {
+    if (this.isOpening || !this.lesson) return;
+    this.leave();
+    history.replaceState(null, "", hashOf({ language: addressOf(location.hash).language }));
   }
 
   /** The motion begins anew. */
@@ -181,7 +191,6 @@ export class LessonPanel {
     else if (act.kind === "pull") stage(w.pullHow);
     else if (act.kind === "press") stage(w.pressHow);
     else if (act.kind === "trace") look.trace = motion.body().contacts[act.at] ?? null;
-    else if (act.kind === "apart") { look.apart = true; desk.picture.setApart(true); }
     else if (act.kind === "principal") look.principal = true;
     else if (act.kind === "tie") {
       stage(w.tieHow);

@@ -83,7 +83,6 @@ export class Player {
     else if (act.kind === "start") this.start(act.values(scene, this.motion.body()));
     else if (act.kind === "again") this.restart();
     else if (act.kind === "trace") this.sight.trace = this.motion.body().contacts[act.at] ?? null;
-    else if (act.kind === "apart") this.sight.apart = true;
     else if (act.kind === "principal") this.sight.principal = true;
     else if (act.kind === "card") this.sight.cards = [act.card];
     else if (act.kind === "chalk") this.chalk();

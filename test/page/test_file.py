@@ -16,6 +16,7 @@ import pytest
 from page_tools import kernels, packages
 
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.page import bundle
 from rigid_proto_ros.page.file import take_of, values_of_mesh, write_page
 
@@ -119,3 +120,15 @@ def test_a_take_for_a_file_holds_what_differs_from_the_defaults() -> None:
     }
     tied = take_of({"mesh": "book", "string.attached": True})
     assert tied["values"] == {"mesh": "book", "string.attached": True}
+
+
+@pytest.mark.slow
+def test_a_lesson_as_a_file_begins_with_it_and_an_unknown_one_is_refused(page: str, tmp_path: Path) -> None:
+    file = tmp_path / "lesson.html"
+    assert main(["lesson", "t_handle", "--html", str(file)]) == 0
+    text = file.read_text("utf-8")
+    assert '<meta name="begin" content="lesson=t_handle">' in text and part(text, "take") == b""
+    assert len(text) == len(page) + len("lesson=t_handle")
+    assert main(["lesson", "t_hndle", "--html", str(file)]) != 0
+    assert main(["lesson", "t_handle", "--html", str(tmp_path / "lesson.txt")]) != 0
+    assert not (tmp_path / "lesson.txt").exists()
