@@ -9,11 +9,13 @@ A page is a process of its own that reads what a browser would be sent. ``--minu
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import random
 import statistics
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -64,6 +66,27 @@ def opened(address: str, watchers: int = 0) -> Iterator[None]:
     finally:
         page.kill()
         page.wait()
+
+
+@contextmanager
+def hand_without_page(flown: Beside) -> Iterator[None]:
+    """The same drag by a thread of this process: what it costs to be pulled, whoever pulls."""
+    stop = threading.Event()
+
+    def pull() -> None:
+        flown.live.schedule(json.dumps([{"t": 0, "string": {"attach": [0.0, 0.0, 0.0], "target": [0.0, 0.0, 0.1]}}]))
+        while not stop.wait(DRAG_S):
+            target = [random.uniform(-0.1, 0.1) for _ in range(3)]
+            flown.live.schedule(json.dumps([{"t": 0, "string": {"target": target}}]))
+        flown.live.schedule(json.dumps([{"t": 0, "string": "release"}]))
+
+    thread = threading.Thread(target=pull)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
 
 
 def load(flown: Beside) -> tuple[float, float]:
@@ -151,15 +174,19 @@ def main() -> None:
             rounds = []
             for _ in range(ROUNDS):
                 alone = load(flown)
+                with hand_without_page(flown):
+                    pulled = load(flown)
                 with opened(address):
                     driven = load(flown)
                 with opened(address, WATCHERS):
-                    rounds.append((alone, driven, load(flown)))
+                    rounds.append((alone, pulled, driven, load(flown)))
                 time.sleep(1.0)
             for k, what in enumerate(("overruns a second", "share of a core")):
-                without, driven, watched = (statistics.median(found[side][k] for found in rounds) for side in range(3))
-                tell(f"{what}, a page that drags", without, driven)
-                tell(f"{what}, {WATCHERS} pages that watch", without, watched)
+                alone_, pulled_, driven_, watched = (
+                    statistics.median(one[side][k] for one in rounds) for side in range(4)
+                )
+                tell(f"{what}, a page that drags, against the same drag without one", pulled_, driven_)
+                tell(f"{what}, {WATCHERS} pages that watch", alone_, watched)
             with Page(address) as page:
                 page.until(lambda: page.pictures, "picture")
                 found = drawn_string_ms(page)

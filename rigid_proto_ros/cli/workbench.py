@@ -48,10 +48,10 @@ def run(args: argparse.Namespace) -> int:
     if importlib.util.find_spec("websockets") is None:
         raise InputError("workbench", is_missing("websockets", "workbench"))
     from ..page.server import LOOPBACK, serve_page
-    from ..parameters.declarations import PARAMETERS
+    from ..parameters.declarations import Parameters
 
-    default = PARAMETERS["workbench_port"].default
-    own, others = serve_page(page_text(values).encode(), args.port, default, args.host or LOOPBACK)
+    page, default = page_text(values).encode(), Parameters().workbench_port
+    own, others = serve_page(page, args.port, default, args.host or LOOPBACK)
     print(f"The workbench is at {own}   (Ctrl-C ends it)", flush=True)
     if others:
         print(f"Others open {others}: each has a body of their own, and nothing of this machine", flush=True)

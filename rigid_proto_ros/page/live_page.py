@@ -241,7 +241,7 @@ class LivePage:
             mesh = None if body_mesh is None or is_bundled else mesh_numbers(body_mesh, _shown_name(scenario))
             if mesh is not None and len(mesh["vertices"]) + len(mesh["triangles"]) > MOST_MESH:
                 mesh = None
-                self._say(f"the page doesn't show a mesh of {len(body_mesh.surface.triangles)} triangles")
+                self._say(f"the page doesn't show a mesh of more than {MOST_MESH // 1_000_000} MB")
             self._tell("mesh", mesh)
         values = {name: value for name, value in scenario.parameters.named().items() if _is_shown(name)}
         values["mesh"] = _shown_name(scenario)

@@ -29,7 +29,7 @@ import time
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
@@ -63,7 +63,7 @@ PIECE = 64 * 1024
 """[bytes] Long texts are sent in such pieces, so that no page holds more than one of them here."""
 
 
-def read_frame(stream: BinaryIO) -> tuple[int, bytes] | None:
+def read_frame(stream: IO[bytes]) -> tuple[int, bytes] | None:
     """Kind and content of the next frame; None at the end."""
     head = stream.read(HEAD.size)
     if len(head) < HEAD.size:
@@ -73,7 +73,7 @@ def read_frame(stream: BinaryIO) -> tuple[int, bytes] | None:
     return (kind, content) if len(content) == length else None
 
 
-def write_frame(stream: BinaryIO, kind: int, content: bytes) -> None:
+def write_frame(stream: IO[bytes], kind: int, content: bytes) -> None:
     """Raises OSError where nobody reads any more."""
     stream.write(HEAD.pack(len(content), kind) + content)
     stream.flush()

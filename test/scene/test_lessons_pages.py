@@ -35,7 +35,9 @@ def test_every_scene_is_a_lesson_and_has_a_page_with_its_title_a_command_a_pictu
     assert all(20 < len(sentence) < 200 for sentence in one.sentences) and one.sentences[-1].endswith(".")
     assert len(one.reason) > 60
     answer = one.choices[one.answer].rstrip(".").lower()
-    assert not any(answer in text.lower() for text in (one.title, one.question, *one.sentences)), "the answer is given away"
+    assert not any(answer in text.lower() for text in (one.title, one.question, *one.sentences)), (
+        "the answer is given away"
+    )
     assert f"rigid_proto simulate config/{name}.yaml" in one.commands
     assert not one.script or one.script in example_names()
     text = (PAGES / f"{name}.md").read_text("utf-8")
