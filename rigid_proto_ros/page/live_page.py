@@ -32,7 +32,7 @@ from ..parameters.declarations import PARAMETERS, READ_ONLY, parameter_named
 from ..scene.command_codec import of_event
 from ..scene.scenario import Scenario, make_scenario
 from ..scene.script import entry_of
-from ..simulation.commands import MoveString, ReleaseString
+from ..simulation.commands import ReleaseString
 from ..simulation.observer import (
     BodyChanged,
     Event,
@@ -270,10 +270,12 @@ class LivePage:
 
     def _done(self, line: str) -> list[dict[str, Any]]:
         """What was done, as an entry of a script; moves of the string's end are in the pictures."""
+        if '"kind": "string_target"' in line[:80]:
+            return []
         event = json.loads(line)
         try:
             command = of_event(event["kind"], event["content"], self._live.frames)
-            if command is None or isinstance(command, MoveString):
+            if command is None:
                 return []
             return [{"t": event["time_ns"] / 1e9, **entry_of(command)}]
         except InputError:
