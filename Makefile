@@ -8,7 +8,6 @@ unexport MAKEFLAGS MFLAGS
 PY := .venv/bin/python
 # Each target installs what it needs and no more: `make run` has no use for what only tests import.
 FOR_RUN := .venv/.pins-run
-FOR_WORKBENCH := .venv/.pins-workbench
 READY := .venv/.pins-all
 # A ROS installation that .venv was made beside, and whose setup.bash wasn't sourced here.
 ROS := if [ -z "$$AMENT_PREFIX_PATH" ] && [ -f .venv/.ros ]; then source "$$(cat .venv/.ros)"; fi;
@@ -34,10 +33,13 @@ run: $(FOR_RUN) ## simulate a bundled body, or MESH=path/to.obj, for 10 s; leave
 	@$(ROS) .venv/bin/rigid_proto demo $(if $(MESH),--mesh "$(MESH)")
 
 # 130 is how the two below end after Ctrl-C: for them no error, of which make would report.
-up: $(FOR_RUN) ## node and viewer; stays until Ctrl-C
+# The page is built once; without Node, or offline, `up` goes on without it and says so.
+up: $(FOR_RUN) ## node with Rerun's view and its page; stays until Ctrl-C
+	@[ ! -x $(PY) ] || $(PY) requirements/wasm_tools.py linker node
 	@$(ROS) .venv/bin/rigid_proto up $(if $(MESH),--mesh "$(MESH)") || [ $$? = 130 ]
 
-workbench: $(FOR_WORKBENCH) ## body and interactive page, without ROS; stays until Ctrl-C
+workbench: $(FOR_RUN) ## the page, in which the body flies by itself; stays until Ctrl-C
+	@[ ! -x $(PY) ] || $(PY) requirements/wasm_tools.py linker node
 	@$(ROS) .venv/bin/rigid_proto workbench $(if $(MESH),--mesh "$(MESH)") || [ $$? = 130 ]
 
 # A wait that has run out says that the machine was busy or that a process wasn't discovered, and nothing about values: such a
@@ -59,7 +61,7 @@ lint: setup ## ruff and mypy
 pictures: setup run ## draw the pictures of README and lessons anew (needs mesa-vulkan-drivers and chromium)
 	.venv/bin/rigid_proto snapshot out/session.mcap --at 4.05 -o docs/flight.png
 	$(PY) docs/lessons/pictures.py
-	PYTHONPATH=test $(PY) docs/page_pictures.py docs
+	PYTHONPATH=test:test/page $(PY) docs/page_pictures.py docs
 	PYTHONPATH=test:test/page $(PY) tools/toy_picture.py docs/flight.webp
 
 site: setup ## site/: the page with a start page and one address a lesson, for any static host

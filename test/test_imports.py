@@ -24,7 +24,6 @@ ORDER = (
         "rerun_view",
         "export",
         "live",
-        "workbench",
         "page",
         "ros",
         "sweep",
@@ -36,10 +35,10 @@ ORDER = (
 )
 """Folders in the order of imports: each knows only those before it."""
 STRANGERS = {
-    "sweep": ("rerun_view", "live", "ros", "workbench"),
-    "identify": ("rerun_view", "live", "ros", "workbench", "sweep"),
+    "sweep": ("rerun_view", "live", "page", "ros"),
+    "identify": ("rerun_view", "live", "page", "ros", "sweep"),
     "robots": (
-        *("motion", "simulation", "scene", "session", "rerun_view", "live", "ros", "workbench", "sweep", "identify"),
+        *("motion", "simulation", "scene", "session", "rerun_view", "live", "page", "ros", "sweep", "identify"),
         "export",
     ),
 }
@@ -62,8 +61,7 @@ ALLOWED = {
     "pxr": ("export.usd",),
     "scipy": ("mesh.solids", "identify"),
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
-    "viser": ("workbench",),
-    "websockets": ("workbench",),  # comes with viser
+    "websockets": ("page.server", "page.watchers"),
     "mcap": ("session.bag", "session.mcap_observer"),
     "zstandard": ("session.bag",),  # comes with mcap
     "rosbags": ("identify.bag_reading",),

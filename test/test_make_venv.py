@@ -41,14 +41,14 @@ def installed_beside(script: ModuleType, monkeypatch: pytest.MonkeyPatch, system
     return [*calls, (script.VENV / "constraints.txt").read_text("utf-8").split("\n")]
 
 
-@pytest.mark.parametrize("stage", ["run", "workbench", "all"])
+@pytest.mark.parametrize("stage", ["run", "all"])
 def test_every_package_of_every_list_is_pinned(script: ModuleType, stage: str) -> None:
     pins = script.pins()
     for requirement in script.wanted(SOURCE / "requirements" / f"{stage}.in"):
         assert script.normalized(script.re.split("[<>=;]", requirement)[0]) in pins, requirement
 
 
-@pytest.mark.parametrize("stage", ["run", "workbench", "all"])
+@pytest.mark.parametrize("stage", ["run", "all"])
 def test_beside_ros_rclpy_and_numpy_stay_and_what_the_system_has_is_not_pinned(script, monkeypatch, stage) -> None:
     system = "numpy=2.3.5 PyYAML=6.0.2 rclpy=10.0.1 coverage=7.6.0"
     first, constraints = installed_beside(script, monkeypatch, system, stage)
@@ -146,7 +146,7 @@ def test_make_calls_no_error_how_up_and_workbench_end_after_ctrl_c(tmp_path, tar
     program.parent.mkdir(parents=True)
     program.write_text(f"#!/bin/sh\nexit {status}\n", "utf-8")
     program.chmod(0o755)
-    command = ["make", "-C", tmp_path, "--no-print-directory", target, "FOR_RUN=", "FOR_WORKBENCH="]
+    command = ["make", "-C", tmp_path, "--no-print-directory", target, "FOR_RUN="]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == made
     assert ("Error" in done.stderr) == bool(made), done.stderr

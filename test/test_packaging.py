@@ -22,6 +22,7 @@ from rigid_proto_ros.base import bundled
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.motion.surface import Surface
+from rigid_proto_ros.page.bundle import built_page
 
 SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
 EXECUTABLES = {"rigid_proto", "rigid_body_node", "poke_client"}
@@ -174,7 +175,7 @@ def test_all_but_ros_is_an_extra_and_every_extra_allows_what_is_pinned() -> None
                 if pin.marker is None or pin.marker.evaluate():
                     pins[pin.name.lower()] = next(iter(pin.specifier)).version
     needed = [r for r in requirements if r.marker is None or r.marker.evaluate({"extra": "all"})]
-    assert {"numba", "rerun-sdk", "mcap", "viser", "pyarrow"} <= {r.name for r in needed}
+    assert {"numba", "rerun-sdk", "mcap", "websockets", "pyarrow"} <= {r.name for r in needed}
     assert not [r.name for r in needed if r.name.startswith("ros-")], "a ROS installation keeps its own"
     for requirement in requirements:
         if any(requirement.marker is None or requirement.marker.evaluate({"extra": e}) for e in ("all", "ros", "test")):
@@ -250,6 +251,9 @@ def test_the_wheel_inspects_simulates_and_serves_the_page_in_an_empty_environmen
     """With what PyPI gives, for this Python. It carries the kernels: nothing is built, and no compiler comes with it."""
     monkeypatch.delenv("PYTHONPATH", raising=False)
     run(sys.executable, "-P", "-m", "rigid_proto_ros.kernels", "wheel", cwd=source_copy, PYTHONPATH=str(source_copy))
+    carried = source_copy / "rigid_proto_ros" / "page" / "lib" / "page.html"
+    carried.parent.mkdir()
+    shutil.copyfile(built_page(), carried)
     run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", tmp_path, ".", cwd=source_copy)
     (wheel,) = tmp_path.glob("*.whl")
     assert "-py3-none-manylinux_2_17_" in wheel.name

@@ -51,7 +51,7 @@ for command in sys.argv[1:]:
 
 def test_a_mesh_is_inspected_a_simulation_recorded_replayed_and_verified_and_the_page_served(tmp_path: Path) -> None:
     pytest.importorskip("mcap")
-    pytest.importorskip("viser")
+    pytest.importorskip("websockets")
     commands = (
         *("inspect hammer", "simulate t_handle --duration 0.5 --bag flight.mcap"),
         *("replay flight.mcap --verify --csv flight.csv", "workbench hammer --no-browser"),

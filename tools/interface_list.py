@@ -10,7 +10,6 @@ test/test_interface_list.py compares; a line that goes, or changes, is a promise
 from __future__ import annotations
 
 import contextlib
-import functools
 import io
 import json
 import re
@@ -101,40 +100,13 @@ def bundled_files() -> Iterator[str]:
             yield f"{kind} {name}"
 
 
-def page_controls() -> Iterator[str]:
-    """Controls of the page by their kind and label; those that exist on every page from its start."""
-    import viser
-
-    from rigid_proto_ros.live.live_simulation import LiveSimulation
-    from rigid_proto_ros.scene.scenario import read_scene
-    from rigid_proto_ros.workbench.main import Workbench
-
-    labels: set[str] = set()
-
-    def recording(method: Callable, kind: str) -> Callable:
-        @functools.wraps(method)
-        def recorded(self: object, label: object = "", *arguments: object, **keywords: object) -> object:
-            handle = method(self, label, *arguments, **keywords)
-            if isinstance(label, str) and label.strip() and "<" not in label and kind not in ("markdown", "html"):
-                labels.add(f"page {kind} {label}")
-            return handle
-
-        return recorded
-
-    undo: list[tuple[type, str, Callable]] = []
-    for owner in (viser.GuiApi, viser.GuiTabGroupHandle):
-        for name in [name for name in vars(owner) if name.startswith("add_")]:
-            method = getattr(owner, name)
-            undo.append((owner, name, method))
-            if name not in ("add_panel", "add_tab_group", "add_uplot"):
-                setattr(owner, name, recording(method, name.removeprefix("add_")))
-    try:
-        workbench = Workbench(LiveSimulation(read_scene("t_handle")))
-    finally:
-        for owner, name, method in undo:
-            setattr(owner, name, method)
-    workbench.close()
-    yield from labels
+def page_words() -> Iterator[str]:
+    """Names of the page's cards and of what stands in its first screen, as its English catalogue has them."""
+    text = (Path(__file__).resolve().parent.parent / "page" / "src" / "words.ts").read_text("utf-8")
+    for group in ("cards", "hand", "tensor"):
+        found = re.search(rf"^  {group}: {{(.*?)}},\n(?=  \w+: )", text, re.MULTILINE | re.DOTALL)
+        assert found, group
+        yield from (f"page {group} {name}" for name in re.findall(r'\b\w+: "([^"]+)"', found[1]))
 
 
 def interface_list() -> list[str]:
@@ -147,7 +119,7 @@ def interface_list() -> list[str]:
             script_keys,
             json_keys,
             bundled_files,
-            page_controls,
+            page_words,
         )
         return sorted({line for part in parts for line in part()})
 

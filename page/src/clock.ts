@@ -44,7 +44,10 @@ export class Clock {
   constructor(motion: Motion, reset: () => void) {
     this.motion = motion;
     this.playing = button("", () => this.setPaused(!this.paused), { class: "round play", id: "play" });
-    this.rates = make("select", { "aria-label": words.time.rate, title: words.time.rate, change: () => { this.rate = Number(this.rates.value); } },
+    const { node } = motion;
+    this.rates = make("select", { "aria-label": words.time.rate, title: words.time.rate, change: () => {
+      if (node) node.setRate(Number(this.rates.value)); else this.rate = Number(this.rates.value);
+    } },
       ...RATES.map((rate) => make("option", { value: rate }, words.time.rates[RATES.indexOf(rate)]!)));
     this.scrub = make("input", { type: "range", min: 0, max: 1000, step: 1, value: 0, "aria-label": words.time.scrub });
     this.scrub.addEventListener("pointerdown", () => { this.scrubbing = true; });
@@ -62,18 +65,25 @@ export class Clock {
     });
     this.marks = make("div", { class: "marks", "aria-hidden": "true" });
     this.text = make("span", { id: "clock" });
-    this.onward = button(words.time.goOn, () => { this.motion.goOn(); this.setPaused(false); }, { id: "onward", title: words.time.goOnTitle });
+    this.onward = motion.can.goOn
+      ? button(words.time.goOn, () => { this.motion.goOn(); this.setPaused(false); }, { id: "onward", title: words.time.goOnTitle })
+      : button(words.live.now, () => { this.wanted = null; this.motion.goOn(); }, { id: "onward", title: words.live.nowTitle });
+    const step = node ? words.live.step : words.time.step;
     this.node = make("div", { id: "time", role: "group", "aria-label": words.time.name },
       button(words.time.back, () => { this.wanted = this.motion.snapshot().timeNs - BACK_NS; }, { class: "round", title: words.time.backTitle, "aria-label": words.time.backTitle }),
       this.playing,
-      button(icon(STEP), () => this.step(), { class: "round", title: words.time.step, "aria-label": words.time.step, id: "step" }),
+      button(icon(STEP), () => this.step(), { class: "round", title: step, "aria-label": step, id: "step" }),
       this.rates, make("div", { class: "scrub" }, this.scrub, this.marks), this.text, this.onward,
       button(icon(RESET), reset, { class: "round reset", title: words.time.reset, "aria-label": words.time.reset, id: "reset" }));
-    this.setPaused(false);
+    this.showPaused(node?.paused ?? false);
   }
 
   setPaused(paused: boolean): void {
     if (this.held && !paused) { say(this.held); return; }
+    if (this.motion.node) this.motion.node.setPaused(paused); else this.showPaused(paused);
+  }
+
+  private showPaused(paused: boolean): void {
     this.paused = paused;
     this.playing.replaceChildren(icon(paused ? PLAY : PAUSE));
     const name = paused ? words.time.play : words.time.pause;
@@ -88,6 +98,8 @@ export class Clock {
 
   step(): void {
     if (this.held) { say(this.held); return; }
+    const { node } = this.motion;
+    if (node) { if (!node.paused) node.setPaused(true); node.step(); return; }
     this.setPaused(true);
     this.motion.advance(this.motion.snapshot().timeNs + STEP_NS);
   }
@@ -99,15 +111,24 @@ export class Clock {
       this.wanted = null;
       return;
     }
-    if (this.paused || this.scrubbing) return;
+    if (this.paused || this.scrubbing || this.motion.node) return;
     const nowNs = this.motion.snapshot().timeNs, passedNs = this.owedNs + Math.round(Math.min(MOST_MS, Math.max(0, milliseconds)) * 1e6 * this.rate);
     const untilNs = Math.max(nowNs, Math.floor((nowNs + passedNs) / GRAIN_NS) * GRAIN_NS);
     this.motion.advance(untilNs);
     this.owedNs = nowNs + passedNs - untilNs;
   }
 
-  /** What was done has changed: other marks. */
-  changed(): void { this.stale = true; }
+  /** What was done has changed: other marks; or a node's time goes otherwise. */
+  changed(): void {
+    this.stale = true;
+    const { node } = this.motion;
+    if (!node) return;
+    if (node.paused !== this.paused) this.showPaused(node.paused);
+    if (node.rate === this.rate && this.rates.value === String(node.rate)) return;
+    this.rate = node.rate;
+    if (!RATES.some((rate) => rate === node.rate)) this.rates.append(make("option", { value: node.rate }, words.live.rate(node.rate)));
+    this.rates.value = String(node.rate);
+  }
 
   show(timeNs: number): void {
     const clock = performance.now();

@@ -9,8 +9,10 @@ import { inside } from "./file.ts";
 import { LANGUAGES } from "./languages.ts";
 import type { LessonTexts } from "./lessons.ts";
 import { COURSES } from "./lessons_steps.ts";
+import { isLive, openLive } from "./live.ts";
 import { Panel, type Desk, type Look } from "./panel.ts";
 import { icon, make, say } from "./panel_elements.ts";
+import { HandPane } from "./panel_hand.ts";
 import { LessonPanel } from "./panel_lesson.ts";
 import { direction } from "./panel_measure.ts";
 import { Picture, type Blow, type Shown } from "./picture.ts";
@@ -64,7 +66,12 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
   const waiting = new Map<string, () => void>();
   const told = (refusal: string | null): boolean => { if (refusal) say(refusal); return !refusal; };
   const startOver = (): void => { pointer.forget(); picture.restart(motion.snapshot()); lessons.restarted(); };
-  const restart = (): void => { motion.reset(); startOver(); if (!clock.held) clock.setPaused(false); };
+  const restart = (): void => {
+    motion.reset();
+    if (motion.node) return; // it says when it has begun anew
+    startOver();
+    if (!clock.held) clock.setPaused(false);
+  };
   const clock = new Clock(motion, restart);
   const pointer: Pointer = new Pointer(stage, motion, picture, () => panel.impulse);
   const open = async (how: () => string | null | Promise<string | null>): Promise<void> => {
@@ -85,22 +92,26 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
   // A body that comes at rest shows nothing: it spins about its middle axis, nearly, and so turns over.
   const lively = (refusal: string | null): string | null => {
     const spin = motion.values()["initial.angular_velocity"] as readonly number[] | undefined;
-    if (refusal || !spin || spin.some((w) => w !== 0)) return refusal;
+    if (refusal || motion.node || !spin || spin.some((w) => w !== 0)) return refusal;
     const { axes } = motion.body(), R = motion.snapshot().body.rotation, own = [0, 1, 2].map((k) => SPIN * (axes[3 * k + 1]! + 0.02 * axes[3 * k]!));
     const refused = motion.set({ "initial.angular_velocity": [0, 1, 2].map((k) => R[3 * k]! * own[0]! + R[3 * k + 1]! * own[1]! + R[3 * k + 2]! * own[2]!) });
     motion.reset();
     return refused;
   };
-  const named = Object.entries(texts).filter(([name]) => name in COURSES).map(([name, { title }]) => ({ name, title }));
+  // A lesson is a take of one's own: beside a node there is none.
+  const named = Object.entries(motion.node ? {} : texts).filter(([name]) => name in COURSES).map(([name, { title }]) => ({ name, title }));
   const desk: Desk = { motion, picture, pointer, clock, look, restart, lessons: named, track: () => track, later: (name, act) => { waiting.set(name, act); }, told, open, lively };
   const panel = new Panel(desk, () => { moved = true; }), lessons = new LessonPanel(desk, panel, texts);
   const drop = make("div", { id: "drop", hidden: true }, words.body.drop);
   app.append(panel.node, drop, make("div", { id: "say", role: "status", "aria-live": "polite" }));
-  document.title = words.title;
+  document.title = motion.node ? `${motion.node.name} – ${words.title}` : words.title;
   document.documentElement.lang = language;
+  const handPane = motion.node && new HandPane(motion.node);
+  if (handPane) panel.node.querySelector("#hand")!.prepend(handPane.node);
 
   printsSheet(app, picture, () => lessons.lesson);
 
+  motion.hear((line) => say(line));
   motion.watch(() => { changed = true; });
   const refresh = (): void => {
     changed = false;
@@ -115,6 +126,17 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
     });
     clock.changed();
     panel.changed();
+    handPane?.changed();
+  };
+  // A node begins anew by whose hand ever.
+  let began = motion.node?.began ?? 0, flown = motion.body().vertices;
+  const beganAnew = (): void => {
+    began = motion.node?.began ?? 0;
+    track.seen.length = 0;
+    startOver();
+    if (motion.body().vertices === flown) return;
+    flown = motion.body().vertices;
+    panel.begin();
   };
   const shownNow = (now: Snapshot): Shown => {
     const values = motion.values(), info = motion.body(), stays = Math.max(BLOW_NS * Math.min(1, clock.rate), BLOW_S * clock.rate * 1e9);
@@ -187,6 +209,7 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
     pointer.act();
     clock.advance(passed);
     if (changed) refresh();
+    if (motion.node && (motion.node.began !== began || motion.body().vertices !== flown)) beganAnew();
     if (moved) fit();
     const now = motion.snapshot();
     drawnNs = now.timeNs;
@@ -215,9 +238,9 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
   panel.begin();
   fit();
   picture.restart(motion.snapshot());
-  if (still) clock.setPaused(true);
+  if (still && !motion.node) clock.setPaused(true);
   const { lesson, isClass } = addressOf(address);
-  if (lesson) void lessons.begin(lesson, isClass).then(told);
+  if (lesson && !motion.node) void lessons.begin(lesson, isClass).then(told);
   if (!picture.renderer) say(words.picture.noWebGL, 12);
   requestAnimationFrame(draw);
   return probe;
@@ -228,12 +251,12 @@ async function start(): Promise<void> {
   try {
     const [kernels, data, take] = await Promise.all([inside("kernels"), inside("data"), inside("take")]);
     if (!kernels || !data) throw new Error(words.picture.incomplete);
-    const motion = await openMotion(kernels, data, take);
+    const motion = isLive() ? await openLive(kernels, data) : await openMotion(kernels, data, take);
     // A file that was written for a lesson opens in it.
     const address = location.hash || (take ? "" : document.querySelector<HTMLMetaElement>("meta[name=begin]")?.content ?? ""), asked = addressOf(address);
     const refusal = asked.take ? await motion.openLink(asked.take) : null;
     // Who was sent nothing sees what a box in place of the truth does.
-    if (!take && !asked.take) motion.setGhost({ inertia_model: "bounding_box" });
+    if (!take && !asked.take && !motion.node) motion.setGhost({ inertia_model: "bounding_box" });
     const probe = begin(motion, { ...new Data(data).declared.lessons, ...LANGUAGES[language]?.lessons }, address, app, scriptMs);
     if (refusal ?? motion.notice()) say(refusal ?? motion.notice(), 12);
     Object.assign(window, { page: probe });

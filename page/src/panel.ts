@@ -155,6 +155,7 @@ export class Panel {
     };
     const chip = (name: Name): HTMLButtonElement => button(words.cards[name], () => this.toggle(name), { "aria-expanded": "false", "data-card": name });
     this.chips = { lessons: chip("lessons"), body: chip("body"), world: chip("world"), ghost: chip("ghost"), tensor: chip("tensor"), measure: chip("measure"), plots: chip("plots"), keep: chip("keep") };
+    this.chips.lessons.hidden = !desk.lessons.length;
     const hand = make("div", { id: "hand", class: "card", role: "group", "aria-label": words.hand.name },
       make("div", { class: "sliders" }, mass.node, this.sliders.x.node, this.sliders.y.node, this.sliders.z.node, poke.node),
       make("div", { class: "chips" }, this.lock, ...Object.values(this.chips)));

@@ -87,7 +87,7 @@ export function bodyCard(desk: Desk): Card {
   heavy = Number((0.2 * motion.body().massKg).toPrecision(1)) || 0.1;
   const node = make("div", {},
     make("h3", {}, w.bundled), bodies, scenes.node,
-    make("h3", {}, w.own), make("div", { class: "row" }, button(w.choose, () => file.click()), file), units.node, make("p", { class: "note" }, w.formats), verdict, facts,
+    ...(motion.can.openFiles ? [make("h3", {}, w.own), make("div", { class: "row" }, button(w.choose, () => file.click()), file), units.node, make("p", { class: "note" }, w.formats)] : []), verdict, facts,
     make("h3", {}, w.mass), make("div", { class: "field" }, w.fixed, make("span", {}, mass.node, " kg")), make("div", { class: "field" }, w.dense, make("span", {}, density.node, " kg/m³")), models.node, own,
     make("h3", {}, w.table), table,
     make("h3", {}, w.ballast), make("div", { class: "field", "data-mark": "ballast" }, make("span", {}, kilograms.node, " kg"), stick), ballast);

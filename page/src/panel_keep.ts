@@ -41,9 +41,10 @@ export function keepCard(desk: Desk): Card {
     const last = look.kept?.seen[look.kept.seen.length - 1];
     if (!last) compared.textContent = "";
   };
-  const node = make("div", {},
+  const asPicture = button(w.picture, () => void desk.picture.saved("#f3f5fa").then((blob) => save("rigid_body.png", blob), failed));
+  const node = !motion.can.keep ? make("div", {}, make("div", { class: "row" }, asPicture, keep, forget), make("p", { class: "note" }, w.keepNote), compared, make("p", { class: "note" }, words.live.recorded)) : make("div", {},
     make("h3", {}, w.share), make("div", { class: "row" }, button(w.link, () => void share().catch(failed)), link,
-      button(w.page, () => void motion.file().then((blob) => save("rigid_body.html", blob), failed)), button(w.picture, () => void desk.picture.saved("#f3f5fa").then((blob) => save("rigid_body.png", blob), failed))),
+      button(w.page, () => void motion.file().then((blob) => save("rigid_body.html", blob), failed)), asPicture),
     make("p", { class: "note" }, w.pageNote),
     make("h3", {}, w.compare), make("div", { class: "row" }, keep, forget), make("p", { class: "note" }, w.keepNote), compared,
     make("h3", {}, w.script), make("div", { class: "row" }, button(w.files, take)), make("p", {}, command), make("p", { class: "note" }, `${w.command} `, hashed));

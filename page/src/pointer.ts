@@ -190,7 +190,7 @@ export class Pointer {
   /** A drag that turned out to be a pinch. */
   private takeBack(hand: Hand): void {
     if (hand.tied) {
-      if (performance.now() - hand.begunMs < PINCH_MS && hand.tiedNs > 0) {
+      if (performance.now() - hand.begunMs < PINCH_MS && hand.tiedNs > 0 && this.motion.can.goOn) {
         this.motion.goTo(hand.tiedNs - 1);
         this.motion.goOn();
       } else this.told(this.motion.submit({ string: "release" }));

@@ -16,9 +16,9 @@ import { Refusals } from "./scene.ts";
 import { Script } from "./script.ts";
 import { sha256 } from "./sha256.ts";
 import type {
-  BodyInfo, Bundled, Entry, GhostChoice, History, Hit, Model, Motion, OpenMotion, Parameter, Snapshot, TakeFiles, Value, Values, Vec3,
+  BodyInfo, Bundled, Can, Entry, GhostChoice, History, Hit, Motion, OpenMotion, Parameter, Snapshot, TakeFiles, Value, Values, Vec3,
 } from "./source.ts";
-import { Observed, triple } from "./state.ts";
+import { Observed } from "./state.ts";
 import { Placed, Surfaces } from "./surface.ts";
 import type { MeshNumbers, Surface } from "./surface.ts";
 import { FORM, linkText, madeBy, takeBytes, takeFiles, takeOf, takeOfLink } from "./take.ts";
@@ -56,6 +56,8 @@ export class Simulation implements Motion {
   readonly version: string;
   readonly bodies: readonly Bundled[];
   readonly scenes: readonly Bundled[];
+  readonly can: Can = { openFiles: true, keep: true, goOn: true };
+  readonly node = null;
   readonly #kernels: Kernels;
   readonly #data: Data;
   readonly #declared: Declarations;
@@ -254,33 +256,7 @@ export class Simulation implements Motion {
   }
 
   body(): BodyInfo {
-    return (this.#info ??= this.#bodyInfo());
-  }
-
-  #bodyInfo(): BodyInfo {
-    const { body } = this.#declared.numbers, row = this.#body.flight.body, surface = this.#placed.surface;
-    const values = this.#body.values, scale = triple(row, body.BODY_SCALE);
-    let models: readonly Model[] | null = null;
-    const listed = (): readonly Model[] => (models ??= this.#observed.models(this.#body));
-    const contacts = Object.entries(values).filter(([name]) => name.startsWith("contacts."));
-    return {
-      name: String(values["mesh"] ?? ""),
-      vertices: surface?.vertices ?? NONE.vertices,
-      triangles: surface === null ? NONE.triangles : trianglesOf(surface),
-      scale,
-      massKg: row[body.MASS] ?? NaN,
-      com: triple(row, body.COM),
-      inertia: [...row.slice(body.INERTIA, body.INERTIA + 9)],
-      moments: triple(row, body.MOMENTS),
-      axes: [...row.slice(body.AXES, body.AXES + 9)],
-      volume: surface?.closed === true ? this.#placed.record.solid.measure * Math.abs(scale[0] * scale[1] * scale[2]) : NaN,
-      length: row[body.LENGTH] ?? 1,
-      findings: surface?.findings ?? [],
-      contacts: Object.fromEntries(contacts.map(([name, point]) => [name.slice("contacts.".length), triple(point as readonly number[])])),
-      get models(): readonly Model[] {
-        return listed();
-      },
-    };
+    return (this.#info ??= this.#observed.info(this.#body));
   }
 
   snapshot(): Snapshot {
@@ -546,6 +522,8 @@ export class Simulation implements Motion {
     return () => this.#watchers.delete(changed);
   }
 
+  hear(): void { /* what is refused is refused at once */ }
+
   #changed(): void {
     this.#info = null;
     for (const changed of this.#watchers) changed();
@@ -573,16 +551,6 @@ export class Simulation implements Motion {
     this.#changed();
     return null;
   }
-}
-
-const NONE = { vertices: new Float64Array(0), triangles: new Uint32Array(0) };
-const outward = new WeakMap<Surface, Uint32Array>();
-
-/** The same array for the same surface. */
-function trianglesOf(surface: Surface): Uint32Array {
-  const known = outward.get(surface) ?? Uint32Array.from(surface.outward);
-  outward.set(surface, known);
-  return known;
 }
 
 function ghostOf(values: Values): GhostChoice {

@@ -204,12 +204,47 @@ export interface TakeFiles {
 /** What can be opened by name. */
 export interface Bundled { readonly name: string; readonly title: string }
 
+/** What a motion can do, beside flying and being touched: open files of one's own; give its take as link, page or script;
+ * go on from a moment that is looked back at. */
+export interface Can { readonly openFiles: boolean; readonly keep: boolean; readonly goOn: boolean }
+
+/** Who drives, of those who look at one node. asked: whether this page has; asking: how many do; owner: of the terminal. */
+export interface HandState {
+  readonly yours: boolean;
+  readonly taken: boolean;
+  readonly locked: boolean;
+  readonly owner: boolean;
+  readonly asked: boolean;
+  readonly asking: number;
+  readonly watchers: number;
+}
+export type Wish = "ask" | "give" | "take" | "lock" | "unlock";
+
+/** A running node, whose time isn't the page's. rate: simulated seconds a second, 0 for as fast as it goes; began: how often
+ * it has begun anew. */
+export interface NodeBehind {
+  readonly name: string;
+  readonly isReached: boolean;
+  readonly paused: boolean;
+  readonly rate: number;
+  readonly began: number;
+  readonly hand: HandState;
+  setPaused(paused: boolean): void;
+  setRate(rate: number): void;
+  /** By one publication. */
+  step(): void;
+  wish(wish: Wish): void;
+}
+
 /** Functions that may refuse return one line of text that says why, or null; then nothing has changed. */
 export interface Motion {
   /** Version of the package that made this page. */
   readonly version: string;
   readonly bodies: readonly Bundled[];
   readonly scenes: readonly Bundled[];
+  readonly can: Can;
+  /** null where the motion is simulated in the page. */
+  readonly node: NodeBehind | null;
   /** Declarations of all parameters that a page can set, `ballast.<name>` and ghost's among them. */
   parameters(): readonly Parameter[];
   /** The values in force now, by name; after a step back those of that time. */
@@ -260,6 +295,8 @@ export interface Motion {
 
   /** Call this whenever body, parameters, ghost or history (but not time alone) have changed; returns what ends that. */
   watch(changed: () => void): () => void;
+  /** Who is told what is to be said later, such as why a node has refused something. */
+  hear(said: (line: string) => void): void;
 }
 
 /** The motion that is simulated in the page (`openMotion` in simulation.ts), of `inside("kernels")`, `inside("data")` and

@@ -7,8 +7,8 @@ import { Flight, Problem, Scene } from "./kernels.ts";
 import type { Kernels, Matrix, Vector } from "./kernels.ts";
 import type { Flown } from "./flight.ts";
 import type { Refusals } from "./scene.ts";
-import type { Acting, Flying, Hit, Model, StringNow, Vec3 } from "./source.ts";
-import type { Placed, Surfaces } from "./surface.ts";
+import type { Acting, BodyInfo, Flying, Hit, Model, StringNow, Vec3 } from "./source.ts";
+import type { Placed, Surface, Surfaces } from "./surface.ts";
 
 export const triple = (numbers: ArrayLike<number>, at = 0): Vec3 => [numbers[at] ?? 0, numbers[at + 1] ?? 0, numbers[at + 2] ?? 0];
 
@@ -147,6 +147,12 @@ export class Observed {
     return [mass * (x - a), mass * (y - b), mass * (z - c)];
   }
 
+  /** Where a point [mesh] is [m, world]. */
+  worldPoint(flown: Flown, point: Vec3): Vec3 {
+    const row = flown.flight.row, own = flown.flight.body, { body } = this.#declared.numbers;
+    return toWorld({ rotation: this.rotation([...row.subarray(3, 7)]), position: triple(row), com: triple(own, body.COM), scale: triple(own, body.BODY_SCALE) }, point);
+  }
+
   /** Where a ray [world] first meets the body. */
   firstHit(flown: Flown, origin: Vec3, direction: Vec3): Hit | null {
     const memory = this.#kernels.memory, { body } = this.#declared.numbers, { placed } = { placed: this.#placed };
@@ -167,6 +173,33 @@ export class Observed {
       world,
       distance: Math.hypot(...minus(world, origin)),
       normal: times(place.rotation, [-inward[0] / length, -inward[1] / length, -inward[2] / length]),
+    };
+  }
+
+  /** The body of a flight, on the surface that is in place. */
+  info(flown: Flown): BodyInfo {
+    const { body } = this.#declared.numbers, row = flown.flight.body, surface = this.#placed.surface;
+    const values = flown.values, scale = triple(row, body.BODY_SCALE);
+    let models: readonly Model[] | null = null;
+    const listed = (): readonly Model[] => (models ??= this.models(flown));
+    const contacts = Object.entries(values).filter(([name]) => name.startsWith("contacts."));
+    return {
+      name: String(values["mesh"] ?? ""),
+      vertices: surface?.vertices ?? NONE.vertices,
+      triangles: surface === null ? NONE.triangles : trianglesOf(surface),
+      scale,
+      massKg: row[body.MASS] ?? NaN,
+      com: triple(row, body.COM),
+      inertia: [...row.slice(body.INERTIA, body.INERTIA + 9)],
+      moments: triple(row, body.MOMENTS),
+      axes: [...row.slice(body.AXES, body.AXES + 9)],
+      volume: surface?.closed === true ? this.#placed.record.solid.measure * Math.abs(scale[0] * scale[1] * scale[2]) : NaN,
+      length: row[body.LENGTH] ?? 1,
+      findings: surface?.findings ?? [],
+      contacts: Object.fromEntries(contacts.map(([name, point]) => [name.slice("contacts.".length), triple(point as readonly number[])])),
+      get models(): readonly Model[] {
+        return listed();
+      },
     };
   }
 
@@ -199,6 +232,16 @@ export class Observed {
       refusal: none,
     };
   }
+}
+
+const NONE = { vertices: new Float64Array(0), triangles: new Uint32Array(0) };
+const outward = new WeakMap<Surface, Uint32Array>();
+
+/** The same array for the same surface. */
+function trianglesOf(surface: Surface): Uint32Array {
+  const known = outward.get(surface) ?? Uint32Array.from(surface.outward);
+  outward.set(surface, known);
+  return known;
 }
 
 /** Where a body is: rotation row by row, position [m, world], centre of mass [m] and scale. */

@@ -30,6 +30,9 @@ export interface Take {
   readonly mesh: MeshNumbers | null;
 }
 
+/** A mesh in a take, its numbers in base64. */
+export interface WrittenMesh { readonly name: string; readonly vertices: string; readonly triangles: string; readonly starts?: string; readonly solid?: string }
+
 interface Written {
   readonly form: number;
   readonly version: string;
@@ -37,7 +40,7 @@ interface Written {
   readonly ghost?: Partial<GhostChoice>;
   readonly script: readonly Entry[];
   readonly endNs: number;
-  readonly mesh?: { readonly name: string; readonly vertices: string; readonly triangles: string; readonly starts?: string; readonly solid?: string };
+  readonly mesh?: WrittenMesh;
 }
 
 const bytesOf = (numbers: Float64Array | Int32Array): Uint8Array => new Uint8Array(numbers.buffer, numbers.byteOffset, numbers.byteLength);
@@ -73,7 +76,8 @@ export function takeOf(bytes: Uint8Array): Take {
   return { form, version: String(version), values, ghost: own, script, endNs, mesh: mesh === undefined ? null : meshOf(mesh) };
 }
 
-function meshOf(mesh: NonNullable<Written["mesh"]>): MeshNumbers {
+/** Throws Refused for what isn't one. */
+export function meshOf(mesh: WrittenMesh): MeshNumbers {
   const f8 = (text: string): Float64Array => new Float64Array(whole(fromBase64(String(text)), 8));
   const i4 = (text: string): Int32Array => new Int32Array(whole(fromBase64(String(text)), 4));
   const { name, starts, solid } = mesh, vertices = f8(mesh.vertices), triangles = i4(mesh.triangles);

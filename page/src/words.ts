@@ -32,6 +32,16 @@ export const english = {
     rates: ["1 ×", "½ ×", "¼ ×", "⅒ ×", "1⁄50 ×"], scrub: "Moment of the take", reset: "Start again", goOn: "go on from here",
     goOnTitle: "Forget what came after this moment, and fly on", seconds: (s: number) => `${s.toFixed(2)} s`,
   },
+  live: {
+    yours: "You drive", others: "Somebody else drives", free: "Nobody drives: touch it", locked: "Its owner drives",
+    away: "Not reached; trying again", lost: "The node isn't reached any more; trying again.", ask: "ask for it", asked: "asked",
+    asking: (n: number) => (n === 1 ? "somebody asks for the hand" : `${n} ask for the hand`), give: "give it", take: "take it",
+    lock: "lock", unlock: "unlock", watching: (n: number) => `${n} look`,
+    past: "This is the past: go to now first.", now: "to now", nowTitle: "What the node does now; to fly on from a moment: rigid_proto replay --at T --as-scene",
+    ghost: "A node's ghost differs in tensor or integrator alone", files: "Files of one's own are opened where the node was started: its parameter mesh",
+    recorded: "What a node does is recorded there: its parameter record, and rigid_proto replay",
+    step: "Step to the next publication", rate: (rate: number) => (rate === 0 ? "as fast as it goes" : `${rate} ×`),
+  },
   cards: { lessons: "lessons", body: "body", world: "gravity", ghost: "ghost", tensor: "tensor", measure: "measure", plots: "plots", keep: "keep" },
   bodies: {
     book: "book", hammer: "hammer", hollow_box: "hollow box", l_bracket: "l bracket", spinning_top: "spinning top", t_handle: "t handle", teapot: "teapot", tennis_racket: "tennis racket",

@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import os
 import sys
+
+from ..base.errors import InputError, is_missing
 
 EXAMPLES = (
     ("rigid_proto up", "the T-handle, with a live view"),
     ("rigid_proto up hammer --viewer web", "another scene, shown in the browser"),
-    ("rigid_proto up hammer --viewer workbench", "with the interactive page in addition to the topics"),
+    ("rigid_proto up hammer --viewer workbench", "with the interactive page alone"),
     ("rigid_proto up part.obj", "your own mesh"),
 )
 
@@ -24,7 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("auto", "web", "native", "workbench", "none"),
         default="auto",
         help="the live view: Rerun in the browser (web) or in a window (native), or the interactive page (workbench); "
-        "auto: native if there is a display, otherwise web",
+        "auto: native if there is a display, otherwise web, and the page beside it",
+    )
+    parser.add_argument(
+        "--host",
+        metavar="ADDRESS",
+        help="address to serve the page on, 0.0.0.0 for the network (default: this machine only)",
     )
 
 
@@ -42,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     viewer = args.viewer
     if viewer == "auto":
         display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-        viewer = "native" if display else "web"
+        viewer = ("native" if display else "web") + (",workbench" if _has_page() else "")
     # To be seen and not to be thrown out of sight: 2 cm/s in the 0.05 s of a poke.
     force = f"{0.35 * scenario.setup.body.mass:.1g}"
     at = "com" if args.mesh else next(iter(scenario.setup.contacts), "com")
@@ -52,4 +60,20 @@ def run(args: argparse.Namespace) -> int:
     from ..ros.main import main
 
     ros_arguments = ["--ros-args", *body, "-p", f"viewer:={viewer}", *overrides]
+    if args.host:
+        ros_arguments += text_parameter("workbench_host", args.host)
     return main(["rigid_body_node", *ros_arguments], as_job=True)
+
+
+def _has_page() -> bool:
+    """Whether the page can be served; else why not is said."""
+    from ..page.bundle import built_page
+
+    try:
+        if importlib.util.find_spec("websockets") is None:
+            raise InputError("page", is_missing("websockets", "workbench"))
+        built_page()
+    except InputError as error:
+        print(f"rigid_proto up: without the interactive page: {error}", file=sys.stderr)
+        return False
+    return True

@@ -1,36 +1,34 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_proto workbench``: a body and its interactive page in one process, until Ctrl-C."""
+"""``rigid_proto workbench``: the page on a scene or mesh, served until Ctrl-C or written as one file."""
 
 from __future__ import annotations
 
 import argparse
 import importlib.util
+import os
 import sys
 import threading
-from pathlib import Path
+import webbrowser
+from typing import Any
 
 from ..base.errors import InputError, is_missing
 
 EXAMPLES = (
     ("rigid_proto workbench hammer", "a bundled scene"),
-    ("rigid_proto workbench --mesh part.obj", "your own mesh"),
-    ("rigid_proto workbench hammer --html out/hammer.html", "a page that needs nothing but a browser, as one file"),
-    (
-        "rigid_proto workbench --script msg_examples/flip_and_poke.yaml --html out/poked.html",
-        "the same, and it plays a poke script",
-    ),
+    ("rigid_proto workbench part.obj", "your own mesh"),
+    ("rigid_proto workbench hammer --html out/hammer.html", "as one file, which needs nothing but a browser"),
+    ("rigid_proto workbench --script msg_examples/flip_and_poke.yaml", "the page plays a poke script"),
+    ("rigid_proto workbench --host 0.0.0.0", "for a class: whoever opens it has a body of their own"),
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("scene", metavar="SCENE.yaml", nargs="?", help="scene file or bundled name (default t_handle)")
     parser.add_argument(
-        "--html",
-        metavar="FILE",
-        help="write a page in which the scene, or a mesh given in its place, flies without a server",
+        "scene", metavar="SCENE", nargs="?", help="scene file, bundled name or mesh file (default: t_handle)"
     )
-    parser.add_argument("--script", metavar="SCRIPT.yaml", help="with --html: a poke script that the page plays")
+    parser.add_argument("--script", metavar="SCRIPT.yaml", help="a poke script that the page plays")
+    parser.add_argument("--html", metavar="FILE", help="write the page as a file, and serve nothing")
     parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(
         "--port", type=int, metavar="PORT", help="port of the page (default 8080, or the next free one)"
@@ -41,49 +39,49 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C, or write a file."""
-    if args.script and not args.html:
-        raise InputError("--script", args.script, "with --html; poke_client plays scripts to a running body")
-    return _write(args) if args.html else _serve(args)
+    from ..page.file import page_text, write_page
+    from ..scene.script import read_script
 
-
-def _serve(args: argparse.Namespace) -> int:
-    if importlib.util.find_spec("viser") is None:
-        raise InputError("workbench", is_missing("viser", "workbench"))
+    script = read_script(args.script) if args.script else []
+    values = _values(args.scene, args.mesh, bool(script))
+    if args.html:
+        write_page(args.html, values, script)
+        print(f"wrote {args.html}: open it in a browser")
+        return 0
+    if importlib.util.find_spec("websockets") is None:
+        raise InputError("workbench", is_missing("websockets", "workbench"))
+    from ..page.server import LOOPBACK, serve_page
     from ..parameters.declarations import Parameters
-    from ..rerun_view.ports import LOOPBACK
-    from ..scene.scenario import make_scenario
-    from ..scene.scene_file import check_record, scene_file, scene_values
-    from ..workbench.main import serve
 
-    scene = args.scene or "t_handle"
-    values = {**scene_values(scene_file(scene)), **({"mesh": args.mesh} if args.mesh else {})}
-    check_record(values.get("record"))
-    port = args.port
-    asked = Parameters().replaced(values).workbench_port
-    if port is None and asked != Parameters().workbench_port:
-        port = asked
-    name = "" if args.mesh else scene
-    wait = threading.Event().wait  # until a signal interrupts it
-    serve(lambda: make_scenario(values), name, port, args.host or LOOPBACK, not args.no_browser, wait)
+    page, default = page_text(values, script).encode(), Parameters().workbench_port
+    own, others = serve_page(page, args.port, default, args.host or LOOPBACK)
+    print(f"The workbench is at {own}   (Ctrl-C ends it)", flush=True)
+    if others:
+        print(f"Others open {others}: each has a body of their own, and nothing of this machine", flush=True)
+    if not args.no_browser and _has_display():
+        webbrowser.open(own)
+    threading.Event().wait()  # until a signal interrupts it
     return 0
 
 
-def _write(args: argparse.Namespace) -> int:
-    from ..page.file import values_of_mesh, write_page
-    from ..scene.scene_file import scene_file, scene_values
-    from ..scene.script import read_script
+def _values(scene: str | None, mesh: str | None, has_script: bool) -> dict[str, Any] | None:
+    """The parameters that the page begins with; None for its own start."""
+    from ..page.file import values_of_mesh
+    from ..scene.scene_file import is_mesh, scene_file, scene_values
 
-    scene, mesh = args.scene, args.mesh
-    if scene and not mesh and not scene.endswith((".yaml", ".yml")) and Path(scene).is_file():
+    if scene and not mesh and is_mesh(scene):
         scene, mesh = None, scene
-    script = read_script(args.script) if args.script else []
-    values = scene_values(scene_file(scene or "t_handle")) if scene or script and not mesh else None
+    if has_script and not (scene or mesh):
+        scene = "t_handle"
+    values = scene_values(scene_file(scene)) if scene else None
     if mesh and values is not None:
         values["mesh"] = mesh
     elif mesh:
         values, note = values_of_mesh(mesh)
         if note:
             print(f"rigid_proto workbench: {mesh}: {note}", file=sys.stderr)
-    write_page(args.html, values, script)
-    print(f"wrote {args.html}: open it in a browser")
-    return 0
+    return values
+
+
+def _has_display() -> bool:
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

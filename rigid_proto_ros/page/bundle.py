@@ -5,7 +5,6 @@ carries it.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import importlib.util
 import os
@@ -14,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import IO
 
 from ..base.bundled import PACKAGE_FOLDER, body_names, scene_names, scene_path
 from ..base.cache import source_stamp, user_cache
@@ -23,6 +23,11 @@ from ..base.interrupts import with_this_package
 from ..base.library import stamp as kernels_stamp
 from ..mesh.locate import resolve_mesh
 from .data import page_data
+
+try:
+    import fcntl
+except ImportError:  # not POSIX: two processes that build at once both do, and the last one's file stays
+    fcntl = None  # type: ignore[assignment]  # it is asked for before use
 
 SOURCE = PACKAGE_FOLDER.parent / "page"
 CARRIED = Path(__file__).with_name("lib") / "page.html"
@@ -47,10 +52,16 @@ def built_page() -> Path:
     if not page.is_file():
         folder.mkdir(parents=True, exist_ok=True)
         with open(folder.parent / "lock", "w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            _wait_for(lock)
             if not page.is_file():
                 _build(page)
     return page
+
+
+def _wait_for(lock: IO[str]) -> None:
+    """Until no other process has it."""
+    if fcntl is not None:
+        fcntl.flock(lock, fcntl.LOCK_EX)
 
 
 def page_stamp() -> str:
@@ -85,7 +96,7 @@ def installed_node(folder: Path = SOURCE) -> str:
     lock = hashlib.sha256((folder / "package-lock.json").read_bytes()).hexdigest()
     mark = folder / "node_modules" / ".installed"
     with open(folder / ".installing", "w") as alone:
-        fcntl.flock(alone, fcntl.LOCK_EX)
+        _wait_for(alone)
         if not mark.is_file() or mark.read_text() != lock:
             print(f"installing packages into {folder.name}/node_modules ...", file=sys.stderr, flush=True)
             _run([*npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=folder)

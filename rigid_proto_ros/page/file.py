@@ -38,18 +38,24 @@ def write_page(
     """Write the page, to begin with a scene of these parameters, by name, and a script of it, or as with ``begins``
     behind the # of its address (page/src/address.ts). Raises InputError.
     """
-    page = built_page().read_text("utf-8")
-    if values is not None:
-        take = base64.b64encode(gzip.compress(json.dumps(take_of(values, script)).encode(), 9, mtime=0)).decode()
-        if _PLACE not in page:
-            raise InputError("page", "the built page has no place for a scene")
-        page = page.replace(_PLACE, f"{_PLACE.partition('></')[0]}>{take}</script>")
+    page = page_text(values, script)
     if begins:
         if _BEGIN not in page:
             raise InputError("page", "the built page has no place for what it begins with")
         page = page.replace(_BEGIN, _BEGIN.replace('content=""', f'content="{escape(begins)}"'), 1)
     with whole_file("--html", file) as beside:
         beside.write_text(page, "utf-8")
+
+
+def page_text(values: dict[str, Any] | None = None, script: Sequence[Command] = ()) -> str:
+    """The page, to begin with a scene of these parameters, by name, and a script of it. Raises InputError."""
+    page = built_page().read_text("utf-8")
+    if values is None:
+        return page
+    take = base64.b64encode(gzip.compress(json.dumps(take_of(values, script)).encode(), 9, mtime=0)).decode()
+    if _PLACE not in page:
+        raise InputError("page", "the built page has no place for a scene")
+    return page.replace(_PLACE, f"{_PLACE.partition('></')[0]}>{take}</script>")
 
 
 def values_of_mesh(mesh: str) -> tuple[dict[str, Any], str]:
@@ -84,7 +90,7 @@ def take_of(values: dict[str, Any], script: Sequence[Command] = ()) -> dict[str,
     }
     if scenario.body_mesh is not None and values.get("mesh", "t_handle") not in body_names():
         used["mesh"] = f"{scenario.body_mesh.mesh.name}.obj"
-        take["mesh"] = _mesh_of(scenario.body_mesh, used["mesh"])
+        take["mesh"] = mesh_numbers(scenario.body_mesh, used["mesh"])
     return take
 
 
@@ -106,7 +112,7 @@ def _changed(parameters: Parameters) -> dict[str, Any]:
     return {name: value for name, value in parameters.named().items() if name == "mesh" or value != defaults.get(name)}
 
 
-def _mesh_of(body: BodyMesh, name: str) -> dict[str, Any]:
+def mesh_numbers(body: BodyMesh, name: str) -> dict[str, Any]:
     """The numbers of a mesh. solid: its moments at unit density (mass/moments.py, MOMENTS), where Python has them."""
     moments = body.moments
     mesh: dict[str, Any] = {

@@ -387,13 +387,19 @@ class Parameters:
     viewer: str = declare(
         "none",
         "Live view of the motion: web for Rerun in the browser, native for Rerun's own window, workbench for the "
-        "interactive page.",
-        choices=("none", "web", "native", "workbench"),
+        "interactive page, which may stand beside one of them.",
+        choices=("none", "web", "native", "workbench", "web,workbench", "native,workbench"),
         changes=READ_ONLY,
     )
     rerun_port: int = _port(9876, "Port on which the live view is served, on this machine only.")
     web_port: int = _port(9090, "Port of the browser's viewer page, on this machine only.")
-    workbench_port: int = _port(8080, "Port of the interactive page, on this machine only.")
+    workbench_port: int = _port(8080, "Port of the interactive page.")
+    workbench_host: str = declare(
+        "127.0.0.1",
+        "Address on which the interactive page is served: this machine only, or 0.0.0.0 for the network, too; others "
+        "then watch, and one at a time drives.",
+        changes=READ_ONLY,
+    )
     thruster: ThrusterRules = ThrusterRules()
     contacts: Mapping[str, Vector] = field(default_factory=dict)
     ballast: Mapping[str, Four] = field(default_factory=dict)

@@ -152,11 +152,6 @@ MOMENTUM_ANGLE_TITLE = "Drift of L's direction"
 GHOST_ANGLE_TITLE = "Angle of the ghost to the body"
 
 
-def css(colour: Colour) -> str:
-    """A colour as browsers write it."""
-    return "rgb({},{},{})".format(*colour)
-
-
 def without_rounding(value: float, largest: float = 1.0) -> float:
     """A number for people to read: 0 for what the arithmetic's rounding leaves beside ``largest``."""
     return float(value) if abs(value) > ROUNDING * largest else 0.0

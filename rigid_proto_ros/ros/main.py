@@ -188,14 +188,15 @@ def make_viewer(scenario: Scenario, node: Node) -> Observer | None:
     be shown or recorded with it.
     """
     parameters = scenario.parameters
-    if parameters.viewer in ("none", "workbench"):
+    viewer = parameters.viewer.partition(",")[0]
+    if viewer in ("none", "workbench"):
         return None
     if importlib.util.find_spec("rerun") is None:
         raise InputError("viewer", is_missing("rerun-sdk", "rerun"))
     from ..rerun_view.live_view import LiveView
 
     return LiveView(
-        parameters.viewer,
+        viewer,
         rerun_port=_asked_for("rerun_port", parameters.rerun_port),
         web_port=_asked_for("web_port", parameters.web_port),
         name=node.get_name(),
@@ -207,18 +208,25 @@ def make_viewer(scenario: Scenario, node: Node) -> Observer | None:
 def open_page(node: RigidBodyNode) -> Callable[[], None]:
     """The interactive page, where it is asked for; returns what closes it."""
     parameters = node.live.scenario.parameters
-    if parameters.viewer != "workbench":
+    if "workbench" not in parameters.viewer:
         return lambda: None
-    if importlib.util.find_spec("viser") is None:
-        raise InputError("viewer", is_missing("viser", "workbench"))
-    from ..workbench.main import Workbench
+    if importlib.util.find_spec("websockets") is None:
+        raise InputError("viewer", is_missing("websockets", "workbench"))
+    from ..page.live_page import LivePage
 
+    port, say = _asked_for("workbench_port", parameters.workbench_port), node.get_logger().warning
     try:
-        page = Workbench(node.live, _asked_for("workbench_port", parameters.workbench_port))
+        page = LivePage(node.live, port, parameters.workbench_host, say)
     except InputError as error:
         # By the name that the node knows it by, which isn't the command's option.
-        raise InputError("workbench_port", error.received, error.accepted) from None
+        names = {"--port": "workbench_port", "--host": "workbench_host"}
+        raise InputError(names.get(error.field, error.field), error.received, error.accepted) from None
     node.get_logger().info(f"the workbench is at {page.address}")
+    if page.guests:
+        node.get_logger().info(
+            f"others watch at {page.guests}: one at a time drives, and your own page can take the hand and lock it; "
+            "they can't read or write files"
+        )
     return page.close
 
 

@@ -33,7 +33,9 @@ from ..simulation.string_control import mesh_point_of
 from .messages import PROJECTIONS
 from .recorded_session import RecordedSession, Resimulation, decode_event, resimulation
 
-NOT_OF_THE_MOTION = frozenset({"record", "viewer", "rerun_port", "web_port", "workbench_port", "start_paused"})
+NOT_OF_THE_MOTION = frozenset(
+    {"record", "viewer", "rerun_port", "web_port", "workbench_port", "workbench_host", "start_paused"}
+)
 """Parameters of a running node that a scene to keep or to send doesn't carry."""
 
 Entry = dict[str, object]

@@ -98,6 +98,7 @@ class FlightArrays:
         self._room = numbers[room_at // 8 :]
         as_bytes = memory.cast("B")
         self._table = as_bytes[loads_at:events_at]
+        self._bytes = as_bytes
         self._string = as_bytes[_STRING_AT:_STRING_END]
         self.call = bound(operate, self.flight, self._loads, self._events, self._room)
         """Perform an operation, by its number and a time [ns]; returns its result: of END_DUE, whether anything ended.
@@ -226,6 +227,11 @@ class FlightArrays:
         return attitude
 
     # Observables
+
+    @property
+    def memory(self) -> bytes:
+        """A copy of the flight and the rows of the active loads, which lie behind it."""
+        return bytes(self._bytes[: _FLIGHT_BYTES + _ROW_BYTES * self.integers[_ACTING]])
 
     @property
     def time_ns(self) -> int:

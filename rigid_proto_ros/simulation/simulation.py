@@ -501,6 +501,11 @@ class Simulation:
         return self._arrays.flight
 
     @property
+    def memory(self) -> bytes:
+        """A copy of the flight's record, and of the rows of its active loads (LOAD_ROW) behind it."""
+        return self._arrays.memory
+
+    @property
     def steps(self) -> int:
         """Steps committed since start or reset; sampling adds none."""
         return int(self.flight.steps_before + fl.steps_of_segment(self.flight))

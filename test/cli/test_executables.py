@@ -95,7 +95,7 @@ def test_a_command_to_type_is_a_name_where_the_path_has_it_and_else_a_path(monke
         (["demo"], "rclpy", "rigid_proto_ros[ros]"),
         (["snapshot", "session.mcap", "--at", "1", "-o", "x.png"], "PIL", "rigid_proto_ros[rerun]"),
         (["snapshot", "session.mcap", "--at", "1", "-o", "x.png"], "rerun", "rigid_proto_ros[rerun]"),
-        (["workbench"], "viser", "rigid_proto_ros[workbench]"),
+        (["workbench"], "websockets", "rigid_proto_ros[workbench]"),
         (["simulate", "t_handle", "--record", "x.mcap,x.rrd"], "rerun", "rigid_proto_ros[rerun]"),
     ],
 )

@@ -16,7 +16,6 @@ from rigid_proto_ros.mass.inspection import model_difference
 from rigid_proto_ros.mass.moments import MODELS
 from rigid_proto_ros.mass.properties import MassProperties, MeshMoments
 from rigid_proto_ros.scene.scenario import read_scene
-from rigid_proto_ros.workbench.body_tab import comparison
 
 
 def turned(moments, rotation_vector, com=(0.0, 0.0, 0.0)) -> MassProperties:
@@ -88,14 +87,6 @@ def test_explicit_numbers_keep_their_com_and_without_a_solid_there_is_no_com_of_
     opened = MeshMoments(vertices, triangles[1:], no_solid="open")
     with pytest.raises(MeshError, match="open"):
         opened.mass_properties("bounding_box", mass=1.0, com="solid")
-
-
-def test_the_pages_table_says_what_counts_and_not_the_largest_entry() -> None:
-    text = comparison(read_scene("hammer"))
-    assert "Largest error" not in text
-    assert "+90.9 %" in text and "0.0808 m" in text and "23 % of the size" in text
-    kept = comparison(read_scene("hammer", {"inertia_model": "bounding_box", "inertia_model_com": "solid"}))
-    assert "COM of the solid" in kept and "0.0808 m" in kept and "+90.9 %" in kept
 
 
 def test_inspect_says_of_every_model_what_counts(capsys: pytest.CaptureFixture) -> None:

@@ -232,7 +232,7 @@ def test_two_nodes_of_one_domain_do_not_mix(rig, tmp_path):
 
 def test_a_port_that_a_scene_names_is_asked_for_and_a_default_one_may_move(monkeypatch):
     """What is asked for and taken is refused, and a free one found and printed, where it is served: test_rerun_live.py,
-    test_workbench_server.py.
+    test_live_who_may.py.
     """
     pytest.importorskip("rerun")
     monkeypatch.setattr("rigid_proto_ros.rerun_view.live_view.LiveView", lambda viewer, **given: given)
@@ -259,14 +259,14 @@ def test_a_report_is_read_between_two_ticks_so_that_its_values_belong_together(m
 
 
 def test_a_page_whose_port_is_taken_is_refused_by_the_parameters_name():
-    pytest.importorskip("viser")
+    pytest.importorskip("websockets")
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
         live = LiveSimulation(make_scenario({"viewer": "workbench", "workbench_port": port}))
         with pytest.raises(InputError, match=f"workbench_port: got {port}"):
-            open_page(SimpleNamespace(live=live))
+            open_page(SimpleNamespace(live=live, get_logger=Mock()))
 
 
 # What goes wrong in flight is said where a ROS user hears it: in the log, in diagnostics, in parameters

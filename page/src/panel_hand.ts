@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+
+import { button, make } from "./panel_elements.ts";
+import type { NodeBehind, Wish } from "./source.ts";
+import { words } from "./words.ts";
+
+/** Who drives the node that the page is beside, and how one gets the hand. */
+export class HandPane {
+  readonly node = make("div", { id: "live", role: "status" });
+  private readonly behind: NodeBehind;
+  private shown = "";
+
+  constructor(behind: NodeBehind) { this.behind = behind; }
+
+  changed(): void {
+    const { hand, isReached } = this.behind, w = words.live, all = JSON.stringify([hand, isReached]);
+    if (all === this.shown) return;
+    this.shown = all;
+    const state = !isReached ? w.away : hand.yours ? w.yours : hand.locked && !hand.owner ? w.locked : hand.taken ? w.others : w.free;
+    const wish = (text: string, what: Wish): HTMLElement => button(text, () => this.behind.wish(what), { "data-wish": what });
+    const others = hand.watchers > 1;
+    this.node.replaceChildren(make("span", {}, state), ...(isReached ? [
+      hand.asking > 0 && hand.yours && make("b", {}, w.asking(hand.asking)),
+      others && make("span", { class: "note" }, w.watching(hand.watchers)),
+      hand.yours && others && wish(w.give, "give"),
+      hand.taken && !hand.yours && !hand.owner && !hand.locked && (hand.asked ? make("span", {}, w.asked) : wish(w.ask, "ask")),
+      hand.owner && hand.taken && !hand.yours && wish(w.take, "take"),
+      hand.owner && (others || hand.locked) && wish(hand.locked ? w.unlock : w.lock, hand.locked ? "unlock" : "lock"),
+    ].filter((part) => part !== false) : []));
+  }
+}

@@ -1,0 +1,397 @@
+# SPDX-License-Identifier: MIT
+"""The page of a running node. Files and sockets are a child process's (watchers.py), which shares neither interpreter
+nor fate with the physics thread: that copies a state when it is asked for one, about thirty times a second while
+somebody looks, and notes what has happened. Whatever is slow behind it, a pipe, the child or a browser, waits on
+threads of its own.
+
+A picture: scene number, loads of the body, whether there is a ghost, loads of the ghost (4 numbers of 4 bytes), then
+the body's FLIGHT (simulation/flight.py) and its acting loads, LOAD_ROW each, and the ghost's. The page has the same
+kernels and so the same records, and makes of them what it shows.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+import subprocess
+import sys
+import threading
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any
+
+from ..base.bundled import body_names
+from ..base.errors import InputError
+from ..base.interrupts import with_this_package
+from ..live.live_simulation import LiveSimulation
+from ..parameters.declarations import PARAMETERS, READ_ONLY, parameter_named
+from ..scene.command_codec import of_event
+from ..scene.scenario import Scenario, make_scenario
+from ..scene.script import entry_of
+from ..simulation.commands import ReleaseString
+from ..simulation.observer import (
+    BodyChanged,
+    Event,
+    Logged,
+    Observer,
+    Published,
+    Refused,
+    Reset,
+    SceneChanged,
+)
+from .bundle import built_page
+from .data import USED, page_version
+from .file import FORM, mesh_numbers
+from .watchers import (
+    ANSWER,
+    COMMAND,
+    LOOKING,
+    PICTURE,
+    READY,
+    REFUSED,
+    SAID,
+    SETTINGS,
+    TOLD,
+    read_frame,
+    write_frame,
+)
+
+PICTURE_S = 1 / 30
+"""[s] Between two pictures, while somebody looks."""
+
+STARTING_S = 20.0
+"""[s] For the child to listen."""
+
+MOST_MESH = 24_000_000
+"""[bytes] Of a mesh as text; a larger one isn't shown."""
+
+MOST_NOTED = 1024
+"""Events that wait for the pages; of more the oldest are left out."""
+
+SETTABLE = frozenset({*USED, "real_time_factor"})
+"""What a page may set, beside ballast: none of them names a file but ``mesh``, which it may set to bundled ones."""
+
+KEPT = ("record", "publish_rate", "publish_clock", "publish_tf", "imu_contact", "schedule_horizon", "real_time_factor")
+"""Parameters that another scene leaves as they are: how one looks at the motion, not the motion."""
+
+ENTRY = frozenset({"at", "force", "push", "torque", "axes", "duration", "slot", "impulse", "angular_impulse"})
+KINDS = frozenset({"wrench", "string", "set", "state", "service"})
+"""Keys of an entry that a page may send: neither a time of its own, nor a repetition."""
+
+_HEAD = struct.Struct("<4I")
+
+
+class _Told(Observer):
+    """Notes what has happened, on the physics thread."""
+
+    takes = frozenset({BodyChanged, SceneChanged, Logged, Refused, Reset})
+
+    def __init__(self) -> None:
+        self.events: deque[Event] = deque(maxlen=MOST_NOTED)
+        self.scene_changed = True
+        self.looking = False
+
+    def wants(self, kind: type) -> bool:
+        """Lines of the log are made for somebody who looks."""
+        return kind in self.takes and (self.looking or kind is not Logged)
+
+    def on(self, event: Event) -> None:
+        """Note it."""
+        if isinstance(event, BodyChanged | SceneChanged):
+            self.scene_changed = True
+        elif self.looking:
+            self.events.append(event)
+
+
+class _GhostWatcher(Observer):
+    """While it is told of states, the simulation has the ghost that its scene asks for."""
+
+    takes = frozenset({Published})
+
+
+class LivePage:
+    """Serves the page until ``close``, or until this process ends. port: the one asked for, None for the first free one
+    from the default on. address: for whoever started the node; guests: for others in the network, or "".
+
+    Raises InputError where the page isn't built or nothing can listen there.
+    """
+
+    def __init__(
+        self,
+        live: LiveSimulation,
+        port: int | None,
+        host: str,
+        say: Callable[[str], None],
+    ) -> None:
+        self._live, self._say = live, say
+        self._told, self._ghost_watcher, self._watches_ghost = _Told(), _GhostWatcher(), False
+        self._looked_at, self._closed = threading.Event(), False
+        self._scene_number = 0
+        self._mesh_sha256: str | None = None
+        self._pace: dict[str, Any] = {}
+        self._last = b""
+        self._holds = False
+        self._writing = threading.Lock()
+        page = str(built_page())
+        self._child = subprocess.Popen(
+            [sys.executable, "-m", "rigid_proto_ros.page.watchers"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=with_this_package(),
+        )
+        about = {"name": live.name, "version": page_version()}
+        settings = {"page": page, "host": host, "port": port, "about": about}
+        self._put(SETTINGS, {**settings, "default": PARAMETERS["workbench_port"].default})
+        self._ready = threading.Event()
+        self._refused: InputError | None = None
+        self.address = self.guests = ""
+        threading.Thread(target=self._read, name="page commands", daemon=True).start()
+        if not self._ready.wait(STARTING_S) or self._refused is not None:
+            self.close()
+            raise self._refused or InputError("workbench_port", "the page's process doesn't start")
+        live.add_observer(self._told)
+        threading.Thread(target=self._send, name="page pictures", daemon=True).start()
+
+    def close(self) -> None:
+        """End the pages."""
+        self._closed = True
+        self._looked_at.set()
+        # It holds nothing, and a thread of this process may be writing to it.
+        self._child.kill()
+        self._child.wait()
+
+    # To the pages
+
+    def _put(self, kind: int, content: bytes | Mapping[str, Any]) -> None:
+        text = content if isinstance(content, bytes) else json.dumps(content).encode()
+        with self._writing, suppress(OSError, ValueError):  # the child has ended, which its reader finds
+            assert self._child.stdin is not None
+            write_frame(self._child.stdin, kind, text)
+
+    def _tell(self, about: str, content: Any) -> None:
+        self._put(TOLD, {about: content})
+
+    def _send(self) -> None:
+        """While somebody looks, tell what has changed and send pictures."""
+        with suppress(InputError):  # the simulation has ended
+            while not self._closed:
+                self._looked_at.wait()
+                while self._told.looking and not self._closed:
+                    self._tell_changes()
+                    picture = self._live.call(self._picture)
+                    if picture != self._last:
+                        self._last = picture
+                        self._put(PICTURE, picture)
+                    time.sleep(PICTURE_S)
+
+    def _picture(self) -> bytes:
+        """The present state, on the physics thread."""
+        loop = self._live.loop
+        simulation, ghost = loop.simulation, loop.ghost
+        body, beside, loads = simulation.memory, b"", 0
+        if ghost is not None and self._live.scenario.ghost is not None:
+            if not ghost.simulation.failure:
+                ghost.simulation.advance(simulation.time_ns)
+            beside, loads = ghost.simulation.memory, len(ghost.simulation.acting)
+        head = _HEAD.pack(self._scene_number, len(simulation.acting), bool(beside), loads)
+        return head + body + beside
+
+    def _tell_changes(self) -> None:
+        loop = self._live.loop
+        factor = float(self._live.scenario.parameters.real_time_factor)
+        pace = {"paused": loop.paused, "rate": factor, "failure": loop.simulation.failure}
+        if self._told.scene_changed:
+            self._told.scene_changed = False
+            self._live.call(self._find_scene)
+            self._tell_scene()
+        if pace != self._pace:
+            self._pace = pace
+            self._tell("time", pace)
+        events = self._told.events
+        done: list[dict[str, Any]] = []
+        while events:
+            event = events.popleft()
+            match event:
+                case Reset():
+                    done.clear()
+                    self._tell("reset", True)
+                case Refused(message=message):
+                    self._tell("said", message)
+                case Logged(line=line):
+                    done += self._done(line)
+        if done:
+            self._tell("done", done)
+
+    def _find_scene(self) -> None:
+        """What the pictures from now on are of, on the physics thread."""
+        self._scenario: Scenario = self._live.scenario
+        self._scene_number += 1
+
+    def _tell_scene(self) -> None:
+        scenario = self._scenario
+        body_mesh = scenario.body_mesh
+        sha256 = body_mesh.mesh.sha256 if body_mesh is not None else ""
+        if sha256 != self._mesh_sha256:
+            self._mesh_sha256 = sha256
+            is_bundled = scenario.parameters.mesh in body_names()
+            mesh = None if body_mesh is None or is_bundled else mesh_numbers(body_mesh, _shown_name(scenario))
+            if mesh is not None and len(mesh["vertices"]) + len(mesh["triangles"]) > MOST_MESH:
+                mesh = None
+                self._say(f"the page doesn't show a mesh of more than {MOST_MESH // 1_000_000} MB")
+            self._tell("mesh", mesh)
+        values = {name: value for name, value in scenario.parameters.named().items() if _is_shown(name)}
+        values["mesh"] = _shown_name(scenario)
+        record = base64.b64encode(scenario.setup.scene.tobytes()).decode()
+        ghost = scenario.ghost
+        of_ghost = base64.b64encode(ghost.scene.tobytes()).decode() if ghost is not None else ""
+        scene = {"number": self._scene_number, "form": FORM, "values": values, "record": record, "ghost": of_ghost}
+        self._watch_ghost(ghost is not None)
+        self._tell("scene", scene)
+
+    def _watch_ghost(self, on: bool) -> None:
+        if on == self._watches_ghost:
+            return
+        self._watches_ghost = on
+        if not on:
+            self._live.remove_observer(self._ghost_watcher)
+            return
+        self._live.add_observer(self._ghost_watcher)
+
+        def begin() -> None:
+            # Nobody has seen this one yet: at time 0 it misses nothing.
+            if self._live.loop.ghost is None and self._live.loop.simulation.time_ns == 0:
+                self._live.loop.begin_ghost()
+
+        self._live.call(begin)
+
+    def _done(self, line: str) -> list[dict[str, Any]]:
+        """What was done, as an entry of a script; moves of the string's end are in the pictures."""
+        if '"kind": "string_target"' in line[:80]:
+            return []
+        event = json.loads(line)
+        try:
+            command = of_event(event["kind"], event["content"], self._live.frames)
+            if command is None:
+                return []
+            return [{"t": event["time_ns"] / 1e9, **entry_of(command)}]
+        except InputError:
+            return []  # no entry says it
+
+    # From the pages
+
+    def _read(self) -> None:
+        assert self._child.stdout is not None
+        while (frame := read_frame(self._child.stdout)) is not None:
+            kind, content = frame
+            if kind == COMMAND:
+                command = json.loads(content)
+                answer = {"answer": command["id"], "refusal": self._obey(command)}
+                self._put(ANSWER, {"watcher": command["watcher"], **answer})
+            elif kind == LOOKING:
+                self._look(json.loads(content))
+            elif kind == SAID:
+                self._say(content.decode())
+            elif kind == READY:
+                ready = json.loads(content)
+                self.address, self.guests = ready["address"], ready["guests"]
+                self._ready.set()
+            elif kind == REFUSED:
+                self._refused = InputError(*json.loads(content))
+                self._ready.set()
+        self._look(False)
+        if not self._ready.is_set():
+            self._refused = InputError("workbench_port", "the page's process has ended")
+            self._ready.set()
+        elif not self._closed:
+            self._say("the page's process has ended, and the node goes on without it")
+        if self._holds:
+            self._obey({"entry": {"string": "release"}})
+
+    def _look(self, looking: bool) -> None:
+        self._told.looking = looking
+        self._last = b""  # for whoever comes
+        if looking:
+            self._looked_at.set()
+        else:
+            self._looked_at.clear()
+
+    def _obey(self, command: Mapping[str, Any]) -> str | None:
+        """Do what a page asks for; why it was refused, or None."""
+        live = self._live
+        try:
+            match command:
+                case {"entry": {"string": "release"}}:
+                    self._holds = False
+                    live.submit(ReleaseString())
+                case {"entry": entry}:
+                    check_entry(entry, live.scenario.parameters.mesh)
+                    self._holds |= "string" in entry
+                    live.schedule(json.dumps([{"t": 0, **entry}]))
+                case {"begin": values}:
+                    self._begin(values)
+                case {"time": "pause" | "resume" as what}:
+                    live.pause(what == "pause")
+                case {"time": "step"}:
+                    live.step()
+                case {"time": "reset"}:
+                    live.reset()
+        except InputError as error:
+            return str(error)
+        except Exception as error:  # a fault of ours; the page is told, and the next command is obeyed
+            traceback.print_exc()
+            return f"{type(error).__name__}: {error}"
+        return None
+
+    def _begin(self, values: Mapping[str, Any]) -> None:
+        """Another scene, in the node as it is."""
+        check_values(values, "")
+        in_force = self._live.scenario.parameters.named()
+        own = {name: in_force[name] for name in in_force if name in KEPT or _is_of_the_node(name)}
+        scenario = make_scenario({**values, **own})
+        was_paused = self._live.paused
+        # Time stands first: a scene that begins paused begins at its time 0.
+        self._live.pause(True)
+        try:
+            self._live.begin(scenario)
+        finally:
+            self._live.pause(was_paused)
+
+
+def check_entry(entry: Mapping[str, Any], mesh: str) -> None:
+    """Raises InputError for an entry that a page may not send. mesh: the present one's name."""
+    unknown = sorted(entry.keys() - ENTRY - KINDS)
+    if unknown:
+        raise InputError("entry", unknown[0], f"of a page: {', '.join(sorted(ENTRY | KINDS))}")
+    if entry.get("service", "clear_wrench") != "clear_wrench":
+        raise InputError("service", entry["service"], "clear_wrench")
+    if isinstance(entry.get("set"), Mapping):
+        check_values(entry["set"], mesh)
+
+
+def check_values(values: Mapping[str, Any], mesh: str) -> None:
+    """Raises InputError for values that a page may not set."""
+    for name, value in values.items():
+        if name not in SETTABLE and not name.startswith(("ballast.", "contacts.")):
+            raise InputError(name, value, "a parameter of body and motion; others are set at the node")
+        if name == "mesh" and value not in ("", mesh, *body_names()):
+            raise InputError(
+                name, value, f"a bundled body, one of {', '.join(body_names())}; files are opened at the node"
+            )
+
+
+def _is_shown(name: str) -> bool:
+    return name in SETTABLE or name.startswith(("ballast.", "contacts."))
+
+
+def _shown_name(scenario: Scenario) -> str:
+    """The mesh's name without its folder."""
+    return scenario.parameters.mesh.replace("\\", "/").rpartition("/")[2]
+
+
+def _is_of_the_node(name: str) -> bool:
+    """Whether a parameter belongs to the running program, and not to what flies in it."""
+    return parameter_named(name).changes == READ_ONLY and not name.startswith(("contacts.", "thrusters."))

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""The interactive page: an observer of a simulation in its own process, and the hands of its user."""
