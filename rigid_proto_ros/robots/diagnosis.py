@@ -6,10 +6,12 @@
 * explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py);
 * not uniform: it isn't the uniform solid's, but some distribution inside the shapes has it;
 * uniform: it is the uniform solid's, to the tolerance and the digits printed;
-* unknown: it can't be compared, for want of a shape that encloses a volume.
+* unknown: it can't be compared, for want of a shape that encloses a volume, or because something that the link shows
+  can't be found or read.
 
 The file's mass is taken as it is, so that the tensor and the COM are checked for themselves. What a link shows and what
-it collides with are compared each, and the better of both is named; a mass distribution may lie in either.
+it collides with are compared each, and the better of both is named; a mass distribution may lie in either. Collision
+shapes are often cruder than what they stand for: they alone condemn no link that shows something else.
 
 Along an axis on which the shapes reach from l to u, a distribution of mean c has at most the variance (c - l)(u - c)
 (Bhatia and Davis, American Mathematical Monthly 107, 2000): all mass at the two ends. A tensor says the variance along
@@ -54,7 +56,8 @@ DIRECTIONS = 1000
 class LinkDiagnosis:
     """One link: ``status`` is one of VERDICTS; errors are relative (COM over the box's diagonal), ``ratio`` is the
     tensor's size over that of the uniform solid; ``judged_by`` says whether by its visual or its collision shapes,
-    ``expected`` what they have as a uniform solid of the link's mass."""
+    ``expected`` what they have as a uniform solid of the link's mass; ``info``: remarks without effect on the verdict.
+    """
 
     link: str
     mesh: str
@@ -67,6 +70,7 @@ class LinkDiagnosis:
     expected: MassProperties | None = None
     note: str = ""
     judged_by: str = ""
+    info: tuple[str, ...] = ()
 
     @property
     def error(self) -> float:
@@ -80,7 +84,7 @@ class LinkDiagnosis:
             name: None if isinstance(value, float) and not math.isfinite(value) else value
             for name, value in vars(self).items()
         }
-        return {**plain, "causes": list(self.causes), "expected": expected}
+        return {**plain, "causes": list(self.causes), "expected": expected, "info": list(self.info)}
 
 
 def impossible_inertial(link: Link) -> str:
@@ -205,22 +209,28 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
 
 
 def diagnose(link: Link, meshes: Meshes, tolerance: float = LIMIT) -> LinkDiagnosis:
-    """The verdict on a link: by what it shows and by what it collides with, the better of both."""
-    found, inside = [], []
-    for role in (VISUAL, COLLISION):
-        shapes = [shape for shape in link.shapes if shape.role == role]
-        if not shapes:
-            continue
+    """The verdict on a link: by what it shows and by what it collides with, the better of both; unknown where anything
+    of what it shows, or of what it collides with where it shows nothing, can't be found or read.
+    """
+    shapes = {role: [shape for shape in link.shapes if shape.role == role] for role in (VISUAL, COLLISION)}
+    readable: dict[str, LinkShapes] = {}
+    lost: dict[str, str] = {}
+    for role, of_role in shapes.items():
         try:
-            parts = meshes.parts(shapes)
+            if of_role:
+                readable[role] = meshes.parts(of_role)
         except InputError as error:
-            name, note = shapes[0].file or shapes[0].kind, link.problem or str(error)
-            found.append(LinkDiagnosis(link.name, name, UNKNOWN, link.mass, note=note, judged_by=role))
-            continue
-        found.append(_compared(link, parts, tolerance, role))
-        inside.append(parts.points)
-    bare = LinkDiagnosis(link.name, "", UNKNOWN, link.mass, note=link.problem or "no shape to compare it with")
-    return _possible(link, min(found, key=_quality, default=bare), inside)
+            lost[role] = str(error)
+    missing = VISUAL if VISUAL in lost else COLLISION if COLLISION in lost and not readable else ""
+    if missing or not readable:
+        note = lost.get(missing, "no shape to compare it with")
+        note = "; ".join(filter(None, [link.problem, note])) if missing else link.problem or note
+        name = shapes[missing][0].file or shapes[missing][0].kind if missing else ""
+        bare = LinkDiagnosis(link.name, name, UNKNOWN, link.mass, note=note, judged_by=missing)
+        return _possible(link, bare, [])
+    found = [_compared(link, parts, tolerance, role) for role, parts in readable.items()]
+    best = replace(min(found, key=_quality), info=tuple(lost.values()))
+    return _possible(link, best, [parts.points for parts in readable.values()])
 
 
 def _quality(diagnosis: LinkDiagnosis) -> tuple[int, bool, float]:

@@ -81,7 +81,9 @@ def test_a_file_included_twice_and_meshes_that_mujoco_cannot_load(tmp_path):
     asset = '<asset><mesh name="m" file="lost.dae"/><texture name="t" type="2d" file="lost.png"/></asset>'
     path = tmp_path / "model.xml"
     path.write_text(f"<mujoco>{asset}<worldbody>{body % ('a', lost)}{body % ('b', '')}</worldbody></mujoco>")
-    assert {d.link: d.status for d in compare_robot(path)} == {"a": "uniform", "b": "uniform"}
+    assert {d.link: d.status for d in compare_robot(path)} == {"a": "unknown", "b": "uniform"}
+    path.write_text(path.read_text().replace('conaffinity="0"', 'conaffinity="1"'))  # collides, too, and isn't shown
+    assert {d.link: d.status for d in compare_robot(path)} == {"a": "unknown", "b": "uniform"}
     assert lump_robot(path).properties.mass == 24.0
 
 

@@ -67,7 +67,8 @@ SPHERE = '<collision><geometry><sphere radius="{}"/></geometry></collision>'
     ("shapes", "mass", "word", "note"),
     [
         (FAR, "1", "unknown", "of the distance"),
-        (FAR + SPHERE.format("1e-30"), "1", "impossible for its shape", ""),
+        (FAR + SPHERE.format("1e-30"), "1", "unknown", "of the distance"),  # what it shows can't be taken
+        (SPHERE.format("1e-30"), "1", "impossible for its shape", ""),
         (SPHERE.format("1e-3"), "1e-300", "impossible for its shape", ""),  # times which no double is the tensor's size
         (BOX.replace("3", "1e30"), "1", "unknown", "a solid of link l0"),
     ],
