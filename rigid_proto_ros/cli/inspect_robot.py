@@ -113,7 +113,7 @@ def _tell_what_is_left_out() -> None:
 def _judge(args: argparse.Namespace, robot: str) -> tuple[int, dict[str, Any]]:
     """Exit status and JSON object of one robot; prints the report unless JSON is asked for."""
     from ..robots.causes import LIMIT
-    from ..robots.diagnosis import NOT_UNIFORM, UNKNOWN, WRONG, compare_robot
+    from ..robots.diagnosis import NOT_JUDGED, NOT_UNIFORM, UNKNOWN, WRONG, compare_robot
 
     diagnoses = compare_robot(
         Path(robot),
@@ -129,7 +129,7 @@ def _judge(args: argparse.Namespace, robot: str) -> tuple[int, dict[str, Any]]:
     counted = (*WRONG, *([NOT_UNIFORM] if close else []), *([UNKNOWN] if args.strict else []))
     with_shapes = [d for d in diagnoses if d.mesh]
     # A comparison of nothing must not look like one that found nothing.
-    nothing = close and with_shapes and all(d.status == UNKNOWN for d in with_shapes)
+    nothing = close and with_shapes and all(d.status in (UNKNOWN, NOT_JUDGED) for d in with_shapes)
     status = 1 if nothing or any(d.status in counted for d in diagnoses) else 0
     return status, {"compare": robot, "links": [d.as_dict() for d in diagnoses]}
 

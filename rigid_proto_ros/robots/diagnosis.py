@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: MIT
 """A verdict on each inertial of a robot file, the first of these words that holds:
 
+* frame: mass 0 and no shape, as of a link that only marks a place;
 * impossible: no body has it (mass > 0, tensor positive definite, A + B >= C);
-* impossible for its shape: no mass distribution inside the link's shapes has it;
-* explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py);
-* not uniform: it isn't the uniform solid's, but some distribution inside the shapes has it;
-* uniform: it is the uniform solid's, to the tolerance and the digits printed;
 * unknown: it can't be compared, for want of a shape that encloses a volume, or because something that the link shows
-  can't be found or read.
+  can't be found or read;
+* uniform: it is the uniform solid's, to the tolerance and the digits printed;
+* explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py);
+* not judged: all shapes are primitives, which often stand in for the parts that were weighed or drawn;
+* impossible for its shape: no mass distribution inside the link's shapes has it;
+* not uniform: it isn't the uniform solid's, but some distribution inside the shapes has it.
 
 The file's mass is taken as it is, so that the tensor and the COM are checked for themselves. What a link shows and what
-it collides with are compared each, and the better of both is named; a mass distribution may lie in either. Collision
-shapes are often cruder than what they stand for: they alone condemn no link that shows something else.
+it collides with are compared each, and the one that counts is named; a mass distribution may lie in either. Collision
+shapes are often cruder than what they stand for: they condemn no link that shows a solid.
 
 Along an axis on which the shapes reach from l to u, a distribution of mean c has at most the variance (c - l)(u - c)
 (Bhatia and Davis, American Mathematical Monthly 107, 2000): all mass at the two ends. A tensor says the variance along
@@ -40,10 +42,11 @@ from .link_shapes import LinkShapes, Meshes
 from .reading import COLLISION, HERE, VISUAL, Link, Shape, check_finite, check_inertial, read_robot
 
 IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED = "impossible", "impossible for its shape", "explained"
-NOT_UNIFORM, UNIFORM, UNKNOWN = "not uniform", "uniform", "unknown"
+NOT_UNIFORM, NOT_JUDGED, UNIFORM, UNKNOWN, FRAME = "not uniform", "not judged", "uniform", "unknown", "frame"
 WRONG = (IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED)
 """Verdicts on inertials that nobody can have meant."""
-VERDICTS = (*WRONG, NOT_UNIFORM, UNIFORM, UNKNOWN)
+VERDICTS = (*WRONG, NOT_UNIFORM, NOT_JUDGED, UNIFORM, UNKNOWN, FRAME)
+"""In the order of a report, the worst first."""
 MARGIN = 1e-3
 """Part of the shapes' diagonal by which they may be larger than they are drawn."""
 MAX_ROUNDING = 0.05
@@ -188,11 +191,18 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
     offset = np.abs(link.center_of_mass - truth.center_of_mass)
     center_left = float(np.max(offset - np.minimum(link.center_step, MAX_ROUNDING * parts.diagonal))) / parts.diagonal
     inertia_error, inertia_left, ratio = _tensor_error(link, truth)
-    causes: tuple[str, ...] = ()
+    of_tensor: tuple[str, ...] = ()
+    of_center: tuple[str, ...] = ()
     if inertia_left > tolerance:
-        causes += explain_inertia(link.inertia, truth, link.center_of_mass, parts)
+        of_tensor = explain_inertia(link.inertia, truth, link.center_of_mass, parts)
     if center_left > tolerance:
-        causes += explain_center(link.center_of_mass, truth, parts)
+        of_center = explain_center(link.center_of_mass, truth, parts)
+    causes = of_tensor + of_center
+    if parts.are_primitives and (bool(of_tensor), bool(of_center)) != (
+        inertia_left > tolerance,
+        center_left > tolerance,
+    ):
+        causes = ()  # by half they say nothing, where the shapes may be those of something else
     density = link.mass / sum(solid.mass for solid in parts.solids)
     note = f"density {density:.4g} kg/m³"
     if not 1.0 <= density <= 25000.0:
@@ -209,9 +219,12 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
 
 
 def diagnose(link: Link, meshes: Meshes, tolerance: float = LIMIT) -> LinkDiagnosis:
-    """The verdict on a link: by what it shows and by what it collides with, the better of both; unknown where anything
+    """The verdict on a link, by what it shows or by what it collides with; unknown where anything
     of what it shows, or of what it collides with where it shows nothing, can't be found or read.
     """
+    if link.mass == 0.0 and not link.shapes:
+        note = "mass 0 and no shape: it only marks a place" + ("; its tensor isn't 0" if np.any(link.inertia) else "")
+        return LinkDiagnosis(link.name, "", FRAME, link.mass, note=note)
     shapes = {role: [shape for shape in link.shapes if shape.role == role] for role in (VISUAL, COLLISION)}
     readable: dict[str, LinkShapes] = {}
     lost: dict[str, str] = {}
@@ -229,25 +242,35 @@ def diagnose(link: Link, meshes: Meshes, tolerance: float = LIMIT) -> LinkDiagno
         bare = LinkDiagnosis(link.name, name, UNKNOWN, link.mass, note=note, judged_by=missing)
         return _possible(link, bare, [])
     found = [_compared(link, parts, tolerance, role) for role, parts in readable.items()]
-    best = replace(min(found, key=_quality), info=tuple(lost.values()))
-    return _possible(link, best, [parts.points for parts in readable.values()])
+    only_primitives = all(parts.are_primitives for parts in readable.values())
+    best = replace(min(found, key=lambda one: _weight(one, readable[one.judged_by])), info=tuple(lost.values()))
+    return _possible(link, best, [parts.points for parts in readable.values()], only_primitives)
 
 
-def _quality(diagnosis: LinkDiagnosis) -> tuple[int, bool, float]:
-    """The better of two diagnoses of a link has the smaller one: the closest verdict, then by error."""
-    order = (UNIFORM, EXPLAINED, NOT_UNIFORM, UNKNOWN).index(diagnosis.status)
-    return order, diagnosis.expected is None, diagnosis.error
+def _weight(diagnosis: LinkDiagnosis, parts: LinkShapes) -> tuple[bool, ...]:
+    """Which of two diagnoses of a link stands, the smaller: one that finds it right; then that of meshes, since
+    primitives stand in for them; one that has numbers; that of what is shown, which is finer than what collides.
+    """
+    has_numbers = diagnosis.expected is not None
+    return diagnosis.status != UNIFORM, parts.are_primitives, not has_numbers, diagnosis.judged_by == COLLISION
 
 
-def _possible(link: Link, diagnosis: LinkDiagnosis, inside: list[Points]) -> LinkDiagnosis:
-    """The diagnosis with the verdict that the link's inertial is impossible, where it is; ``inside``: points (n, 3) of
-    the shapes.
+def _possible(
+    link: Link, diagnosis: LinkDiagnosis, inside: list[Points], only_primitives: bool = False
+) -> LinkDiagnosis:
+    """The diagnosis with the verdict that the link's inertial is impossible, or not judged, where it is; ``inside``:
+    points (n, 3) of the shapes.
     """
     if link.problem:
         return diagnosis
     if reason := impossible_inertial(link):
         return replace(diagnosis, status=IMPOSSIBLE, causes=(reason, *diagnosis.causes))
-    if inside and (reason := beyond_shapes(link, np.concatenate(inside))):
+    if only_primitives and diagnosis.status == NOT_UNIFORM:
+        note = f"its shapes are primitives only: not judged against them; {diagnosis.note}"
+        return replace(diagnosis, status=NOT_JUDGED, note=note)
+    if diagnosis.status != UNIFORM and inside and (reason := beyond_shapes(link, np.concatenate(inside))):
+        if diagnosis.status == EXPLAINED:
+            return replace(diagnosis, causes=(*diagnosis.causes, reason))
         return replace(diagnosis, status=BEYOND_SHAPE, causes=(reason, *diagnosis.causes))
     return diagnosis
 

@@ -14,7 +14,7 @@ from ..base.files import read_bounded
 from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mass.tensor import SIX
 from ..mesh.locate import Search
-from .diagnosis import NOT_UNIFORM, UNIFORM, LinkDiagnosis, diagnose
+from .diagnosis import FRAME, NOT_JUDGED, NOT_UNIFORM, UNIFORM, LinkDiagnosis, diagnose
 from .link_shapes import Meshes
 from .reading import MAX_BYTES, Link, parse_xml, robot_of
 
@@ -52,6 +52,8 @@ def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict[int, tup
     """Why a link that isn't uniform can't, or shan't, be written; "" when it can."""
     if diagnosis.status == NOT_UNIFORM and not everything:
         return "it is possible for its shapes; --all replaces it by that of the uniform solid"
+    if diagnosis.status == NOT_JUDGED and not everything:
+        return "its shapes are primitives only, which often stand in for others; --all replaces it by that of theirs"
     if link.problem or diagnosis.expected is None:
         return diagnosis.note or "its mass isn't a positive number"
     if link.element is None or id(link.element) not in places:
@@ -85,8 +87,9 @@ def fix_robot(
     fixed, written = [], {}
     for link in links:
         diagnosis = diagnose(link, meshes)
-        reason = "" if diagnosis.status == UNIFORM else _reason_to_leave(link, diagnosis, places, everything)
-        if diagnosis.status != UNIFORM and not reason and diagnosis.expected is not None:
+        right = diagnosis.status in (UNIFORM, FRAME)
+        reason = "" if right else _reason_to_leave(link, diagnosis, places, everything)
+        if not right and not reason and diagnosis.expected is not None:
             written[id(link.element)] = write(diagnosis.expected)
         fixed.append(FixedLink(diagnosis, id(link.element) in written, reason))
     for element, (start, end) in sorted(places.items(), key=lambda item: item[1], reverse=True):

@@ -179,6 +179,11 @@ class LinkShapes:
         return ", ".join(dict.fromkeys(body.mesh.name if body else shape.kind for shape, body in self.parts))
 
     @property
+    def are_primitives(self) -> bool:
+        """Whether none of them is a mesh."""
+        return all(body is None for _, body in self.parts)
+
+    @property
     def diagonal(self) -> float:
         """Diagonal of the box, in the link's axes, around all."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))

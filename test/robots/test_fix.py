@@ -57,7 +57,7 @@ def test_only_the_inertials_of_a_urdf_change(parts):
     path = parts / "robot.urdf"
     data, links = fixed(path, URDF)
     assert [(name, link.before.status, link.written) for name, link in links.items()] == [
-        ("arm", "impossible for its shape", True), ("bare", "unknown", False), ("open", "unknown", False),
+        ("arm", "explained", True), ("bare", "unknown", False), ("open", "unknown", False),
         ("one", "impossible", True)
     ]  # fmt: skip
     assert "no <inertial>" in links["bare"].left and "open surface" in links["open"].left
@@ -124,7 +124,7 @@ def test_the_command_writes_tells_and_leaves(parts, capsys):
     path.write_bytes(URDF.encode())
     assert main(["inspect", "--compare", str(path), "--fix", str(out)]) == 0
     told = capsys.readouterr().out
-    assert "arm: impossible for its shape -> uniform" in told and "open: unknown; left: open" in told
+    assert "arm: explained -> uniform" in told and "open: unknown; left: open" in told
     assert "2 of 4 inertials rewritten, 2 left" in told
     assert path.read_bytes() == URDF.encode()
     assert main(["inspect", "--compare", str(out), "--fix", str(parts / "again.urdf"), "--json"]) == 0
@@ -154,7 +154,7 @@ def test_the_robots_own_file_is_not_overwritten(spelling, parts, capsys, monkeyp
 
 def test_what_a_body_of_the_shapes_can_have_stays_unless_all_is_asked_for(parts):
     path = parts / "robot.urdf"
-    shape = '<visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
+    shape = f"<visual>{MESH}</visual>"
     inertial = '<inertial><mass value="1.000"/><inertia ixx="0.012" iyy="0.009" izz="0.005"/></inertial>'
     data, links = fixed(path, f'<robot name="r"><link name="a">{shape}{inertial}</link></robot>')
     assert data == path.read_bytes() and "--all" in links["a"].left
