@@ -206,6 +206,18 @@ class LinkShapes:
         volume = sum(solid.mass for solid in self.solids)
         return sum((solid.inertia for solid in self.solids), np.zeros((3, 3))) * (mass / volume)
 
+    def shell(self, mass: float) -> MassProperties:
+        """``mass`` kg spread evenly over the surfaces of the meshes, in the link's axes; raises InputError where some
+        shapes are primitives.
+        """
+        found = []
+        for shape, body in self.parts:
+            if body is None:
+                raise InputError("shell", shape.kind, "meshes alone")
+            area = body.moments.moments("shell", shape.scale).measure * float(shape.scale[0]) ** 2
+            found.append(placed(body.moments.mass_properties("shell", scale=shape.scale, mass=area), shape.pose))
+        return of_mass(combined(found, self.names), mass)
+
     def box(self, mass: float) -> MassProperties:
         """The box around all, in the first shape's axes, as a solid of ``mass`` kg."""
         R = self.first.pose.rotation
