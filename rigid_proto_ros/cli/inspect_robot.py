@@ -41,7 +41,10 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --compare: exit 1 also for an inertial that differs from a uniform solid's by more than T",
     )  # fmt: skip
     parser.add_argument("--strict", action="store_true", help="with --compare: exit 1 also for a link that is unknown")
-    parser.add_argument("--fix", metavar="OUT", help="with --compare: write the file to OUT with corrected inertials")
+    parser.add_argument(
+        "--fix", metavar="OUT",
+        help="with --compare: write the file to OUT with corrected inertials, and with --density also those missing",
+    )  # fmt: skip
     parser.add_argument("--all", action="store_true", help="with --fix: correct those that aren't uniform, too")
     parser.add_argument("--lump", metavar="ROBOT", help="a URDF, SDF or MJCF with its joints at 0, as one rigid body")
     parser.add_argument("--as-scene", metavar="FILE.yaml", help="with --lump: write a scene of this body, and its mesh")
@@ -90,7 +93,7 @@ def compare(args: argparse.Namespace) -> int:
 
 def _check_options(args: argparse.Namespace) -> None:
     """Refuse options that ``--compare`` doesn't go with, or that need another one."""
-    _refuse(args, "compare", "lump", "as-scene", "verify", "urdf", "sdf", "mjcf", "model", "ballast", "mass", "density")
+    _refuse(args, "compare", "lump", "as-scene", "verify", "urdf", "sdf", "mjcf", "model", "ballast", "mass")
     _refuse(args, "compare", "repair", "fallback")
     if args.scale and not args.mesh:
         raise InputError("--scale", "needs the MESH of one link; the robot's file gives the scales of its own meshes")
@@ -98,6 +101,10 @@ def _check_options(args: argparse.Namespace) -> None:
         raise InputError("--tolerance", args.tolerance, "a finite number > 0")
     if args.strict and args.fix is not None:
         raise InputError("--strict", "checks alone; --fix says of each link what was left and why")
+    if args.density is not None and args.fix is None:
+        raise InputError("--density", "needs --fix OUT, which gives links without an inertial that of their shapes")
+    if args.density is not None and not 0.0 < args.density < math.inf:
+        raise InputError("density", args.density, "a finite number > 0")
     if args.all and args.fix is None:
         raise InputError("--all", "needs --fix OUT")
     if len(args.compare) > 1 and (args.mesh or args.fix):
@@ -168,7 +175,13 @@ def _fix(args: argparse.Namespace) -> int:
     if is_same_file(robot, args.fix):
         raise InputError("--fix", args.fix, "another file than the robot's")
     folders = tuple(args.package_path or ())
-    data, links = fix_robot(robot, folders=folders, accept_open=args.accept_open or 0.0, everything=args.all)
+    data, links = fix_robot(
+        robot,
+        folders=folders,
+        accept_open=args.accept_open or 0.0,
+        everything=args.all,
+        density=args.density or 0.0,
+    )
     with whole_file("--fix", args.fix) as path:
         path.write_bytes(data)
     if args.json:

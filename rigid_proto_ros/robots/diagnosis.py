@@ -32,6 +32,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.vectors import Points, Vector3
 from ..mass.from_mesh import mesh_body
+from ..mass.inspection import remarks
 from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor
 from ..mesh.locate import Search
@@ -243,8 +244,30 @@ def diagnose(link: Link, meshes: Meshes, tolerance: float = LIMIT) -> LinkDiagno
         return _possible(link, bare, [])
     found = [_compared(link, parts, tolerance, role) for role, parts in readable.items()]
     only_primitives = all(parts.are_primitives for parts in readable.values())
-    best = replace(min(found, key=lambda one: _weight(one, readable[one.judged_by])), info=tuple(lost.values()))
+    best = replace(
+        min(found, key=lambda one: _weight(one, readable[one.judged_by])),
+        info=(*lost.values(), *_remarks(readable[VISUAL if VISUAL in readable else COLLISION])),
+    )
     return _possible(link, best, [parts.points for parts in readable.values()], only_primitives)
+
+
+def missing_inertial(link: Link, meshes: Meshes, density: float) -> MassProperties:
+    """The inertial of a link that has none: of its visual shapes, or of its collision shapes where it has no others,
+    as solids of ``density`` [kg/m³]. Raises InputError where some can't be found or read, or bound no solid.
+    """
+    shown = [shape for shape in link.shapes if shape.role == VISUAL]
+    parts = meshes.parts(shown or link.shapes)
+    properties = parts.uniform(density * sum(solid.mass for solid in parts.solids))
+    check_finite(f"link {link.name}", mass=properties.mass, inertia=properties.inertia)
+    check_tensor(properties.inertia, source=f"tensor of link {link.name}")
+    return properties
+
+
+def _remarks(parts: LinkShapes) -> list[str]:
+    """What the user of a link's meshes may not expect."""
+    bodies = [body for _, body in parts.parts if body is not None]
+    told = [f"{body.mesh.name}: {text}" for body in bodies for text in remarks(body, parts.diagonal)]
+    return list(dict.fromkeys(told))
 
 
 def _weight(diagnosis: LinkDiagnosis, parts: LinkShapes) -> tuple[bool, ...]:

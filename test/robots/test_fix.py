@@ -163,6 +163,50 @@ def test_what_a_body_of_the_shapes_can_have_stays_unless_all_is_asked_for(parts)
     assert_finds_nothing(path, data)
 
 
+def test_missing_inertials_are_filled_in_from_the_shapes_at_a_density(parts, capsys):
+    path, out, gone = (
+        parts / "robot.urdf",
+        parts / "fixed.urdf",
+        '<visual><geometry><mesh filename="no.stl"/></geometry></visual>',
+    )
+    box = '<{0}><origin xyz="0 0 1"/><geometry><box size="0.1 0.2 0.3"/></geometry></{0}>'
+    path.write_text(
+        '<robot name="r"><!-- <link name="bare"> -->\n  <link name="bare">\n    '
+        f'<visual>{MESH}</visual>\n  </link><link name="box">{box.format("visual")}{box.format("collision")}</link>\n'
+        f'<link name="hit">{box.format("collision")}</link><link name="gone">{gone}{box.format("collision")}</link>'
+        '<link name="open"><visual><geometry><mesh filename="open.obj"/></geometry></visual></link><link name="empty"/>\n</robot>'
+    )
+    assert main(["inspect", "--compare", str(path), "--fix", str(out), "--density", "500"]) == 0
+    told = capsys.readouterr().out
+    for words in ("bare: unknown -> uniform", "box: unknown -> uniform", "hit: unknown -> uniform", "3 of 5 inertials"):
+        assert words in told
+    assert "gone: unknown; left: no <inertial>; visual mesh not found" in told and "open: unknown; left" in told
+    links = {link.name: link for link in read_robot(out).links}
+    for name, height in (("bare", 0.0), ("box", 1.0), ("hit", 1.0)):
+        assert links[name].mass == pytest.approx(3.0, rel=1e-6) and links[name].center_of_mass[2] == pytest.approx(
+            height
+        )
+        assert links[name].inertia == pytest.approx(3.0 / 12.0 * np.diag([0.13, 0.1, 0.05]), rel=1e-6)
+    assert b'  <link name="bare">\n    <inertial>\n      <origin' in out.read_bytes()
+    assert re.sub(rb"\s*<inertial>.*?</inertial>", b"", out.read_bytes(), flags=re.DOTALL) == path.read_bytes()
+    data, _ = fix_robot(out, density=500.0)
+    assert data == out.read_bytes()
+    for more in (["--density", "500"], ["--fix", str(out), "--density", "0"], ["--fix", str(out), "--density", "nan"]):
+        assert main(["inspect", "--compare", str(path), *more]) == 2
+
+
+def test_missing_inertials_of_an_sdf_are_filled_in_and_those_that_a_simulator_computes_are_left(parts):
+    path, auto = parts / "model.sdf", "<inertial auto='true'/>"
+    path.write_text(re.sub("<inertial>.*</inertial>", "", SDF, flags=re.DOTALL))
+    data, links = fix_robot(path, density=1000.0)
+    path.write_bytes(data)
+    (link,) = read_robot(path).links
+    assert links[0].written and link.mass == pytest.approx(6.0, rel=1e-6)
+    path.write_text(re.sub("<inertial>.*</inertial>", auto, SDF, flags=re.DOTALL))
+    data, links = fix_robot(path, density=1000.0)
+    assert data == path.read_bytes() and "auto" in links[0].left
+
+
 def test_an_inertial_within_another_is_refused(parts):
     path = parts / "robot.urdf"
     path.write_bytes(URDF.replace("</inertial>", "<inertial/></inertial>", 1).encode())
