@@ -56,7 +56,7 @@ def test_far_from_the_origin_the_limit_is_that_of_a_files_numbers():
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-16.0, -6.2))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_what_is_said_of_the_effect_bounds_it(seed, exponent):
     vertices, triangles = sphere(8)
     true = MeshMoments(vertices, triangles).mass_properties(density=1.0)
