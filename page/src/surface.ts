@@ -18,9 +18,11 @@ export interface MeshNumbers {
   readonly solid?: Float64Array;
 }
 
-/** A mesh that was judged. outward: triangles 3 m, wound outward; record: MESH, as far as it is known. */
+/** A mesh that was judged. outward: triangles 3 m, wound outward; enclosing: those of its solid, over fewer vertices
+ * where corners at open edges count as one; record: MESH, as far as it is known. */
 export interface Surface extends MeshNumbers {
   readonly outward: Int32Array;
+  readonly enclosing: Int32Array;
   readonly closed: boolean;
   readonly inward: boolean;
   readonly findings: readonly Finding[];
@@ -29,6 +31,9 @@ export interface Surface extends MeshNumbers {
 
 /** The largest numbers of a mesh whose moments are finite (mass/verdict.py, SIZE_RANGE). */
 const SIZES = [1e-60, 1e60] as const;
+
+/** Part of the box's diagonal up to which corners at open edges count as one (mesh/topology.py, JOINED). */
+const JOINED = 1e-6;
 
 /** Write vertices (n, 3) into memory. */
 function vertexMatrix(memory: Memory, vertices: Float64Array): Matrix {
@@ -61,6 +66,16 @@ function turned(triangles: Int32Array): Int32Array {
   return found;
 }
 
+/** Edges (e, 6) of triangles, components (m) and their count, and edges of an odd number of triangles and wound alike. */
+interface Connected {
+  readonly corners: Matrix;
+  readonly edges: Matrix;
+  readonly component: Vector;
+  readonly count: number;
+  readonly odd: number;
+  readonly flipped: number;
+}
+
 /** Judges surfaces and computes their moments, in memory that it gives back. */
 export class Surfaces {
   readonly #kernels: Kernels;
@@ -91,32 +106,52 @@ export class Surfaces {
     const n = vertices.n, m = triangles.n;
     const room = memory.numbers(kernels.topologyRoom(n, m));
     const welded = memory.matrix(m, 3);
-    const corners = kernels.weldTriangles(vertices, triangles, room, welded) === 1 ? welded : triangles;
-    const edges = memory.matrix(kernels.sortEdges(corners, n, room), 6), component = memory.numbers(m);
-    const count = kernels.fillEdges(corners, room, edges, component);
-    const [odd, flipped] = kernels.edgeDefects(edges);
+    const first = kernels.weldTriangles(vertices, triangles, room, welded) === 1 ? welded : triangles;
+    const separate = this.#connected(first, n, room), near = this.#joined(vertices, first, separate, room);
+    const { corners, component, count, odd, flipped } = near?.connected ?? separate;
     const whole = kernels.signedVolumes(vertices, corners, component, memory.numbers(count), memory.matrix(count, 3), memory.matrix(count, 3));
     const findings: Finding[] = [];
     const add = (code: string, severity: Finding["severity"], ...numbers: number[]): void => {
       const text = filled(words[code] ?? code, Object.fromEntries(numbers.map((x, k) => [k, String(x)])));
-      const message = numbers[0] === 1 ? text.replace("edges", "edge").replace("faces", "face") : text;
+      const message = numbers[0] === 1 ? text.replace("edges", "edge").replace("faces", "face").replace("corners", "corner") : text;
       findings.push({ code, severity, message: severity === "error" ? `${message}; ${words["remedy"]}` : message });
     };
+    if (near !== null) add("joined_corners", "info", near.found, Number(near.farthest.toPrecision(2)));
     if (odd > 0) add("open", "error", odd);
     if (flipped > 0) add("inconsistent_winding", "error", flipped);
     const inward = odd === 0 && flipped === 0 && whole < 0;
+    const enclosing = near === null ? mesh.triangles : Int32Array.from({ length: 3 * m }, (_, k) => memory.i4(corners.at, 6 * m)[2 * k] ?? 0);
     if (odd === 0 && flipped === 0) {
       const surplus = this.#surplus(corners, n, room);
       if (surplus > 0) add("duplicate_faces", "error", surplus);
       if (inward) add("inward", "warning");
-      if (mesh.solid === undefined && surplus === 0 && !this.#fill(record, mesh, 0, memory)) add("zero_volume", "error");
+      if (mesh.solid === undefined && surplus === 0 && !this.#fill(record, { ...mesh, triangles: enclosing }, 0, memory)) add("zero_volume", "error");
     }
     if (mesh.solid !== undefined) this.#take(record, mesh.solid);
     if (count > 1 || mesh.solid === undefined) findings.push({ code: "unchecked", severity: "info", message: words["unchecked"] ?? "" });
     const closed = mesh.solid !== undefined || !findings.some((each) => each.severity === "error");
     const bytes = Uint8Array.from(memory.u1(record.at, Mesh.SIZE));
     const outward = inward ? turned(mesh.triangles) : mesh.triangles;
-    return { ...mesh, outward, closed, inward, findings, record: bytes };
+    return { ...mesh, outward, enclosing, closed, inward, findings, record: bytes };
+  }
+
+  /** Edges and components of triangles over welded vertices. */
+  #connected(corners: Matrix, vertexCount: number, room: Vector): Connected {
+    const kernels = this.#kernels, memory = kernels.memory;
+    const edges = memory.matrix(kernels.sortEdges(corners, vertexCount, room), 6), component = memory.numbers(corners.n);
+    const count = kernels.fillEdges(corners, room, edges, component);
+    const [odd, flipped] = kernels.edgeDefects(edges);
+    return { corners, edges, component, count, odd, flipped };
+  }
+
+  /** The same with corners at open edges joined where they differ by rounding alone; null where that closes nothing. */
+  #joined(vertices: Matrix, corners: Matrix, separate: Connected, room: Vector): { connected: Connected; found: number; farthest: number } | null {
+    if (separate.odd === 0) return null;
+    const joined = this.#kernels.memory.matrix(corners.n, 3);
+    const [found, farthest] = this.#kernels.joinOpenEdges(vertices, corners, separate.edges, JOINED, room, joined);
+    if (found === 0) return null;
+    const connected = this.#connected(joined, vertices.n, room);
+    return connected.odd < separate.odd ? { connected, found, farthest } : null;
   }
 
   /** Faces that occur twice with one winding, where the surface is closed without the copies, too. */
@@ -163,7 +198,7 @@ export class Surfaces {
    * has any. */
   provide(record: Mesh, surface: Surface, model: number, scale: Float64Array): boolean {
     const memory = this.#kernels.memory, mark = memory.mark();
-    const found = (model !== 0 || surface.closed) && this.#fill(record, surface, model, memory, scale);
+    const found = (model !== 0 || surface.closed) && this.#fill(record, model === 0 ? { ...surface, triangles: surface.enclosing } : surface, model, memory, scale);
     memory.release(mark);
     if (found) surface.record.set(memory.u1(record.at, Mesh.SIZE));
     return found;

@@ -26,6 +26,7 @@ NEEDS = {
     "fix": "--compare ROBOT",
     "all": "--compare ROBOT --fix OUT",
     "tolerance": "--compare ROBOT",
+    "strict": "--compare ROBOT",
     "package-path": "--compare ROBOT or --lump ROBOT",
     "as-scene": "--lump ROBOT",
 }

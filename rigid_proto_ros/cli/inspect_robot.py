@@ -40,7 +40,11 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
         "--tolerance", type=float, metavar="T",
         help="with --compare: exit 1 also for an inertial that differs from a uniform solid's by more than T",
     )  # fmt: skip
-    parser.add_argument("--fix", metavar="OUT", help="with --compare: write the file to OUT with corrected inertials")
+    parser.add_argument("--strict", action="store_true", help="with --compare: exit 1 also for a link that is unknown")
+    parser.add_argument(
+        "--fix", metavar="OUT",
+        help="with --compare: write the file to OUT with corrected inertials, and with --density also those missing",
+    )  # fmt: skip
     parser.add_argument("--all", action="store_true", help="with --fix: correct those that aren't uniform, too")
     parser.add_argument("--lump", metavar="ROBOT", help="a URDF, SDF or MJCF with its joints at 0, as one rigid body")
     parser.add_argument("--as-scene", metavar="FILE.yaml", help="with --lump: write a scene of this body, and its mesh")
@@ -61,18 +65,10 @@ def _refuse(args: argparse.Namespace, use: str, *names: str) -> None:
 
 def compare(args: argparse.Namespace) -> int:
     """``inspect [MESH] --compare ROBOT...``: 1 if a link's inertial is wrong, otherwise 0; with a mesh or a tolerance
-    also 1 if an inertial differs from that of the uniform solid, or if nothing could be compared.
+    also 1 if an inertial differs from that of the uniform solid, or if nothing could be compared; with --strict also
+    if a link is unknown.
     """
-    _refuse(args, "compare", "lump", "as-scene", "verify", "urdf", "sdf", "mjcf", "model", "ballast", "mass", "density")
-    _refuse(args, "compare", "repair", "fallback")
-    if args.scale and not args.mesh:
-        raise InputError("--scale", "needs the MESH of one link; the robot's file gives the scales of its own meshes")
-    if args.tolerance is not None and not 0.0 < args.tolerance < math.inf:
-        raise InputError("--tolerance", args.tolerance, "a finite number > 0")
-    if args.all and args.fix is None:
-        raise InputError("--all", "needs --fix OUT")
-    if len(args.compare) > 1 and (args.mesh or args.fix):
-        raise InputError("--compare", " ".join(args.compare), "one robot, with MESH or --fix")
+    _check_options(args)
     _tell_what_is_left_out()
     if args.fix is not None:
         return _fix(args)
@@ -95,6 +91,26 @@ def compare(args: argparse.Namespace) -> int:
     return max(status for status, _ in found)
 
 
+def _check_options(args: argparse.Namespace) -> None:
+    """Refuse options that ``--compare`` doesn't go with, or that need another one."""
+    _refuse(args, "compare", "lump", "as-scene", "verify", "urdf", "sdf", "mjcf", "model", "ballast", "mass")
+    _refuse(args, "compare", "repair", "fallback")
+    if args.scale and not args.mesh:
+        raise InputError("--scale", "needs the MESH of one link; the robot's file gives the scales of its own meshes")
+    if args.tolerance is not None and not 0.0 < args.tolerance < math.inf:
+        raise InputError("--tolerance", args.tolerance, "a finite number > 0")
+    if args.strict and args.fix is not None:
+        raise InputError("--strict", "checks alone; --fix says of each link what was left and why")
+    if args.density is not None and args.fix is None:
+        raise InputError("--density", "needs --fix OUT, which gives links without an inertial that of their shapes")
+    if args.density is not None and not 0.0 < args.density < math.inf:
+        raise InputError("density", args.density, "a finite number > 0")
+    if args.all and args.fix is None:
+        raise InputError("--all", "needs --fix OUT")
+    if len(args.compare) > 1 and (args.mesh or args.fix):
+        raise InputError("--compare", " ".join(args.compare), "one robot, with MESH or --fix")
+
+
 def _tell_what_is_left_out() -> None:
     if missing := hull_is_missing():
         left_out = "nobody looks along the normals of a shape's hull, nor for a hull as the cause"
@@ -104,7 +120,7 @@ def _tell_what_is_left_out() -> None:
 def _judge(args: argparse.Namespace, robot: str) -> tuple[int, dict[str, Any]]:
     """Exit status and JSON object of one robot; prints the report unless JSON is asked for."""
     from ..robots.causes import LIMIT
-    from ..robots.diagnosis import NOT_UNIFORM, UNKNOWN, WRONG, compare_robot
+    from ..robots.diagnosis import NOT_JUDGED, NOT_UNIFORM, UNKNOWN, WRONG, compare_robot
 
     diagnoses = compare_robot(
         Path(robot),
@@ -116,11 +132,11 @@ def _judge(args: argparse.Namespace, robot: str) -> tuple[int, dict[str, Any]]:
     )
     if not args.json:
         _print_diagnoses(diagnoses)
-    strict = args.mesh is not None or args.tolerance is not None
-    counted = (*WRONG, NOT_UNIFORM) if strict else WRONG
+    close = args.mesh is not None or args.tolerance is not None
+    counted = (*WRONG, *([NOT_UNIFORM] if close else []), *([UNKNOWN] if args.strict else []))
     with_shapes = [d for d in diagnoses if d.mesh]
     # A comparison of nothing must not look like one that found nothing.
-    nothing = strict and with_shapes and all(d.status == UNKNOWN for d in with_shapes)
+    nothing = close and with_shapes and all(d.status in (UNKNOWN, NOT_JUDGED) for d in with_shapes)
     status = 1 if nothing or any(d.status in counted for d in diagnoses) else 0
     return status, {"compare": robot, "links": [d.as_dict() for d in diagnoses]}
 
@@ -137,6 +153,8 @@ def _print_diagnoses(diagnoses: list[LinkDiagnosis]) -> None:
             print(f"  differs from the uniform solid of its {d.judged_by} shapes: {errors}, {center}")
         for cause in d.causes:
             print(f"  cause: {cause}")
+        for remark in d.info:
+            print(printable(f"  info: {remark}"))
         if d.expected is not None and d.status not in ("uniform", "not uniform"):
             center_of_mass, six = d.expected.center_of_mass, six_from_tensor(d.expected.inertia)
             print(f"  expected: com {' '.join(f'{value:.9g}' for value in center_of_mass)}")
@@ -157,7 +175,13 @@ def _fix(args: argparse.Namespace) -> int:
     if is_same_file(robot, args.fix):
         raise InputError("--fix", args.fix, "another file than the robot's")
     folders = tuple(args.package_path or ())
-    data, links = fix_robot(robot, folders=folders, accept_open=args.accept_open or 0.0, everything=args.all)
+    data, links = fix_robot(
+        robot,
+        folders=folders,
+        accept_open=args.accept_open or 0.0,
+        everything=args.all,
+        density=args.density or 0.0,
+    )
     with whole_file("--fix", args.fix) as path:
         path.write_bytes(data)
     if args.json:
@@ -176,7 +200,21 @@ def lump(args: argparse.Namespace) -> int:
     """``inspect --lump ROBOT``: print the robot as one body, and write it as a scene if asked for."""
     from ..robots.composite_inertia import lump_robot
 
-    _refuse(args, "lump", "mesh", "compare", "fix", "all", "tolerance", "verify", "ballast", "mass", "density", "model")
+    _refuse(
+        args,
+        "lump",
+        "mesh",
+        "compare",
+        "fix",
+        "all",
+        "tolerance",
+        "strict",
+        "verify",
+        "ballast",
+        "mass",
+        "density",
+        "model",
+    )
     _refuse(args, "lump", "scale", "repair", "fallback", "accept-open")
     whole = lump_robot(Path(args.lump), tuple(args.package_path or ()))
     written = () if args.as_scene is None else _write_scene(whole, args.as_scene)

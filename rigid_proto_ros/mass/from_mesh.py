@@ -26,7 +26,7 @@ from ..base.files import whole_file
 from ..base.vectors import Points, Triangles
 from ..mesh.reading import Mesh, load_mesh
 from ..mesh.solids import box_surface, can_unite, convex_hull, united_surface
-from ..mesh.topology import turned_triangles
+from ..mesh.topology import mesh_topology, turned_triangles
 from .moments import referenced_vertices
 from .properties import MeshMoments, Surface
 from .repair import close_surface, repair_surface
@@ -93,6 +93,8 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
     if verdict.united:
         outward = turned_triangles(triangles) if verdict.inward else triangles
         stand_in = functools.cache(lambda: united_surface(vertices, outward)[:2])
+    elif verdict.joined and verdict.closed:
+        stand_in = functools.cache(lambda: (vertices, mesh_topology(vertices, triangles).corners))
     elif fallback and verdict.usable and not verdict.closed:
         points = referenced_vertices(vertices, triangles)
         shape, made = ("convex hull", convex_hull) if fallback == "hull" else ("bounding box", box_surface)

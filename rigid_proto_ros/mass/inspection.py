@@ -34,6 +34,18 @@ JSON_KEYS = (
 LARGE_M = 5.0
 """Longest side [m] above which a wrong unit is suspected: few simulated bodies are longer, but every part of more than
 5 mm drawn in millimetres is."""
+SMALL_M = 1e-4
+"""Longest side [m] below which it is said that millimetres may have been scaled twice."""
+
+
+def remarks(body: MeshBody, side: float) -> list[str]:
+    """What a mesh's user may not expect of a body whose longest side is ``side`` [m], without effect on its numbers."""
+    told = []
+    if body.mesh.up_axis not in ("", "Z"):
+        told.append(f"the file says that {body.mesh.up_axis} is up, which isn't applied: axes are those of its numbers")
+    if 0.0 < side < SMALL_M:
+        told.append(f"the body is {side:.3g} m across: millimetres may have been scaled to metres twice")
+    return told
 
 
 @dataclass(frozen=True)
@@ -144,6 +156,7 @@ def inspect_mesh(
     points = referenced_vertices(body.vertices, body.moments.triangles) * s
     lower, upper = points.min(axis=0), points.max(axis=0)
     side = float(np.max(upper - lower))
+    findings += [Finding("unexpected", INFO, text) for text in remarks(body, side)]
     if side > LARGE_M:
         units = f"it would be {side:.4g} mm if the file is in millimetres (--scale 0.001)"
         findings.append(Finding("unit_suspicion", WARNING, f"the body is {side:.4g} m across; {units} (scale)"))

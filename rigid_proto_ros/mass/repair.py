@@ -16,10 +16,7 @@ from ..base.rotation import length, times
 from ..base.vectors import BoolArray, IntArray, Points, Triangles
 from ..mesh.intersection import component_nesting
 from ..mesh.topology import Topology, component_sums, fan, joined_sets, mesh_topology, rims, surplus_copies
-from .verdict import MAX_NESTED_COMPONENTS, counted, wound_wrong
-
-WELD = 1e-5
-"""Rim vertices closer than this fraction of the diagonal are welded: the rounding of files with six digits."""
+from .verdict import MAX_NESTED_COMPONENTS, WELD, counted, wound_wrong
 
 
 @dataclass

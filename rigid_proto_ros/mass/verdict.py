@@ -24,7 +24,7 @@ from ..mesh.topology import (
     surplus_copies,
     turned_triangles,
 )
-from .moments import referenced_vertices, solid_moments
+from .moments import Moments, referenced_vertices, solid_moments
 
 INFO, WARNING, ERROR = "info", "warning", "error"
 NESTED = "nested_components"
@@ -38,6 +38,10 @@ SIZE_RANGE = 1e-60, 1e60
 """Smallest and largest longest side of a surface: moments grow with the fifth power, and doubles end at 1e308."""
 SMALL_HOLES = 0.1
 """Largest effect of holes for which the message includes the option that accepts it."""
+WELD = 1e-5
+"""Part of the diagonal up to which repair joins corners at open edges: the rounding of files with six digits."""
+GAP = 5e-3
+"""Part of the diagonal up to which what keeps a surface open is called a gap, not a hole."""
 MAX_RIM = 20_000
 """Unbalanced edges up to which caps are tried; following more takes too long."""
 MAX_SELF_CROSSING = 20_000
@@ -59,7 +63,8 @@ class Verdict:
     so that other models can be computed; ``closed``: the surface bounds a solid; ``reason``: why not; ``inward``: it is
     wound inward throughout and must be reversed. ``hole_effect``: the largest change of volume, relative to itself, or
     of the tensor, relative to its largest entry, that closing an open surface can cause; None if unknown; ``united``:
-    components overlap, and the solid is their union."""
+    components overlap, and the solid is their union; ``joined``: number of corners at open edges that count as others.
+    """
 
     findings: list[Finding] = field(default_factory=list)
     usable: bool = True
@@ -71,6 +76,7 @@ class Verdict:
     components: int = 0
     hole_effect: float | None = None
     united: bool = False
+    joined: int = 0
 
     def add(self, code: str, severity: str, message: str, remedy: str = "") -> None:
         """Append a finding. An error also rules out the solid; the first error is the reason."""
@@ -99,6 +105,8 @@ def _check_edges(verdict: Verdict, topology: Topology, vertices: Points) -> None
             verdict.add("duplicate_faces", WARNING, f"{message}; a volume beside them counts twice")
         else:
             verdict.add("duplicate_faces", INFO, message)
+    if topology.joined:
+        _tell_joined(verdict, topology, vertices)
     verdict.hole_effect = _hole_effect(topology, vertices)
     known = ""
     if verdict.hole_effect is not None and verdict.hole_effect < SMALL_HOLES:
@@ -107,15 +115,45 @@ def _check_edges(verdict: Verdict, topology: Topology, vertices: Points) -> None
     if topology.odd:
         rim = len(topology.boundary)
         edges = counted(rim, "boundary edge")
+        wide = mesh_topology(vertices, topology.corners, GAP)
+        gap = "" if wide.odd else f" at gaps up to {wide.farthest:.2g} wide"
         if topology.odd > rim:
             edges += f" and {counted(topology.odd - rim, 'edge')} of 3 or more faces"
-        remedy = "--repair (mesh_repair) welds edges and caps holes"
-        verdict.add("open", ERROR, f"open surface with {edges}{known}", remedy)
+        remedy = f"--repair (mesh_repair) welds {f'gaps up to {WELD:g} of the size' if gap else 'edges'} and caps holes"
+        verdict.add("open", ERROR, f"open surface with {edges}{gap}{known}", remedy)
         known = ""
     if topology.flipped:
         edges = f"{counted(topology.flipped, 'edge')} used twice in the same direction"
         remedy = "--repair (mesh_repair) turns faces"
         verdict.add("inconsistent_winding", ERROR, f"inconsistent winding: {edges}{known}", remedy)
+
+
+def _tell_joined(verdict: Verdict, topology: Topology, vertices: Points) -> None:
+    """Say that corners at open edges count as one, and what may depend on it."""
+    verdict.joined = topology.joined
+    effect = _joined_effect(topology, vertices)
+    most = "" if effect is None else f"at most {_rounded_up(100.0 * effect)} %"
+    depends = f"; volume and tensor depend on it by {most}" if most else ""
+    corners = f"{counted(topology.joined, 'corner')} at open edges"
+    verdict.add("joined_corners", INFO, f"{corners} joined to others up to {topology.farthest:.2g} away{depends}")
+
+
+def _joined_effect(topology: Topology, vertices: Points) -> float | None:
+    """The largest change of volume, relative to itself, or of the tensor, relative to its largest entry, by any way to
+    close what joining closed: strips along the open edges, no wider than the corners are apart. None for a surface
+    without a volume.
+
+    As in ``_hole_effect``; the strips' area is at most (length + width) · width for each edge.
+    """
+    try:
+        moments = solid_moments(vertices, topology.corners)
+    except MeshError:
+        return None
+    ends = vertices[topology.seam[:, :2]]
+    lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+    reach = float(np.max(np.linalg.norm(ends - moments.centroid, axis=2))) + topology.farthest
+    area = float(np.sum(lengths + topology.farthest)) * topology.farthest
+    return _effect(moments, [area * reach**k / (k + 2) for k in (1, 2, 3)])
 
 
 def _hole_effect(topology: Topology, vertices: Points) -> float | None:
@@ -135,8 +173,15 @@ def _hole_effect(topology: Topology, vertices: Points) -> float | None:
     a, b, c = (vertices[caps[:, k]] - moments.centroid for k in range(3))
     areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     reach = np.sqrt(np.max([np.sum(corner**2, axis=1) for corner in (a, b, c)], axis=0))
+    return _effect(moments, [float(np.sum(areas * reach**k)) / (k + 2) for k in (1, 2, 3)])
+
+
+def _effect(moments: Moments, most: list[float]) -> float | None:
+    """The largest relative change of volume or tensor where volume, first and second moments change by at most
+    ``most``; None where nothing can be said.
+    """
     volume = abs(moments.measure)
-    added, first, second = (float(np.sum(areas * reach**k)) / (k + 2) for k in (1, 2, 3))
+    added, first, second = most
     if not added < volume:
         return None
     xx, _, _, yy, _, zz = np.abs(moments.second)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
@@ -30,6 +31,7 @@ FORMATS = (*OWN_FORMATS, "glb", "gltf", "3mf", "dae")
 are read by trimesh."""
 MAX_BYTES = 400 * MAX_TRIANGLES
 """A larger file is refused without reading it; .obj text with normals takes about 150 bytes per triangle."""
+_UP_AXIS = re.compile(rb"<up_axis>\s*([XYZ])_UP\s*</up_axis>")
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,8 @@ class Mesh:
     triangles are contiguous: polygon k is triangles[polygon_starts[k]:polygon_starts[k + 1]]; polygon_starts is None
     when every face is a triangle. sha256 is the hex digest of the file's bytes, and of those of every other file that
     was read with it; path its absolute path. unit: the unit that the file states [m], by which the vertices have been
-    multiplied; 1 if it states none.
+    multiplied; 1 if it states none. up_axis: which axis it says is up, "" if it says nothing; coordinates stay as they
+    are.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Mesh:
     polygon_starts: IntArray | None
     sha256: str
     unit: float = 1.0
+    up_axis: str = ""
 
 
 def fan_polygons(corners: IntArray, starts: IntArray) -> tuple[Triangles, IntArray | None]:
@@ -109,6 +113,7 @@ def read_mesh(data: bytes, path: Path) -> Mesh:
         raise MeshError("mesh", path.name, f"a file named .{', .'.join(FORMATS)}, or another format that trimesh reads")
     if not data.strip():
         raise MeshError(path.name, "the file is empty")
+    up = _UP_AXIS.search(data) if suffix == "dae" else None
     sha256, starts, unit = hashlib.sha256(data).hexdigest(), None, 1.0
     if suffix in OWN_FORMATS:
         vertices, corners, sides = OWN_FORMATS[suffix](data, path.name)
@@ -120,7 +125,8 @@ def read_mesh(data: bytes, path: Path) -> Mesh:
     if not 0 < len(triangles) <= MAX_TRIANGLES:
         many = f"{len(triangles)} triangles; at most {MAX_TRIANGLES} are read"
         raise MeshError(path.name, many if len(triangles) else "the file has no faces")
-    return Mesh(path.stem, str(path), vertices, triangles, starts, sha256, unit)
+    up_axis = "" if up is None else up[1].decode()
+    return Mesh(path.stem, str(path), vertices, triangles, starts, sha256, unit, up_axis)
 
 
 def load_mesh(name: str, *, search: Search = NOWHERE_ELSE) -> Mesh:

@@ -20,6 +20,8 @@ MAX_RATIO, SPARE = 100, 1_000_000
 """Bytes unpacked, for each byte of the file and beyond: models shrink to a tenth, and what is made to fill the memory
 to a thousandth.
 """
+MAX_DEPTH = 100
+"""Of objects within objects."""
 MAX_PLACES = 100_000
 """Maximum number of placements of objects, nested ones included; a file with more is refused."""
 _CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
@@ -44,7 +46,7 @@ class _Package:
         self._assembly = assembly
         self._names = {f"/{name.lower().lstrip('/')}": name for name in archive.namelist()}
         self._models: dict[str, tuple[ElementTree.Element, dict[str, ElementTree.Element]]] = {}
-        self._places = 0
+        self._places: dict[tuple[str, str], int] = {}
 
     def refusal(self, reason: str, accepted: str = "") -> MeshError:
         """An error that names the file."""
@@ -92,11 +94,25 @@ class _Package:
             raise self.refusal(f"unit {unit}", f"a file in one of {', '.join(UNITS)}")
         return UNITS[unit]
 
-    def place(self, reference: ElementTree.Element, path: str, above: FloatArray, depth: int) -> None:
-        """Add the object that an item or component in the file ``path`` refers to."""
-        self._places += 1
-        if self._places > MAX_PLACES or depth > 100:
+    def places(self, reference: ElementTree.Element, path: str, depth: int = 0) -> int:
+        """How many objects are placed by what an item or component in the file ``path`` refers to, each object counted
+        once and multiplied. Raises MeshError for more than MAX_PLACES, and for objects within themselves.
+        """
+        target, number = reference.get(f"{{{_PRODUCTION}}}path", path), reference.get("objectid", "")
+        total = self._places.get((target, number), 0)
+        if total:
+            return total
+        found, total = self.model(target)[1].get(number), 1
+        if found is not None and found.get("type") not in SUPPORTS and depth <= MAX_DEPTH:
+            parts = (part for child in found if tag_of(child) == "components" for part in child)
+            total += sum(self.places(part, target, depth + 1) for part in parts)
+        if total > MAX_PLACES or depth > MAX_DEPTH:
             raise self.refusal(f"its components place objects more than {MAX_PLACES} times, or within themselves")
+        self._places[target, number] = total
+        return total
+
+    def place(self, reference: ElementTree.Element, path: str, above: FloatArray) -> None:
+        """Add the object that an item or component in the file ``path`` refers to."""
         target = reference.get(f"{{{_PRODUCTION}}}path", path)
         number = reference.get("objectid", "")
         found = self.model(target)[1].get(number)
@@ -111,7 +127,7 @@ class _Package:
                 self._assembly.add(*self._mesh(child), matrix, f"object {number}")
             elif tag_of(child) == "components":
                 for component in child:
-                    self.place(component, target, matrix, depth + 1)
+                    self.place(component, target, matrix)
             elif tag_of(child) != "metadatagroup":
                 raise self.refusal(f"object {number} is made of {tag_of(child)}", "objects of mesh and components")
 
@@ -144,6 +160,9 @@ def add_threemf(data: bytes, assembly: Assembly, max_bytes: int) -> float:
         root = package.root()
         unit = package.unit(root)
         build = package.model(root)[0].find(f"{{{_CORE}}}build")
-        for item in build if build is not None else ():
-            package.place(item, root, np.eye(4), 0)
+        items = [] if build is None else list(build)
+        if sum(package.places(item, root) for item in items) > MAX_PLACES:
+            raise package.refusal(f"it builds more than {MAX_PLACES} objects")
+        for item in items:
+            package.place(item, root, np.eye(4))
     return unit

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Topology of a triangle mesh: edges, holes, consistent winding, components and duplicate faces.
 
-Vertices at bit-equal positions count as one here, so that splitting corners for textures has no effect. The volume of a
+Vertices at bit-equal positions count as one here, so that splitting corners for textures has no effect, and so do those
+of open edges that differ by rounding alone. The volume of a
 surface is the same for every origin exactly if each edge is used equally often in both directions; ``unbalanced`` holds
 the edges that aren't.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +18,11 @@ from ..base.arithmetic import bits_of
 from ..base.compilation import exported, njit
 from ..base.errors import MeshError
 from ..base.vectors import BoolArray, FloatArray, IntArray, Points, Triangles
+
+JOINED = 1e-6
+"""Part of the box's diagonal up to which corners at open edges count as one: what exporters leave between patches."""
+ROUNDING = 2.0**-22
+"""Part of the largest coordinate up to which they do: two units in the last place of a file's float32."""
 
 
 @njit(error_model="numpy", allocates=False)
@@ -281,6 +288,93 @@ def edge_defects(edges: IntArray) -> tuple[int, int]:
     return odd, flipped
 
 
+@njit(error_model="numpy", allocates=False)
+def _joining_distance(vertices: Points, corners: Triangles, part: float) -> float:
+    """``part`` of the diagonal of the box around triangles (m, 3), or ROUNDING of the largest coordinate."""
+    largest, squares = 0.0, 0.0
+    for k in range(3):
+        low, high = np.inf, -np.inf
+        for t in range(corners.shape[0]):
+            for c in range(3):
+                x = vertices[corners[t, c], k]
+                low, high = min(low, x), max(high, x)
+        largest = max(largest, abs(low), abs(high))
+        squares += (high - low) * (high - low)
+    return max(part * math.sqrt(squares), ROUNDING * largest)
+
+
+@njit(error_model="numpy", allocates=False)
+def _cell_slot(a: int, b: int, c: int, size: int) -> int:
+    """The slot for a cell of three whole numbers among ``size``, a power of two."""
+    h = np.uint64(np.int64(a)) * np.uint64(0x9E3779B97F4A7C15)
+    h = ((h ^ (h >> np.uint64(32))) + np.uint64(np.int64(b))) * np.uint64(0xBF58476D1CE4E5B9)
+    h = ((h ^ (h >> np.uint64(29))) + np.uint64(np.int64(c))) * np.uint64(0x94D049BB133111EB)
+    return int(np.int64((h ^ (h >> np.uint64(32))) & np.uint64(size - 1)))
+
+
+@njit(error_model="numpy", allocates=False)
+def _distance(vertices: Points, i: int, j: int) -> float:
+    x, y, z = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1], vertices[j, 2] - vertices[i, 2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@njit(error_model="numpy", allocates=False)
+def _nearest_kept(vertices: Points, i: int, limit: float, table: IntArray, following: IntArray) -> int:
+    """The vertex in the table that lies nearest to vertex i, the first of several; −1 for none within ``limit``, and
+    then i is put into it. table: first vertex in each slot of cells as large as the limit; following: the next ones.
+    """
+    a, b, c = (math.floor(vertices[i, 0] / limit), math.floor(vertices[i, 1] / limit),
+               math.floor(vertices[i, 2] / limit))  # fmt: skip
+    best, nearest = -1, limit
+    for cell in range(27):
+        j = table[_cell_slot(a + (cell // 9 - 1), b + (cell // 3 % 3 - 1), c + (cell % 3 - 1), table.shape[0])]
+        while j >= 0:
+            distance = _distance(vertices, i, j)
+            if distance < nearest or (distance == nearest and (best < 0 or j < best)):
+                best, nearest = j, distance
+            j = following[j]
+    if best < 0:
+        slot = _cell_slot(a, b, c, table.shape[0])
+        following[i], table[slot] = table[slot], i
+    return best
+
+
+@exported("f8[:,:]", "i8[:,:]", "i8[:,:]", "f8", "i8[:]", "i8[:,:]", returns="i8 f8", nogil=True)
+def join_open_edges(
+    vertices: Points, corners: Triangles, edges: IntArray, part: float, room: IntArray, joined: Triangles
+) -> tuple[int, float]:
+    """Fill ``joined`` (m, 3) with corners (m, 3) over fewer vertices: those of open edges, of which ``edges`` (e, 6)
+    has an odd number of triangles, that lie within ``part`` of the box's diagonal, or ROUNDING of the largest
+    coordinate, of one with a smaller number that stays. Returns how many don't stay, and the largest distance; room:
+    see ``topology_room``.
+
+    None is joined to one that is joined itself, so that no chain of near ones becomes one.
+    """
+    count, rim = vertices.shape[0], 0
+    target, following = room[:count], room[count : 2 * count]
+    for i in range(count):
+        target[i] = -1
+    for e in range(edges.shape[0]):
+        if (edges[e, 2] + edges[e, 3]) & 1:
+            rim += 2
+            target[edges[e, 0]], target[edges[e, 1]] = edges[e, 0], edges[e, 1]
+    table = room[2 * count : 2 * count + _table_size(min(rim, count))]
+    for slot in range(table.shape[0]):
+        table[slot] = -1
+    limit = _joining_distance(vertices, corners, part)
+    found, farthest = 0, 0.0
+    for i in range(count if 0.0 < limit < np.inf else 0):
+        if target[i] >= 0:
+            kept = _nearest_kept(vertices, i, limit, table, following)
+            if kept >= 0:
+                target[i] = kept
+                found, farthest = found + 1, max(farthest, _distance(vertices, i, kept))
+    for t in range(corners.shape[0]):
+        for k in range(3):
+            joined[t, k] = target[corners[t, k]] if target[corners[t, k]] >= 0 else corners[t, k]
+    return found, farthest
+
+
 @exported("i8[:,:]", "i8[:,:]", nogil=True)
 def turn_triangles(triangles: Triangles, turned: Triangles) -> None:
     """Fill ``turned`` (m, 3) with triangles (m, 3) wound the other way."""
@@ -294,7 +388,8 @@ class Topology:
 
     corners (m, 3): triangles over welded vertices. edges (e, 6): low vertex, high vertex, uses low→high, uses high→low,
     first triangle, second triangle or −1. component (m,): number of each triangle's component, counted from 0 by first
-    appearance. duplicates (m,): True for a triangle that repeats an earlier one with the same winding.
+    appearance. duplicates (m,): True for a triangle that repeats an earlier one with the same winding. joined: number
+    of vertices of open edges that count as others, up to ``farthest`` away; seam (k, 6): the open edges before that.
     """
 
     corners: Triangles
@@ -302,6 +397,9 @@ class Topology:
     component: IntArray
     components: int
     duplicates: BoolArray
+    joined: int
+    farthest: float
+    seam: IntArray
 
     @property
     def boundary(self) -> IntArray:
@@ -338,8 +436,10 @@ def _edges(corners: Triangles, vertex_count: int, room: IntArray) -> tuple[IntAr
     return edges, component, fill_edges(corners, room, edges, component)
 
 
-def mesh_topology(vertices: Points, triangles: Triangles) -> Topology:
-    """The topology of triangles (m, 3) over vertices (n, 3); raises MeshError for a vertex number out of range."""
+def mesh_topology(vertices: Points, triangles: Triangles, part: float = JOINED) -> Topology:
+    """The topology of triangles (m, 3) over vertices (n, 3), those of open edges joined up to ``part`` of the box's
+    diagonal where that leaves fewer of them open; raises MeshError for a vertex number out of range.
+    """
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)
     room = np.empty(topology_room(len(vertices), len(triangles)), np.int64)
@@ -349,8 +449,17 @@ def mesh_topology(vertices: Points, triangles: Triangles) -> Topology:
         raise MeshError("mesh", f"a face uses a vertex outside 0 to {len(vertices) - 1}")
     corners = corners if welded else triangles
     edges, component, components = _edges(corners, len(vertices), room)
+    count, farthest, seam = 0, 0.0, edges[:0]
+    odd = edge_defects(edges)[0]
+    if odd:
+        joined = np.empty_like(corners)
+        found, far = join_open_edges(vertices, corners, edges, part, room, joined)
+        again = _edges(joined, len(vertices), room) if found else (edges, component, components)
+        if edge_defects(again[0])[0] < odd:
+            count, farthest, seam = found, far, edges[(edges[:, 2] + edges[:, 3]) % 2 == 1]
+            corners, (edges, component, components) = joined, again
     mark_duplicates(corners, room, duplicates)
-    return Topology(corners, edges, component, components, duplicates)
+    return Topology(corners, edges, component, components, duplicates, count, farthest, seam)
 
 
 def turned_triangles(triangles: Triangles) -> Triangles:

@@ -56,6 +56,8 @@ _QUARTER_TURNS = [turn for turn in _TURNS if np.linalg.det(turn) > 0.0]
 def _other_shapes(parts: LinkShapes, mass: float) -> Iterator[tuple[str, MassProperties]]:
     """What other tools and habits put in the place of the solid, in the link's axes."""
     yield "the bounding box", parts.box(mass)
+    with contextlib.suppress(InputError):  # of primitives
+        yield "the shell", parts.shell(mass)
     with contextlib.suppress(InputError):  # of points in one plane
         yield "the convex hull", MeshMoments(*convex_hull(parts.points)).mass_properties(mass=mass)
 
@@ -70,14 +72,17 @@ def _mistakes(truth: MassProperties, stated: Vector3, parts: LinkShapes) -> Iter
         yield f"tensor of {name}, not of the solid", of.inertia
     # The true tensor's six entries in another order or with other signs, or its axes exchanged.
     xx, xy, xz, yy, yz, zz = six_from_tensor(inertia)
+    yield from _wrong_signs(inertia)
     orders = {
-        "signs of the products: written as plus the integrals of xy, xz, yz": (xx, -xy, -xz, yy, -yz, zz),
         "products left out": (xx, 0.0, 0.0, yy, 0.0, zz),
         "order of entries: xx yy zz xy xz yz where xx xy xz yy yz zz belongs": (xx, yy, zz, xy, xz, yz),
         "order of entries: xx xy xz yy yz zz where xx yy zz xy xz yz belongs": (xx, yy, yz, xy, zz, xz),
         "the first six of nine entries, row by row, where the upper triangle belongs": (xx, xy, xz, xy, yy, yz),
-        "order of products: xy yz xz": (xx, xy, yz, yy, xz, zz),
-        "order of products: yz xz xy": (xx, yz, xz, yy, xy, zz),
+        "products ixy and ixz exchanged": (xx, xz, xy, yy, yz, zz),
+        "products ixz and iyz exchanged": (xx, xy, yz, yy, xz, zz),
+        "products ixy and iyz exchanged": (xx, yz, xz, yy, xy, zz),
+        "order of products: xz yz xy": (xx, xz, yz, yy, xy, zz),
+        "order of products: yz xy xz": (xx, yz, xy, yy, xz, zz),
     }
     for sentence, six in orders.items():
         yield sentence, tensor_from_six(six)
@@ -106,6 +111,31 @@ def _mistakes(truth: MassProperties, stated: Vector3, parts: LinkShapes) -> Iter
         yield "parts summed about their own centres", parts.summed_about_own_centers(mass)
 
 
+def _wrong_signs(inertia: Matrix3) -> list[tuple[str, Matrix3]]:
+    """Mistakes in the products' signs, and the tensors that they make; those that make the same one, since another
+    product is 0, in one sentence.
+    """
+    xx, xy, xz, yy, yz, zz = six_from_tensor(inertia)
+    sides = {f"a copy for the other side that wasn't mirrored in {axis}": axis for axis in "xyz"}
+    signs = {
+        "signs of the products: written as plus the integrals of xy, xz, yz": (-1.0, -1.0, -1.0),
+        **{name: tuple(-1.0 if axis in pair else 1.0 for pair in ("xy", "xz", "yz")) for name, axis in sides.items()},
+        "sign of ixy": (-1.0, 1.0, 1.0),
+        "sign of ixz": (1.0, -1.0, 1.0),
+        "sign of iyz": (1.0, 1.0, -1.0),
+    }
+    found: list[tuple[str, Matrix3]] = []
+    for sentence, (a, b, c) in signs.items():
+        wrong = tensor_from_six((xx, a * xy, b * xz, yy, c * yz, zz))
+        near = LIMIT * float(np.max(np.abs(inertia)))
+        same = next((k for k, (_, other) in enumerate(found) if np.max(np.abs(wrong - other)) <= near), None)
+        if same is None:
+            found.append((sentence, wrong))
+        else:
+            found[same] = f"{found[same][0]}, or {sentence}", found[same][1]
+    return found
+
+
 def _one_entry(have: FloatArray, want: FloatArray) -> str:
     """That one of six entries (6,) is a power of ten times the true one, the others right; "" where it isn't so."""
     wrong = np.flatnonzero(np.abs(have - want) > LIMIT * np.max(np.abs(want)))
@@ -118,12 +148,19 @@ def _one_entry(have: FloatArray, want: FloatArray) -> str:
     return f"{SIX[wrong[0]]} is 10^{power} times the true one"
 
 
-def _unit(factor: float) -> str | None:
-    """Which wrong unit makes a tensor ``factor`` times too large: "" none, None no known one."""
+def _unit(factor: float, density: float) -> str | None:
+    """Which wrong unit makes a tensor ``factor`` times too large: "" none, None no known one. density [kg/m³]: what the
+    true one has.
+    """
     if abs(factor - 1.0) <= LIMIT:
         return ""
     times = f"{factor:.4g} times too large" if factor > 1.0 else f"{1.0 / factor:.4g} times too small"
-    return next((f"{text}: {times}" for known, text in _FACTORS.items() if abs(factor / known - 1.0) <= LIMIT), None)
+    unit_density = {}
+    if 0.0 < density < math.inf:
+        at = f"computed at unit density, as MeshLab does, not at {density:.6g} kg/m³"
+        unit_density = {1.0 / density: at, 1e15 / density: f"{at}, and with lengths in mm"}
+    factors = [*unit_density.items(), *_FACTORS.items()]
+    return next((f"{text}: {times}" for known, text in factors if abs(factor / known - 1.0) <= LIMIT), None)
 
 
 def explain_inertia(given: Matrix3, truth: MassProperties, stated: Vector3, parts: LinkShapes) -> tuple[str, ...]:
@@ -133,10 +170,10 @@ def explain_inertia(given: Matrix3, truth: MassProperties, stated: Vector3, part
     """
     if not np.any(given):
         return ("all entries zero",)
-    found = []
+    found, density = [], truth.mass / sum(solid.mass for solid in parts.solids)
     for sentence, wrong in _mistakes(truth, stated, parts):
         factor = float(np.sum(given * wrong) / max(np.sum(wrong * wrong), 1e-300))
-        unit = _unit(factor) if factor > 0.0 else None
+        unit = _unit(factor, density) if factor > 0.0 else None
         fits = np.max(np.abs(given - factor * wrong)) <= LIMIT * factor * np.max(np.abs(wrong))
         if fits and unit is None and not sentence and not _is_isotropic(wrong) and abs(factor - 1.0) > ANOTHER_MASS:
             other = f"computed for {factor * truth.mass:.6g} kg (another density?)"
@@ -169,6 +206,10 @@ def explain_center(given: Vector3, truth: MassProperties, parts: LinkShapes) -> 
         ("COM in cm", 100.0 * com),
         ("COM 1000 times too small", com / 1000.0),
         ("COM with the opposite sign", -com),
+        *(
+            (f"COM of a copy for the other side that wasn't mirrored in {axis}", com * (1.0 - 2.0 * np.eye(3)[k]))
+            for k, axis in enumerate("xyz")
+        ),
         ("COM with y and z exchanged", com[[0, 2, 1]]),
         *((f"COM that of {name}", of.center_of_mass) for name, of in _other_shapes(parts, truth.mass)),
     ]

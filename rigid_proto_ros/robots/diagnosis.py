@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: MIT
 """A verdict on each inertial of a robot file, the first of these words that holds:
 
+* frame: mass 0 and no shape, as of a link that only marks a place;
 * impossible: no body has it (mass > 0, tensor positive definite, A + B >= C);
-* impossible for its shape: no mass distribution inside the link's shapes has it;
-* explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py);
-* not uniform: it isn't the uniform solid's, but some distribution inside the shapes has it;
+* unknown: it can't be compared, for want of a shape that encloses a volume, or because something that the link shows
+  can't be found or read;
 * uniform: it is the uniform solid's, to the tolerance and the digits printed;
-* unknown: it can't be compared, for want of a shape that encloses a volume.
+* explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py);
+* not judged: all shapes are primitives, which often stand in for the parts that were weighed or drawn;
+* impossible for its shape: no mass distribution inside the link's shapes has it;
+* not uniform: it isn't the uniform solid's, but some distribution inside the shapes has it.
 
 The file's mass is taken as it is, so that the tensor and the COM are checked for themselves. What a link shows and what
-it collides with are compared each, and the better of both is named; a mass distribution may lie in either.
+it collides with are compared each, and the one that counts is named; a mass distribution may lie in either. Collision
+shapes are often cruder than what they stand for: they condemn no link that shows a solid.
 
 Along an axis on which the shapes reach from l to u, a distribution of mean c has at most the variance (c - l)(u - c)
 (Bhatia and Davis, American Mathematical Monthly 107, 2000): all mass at the two ends. A tensor says the variance along
@@ -28,6 +32,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.vectors import Points, Vector3
 from ..mass.from_mesh import mesh_body
+from ..mass.inspection import remarks
 from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor
 from ..mesh.locate import Search
@@ -38,10 +43,11 @@ from .link_shapes import LinkShapes, Meshes
 from .reading import COLLISION, HERE, VISUAL, Link, Shape, check_finite, check_inertial, read_robot
 
 IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED = "impossible", "impossible for its shape", "explained"
-NOT_UNIFORM, UNIFORM, UNKNOWN = "not uniform", "uniform", "unknown"
+NOT_UNIFORM, NOT_JUDGED, UNIFORM, UNKNOWN, FRAME = "not uniform", "not judged", "uniform", "unknown", "frame"
 WRONG = (IMPOSSIBLE, BEYOND_SHAPE, EXPLAINED)
 """Verdicts on inertials that nobody can have meant."""
-VERDICTS = (*WRONG, NOT_UNIFORM, UNIFORM, UNKNOWN)
+VERDICTS = (*WRONG, NOT_UNIFORM, NOT_JUDGED, UNIFORM, UNKNOWN, FRAME)
+"""In the order of a report, the worst first."""
 MARGIN = 1e-3
 """Part of the shapes' diagonal by which they may be larger than they are drawn."""
 MAX_ROUNDING = 0.05
@@ -54,7 +60,8 @@ DIRECTIONS = 1000
 class LinkDiagnosis:
     """One link: ``status`` is one of VERDICTS; errors are relative (COM over the box's diagonal), ``ratio`` is the
     tensor's size over that of the uniform solid; ``judged_by`` says whether by its visual or its collision shapes,
-    ``expected`` what they have as a uniform solid of the link's mass."""
+    ``expected`` what they have as a uniform solid of the link's mass; ``info``: remarks without effect on the verdict.
+    """
 
     link: str
     mesh: str
@@ -67,6 +74,7 @@ class LinkDiagnosis:
     expected: MassProperties | None = None
     note: str = ""
     judged_by: str = ""
+    info: tuple[str, ...] = ()
 
     @property
     def error(self) -> float:
@@ -80,7 +88,7 @@ class LinkDiagnosis:
             name: None if isinstance(value, float) and not math.isfinite(value) else value
             for name, value in vars(self).items()
         }
-        return {**plain, "causes": list(self.causes), "expected": expected}
+        return {**plain, "causes": list(self.causes), "expected": expected, "info": list(self.info)}
 
 
 def impossible_inertial(link: Link) -> str:
@@ -184,11 +192,18 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
     offset = np.abs(link.center_of_mass - truth.center_of_mass)
     center_left = float(np.max(offset - np.minimum(link.center_step, MAX_ROUNDING * parts.diagonal))) / parts.diagonal
     inertia_error, inertia_left, ratio = _tensor_error(link, truth)
-    causes: tuple[str, ...] = ()
+    of_tensor: tuple[str, ...] = ()
+    of_center: tuple[str, ...] = ()
     if inertia_left > tolerance:
-        causes += explain_inertia(link.inertia, truth, link.center_of_mass, parts)
+        of_tensor = explain_inertia(link.inertia, truth, link.center_of_mass, parts)
     if center_left > tolerance:
-        causes += explain_center(link.center_of_mass, truth, parts)
+        of_center = explain_center(link.center_of_mass, truth, parts)
+    causes = of_tensor + of_center
+    if parts.are_primitives and (bool(of_tensor), bool(of_center)) != (
+        inertia_left > tolerance,
+        center_left > tolerance,
+    ):
+        causes = ()  # by half they say nothing, where the shapes may be those of something else
     density = link.mass / sum(solid.mass for solid in parts.solids)
     note = f"density {density:.4g} kg/m³"
     if not 1.0 <= density <= 25000.0:
@@ -205,39 +220,80 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
 
 
 def diagnose(link: Link, meshes: Meshes, tolerance: float = LIMIT) -> LinkDiagnosis:
-    """The verdict on a link: by what it shows and by what it collides with, the better of both."""
-    found, inside = [], []
-    for role in (VISUAL, COLLISION):
-        shapes = [shape for shape in link.shapes if shape.role == role]
-        if not shapes:
-            continue
+    """The verdict on a link, by what it shows or by what it collides with; unknown where anything
+    of what it shows, or of what it collides with where it shows nothing, can't be found or read.
+    """
+    if link.mass == 0.0 and not link.shapes:
+        note = "mass 0 and no shape: it only marks a place" + ("; its tensor isn't 0" if np.any(link.inertia) else "")
+        return LinkDiagnosis(link.name, "", FRAME, link.mass, note=note)
+    shapes = {role: [shape for shape in link.shapes if shape.role == role] for role in (VISUAL, COLLISION)}
+    readable: dict[str, LinkShapes] = {}
+    lost: dict[str, str] = {}
+    for role, of_role in shapes.items():
         try:
-            parts = meshes.parts(shapes)
+            if of_role:
+                readable[role] = meshes.parts(of_role)
         except InputError as error:
-            name, note = shapes[0].file or shapes[0].kind, link.problem or str(error)
-            found.append(LinkDiagnosis(link.name, name, UNKNOWN, link.mass, note=note, judged_by=role))
-            continue
-        found.append(_compared(link, parts, tolerance, role))
-        inside.append(parts.points)
-    bare = LinkDiagnosis(link.name, "", UNKNOWN, link.mass, note=link.problem or "no shape to compare it with")
-    return _possible(link, min(found, key=_quality, default=bare), inside)
+            lost[role] = str(error)
+    missing = VISUAL if VISUAL in lost else COLLISION if COLLISION in lost and not readable else ""
+    if missing or not readable:
+        note = lost.get(missing, "no shape to compare it with")
+        note = "; ".join(filter(None, [link.problem, note])) if missing else link.problem or note
+        name = shapes[missing][0].file or shapes[missing][0].kind if missing else ""
+        bare = LinkDiagnosis(link.name, name, UNKNOWN, link.mass, note=note, judged_by=missing)
+        return _possible(link, bare, [])
+    found = [_compared(link, parts, tolerance, role) for role, parts in readable.items()]
+    only_primitives = all(parts.are_primitives for parts in readable.values())
+    best = replace(
+        min(found, key=lambda one: _weight(one, readable[one.judged_by])),
+        info=(*lost.values(), *_remarks(readable[VISUAL if VISUAL in readable else COLLISION])),
+    )
+    return _possible(link, best, [parts.points for parts in readable.values()], only_primitives)
 
 
-def _quality(diagnosis: LinkDiagnosis) -> tuple[int, bool, float]:
-    """The better of two diagnoses of a link has the smaller one: the closest verdict, then by error."""
-    order = (UNIFORM, EXPLAINED, NOT_UNIFORM, UNKNOWN).index(diagnosis.status)
-    return order, diagnosis.expected is None, diagnosis.error
+def missing_inertial(link: Link, meshes: Meshes, density: float) -> MassProperties:
+    """The inertial of a link that has none: of its visual shapes, or of its collision shapes where it has no others,
+    as solids of ``density`` [kg/m³]. Raises InputError where some can't be found or read, or bound no solid.
+    """
+    shown = [shape for shape in link.shapes if shape.role == VISUAL]
+    parts = meshes.parts(shown or link.shapes)
+    properties = parts.uniform(density * sum(solid.mass for solid in parts.solids))
+    check_finite(f"link {link.name}", mass=properties.mass, inertia=properties.inertia)
+    check_tensor(properties.inertia, source=f"tensor of link {link.name}")
+    return properties
 
 
-def _possible(link: Link, diagnosis: LinkDiagnosis, inside: list[Points]) -> LinkDiagnosis:
-    """The diagnosis with the verdict that the link's inertial is impossible, where it is; ``inside``: points (n, 3) of
-    the shapes.
+def _remarks(parts: LinkShapes) -> list[str]:
+    """What the user of a link's meshes may not expect."""
+    bodies = [body for _, body in parts.parts if body is not None]
+    told = [f"{body.mesh.name}: {text}" for body in bodies for text in remarks(body, parts.diagonal)]
+    return list(dict.fromkeys(told))
+
+
+def _weight(diagnosis: LinkDiagnosis, parts: LinkShapes) -> tuple[bool, ...]:
+    """Which of two diagnoses of a link stands, the smaller: one that finds it right; then that of meshes, since
+    primitives stand in for them; one that has numbers; that of what is shown, which is finer than what collides.
+    """
+    has_numbers = diagnosis.expected is not None
+    return diagnosis.status != UNIFORM, parts.are_primitives, not has_numbers, diagnosis.judged_by == COLLISION
+
+
+def _possible(
+    link: Link, diagnosis: LinkDiagnosis, inside: list[Points], only_primitives: bool = False
+) -> LinkDiagnosis:
+    """The diagnosis with the verdict that the link's inertial is impossible, or not judged, where it is; ``inside``:
+    points (n, 3) of the shapes.
     """
     if link.problem:
         return diagnosis
     if reason := impossible_inertial(link):
         return replace(diagnosis, status=IMPOSSIBLE, causes=(reason, *diagnosis.causes))
-    if inside and (reason := beyond_shapes(link, np.concatenate(inside))):
+    if only_primitives and diagnosis.status == NOT_UNIFORM:
+        note = f"its shapes are primitives only: not judged against them; {diagnosis.note}"
+        return replace(diagnosis, status=NOT_JUDGED, note=note)
+    if diagnosis.status != UNIFORM and inside and (reason := beyond_shapes(link, np.concatenate(inside))):
+        if diagnosis.status == EXPLAINED:
+            return replace(diagnosis, causes=(*diagnosis.causes, reason))
         return replace(diagnosis, status=BEYOND_SHAPE, causes=(reason, *diagnosis.causes))
     return diagnosis
 

@@ -6,17 +6,19 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..base.files import read_bounded
 from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
+from ..mass.properties import MassProperties
 from ..mass.tensor import SIX
 from ..mesh.locate import Search
-from .diagnosis import NOT_UNIFORM, UNIFORM, LinkDiagnosis, diagnose
+from .diagnosis import FRAME, NOT_JUDGED, NOT_UNIFORM, UNIFORM, LinkDiagnosis, diagnose, missing_inertial
 from .link_shapes import Meshes
-from .reading import MAX_BYTES, Link, parse_xml, robot_of
+from .reading import MAX_BYTES, NO_INERTIAL, Link, parse_xml, robot_of
 
 _WRITERS = {"robot": urdf_inertial, "sdf": sdf_inertial, "mujoco": mjcf_inertial}
 _REPLACED = {"origin", "pose", "mass", "inertia", *SIX}
@@ -28,6 +30,10 @@ _INERTIAL = re.compile(
     re.DOTALL,
 )
 """An <inertial>, or what may hold one that is no element."""
+_LINK = re.compile(
+    rb"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|(?P<link><link(?=[\s/>])" + _ATTRIBUTES + rb">)", re.DOTALL
+)
+"""The start of a <link>, or what may hold one that is no element."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,8 @@ def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict[int, tup
     """Why a link that isn't uniform can't, or shan't, be written; "" when it can."""
     if diagnosis.status == NOT_UNIFORM and not everything:
         return "it is possible for its shapes; --all replaces it by that of the uniform solid"
+    if diagnosis.status == NOT_JUDGED and not everything:
+        return "its shapes are primitives only, which often stand in for others; --all replaces it by that of theirs"
     if link.problem or diagnosis.expected is None:
         return diagnosis.note or "its mass isn't a positive number"
     if link.element is None or id(link.element) not in places:
@@ -60,12 +68,28 @@ def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict[int, tup
     return f"its <inertial> has a <{others[0]}>, which would be lost" if others else ""
 
 
+def _filled_in(link: Link, meshes: Meshes, density: float) -> tuple[MassProperties | None, str]:
+    """The inertial that a link is missing, or None and why it can't have one."""
+    if link.owner is None:
+        return None, f"{link.problem}; MuJoCo computes it from its geoms"
+    try:
+        return missing_inertial(link, meshes, density), ""
+    except InputError as error:
+        return None, f"{link.problem}; {error}"
+
+
 @np.errstate(all="ignore")
 def fix_robot(
-    path: Path, *, folders: tuple[Path, ...] = (), accept_open: float = 0.0, everything: bool = False
+    path: Path,
+    *,
+    folders: tuple[Path, ...] = (),
+    accept_open: float = 0.0,
+    everything: bool = False,
+    density: float = 0.0,
 ) -> tuple[bytes, list[FixedLink]]:
     """The file's bytes with every wrong inertial rewritten from the link's shapes, and what became of each link;
-    ``everything``: those that are possible, but not uniform, as well.
+    ``everything``: those that are possible, but not uniform, as well; ``density`` > 0 [kg/m³]: links without one get
+    that of their shapes.
 
     The mass stays; COM and tensor become those of a solid of one density. Raises InputError for a file that can't be
     read, is xacro, or isn't written in ASCII's bytes.
@@ -74,23 +98,42 @@ def fix_robot(
     root = parse_xml(data, path)
     if b"\0" in data:
         raise InputError("fix", path.name, "a file in UTF-8 or another ASCII-compatible encoding")
-    found = [match.span() for match in _INERTIAL.finditer(data) if match["inertial"]]
-    elements = list(root.iter("inertial"))  # before those of included files are put into the tree by reading it
-    if len(found) != len(elements):
-        raise InputError("fix", path.name, "a file whose <inertial> elements are none within another")
-    places = {id(element): place for element, place in zip(elements, found, strict=True)}
+    # Before the elements of included files are put into the tree by reading it.
+    places = _places(root, "inertial", _INERTIAL, data, path)
+    owners = _places(root, "link", _LINK, data, path) if density else {}
     links = robot_of(root, path).links
     meshes = Meshes(Search(path.parent, folders), accept_open)
     write = _WRITERS[str(root.tag)]
-    fixed, written = [], {}
+    fixed: list[FixedLink] = []
+    changes: list[tuple[int, int, bytes]] = []
     for link in links:
         diagnosis = diagnose(link, meshes)
-        reason = "" if diagnosis.status == UNIFORM else _reason_to_leave(link, diagnosis, places, everything)
-        if diagnosis.status != UNIFORM and not reason and diagnosis.expected is not None:
-            written[id(link.element)] = write(diagnosis.expected)
-        fixed.append(FixedLink(diagnosis, id(link.element) in written, reason))
-    for element, (start, end) in sorted(places.items(), key=lambda item: item[1], reverse=True):
-        if element in written:
-            inertial = written[element].rstrip().encode().replace(b"\n", _indent(data, start))
-            data = data[:start] + inertial + data[end:]
+        if density and link.problem == NO_INERTIAL:
+            made, reason = _filled_in(link, meshes, density)
+            if made is not None:
+                start = owners[id(link.owner)][1]
+                blank = data[start : len(data) - len(data[start:].lstrip())]  # before whatever the link has first
+                text = write(made).rstrip().encode().replace(b"\n", _indent(blank + b"<", len(blank)))
+                changes.append((start, start, blank + text))
+            fixed.append(FixedLink(diagnosis, made is not None, reason))
+            continue
+        right = diagnosis.status in (UNIFORM, FRAME)
+        reason = "" if right else _reason_to_leave(link, diagnosis, places, everything)
+        is_written = not right and not reason and diagnosis.expected is not None
+        if is_written and diagnosis.expected is not None:
+            start, end = places[id(link.element)]
+            text = write(diagnosis.expected).rstrip().encode().replace(b"\n", _indent(data, start))
+            changes.append((start, end, text))
+        fixed.append(FixedLink(diagnosis, is_written, reason))
+    for start, end, text in sorted(changes, reverse=True):
+        data = data[:start] + text + data[end:]
     return data, fixed
+
+
+def _places(root: Element, tag: str, pattern: re.Pattern[bytes], data: bytes, path: Path) -> dict[int, tuple[int, int]]:
+    """Where in the file's bytes each element of a tag, by its id, begins and ends, as ``pattern`` finds them."""
+    found = [match.span() for match in pattern.finditer(data) if match[tag]]
+    elements = list(root.iter(tag))
+    if len(found) != len(elements):
+        raise InputError("fix", path.name, f"a file whose <{tag}> elements are none within another")
+    return {id(element): place for element, place in zip(elements, found, strict=True)}

@@ -11,11 +11,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..base.errors import InputError, MeshError
 from ..base.vectors import Matrix3, Points, Triangles, Vector3
 from ..mass.from_mesh import MeshBody, mesh_body
 from ..mass.properties import MassProperties
-from ..mesh.locate import Search
+from ..mesh.locate import Search, resolve_mesh
 from ..mesh.reading import Mesh, load_mesh
 from .reading import Link, Pose, Shape, check_finite
 
@@ -130,13 +130,37 @@ class Meshes:
     """The meshes that a robot's shapes name, each loaded once; accept_open as in ``mesh_body``."""
 
     def __init__(self, search: Search, accept_open: float = 0.0) -> None:
-        self.body = functools.cache(lambda file: mesh_body(load_mesh(file, search=search), accept_open=accept_open))
+        self._search = search
+        self._body = functools.cache(lambda path: mesh_body(load_mesh(path), accept_open=accept_open))
+
+    def _taken(self, shape: Shape) -> MeshBody | None:
+        """The body of a shape's mesh, None for a primitive; raises InputError that says whether it wasn't found or
+        can't be read.
+        """
+        try:
+            check_shape(shape)
+            path = str(resolve_mesh(shape.file, self._search)) if shape.kind == "mesh" else ""
+        except MeshError as error:
+            raise InputError(f"{shape.role} mesh not found", str(error).removeprefix("mesh: ")) from None
+        except InputError as error:
+            raise InputError(f"{shape.role} {shape.kind} that can't be taken", str(error)) from None
+        try:
+            return self._body(path) if path else None
+        except InputError as error:
+            raise InputError(f"{shape.role} mesh that can't be read", str(error)) from None
 
     def parts(self, shapes: Sequence[Shape]) -> LinkShapes:
-        """The shapes with their meshes; raises InputError for one that can't be taken."""
+        """The shapes with their meshes; raises InputError for those that can't be taken, by name."""
+        taken, lost = [], []
         for shape in shapes:
-            check_shape(shape)
-        return LinkShapes([(shape, self.body(shape.file) if shape.kind == "mesh" else None) for shape in shapes])
+            try:
+                taken.append((shape, self._taken(shape)))
+            except InputError as error:
+                lost.append(error)
+        if lost:
+            others = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
+            raise InputError(lost[0].field, f"{lost[0].received}{others}")
+        return LinkShapes(taken)
 
 
 class LinkShapes:
@@ -153,6 +177,11 @@ class LinkShapes:
     def names(self) -> str:
         """What the shapes are called: mesh names and kinds."""
         return ", ".join(dict.fromkeys(body.mesh.name if body else shape.kind for shape, body in self.parts))
+
+    @property
+    def are_primitives(self) -> bool:
+        """Whether none of them is a mesh."""
+        return all(body is None for _, body in self.parts)
 
     @property
     def diagonal(self) -> float:
@@ -176,6 +205,18 @@ class LinkShapes:
         """What comes out (3, 3) when the parts' tensors are added as if all had one centre of mass."""
         volume = sum(solid.mass for solid in self.solids)
         return sum((solid.inertia for solid in self.solids), np.zeros((3, 3))) * (mass / volume)
+
+    def shell(self, mass: float) -> MassProperties:
+        """``mass`` kg spread evenly over the surfaces of the meshes, in the link's axes; raises InputError where some
+        shapes are primitives.
+        """
+        found = []
+        for shape, body in self.parts:
+            if body is None:
+                raise InputError("shell", shape.kind, "meshes alone")
+            area = body.moments.moments("shell", shape.scale).measure * float(shape.scale[0]) ** 2
+            found.append(placed(body.moments.mass_properties("shell", scale=shape.scale, mass=area), shape.pose))
+        return of_mass(combined(found, self.names), mass)
 
     def box(self, mass: float) -> MassProperties:
         """The box around all, in the first shape's axes, as a solid of ``mass`` kg."""

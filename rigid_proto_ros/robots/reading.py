@@ -78,7 +78,7 @@ class Link:
     """What a file says of one link: mass [kg], COM (3,) [m] and tensor (3, 3) [kg m²] about it, both in the link's
     axes; ``problem`` says why when it doesn't. The steps are half a unit of the last digit printed, for mass, COM
     (3,) and tensor (3, 3): what a number may be off by for its printing alone. ``element``: the <inertial> that was
-    read, None where the file has it from elsewhere. ``computed``: a
+    read, None where the file has it from elsewhere; ``owner``: the <link>. ``computed``: a
     simulator computes the inertial from the collision shapes, for the mass if there is one.
     """
 
@@ -93,6 +93,7 @@ class Link:
     inertia_step: Matrix3 = field(default_factory=lambda: np.zeros((3, 3)))
     element: Element | None = None
     computed: bool = False
+    owner: Element | None = None
 
 
 @dataclass
@@ -269,7 +270,7 @@ def _urdf_link(link: Element) -> Link:
     for role, part, of in _drawn(link):
         plain = Shape(role, of.tag, _urdf_pose(part.find("origin"), f"a {role} of link {name}"))
         shapes.append(_sized(plain, name, of.get("filename", ""), of.get("scale", "1 1 1"), of.get))
-    bare = Link(name, tuple(shapes))
+    bare = Link(name, tuple(shapes), owner=link)
     inertial = link.find("inertial")
     if inertial is None:
         return bare
@@ -368,7 +369,7 @@ def _sdf_link(link: Element) -> Link:
         own = _sdf_pose(part, f"a {role} of {owner}")
         plain = Shape(role, of.tag, own, problem=problem, density=dense)
         shapes.append(_sized(plain, name, _text(of, "uri", ""), _text(of, "scale", "1 1 1"), of.findtext))
-    bare = Link(name, tuple(shapes))
+    bare = Link(name, tuple(shapes), owner=link)
     if inertial is None:
         return bare
     if _is_true(inertial.get("auto", "")):

@@ -14,6 +14,7 @@ from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, GEOMETRY, Gltf, collada, c
 from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mesh import reading
+from rigid_proto_ros.mesh.assembly import Assembly
 from rigid_proto_ros.mesh.reading import Mesh, load_mesh
 
 
@@ -134,6 +135,13 @@ def test_3mf_supports_are_no_part_of_the_body_and_mirrored_items_face_outward(tm
     mirrored = 'objectid="1" transform="-1 0 0 0 1 0 0 0 1 0 0 0"'
     body = mesh_body(load_3mf(tmp_path, model(objects, mirrored, f'objectid="2" {SHIFT}', f'objectid="3" {SHIFT}')))
     assert body.moments.moments("solid").measure == 1.0 and not body.verdict.inward
+
+
+def test_3mf_components_within_each_other_are_multiplied_before_any_is_placed(tmp_path, monkeypatch):
+    monkeypatch.setattr(Assembly, "add", lambda *_: pytest.fail("one was placed"))
+    nested = "".join(components(k, *[f'objectid="{k - 1}"'] * 30) for k in range(2, 8))
+    with pytest.raises(MeshError, match="more than 100000 times"):
+        load_3mf(tmp_path, model(cube_object(1) + nested, 'objectid="7"'))
 
 
 @pytest.mark.parametrize(

@@ -155,6 +155,24 @@ def test_thousands_of_damaged_files_are_read_alike_or_refused(page_file: Path, t
 
 
 @pytest.mark.slow
+def test_corners_that_differ_by_rounding_count_as_joined_on_the_page_too(page_file: Path, tmp_path: Path) -> None:
+    vertices, triangles = sphere(8)
+    random = np.random.default_rng(3)
+    for name, apart in (("cracked", 1e-8), ("gaping", 1e-4)):
+        shift = random.uniform(-apart, apart, (3 * len(triangles), 3))
+        own = np.arange(3 * len(triangles)).reshape(-1, 3)
+        (tmp_path / f"{name}.obj").write_bytes(mf.obj(vertices[triangles.ravel()] + shift, own))
+    told = on_the_page(page_file, tmp_path)
+    assert told["cracked.obj"]["closed"] and not told["gaping.obj"]["closed"]
+    mesh = load_mesh(str(tmp_path / "cracked.obj"))
+    moments = mesh_body(mesh).moments.moments("solid")
+    flat = [moments.measure, *moments.reference, *moments.center, *moments.center_low, *moments.second]
+    assert told["cracked.obj"]["moments"][0] == [float(x) for x in flat]
+    check_moments({"moments": told["cracked.obj"]["moments"]}, mesh, MODELS[1:])
+    check_numbers(told["cracked.obj"], mesh)
+
+
+@pytest.mark.slow
 def test_open_and_wrongly_wound_surfaces_are_told_with_what_to_do(page_file: Path, tmp_path: Path) -> None:
     vertices, triangles = box(cells=2)
     mixed = triangles.copy()

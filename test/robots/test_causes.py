@@ -104,7 +104,20 @@ MISTAKES = {
     "density": (lambda c, s: (c, 3.3 * s), "2.31 kg"),
     "sign of products": (lambda c, s: (c, s * [1, -1, -1, 1, -1, 1]), "signs of the products"),
     "order of entries": (lambda c, s: (c, s[[0, 3, 5, 1, 2, 4]]), "order of entries: xx yy zz"),
-    "order of products": (lambda c, s: (c, s[[0, 1, 4, 3, 2, 5]]), "order of products"),
+    "ixz and iyz": (lambda c, s: (c, s[[0, 1, 4, 3, 2, 5]]), "products ixz and iyz exchanged"),
+    "ixy and ixz": (lambda c, s: (c, s[[0, 2, 1, 3, 4, 5]]), "products ixy and ixz exchanged"),
+    "ixy and iyz": (lambda c, s: (c, s[[0, 4, 2, 3, 1, 5]]), "products ixy and iyz exchanged"),
+    "order of products": (lambda c, s: (c, s[[0, 4, 1, 3, 2, 5]]), "order of products: yz xy xz"),
+    "sign of ixy": (lambda c, s: (c, s * [1, -1, 1, 1, 1, 1]), "sign of ixy"),
+    "sign of ixz": (lambda c, s: (c, s * [1, 1, -1, 1, 1, 1]), "sign of ixz"),
+    "sign of iyz": (lambda c, s: (c, s * [1, 1, 1, 1, -1, 1]), "sign of iyz"),
+    "mirrored x": (lambda c, s: (c, s * [1, -1, -1, 1, 1, 1]), "the other side that wasn't mirrored in x"),
+    "mirrored y": (lambda c, s: (c, s * [1, -1, 1, 1, -1, 1]), "the other side that wasn't mirrored in y"),
+    "mirrored z": (lambda c, s: (c, s * [1, 1, -1, 1, -1, 1]), "the other side that wasn't mirrored in z"),
+    "mirrored with its com": (
+        lambda c, s: (c * [1, -1, 1], s * [1, -1, 1, 1, -1, 1]),
+        "COM of a copy for the other side that wasn't mirrored in y",
+    ),
     "no products": (lambda c, s: (c, s * [1, 0, 0, 1, 0, 1]), "products left out"),
     "about the link's origin": (lambda c, s: (c, about(c, s, np.zeros(3))), "link's origin"),
     "about the mesh's origin": (lambda c, s: (c, about(c, s, POSITION)), "mesh's origin"),
@@ -130,6 +143,39 @@ def test_each_usual_mistake_is_named(capsys, tmp_path, truth, mistake):
     assert any(words_of_cause in cause for cause in link["causes"]), link["causes"]
     assert np.array(link["expected"]["inertia"]) == pytest.approx(tensor_from_six(truth[1]), rel=1e-12, abs=1e-15)
     assert link["expected"]["center_of_mass"] == pytest.approx(truth[0], rel=1e-12)
+
+
+def test_a_shells_tensor_is_recognised(capsys, tmp_path):
+    shell = mesh_body("hammer").moments.mass_properties("shell", scale=SCALE, mass=MASS)
+    R = rotation_from_rpy(*RPY)
+    text = urdf(R @ shell.center_of_mass + POSITION, six_from_tensor(R @ shell.inertia @ R.T))
+    status, (link,) = compare(capsys, tmp_path, text)
+    assert (status, link["status"]) == (1, "explained")
+    assert link["causes"] == ["tensor of the shell, not of the solid", "COM that of the shell"]
+
+
+@pytest.mark.parametrize(("lengths", "words_of_cause"), [(1.0, "unit density, as"), (1e15, "with lengths in mm")])
+@pytest.mark.parametrize("density", [1000.0, 2700.0])
+def test_a_tensor_at_unit_density_is_recognised(capsys, tmp_path, truth, lengths, words_of_cause, density):
+    mass = density * mesh_body("hammer").moments.mass_properties(scale=SCALE, density=1.0).mass
+    com, six = truth
+    status, (link,) = compare(capsys, tmp_path, urdf(com, six * (mass / MASS) * lengths / density, mass))
+    assert status == 1 and words_of_cause in link["causes"][0] and f"{density:g} kg/m³" in link["causes"][0]
+    assert np.array(link["expected"]["inertia"]) == pytest.approx(tensor_from_six(six * mass / MASS), rel=1e-12)
+
+
+def test_signs_that_come_to_the_same_are_told_together(capsys, tmp_path):
+    # A box turned about z has one product only.
+    box = '<visual><origin rpy="0 0 0.4"/><geometry><box size="0.3 0.1 0.2"/></geometry></visual>'
+    R = rotation_from_rpy(0, 0, 0.4)
+    six = six_from_tensor(R @ np.diag([0.05, 0.13, 0.1]) @ R.T / 12.0) * np.array([1, -1, 1, 1, 1, 1])
+    entries = " ".join(f'{name}="{float(value):.17g}"' for name, value in zip(NAMES, six, strict=True))
+    text = (
+        f'<robot name="r"><link name="l">{box}<inertial><mass value="1"/><inertia {entries}/></inertial></link></robot>'
+    )
+    _, (link,) = compare(capsys, tmp_path, text)
+    cause = link["causes"][0]
+    assert cause.startswith("signs of the products") and "mirrored in x, or" in cause and cause.endswith("sign of ixy")
 
 
 def test_a_bounding_boxs_tensor_is_recognised(capsys, tmp_path):

@@ -57,7 +57,7 @@ def test_only_the_inertials_of_a_urdf_change(parts):
     path = parts / "robot.urdf"
     data, links = fixed(path, URDF)
     assert [(name, link.before.status, link.written) for name, link in links.items()] == [
-        ("arm", "impossible for its shape", True), ("bare", "unknown", False), ("open", "unknown", False),
+        ("arm", "explained", True), ("bare", "unknown", False), ("open", "unknown", False),
         ("one", "impossible", True)
     ]  # fmt: skip
     assert "no <inertial>" in links["bare"].left and "open surface" in links["open"].left
@@ -124,7 +124,7 @@ def test_the_command_writes_tells_and_leaves(parts, capsys):
     path.write_bytes(URDF.encode())
     assert main(["inspect", "--compare", str(path), "--fix", str(out)]) == 0
     told = capsys.readouterr().out
-    assert "arm: impossible for its shape -> uniform" in told and "open: unknown; left: open" in told
+    assert "arm: explained -> uniform" in told and "open: unknown; left: open" in told
     assert "2 of 4 inertials rewritten, 2 left" in told
     assert path.read_bytes() == URDF.encode()
     assert main(["inspect", "--compare", str(out), "--fix", str(parts / "again.urdf"), "--json"]) == 0
@@ -154,13 +154,57 @@ def test_the_robots_own_file_is_not_overwritten(spelling, parts, capsys, monkeyp
 
 def test_what_a_body_of_the_shapes_can_have_stays_unless_all_is_asked_for(parts):
     path = parts / "robot.urdf"
-    shape = '<visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
+    shape = f"<visual>{MESH}</visual>"
     inertial = '<inertial><mass value="1.000"/><inertia ixx="0.012" iyy="0.009" izz="0.005"/></inertial>'
     data, links = fixed(path, f'<robot name="r"><link name="a">{shape}{inertial}</link></robot>')
     assert data == path.read_bytes() and "--all" in links["a"].left
     data, links = fixed(path, everything=True)
     assert (links["a"].before.status, links["a"].written) == ("not uniform", True)
     assert_finds_nothing(path, data)
+
+
+def test_missing_inertials_are_filled_in_from_the_shapes_at_a_density(parts, capsys):
+    path, out, gone = (
+        parts / "robot.urdf",
+        parts / "fixed.urdf",
+        '<visual><geometry><mesh filename="no.stl"/></geometry></visual>',
+    )
+    box = '<{0}><origin xyz="0 0 1"/><geometry><box size="0.1 0.2 0.3"/></geometry></{0}>'
+    path.write_text(
+        '<robot name="r"><!-- <link name="bare"> -->\n  <link name="bare">\n    '
+        f'<visual>{MESH}</visual>\n  </link><link name="box">{box.format("visual")}{box.format("collision")}</link>\n'
+        f'<link name="hit">{box.format("collision")}</link><link name="gone">{gone}{box.format("collision")}</link>'
+        '<link name="open"><visual><geometry><mesh filename="open.obj"/></geometry></visual></link><link name="empty"/>\n</robot>'
+    )
+    assert main(["inspect", "--compare", str(path), "--fix", str(out), "--density", "500"]) == 0
+    told = capsys.readouterr().out
+    for words in ("bare: unknown -> uniform", "box: unknown -> uniform", "hit: unknown -> uniform", "3 of 5 inertials"):
+        assert words in told
+    assert "gone: unknown; left: no <inertial>; visual mesh not found" in told and "open: unknown; left" in told
+    links = {link.name: link for link in read_robot(out).links}
+    for name, height in (("bare", 0.0), ("box", 1.0), ("hit", 1.0)):
+        assert links[name].mass == pytest.approx(3.0, rel=1e-6) and links[name].center_of_mass[2] == pytest.approx(
+            height
+        )
+        assert links[name].inertia == pytest.approx(3.0 / 12.0 * np.diag([0.13, 0.1, 0.05]), rel=1e-6)
+    assert b'  <link name="bare">\n    <inertial>\n      <origin' in out.read_bytes()
+    assert re.sub(rb"\s*<inertial>.*?</inertial>", b"", out.read_bytes(), flags=re.DOTALL) == path.read_bytes()
+    data, _ = fix_robot(out, density=500.0)
+    assert data == out.read_bytes()
+    for more in (["--density", "500"], ["--fix", str(out), "--density", "0"], ["--fix", str(out), "--density", "nan"]):
+        assert main(["inspect", "--compare", str(path), *more]) == 2
+
+
+def test_missing_inertials_of_an_sdf_are_filled_in_and_those_that_a_simulator_computes_are_left(parts):
+    path, auto = parts / "model.sdf", "<inertial auto='true'/>"
+    path.write_text(re.sub("<inertial>.*</inertial>", "", SDF, flags=re.DOTALL))
+    data, links = fix_robot(path, density=1000.0)
+    path.write_bytes(data)
+    (link,) = read_robot(path).links
+    assert links[0].written and link.mass == pytest.approx(6.0, rel=1e-6)
+    path.write_text(re.sub("<inertial>.*</inertial>", auto, SDF, flags=re.DOTALL))
+    data, links = fix_robot(path, density=1000.0)
+    assert data == path.read_bytes() and "auto" in links[0].left
 
 
 def test_an_inertial_within_another_is_refused(parts):

@@ -81,8 +81,33 @@ def test_a_file_included_twice_and_meshes_that_mujoco_cannot_load(tmp_path):
     asset = '<asset><mesh name="m" file="lost.dae"/><texture name="t" type="2d" file="lost.png"/></asset>'
     path = tmp_path / "model.xml"
     path.write_text(f"<mujoco>{asset}<worldbody>{body % ('a', lost)}{body % ('b', '')}</worldbody></mujoco>")
-    assert {d.link: d.status for d in compare_robot(path)} == {"a": "uniform", "b": "uniform"}
+    assert {d.link: d.status for d in compare_robot(path)} == {"a": "unknown", "b": "uniform"}
+    path.write_text(path.read_text().replace('conaffinity="0"', 'conaffinity="1"'))  # collides, too, and isn't shown
+    assert {d.link: d.status for d in compare_robot(path)} == {"a": "unknown", "b": "uniform"}
     assert lump_robot(path).properties.mass == 24.0
+
+
+PARTS = '<asset><model name="m" file="part.xml"/></asset>'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<worldbody><replicate count="100000000"><body><geom size=".1"/></body></replicate></worldbody>',
+        "<worldbody>" + 5 * '<replicate count="30">' + '<geom size=".1"/>' + 5 * "</replicate>" + "</worldbody>",
+        '<worldbody><body name="b"><flexcomp name="f" type="grid" count="900 900 900"/></body></worldbody>',
+        '<asset><texture name="t" type="2d" builtin="flat" width="90000" height="90000"/></asset>',
+        f'{PARTS}<worldbody><replicate count="3000"><attach model="m" prefix="a"/></replicate></worldbody>',
+    ],
+)
+def test_an_mjcf_that_grows_beyond_all_measure_is_refused_before_mujoco_reads_it(tmp_path, monkeypatch, text):
+    mujoco = pytest.importorskip("mujoco")
+    monkeypatch.setattr(mujoco.MjSpec, "from_string", lambda _: pytest.fail("MuJoCo was asked"))
+    grown = '<replicate count="1000"><geom size=".1"/></replicate>'
+    (tmp_path / "part.xml").write_text(f"<mujoco><worldbody><body>{grown}</body></worldbody></mujoco>")
+    (tmp_path / "model.xml").write_text(f"<mujoco>{text}</mujoco>")
+    with pytest.raises(InputError, match=r"replicates to \S+ elements'; accepted: at most 20000"):
+        compare_robot(tmp_path / "model.xml")
 
 
 def test_an_mjcf_too_deep_or_with_a_pipe_to_include_is_refused(tmp_path):
