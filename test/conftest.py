@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -83,6 +84,27 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("page") / "data"
     file.write_bytes(page_data())
     return file
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """The browser that the tests of a module share."""
+    from page_browser import chromium
+
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture
+def opened(browser: Any) -> Iterator[Any]:
+    """The page's first screen, paused a third of a second after it began."""
+    from page_browser import Opened
+
+    page = Opened(browser)
+    page.pause()
+    page.fly(0.33)
+    yield page
+    page.close()
 
 
 @pytest.fixture

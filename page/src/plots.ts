@@ -103,7 +103,7 @@ export class Plots {
     const all: Readonly<Record<string, Plot>> = {
       energy: plot("energy", words.plots.energy, "J", [
         energy(words.energy.spin, "#7a45d1", (e) => e.spin), energy(words.energy.move, "#0b7466", (e) => e.move), energy(words.energy.string, "#d1432f", (e) => e.string),
-        energy(words.energy.all, "#6b7385", whole), { name: words.energy.ghost, colour: "#2f7fd6", value: ({ now, gravity }) => (now.ghost ? whole(energies(now.ghost, gravity)) : NaN) }]),
+        energy(words.energy.all, "#6b7385", whole), { name: words.energy.ghost, colour: "#2166b8", value: ({ now, gravity }) => (now.ghost ? whole(energies(now.ghost, gravity)) : NaN) }]),
       omega: plot("omega", words.plots.omega, "rad/s", AXES.map((colour, k) => ({ name: `ω${"₁₂₃"[k]}`, colour, value: (seen) => principal(seen, k) }))),
       momentum: plot("momentum", words.plots.momentum, "N m s", AXES.map((colour, k) => ({ name: `L${"xyz"[k]}`, colour, value: ({ now }) => now.body.momentum[k]! }))),
       angle: plot("angle", words.plots.angle, "°", [{ name: words.angle.name, colour: "#2f63ad", value: ({ now }) => (now.angleToGhost * 180) / Math.PI }]),

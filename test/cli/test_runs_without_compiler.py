@@ -107,7 +107,7 @@ def test_the_node_and_its_client_need_neither(folder: Path, ros_environment: dic
 
 def test_a_robot_without_scipy_is_judged_as_far_as_that_goes_and_told_the_rest(folder: Path) -> None:
     done = run("rigid_proto", "inspect", "--compare", "robot.urdf", "--json", environment=refusing(folder), cwd=folder)
-    assert done.returncode == 1 and json.loads(done.stdout)["links"][0]["status"] == "impossible for its shape"
+    assert done.returncode == 1 and json.loads(done.stdout)["links"][0]["status"] == "explained"
     told = [line for line in done.stderr.splitlines() if not line.endswith("is imported")]
     assert told == [
         "rigid_proto inspect: scipy is missing: pip install 'rigid_proto_ros[meshes]'; until then nobody looks along the "
