@@ -39,7 +39,7 @@ li a { display: block; height: 100%; border-radius: 14px; overflow: hidden; back
   text-decoration: none; }
 li a:hover, li a:focus-visible, .toy:hover, .toy:focus-visible { outline: 3px solid #3355c8; }
 li i { display: block; aspect-ratio: 16 / 11; overflow: hidden; background: #0d0f12; }
-li img { display: block; width: 166%; margin: -12% 0 0; } /* of a recording's picture the motion, without what stands beside it */
+li img { display: block; width: 166%; margin: -7% 0 0; } /* of a recording's picture the motion, without what stands beside it */
 li b, li span { display: block; padding: .7rem 1rem 0; }
 li span { padding: .2rem 1rem 1rem; font-size: .95rem; color: #4b5873; }
 """
