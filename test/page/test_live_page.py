@@ -144,7 +144,11 @@ def test_the_page_ends_with_its_process_and_the_body_flies_on_released() -> None
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
 def test_the_pages_process_ends_when_the_nodes_is_killed(how: signal.Signals) -> None:
-    code = "from live_rig import Beside; import time; b = Beside({'mesh': 't_handle'}); print(b.child.pid, flush=True); time.sleep(100)"
+    # It hears Ctrl-C also where the tests' own process ignores it.
+    code = (
+        "import signal, time; signal.signal(signal.SIGINT, signal.default_int_handler); from live_rig import Beside; "
+        "b = Beside({'mesh': 't_handle'}); print(b.child.pid, flush=True); time.sleep(100)"
+    )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(TEST.parent), str(TEST), str(TEST / "page")])}
     node = subprocess.Popen(
         [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
