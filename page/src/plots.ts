@@ -123,7 +123,7 @@ export class Plots {
     for (const { canvas, curves } of this.plots) {
       const width = canvas.clientWidth, height = canvas.clientHeight, ratio = Math.min(2, devicePixelRatio || 1);
       if (!width) continue;
-      if (canvas.width !== Math.round(width * ratio)) { canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); }
+      if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) { canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); }
       const paper = canvas.getContext("2d")!;
       paper.setTransform(ratio, 0, 0, ratio, 0, 0);
       paper.clearRect(0, 0, width, height);
