@@ -50,7 +50,8 @@ def run(args: argparse.Namespace) -> int:
         return 0
     if importlib.util.find_spec("websockets") is None:
         raise InputError("workbench", is_missing("websockets", "workbench"))
-    from ..page.server import LOOPBACK, serve_page
+    from ..base.ports import LOOPBACK
+    from ..page.server import serve_page
     from ..parameters.declarations import Parameters
 
     page, default = page_text(values, script).encode(), Parameters().workbench_port

@@ -26,10 +26,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from ..base.errors import InputError
-
-LOOPBACK = "127.0.0.1"
-PORTS_TRIED = 64
-"""How many ports above a taken default are tried before giving up."""
+from ..base.ports import LOOPBACK, PORTS_TRIED, ports_to_try
 
 MOST_CONNECTIONS = 96
 MOST_OF_ONE_MACHINE = 24
@@ -160,12 +157,10 @@ class PageServer:
 
     async def begin(self, asked: int | None, default: int) -> None:
         """Listen on the port that was asked for, or on the first free one from the default on. Raises InputError."""
-        if asked is not None and not 1 <= asked <= 65535:
-            raise InputError("--port", asked, "a TCP port, 1 to 65535")
+        ports = ports_to_try("--port", asked, default)
         logger = logging.getLogger("rigid_proto_ros.page")
         logger.setLevel(logging.CRITICAL + 1)  # dropped and broken connections are not errors
         kind = type("Connection", (_Connection,), {"lines": self.lines, "opened": {}})
-        ports = range(default, min(default + PORTS_TRIED, 65536)) if asked is None else [asked]
         for port in ports:
             try:
                 self._server = await serve(

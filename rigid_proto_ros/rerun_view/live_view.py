@@ -12,11 +12,12 @@ from functools import partial
 import rerun as rr
 
 from ..base.errors import InputError
+from ..base.ports import LOOPBACK
 from ..session.mailbox import Noted
 from . import viewers
 from .backend import Stream, last_line
 from .observer import RerunObserver
-from .ports import LOOPBACK, PortTakenError, listens, serve_on_port
+from .ports import PortTakenError, listens, serve_on_port
 
 DEFAULT_RERUN_PORT = 9876
 DEFAULT_WEB_PORT = 9090

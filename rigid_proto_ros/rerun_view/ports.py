@@ -9,12 +9,9 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from ..base.errors import InputError
+from ..base.ports import LOOPBACK, PORTS_TRIED, ports_to_try
 
 _Served = TypeVar("_Served")
-
-LOOPBACK = "127.0.0.1"
-PORTS_TRIED = 64
-"""How many ports above a taken default are tried before giving up."""
 
 
 def is_free(port: int) -> bool:
@@ -39,10 +36,7 @@ def serve_on_port(field: str, asked: int | None, default: int, serve: Callable[[
     ``serve`` raises PortTakenError where another process was faster. Raises InputError where ``asked`` is given and
     taken, or no port near the default is free.
     """
-    if asked is not None and not 1 <= asked <= 65535:
-        raise InputError(field, asked, "a TCP port, 1 to 65535")
-    candidates = range(default, min(default + PORTS_TRIED, 65536)) if asked is None else [asked]
-    for port in candidates:
+    for port in ports_to_try(field, asked, default):
         if is_free(port):
             try:
                 return serve(port)

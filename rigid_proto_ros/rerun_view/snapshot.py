@@ -16,8 +16,9 @@ from PIL import Image
 
 from ..base.errors import InputError
 from ..base.files import check_whole_file, whole_file
+from ..base.ports import LOOPBACK
 from .backend import SIM_TIME
-from .ports import LOOPBACK, PortTakenError, is_free, listens, serve_on_port
+from .ports import PortTakenError, is_free, listens, serve_on_port
 from .viewers import ViewerProcess, open_headless
 
 FIRST_PORT = 19876

@@ -17,7 +17,8 @@ from urllib.parse import quote
 
 from ..base.errors import is_missing
 from ..base.interrupts import end_with_this_thread
-from .ports import LOOPBACK, PortTakenError, listens
+from ..base.ports import LOOPBACK
+from .ports import PortTakenError, listens
 
 STOP_TIMEOUT_S = 1.0
 START_TIMEOUT_S = 30.0

@@ -319,19 +319,12 @@ def test_a_lesson_is_played_with_the_mouse(browser: Any) -> None:
 
 @pytest.mark.stress
 @pytest.mark.parametrize("name", [one.name for one in lessons()])
-def test_a_lesson_is_played_before_a_class(browser: Any, name: str, tmp_path: Path) -> None:
-    page = Taught(browser, name, "&class", size=CLASS)
-    page.answer()
-    page.again()
-    BY_BUTTONS.get(name, by_buttons)(page)
-    page.look(tmp_path / f"{name}.png")
-    page.close()
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("name", [one.name for one in lessons()])
-def test_a_lesson_is_played_on_a_phone(browser: Any, name: str, tmp_path: Path) -> None:
-    page = Taught(browser, name, size=PHONE, touch=True)
+@pytest.mark.parametrize("where", ["class", "phone"])
+def test_a_lesson_is_played_before_a_class_and_on_a_phone(browser: Any, where: str, name: str, tmp_path: Path) -> None:
+    before_class = where == "class"
+    page = Taught(
+        browser, name, "&class" if before_class else "", size=CLASS if before_class else PHONE, touch=not before_class
+    )
     page.answer()
     page.again()
     BY_BUTTONS.get(name, by_buttons)(page)

@@ -14,6 +14,7 @@ import rerun_flight as flight
 from rerun_flight import wait_for
 
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.base.ports import PORTS_TRIED
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.rerun_view import ports, viewers
 from rigid_proto_ros.rerun_view.backend import SIM_TIME
@@ -93,7 +94,7 @@ def test_who_loses_the_race_for_a_port_serves_on_the_next_one_on_loopback_only_a
             addresses = [observer.live_address, observer.web_address]
             served = [int(address.split(":")[2].split("/")[0]) for address in addresses]
             for port, asked in zip(served, taken.values(), strict=True):
-                assert asked < port < asked + ports.PORTS_TRIED
+                assert asked < port < asked + PORTS_TRIED
             assert b"html" in wait_for(lambda: _page(observer.web_address)).lower()
             pids = (os.getpid(), observer._process.process.pid)
             assert wait_for(lambda: all(ports.listens(pid, at) for pid, at in zip(pids, served, strict=True)))
