@@ -118,21 +118,26 @@ class LiveSimulation:
         self.loop.observer.close()
         self._say_recording(self._recorders, [])
 
-    def call(self, function: Callable[[], Any]) -> Any:
-        """Run a function on the physics thread between two ticks and return what it returns, or raise what it raises;
-        at once, before the thread is started.
-
-        Raises InputError when the simulation has ended, or the thread is too busy to begin it within BUSY_S; then it is
-        never run.
+    def post(self, function: Callable[[], Any]) -> Future[Any]:
+        """Let the physics thread run a function between two ticks, in the order of posting, without waiting for it; at
+        once, before the thread is started. Raises InputError when the simulation has ended.
         """
         future: Future[Any] = Future()
         with self._handing_over:
             if self._stopping:
                 raise InputError("request", "the simulation has ended")
             if self._thread is None:
-                return function()
-            self._requests.append((function, future))
+                _fulfil(future, function)
+            else:
+                self._requests.append((function, future))
         self.endpoints.wake()
+        return future
+
+    def call(self, function: Callable[[], Any]) -> Any:
+        """Post a function, and return what it returns, or raise what it raises. Raises InputError where the thread is
+        too busy to begin it within BUSY_S; then it is never run.
+        """
+        future = self.post(function)
         try:
             return future.result(BUSY_S)
         except CancelledError:
@@ -175,10 +180,7 @@ class LiveSimulation:
             function, future = self._requests.pop(0)
             if future.set_running_or_notify_cancel():
                 self.loop.prepare_request()
-                try:
-                    future.set_result(function())
-                except BaseException as error:  # the caller's to handle
-                    future.set_exception(error)
+                _fulfil(future, function)
 
     # Reading
 
@@ -212,7 +214,11 @@ class LiveSimulation:
         """Take an entry of a script, or a list of entries, as YAML, ``t`` in simulated seconds; a list is taken or
         refused whole. Raises CommandRefused, counted.
         """
-        self.call(lambda: self.loop.commands.receive_schedule(lambda: text))
+        self.call(self.scheduling(text))
+
+    def scheduling(self, text: str) -> Callable[[], None]:
+        """What ``schedule`` has the physics thread do."""
+        return lambda: self.loop.commands.receive_schedule(lambda: text)
 
     # Time
 
@@ -396,6 +402,13 @@ class LiveSimulation:
             return finished
 
         _close(self.call(give_up))
+
+
+def _fulfil(future: Future[Any], function: Callable[[], Any]) -> None:
+    try:
+        future.set_result(function())
+    except BaseException as error:  # the caller's to handle
+        future.set_exception(error)
 
 
 def _close(recorders: list[WritingObserver]) -> None:

@@ -20,7 +20,8 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import suppress
 from typing import Any
 
@@ -29,14 +30,13 @@ from ..base.errors import InputError
 from ..base.interrupts import with_this_package
 from ..live.live_simulation import LiveSimulation
 from ..parameters.declarations import PARAMETERS, READ_ONLY, parameter_named
-from ..scene.command_codec import of_event
 from ..scene.scenario import Scenario, make_scenario
 from ..scene.script import entry_of
-from ..simulation.commands import ReleaseString
+from ..simulation.commands import Command, MoveString, ReleaseString
 from ..simulation.observer import (
+    Acted,
     BodyChanged,
     Event,
-    Logged,
     Observer,
     Published,
     Refused,
@@ -47,7 +47,7 @@ from .bundle import built_page
 from .data import USED, page_version
 from .file import FORM, mesh_numbers
 from .watchers import (
-    ANSWER,
+    ANSWERS,
     COMMAND,
     LOOKING,
     PICTURE,
@@ -88,16 +88,12 @@ _HEAD = struct.Struct("<4I")
 class _Told(Observer):
     """Notes what has happened, on the physics thread."""
 
-    takes = frozenset({BodyChanged, SceneChanged, Logged, Refused, Reset})
+    takes = frozenset({BodyChanged, SceneChanged, Acted, Refused, Reset})
 
     def __init__(self) -> None:
         self.events: deque[Event] = deque(maxlen=MOST_NOTED)
         self.scene_changed = True
         self.looking = False
-
-    def wants(self, kind: type) -> bool:
-        """Lines of the log are made for somebody who looks."""
-        return kind in self.takes and (self.looking or kind is not Logged)
 
     def on(self, event: Event) -> None:
         """Note it."""
@@ -129,7 +125,9 @@ class LivePage:
     ) -> None:
         self._live, self._say = live, say
         self._told, self._ghost_watcher, self._watches_ghost = _Told(), _GhostWatcher(), False
-        self._looked_at, self._closed = threading.Event(), False
+        # What became of commands waits for the next picture, or for nothing while nobody looks.
+        self._answers: deque[dict[str, Any]] = deque()
+        self._due, self._closed = threading.Event(), False
         self._scene_number = 0
         self._mesh_sha256: str | None = None
         self._pace: dict[str, Any] = {}
@@ -159,14 +157,14 @@ class LivePage:
     def close(self) -> None:
         """End the pages."""
         self._closed = True
-        self._looked_at.set()
+        self._due.set()
         # It holds nothing, and a thread of this process may be writing to it.
         self._child.kill()
         self._child.wait()
 
     # To the pages
 
-    def _put(self, kind: int, content: bytes | Mapping[str, Any]) -> None:
+    def _put(self, kind: int, content: bytes | Mapping[str, Any] | Sequence[Any]) -> None:
         text = content if isinstance(content, bytes) else json.dumps(content).encode()
         with self._writing, suppress(OSError, ValueError):  # the child has ended, which its reader finds
             assert self._child.stdin is not None
@@ -176,17 +174,21 @@ class LivePage:
         self._put(TOLD, {about: content})
 
     def _send(self) -> None:
-        """While somebody looks, tell what has changed and send pictures."""
+        """Send answers; while somebody looks, tell what has changed and send pictures."""
         with suppress(InputError):  # the simulation has ended
             while not self._closed:
-                self._looked_at.wait()
-                while self._told.looking and not self._closed:
-                    self._tell_changes()
-                    picture = self._live.call(self._picture)
-                    if picture != self._last:
-                        self._last = picture
-                        self._put(PICTURE, picture)
-                    time.sleep(PICTURE_S)
+                if self._answers:
+                    self._put(ANSWERS, [self._answers.popleft() for _ in range(len(self._answers))])
+                if not self._told.looking:
+                    self._due.wait()
+                    self._due.clear()
+                    continue
+                self._tell_changes()
+                picture = self._live.call(self._picture)
+                if picture != self._last:
+                    self._last = picture
+                    self._put(PICTURE, picture)
+                time.sleep(PICTURE_S)
 
     def _picture(self) -> bytes:
         """The present state, on the physics thread."""
@@ -221,8 +223,8 @@ class LivePage:
                     self._tell("reset", True)
                 case Refused(message=message):
                     self._tell("said", message)
-                case Logged(line=line):
-                    done += self._done(line)
+                case Acted(time_ns, command):
+                    done += _as_entry(time_ns, command)
         if done:
             self._tell("done", done)
 
@@ -268,19 +270,6 @@ class LivePage:
 
         self._live.call(begin)
 
-    def _done(self, line: str) -> list[dict[str, Any]]:
-        """What was done, as an entry of a script; moves of the string's end are in the pictures."""
-        if '"kind": "string_target"' in line[:80]:
-            return []
-        event = json.loads(line)
-        try:
-            command = of_event(event["kind"], event["content"], self._live.frames)
-            if command is None:
-                return []
-            return [{"t": event["time_ns"] / 1e9, **entry_of(command)}]
-        except InputError:
-            return []  # no entry says it
-
     # From the pages
 
     def _read(self) -> None:
@@ -288,9 +277,7 @@ class LivePage:
         while (frame := read_frame(self._child.stdout)) is not None:
             kind, content = frame
             if kind == COMMAND:
-                command = json.loads(content)
-                answer = {"answer": command["id"], "refusal": self._obey(command)}
-                self._put(ANSWER, {"watcher": command["watcher"], **answer})
+                self._obey(json.loads(content))
             elif kind == LOOKING:
                 self._look(json.loads(content))
             elif kind == SAID:
@@ -309,42 +296,57 @@ class LivePage:
         elif not self._closed:
             self._say("the page's process has ended, and the node goes on without it")
         if self._holds:
-            self._obey({"entry": {"string": "release"}})
+            with suppress(InputError):  # the simulation has ended
+                self._release()
 
     def _look(self, looking: bool) -> None:
         self._told.looking = looking
         self._last = b""  # for whoever comes
-        if looking:
-            self._looked_at.set()
-        else:
-            self._looked_at.clear()
+        self._due.set()
 
-    def _obey(self, command: Mapping[str, Any]) -> str | None:
-        """Do what a page asks for; why it was refused, or None."""
-        live = self._live
+    def _obey(self, command: Mapping[str, Any]) -> None:
+        """Do what a page asks for. Nobody waits for what becomes of an entry: a drag brings sixty a second, and a wait
+        for another thread takes as long as the entry itself.
+        """
         try:
             match command:
                 case {"entry": {"string": "release"}}:
-                    self._holds = False
-                    live.submit(ReleaseString())
+                    self._release()
                 case {"entry": entry}:
-                    check_entry(entry, live.scenario.parameters.mesh)
+                    check_entry(entry, self._live.scenario.parameters.mesh)
                     self._holds |= "string" in entry
-                    live.schedule(json.dumps([{"t": 0, **entry}]))
+                    acts = self._live.scheduling(json.dumps([{"t": 0, **entry}]))
+                    self._live.post(acts).add_done_callback(lambda acted: self._answer_entry(command, acted))
+                    return
                 case {"begin": values}:
                     self._begin(values)
                 case {"time": "pause" | "resume" as what}:
-                    live.pause(what == "pause")
+                    self._live.pause(what == "pause")
                 case {"time": "step"}:
-                    live.step()
+                    self._live.step()
                 case {"time": "reset"}:
-                    live.reset()
-        except InputError as error:
-            return str(error)
-        except Exception as error:  # a fault of ours; the page is told, and the next command is obeyed
-            traceback.print_exc()
-            return f"{type(error).__name__}: {error}"
-        return None
+                    self._live.reset()
+        except Exception as error:  # for the page; the next command is obeyed
+            self._answer(command, error)
+        else:
+            self._answer(command)
+
+    def _answer_entry(self, command: Mapping[str, Any], acted: Future[None]) -> None:
+        if not acted.cancelled():  # by the end of the simulation
+            self._answer(command, acted.exception())
+
+    def _answer(self, command: Mapping[str, Any], error: BaseException | None = None) -> None:
+        refusal = None if error is None else str(error)
+        if not (error is None or isinstance(error, InputError)):  # a fault of ours
+            traceback.print_exception(error)
+            refusal = f"{type(error).__name__}: {error}"
+        self._answers.append({"watcher": command["watcher"], "answer": command["id"], "refusal": refusal})
+        if not self._told.looking:
+            self._due.set()
+
+    def _release(self) -> None:
+        self._holds = False
+        self._live.submit(ReleaseString())
 
     def _begin(self, values: Mapping[str, Any]) -> None:
         """Another scene, in the node as it is."""
@@ -359,6 +361,15 @@ class LivePage:
             self._live.begin(scenario)
         finally:
             self._live.pause(was_paused)
+
+
+def _as_entry(time_ns: int, command: Command) -> list[dict[str, Any]]:
+    """What was done, as an entry of a script; moves of the string's end are in the pictures."""
+    if isinstance(command, MoveString):
+        return []
+    with suppress(InputError):  # no entry says it
+        return [{"t": time_ns / 1e9, **entry_of(command)}]
+    return []
 
 
 def check_entry(entry: Mapping[str, Any], mesh: str) -> None:

@@ -37,7 +37,7 @@ from websockets.exceptions import ConnectionClosed
 from ..base.errors import InputError
 from .server import MOST_WATCHERS, PageServer, addresses, new_token
 
-SETTINGS, TOLD, PICTURE, ANSWER = range(4)
+SETTINGS, TOLD, PICTURE, ANSWERS = range(4)
 """Kinds of frames from the node."""
 COMMAND, LOOKING, SAID, READY, REFUSED = range(5)
 """Kinds of frames to the node."""
@@ -145,13 +145,13 @@ class Watchers:
         for watcher in self._all.values():
             watcher.due.set()
 
-    def answer(self, content: bytes) -> None:
-        """What became of a command goes to the page that gave it."""
-        found = json.loads(content)
-        watcher = self._all.get(found.pop("watcher"))
-        if watcher is not None:
-            watcher.unanswered -= 1
-            watcher.tell(_json(found))
+    def answers(self, content: bytes) -> None:
+        """What became of commands goes to the pages that gave them."""
+        for found in json.loads(content):
+            watcher = self._all.get(found.pop("watcher"))
+            if watcher is not None:
+                watcher.unanswered -= 1
+                watcher.tell(_json(found))
 
     # Pages
 
@@ -367,7 +367,7 @@ class _Child:
                     os._exit(0)  # the node has ended
 
     def _read(self, watchers: Watchers) -> None:
-        handlers = {TOLD: watchers.told, PICTURE: watchers.picture, ANSWER: watchers.answer}
+        handlers = {TOLD: watchers.told, PICTURE: watchers.picture, ANSWERS: watchers.answers}
         while (frame := read_frame(self._in)) is not None:
             kind, content = frame
             self._loop.call_soon_threadsafe(handlers[kind], content)

@@ -130,6 +130,13 @@ class Applied(NamedTuple):
     attitude: Attitude
 
 
+class Acted(NamedTuple):
+    """A command has acted, of whatever kind."""
+
+    time_ns: int
+    command: Command
+
+
 class StringChanged(NamedTuple):
     """The string is tied like this from ``time_ns`` on, or not at all; comes again at every target. arm (3,) [m, body
     axes]: from the COM to its knot.
@@ -188,6 +195,7 @@ Event = (
     | LoadBegan
     | LoadEnded
     | Applied
+    | Acted
     | StringChanged
     | Logged
     | Refused

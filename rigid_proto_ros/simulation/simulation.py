@@ -45,6 +45,7 @@ from .effects import APPLY, CUT, END_ALL, END_DUE, FINISH
 from .flight_arrays import NOTEWORTHY, ActingLoad, FlightArrays
 from .observer import (
     AccuracyFloor,
+    Acted,
     Applied,
     BodyChanged,
     EventLog,
@@ -282,7 +283,7 @@ class Simulation:
         observer, arrays = self.observer, self._arrays
         if not (self._wants_loads or observer.wants(Logged) or arrays.integers[NOTEWORTHY]):
             for pending in due:
-                self.events.note(pending.time_ns, pending.command)
+                self._note(pending.time_ns, pending.command)
             return
         first = arrays.first_due
         for number, (now_ns, what, load_id, row) in enumerate(arrays.last_events()):
@@ -320,8 +321,17 @@ class Simulation:
         # A noted change would keep its whole setup in memory, mesh included.
         if self.observer.wants(Logged) or isinstance(command, Change):
             self.log(command.kind, dict(command.content))
+            self._tell_acted(self.time_ns, command)
         else:
-            self.events.note(self.time_ns, command)
+            self._note(self.time_ns, command)
+
+    def _note(self, time_ns: int, command: Command) -> None:
+        self.events.note(time_ns, command)
+        self._tell_acted(time_ns, command)
+
+    def _tell_acted(self, time_ns: int, command: Command) -> None:
+        if Acted in self.observer.takes:
+            self.observer.on(Acted(time_ns, command))
 
     # Events that need Python code
 

@@ -3,11 +3,12 @@
 
 import json
 
-from flights import SECOND, EventLines, flight, wrench
+from flights import SECOND, EventLines, Heard, flight, wrench
 
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.simulation import observer
-from rigid_proto_ros.simulation.observer import Logged, Observer, Observers
+from rigid_proto_ros.simulation.commands import ClearWrench, MoveString, ReleaseString, TieString
+from rigid_proto_ros.simulation.observer import Acted, Logged, Observer, Observers
 
 BODY = make_body(2.0, (0.0, 0.0, 0.0), ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9)))
 
@@ -55,3 +56,24 @@ def test_events_chained_later_give_the_hash_of_those_chained_at_once(monkeypatch
     # Lines that were read carry the whole chain, those that nobody read included.
     assert fickle.lines == [line for line in reader.lines if line in fickle.lines]
     assert 0 < len(fickle.lines) < 50
+
+
+def test_commands_that_acted_are_told_as_they_were_given_in_their_order_whoever_reads_lines():
+    commands = [
+        wrench("body", (0.1, 0.0, 0.0)),
+        TieString("mesh", (0.0, 0.0, 0.0)),
+        MoveString((0.0, 0.0, 1.0)),
+        wrench("body", (0.0, 0.1, 0.0)),
+        ReleaseString(),
+        ClearWrench(),
+    ]
+    for listening in (False, True):
+        simulation, heard, reader = flight(BODY), Heard(Acted), Reader()
+        reader.listening = listening
+        simulation.watch(Observers(heard, reader))
+        for number, command in enumerate(commands):
+            simulation.submit(command, number * SECOND // 100)
+        simulation.advance(SECOND)
+        assert [(event.time_ns, event.command) for event in heard.events] == [
+            (number * SECOND // 100, command) for number, command in enumerate(commands)
+        ]
