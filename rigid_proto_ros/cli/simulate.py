@@ -19,6 +19,7 @@ from .exports import add_exports, asked, check_exports, write_exports
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord
     from ..scene.scenario import Scenario
+    from ..simulation.commands import Command
 
 DURATION_NS = 10_000_000_000
 AFTER_SCRIPT_NS = 1_000_000_000
@@ -56,6 +57,12 @@ def add_arguments(parser: Parser) -> None:
         help="an .mcap: the recording, as a bag of the node's topics; an .rrd: a view for Rerun; or both with a comma",
     )
     parser.add_argument("--bag", metavar="FILE.mcap", help="the same as --record FILE.mcap, beside a --record FILE.rrd")
+    parser.add_argument(
+        "--sensitivity",
+        action="store_true",
+        help="simulate again, ten times as accurate, and print how far the end moves; errors of a chaotic motion grow "
+        "exponentially",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     add_exports(parser)
     parser.instead_of = _instead_of
@@ -75,6 +82,7 @@ def run(args: argparse.Namespace) -> int:
     from ..scene.scenario import read_scene
     from ..scene.scenario_run import OfflineRun, run_with_progress, summary
     from ..scene.script import read_script
+    from ..scene.sensitivity import sensitivity_of
     from ..simulation.commands import nanoseconds
     from ..simulation.observer import Observers
 
@@ -88,10 +96,7 @@ def run(args: argparse.Namespace) -> int:
     if beyond := sum(command.stamp_ns >= duration_ns for command in script):
         _warn(f"{beyond} of the script's {len(script)} commands act at or after the end, {duration_ns / 1e9:.9g} s")
     files = _recorded(scenario, args, "record" in settings)
-    if files:
-        # Check everything that can be refused now, before a recording of an earlier run is overwritten.
-        OfflineRun(scenario, script)
-    check_exports(args)
+    _check(scenario, script, args, files)
     record: FlightRecord | None = None
     if asked(args):
         from ..export.flight_record import FlightRecord
@@ -111,6 +116,8 @@ def run(args: argparse.Namespace) -> int:
         _warn(f"commands refused: {count}, {reason}: {flight.simulation.refusals[reason]}")
     if flight.ghost is not None and flight.ghost.refusal:
         _warn(flight.ghost.refusal)
+    if args.sensitivity:
+        result["sensitivity"] = sensitivity_of(flight.simulation, scenario, script)
     if args.json:
         print(json.dumps(result))
     else:
@@ -127,6 +134,27 @@ def run(args: argparse.Namespace) -> int:
         return 1
     # A recording that stopped has already printed a message.
     return 2 if recorded != files else 1 if flight.simulation.refused else 0
+
+
+def _check(scenario: Scenario, script: list[Command], args: argparse.Namespace, files: list[str]) -> None:
+    """Check everything that can be refused now, before a recording of an earlier run is overwritten."""
+    from ..scene.scenario_run import OfflineRun
+    from ..scene.sensitivity import finer
+
+    if files:
+        OfflineRun(scenario, script)
+    check_exports(args)
+    if args.sensitivity:
+        finer(scenario)
+
+
+def _moved(attitude: float | None, position: float, wall_time: float, **finer: float) -> str:
+    """How far the end moves, in a line."""
+    (name, value), *_ = ((name, value) for name, value in finer.items() if name in ("accuracy", "step"))
+    with_it = f"with {name} {value:g} ({wall_time:.3g} s of wall time)"
+    if attitude is None:
+        return f" unknown: the motion stops {with_it}"
+    return f" {attitude:.3g} rad and {position:.3g} m {with_it}"
 
 
 def _setting(text: str) -> tuple[str, object]:
@@ -174,6 +202,8 @@ def _print_summary(result: dict[str, Any], recordings: list[str]) -> None:
         "integrator": f" {result['integrator']}, {result['steps']} steps",
         "state hash": f" {result['state_hash']}",
     }
+    if "sensitivity" in result:
+        rows["sensitivity"] = _moved(**result["sensitivity"])
     for name, value in rows.items():
         print(f"{name:16s} {value}")
     for file in recordings:

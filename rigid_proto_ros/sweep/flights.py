@@ -29,13 +29,18 @@ from ..motion.state import State
 from ..scene.scenario import Scenario, read_scene
 from ..scene.scenario_run import OfflineRun
 from ..scene.script import MAX_TIME_S, expand_entry
+from ..scene.sensitivity import sensitivity_of
 from ..scene.yaml_text import plain
-from ..simulation.commands import nanoseconds
+from ..simulation.commands import Command, nanoseconds
 from ..simulation.observer import Observer
+from ..simulation.quantities import DIFFERENCES
 from .table import cores
 
 Scene = Scenario
 """A checked scene. It can be flown any number of times, and goes to other processes."""
+
+MOST_GIVEN = 100_000
+"""Commands of a flight that are kept for ``Flight.sensitivity``: some tens of megabytes."""
 
 Value = TypeVar("Value")
 Result = TypeVar("Result")
@@ -61,7 +66,9 @@ class Flight:
 
             observer = McapObserver(record, parameters=scene.parameters, simulated_log=True)
         self._observer = observer
+        self._scene = scene
         self._run = OfflineRun(scene, observer=observer)
+        self._given: list[Command] = []
 
     def __enter__(self) -> Flight:
         return self
@@ -75,7 +82,10 @@ class Flight:
         """
         if not isinstance(entry, (dict, Mapping)):  # a mapping's own check is slow
             raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
-        self._run.submit(expand_entry(dict(entry), "command", now_ns=self._run.simulation.time_ns))
+        commands = expand_entry(dict(entry), "command", now_ns=self._run.simulation.time_ns)
+        self._run.submit(commands)
+        if len(self._given) <= MOST_GIVEN:
+            self._given += commands
 
     def step(self, seconds: float) -> State:
         """Simulate so long, and return the state at the end. Raises InputError for no such time, when the motion fails,
@@ -111,6 +121,20 @@ class Flight:
         hasn't.
         """
         return self._run.simulation.accuracy_floor
+
+    def sensitivity(self) -> dict[str, float]:
+        """How far the present state is from that of a second flight, ten times as accurate, which this simulates from
+        time 0 with the same commands: ``attitude`` [rad], ``position`` [m], ``velocity`` [m/s] and ``spin`` [rad/s].
+
+        Raises InputError where nothing more accurate can be asked for, the motion failed, or more than MOST_GIVEN
+        commands were given, which aren't kept.
+        """
+        if len(self._given) > MOST_GIVEN:
+            raise InputError("sensitivity", "more commands", f"a flight of at most {MOST_GIVEN} commands")
+        found = sensitivity_of(self._run.simulation, self._scene, self._given)
+        if found["attitude"] is None:
+            raise InputError("sensitivity", self._run.simulation.failure or "a second flight that stops")
+        return {name: found[name] for name in DIFFERENCES}
 
     def close(self) -> None:
         """Finish the recording."""

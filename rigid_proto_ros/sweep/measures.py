@@ -20,7 +20,7 @@ from .fields import known_name, mapping, names, number
 
 MAX_SAMPLES = 100_000
 """Samples of one flight: a state is kept of each."""
-KINDS = ("final", "max", "min", "flips", "first", "difference")
+KINDS = ("final", "max", "min", "flips", "first", "difference", "sensitivity")
 _STATE_PARTS = {"position": 3, "orientation": 4, "velocity": 3, "spin": 3}
 
 
@@ -38,6 +38,11 @@ class Measures:
     def needs_reference(self) -> bool:
         """Something is compared with the reference."""
         return bool((self.table[:, fm.KIND] == fm.DIFFERENCE).any())
+
+    @property
+    def needs_finer(self) -> bool:
+        """The reference is the same motion, ten times as accurate."""
+        return any(name.startswith("sensitivity.") for name in self.columns)
 
 
 def read_measures(spec: Any, watch: float, duration_s: float, field: str) -> Measures:

@@ -35,6 +35,7 @@ from ..scene.scenario import BodyMesh, Scenario, build_scenario, load_body_mesh,
 from ..scene.scenario_run import OfflineRun
 from ..scene.scene_file import scene_file, scene_values
 from ..scene.script import expand_script
+from ..scene.sensitivity import finer_values
 from ..scene.yaml_text import load_yaml, plain, read_text
 from ..simulation.commands import Command, nanoseconds
 from .fields import mapping, number, whole
@@ -221,6 +222,10 @@ def make_study(spec: Any, name: str = "study", folder: Path = Path()) -> Study:
     measures = read_measures(spec.get("measure"), watch, duration_s, f"{name}, measure")
     vary = _vary(spec["vary"], name, base.parameters, script)
     reference = _reference(spec.get("reference"), f"{name}, reference")
+    if measures.needs_finer:
+        if reference is not None:
+            raise InputError(f"{name}, measure.sensitivity", "with a reference", "a study without one")
+        reference = _finer(base, vary, script, f"{name}, measure.sensitivity")
     if measures.needs_reference and reference is None:
         raise InputError(f"{name}, reference", None, "parameters of a reference, since a difference is measured")
     samples = _samples(spec.get("samples"), f"{name}, samples", vary)
@@ -332,6 +337,17 @@ def _reference(spec: Any, field: str) -> dict[str, Any] | None:
         if parameter == "record" or parameter_named(parameter).changes == READ_ONLY:
             raise InputError(f"{field}.{parameter}", changes[parameter], "a parameter that changes the motion")
     return changes
+
+
+def _finer(base: Scenario, vary: tuple[Vary, ...], entries: list[Any], field: str) -> Mapping[str, Value]:
+    """The reference of a sensitivity, which is one for all rows."""
+    of_accuracy = {"accuracy", "step", "integrator"}
+    changed = {v.target.parameter for v in vary} | {v.target.path[-1] for v in vary if v.target.entry}
+    for entry in entries:
+        changed |= set(entry.get("set", {}))
+    if found := sorted(map(str, of_accuracy & changed)):
+        raise InputError(field, f"with {found[0]} varied or set", "a study in which accuracy, step and integrator stay")
+    return finer_values(base.parameters, base.setup.integrator.order)
 
 
 def _samples(spec: Any, field: str, vary: tuple[Vary, ...]) -> int:
