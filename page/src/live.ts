@@ -13,7 +13,7 @@ import { Parameters } from "./parameters.ts";
 import { Refusals } from "./scene.ts";
 import { Script } from "./script.ts";
 import type {
-  BodyInfo, Bundled, Can, Entry, GhostChoice, HandState, History, Hit, Motion, NodeBehind, Parameter, Snapshot, StringNow, TakeFiles, Value, Values, Vec3, Wish,
+  BodyInfo, Bundled, Can, Entry, GhostChoice, HandState, History, Hit, Motion, NodeBehind, Parameter, Sensitivity, Snapshot, StringNow, TakeFiles, Value, Values, Vec3, Wish,
 } from "./source.ts";
 import { Observed } from "./state.ts";
 import { Placed, Surfaces } from "./surface.ts";
@@ -395,6 +395,7 @@ export class Live implements Motion, NodeBehind {
 
   take(): TakeFiles { throw new Refused(words.live.recorded); }
 
+  sensitivity(): Sensitivity { throw new Refused(words.live.recorded); }
   hash(): Promise<string> { return Promise.reject(new Refused(words.live.recorded)); }
 
   link(): Promise<string> { return Promise.reject(new Refused(words.live.recorded)); }

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 
 import { chalked } from "./chalk.ts";
+import { Refused } from "./numbers.ts";
 import type { Card, Desk } from "./panel.ts";
 import { button, choice, make, say } from "./panel_elements.ts";
 import type { Snapshot, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
+
+/** [degrees] What an error that has grown so large can be seen by. */
+const CHAOS = 1;
 
 /** Directions that an angle can be measured between, in the world. */
 export function direction(thing: string, now: Snapshot, axes: readonly number[], first: Vec3 | null): Vec3 | null {
@@ -65,6 +69,17 @@ export function measureCard(desk: Desk): Card {
   }, { "aria-pressed": "false" });
   const wipe = button(w.wipe, () => { look.chalk = []; });
 
+  const sensitive = make("p"), again = button(w.again, () => {
+    try {
+      const { attitude, position, finer: [name, value] } = motion.sensitivity(), degrees = (attitude * 180) / Math.PI;
+      sensitive.textContent = `${w.moved(degrees.toPrecision(2), position.toPrecision(2), `${name} ${short(value, 2)}`)} ${degrees > CHAOS ? w.chaos : w.holds}`;
+    } catch (error) {
+      if (!(error instanceof Refused)) throw error;
+      sensitive.textContent = error.message;
+    }
+    sensitive.scrollIntoView({ block: "nearest" });
+  });
+
   const readings = make("table");
   let first: Vec3 | null = null;
   const node = make("div", {},
@@ -72,7 +87,8 @@ export function measureCard(desk: Desk): Card {
     make("h3", {}, w.watch), make("div", { class: "row" }, watch, go, clear),
     make("h3", {}, w.trace), make("div", { class: "row", role: "group", "aria-label": w.trace, "data-mark": "trace" }, ...traces),
     make("h3", {}, w.chalk), make("div", { class: "row" }, chalk, wipe),
-    make("h3", {}, w.readings), readings);
+    make("h3", {}, w.readings), readings,
+    ...(motion.can.keep ? [make("h3", {}, w.sensitivity), make("div", { class: "row" }, again), sensitive] : []));
   return {
     node, changed: () => { first = desk.track().seen[0]?.now.body.momentum ?? null; },
     show(now) {

@@ -16,17 +16,20 @@ import { Refusals } from "./scene.ts";
 import { Script } from "./script.ts";
 import { sha256 } from "./sha256.ts";
 import type {
-  BodyInfo, Bundled, Can, Entry, GhostChoice, History, Hit, Motion, OpenMotion, Parameter, Snapshot, TakeFiles, Value, Values, Vec3,
+  BodyInfo, Bundled, Can, Entry, GhostChoice, History, Hit, Motion, OpenMotion, Parameter, Sensitivity, Snapshot, TakeFiles, Value, Values, Vec3,
 } from "./source.ts";
 import { Observed } from "./state.ts";
 import { Placed, Surfaces } from "./surface.ts";
 import type { MeshNumbers, Surface } from "./surface.ts";
 import { FORM, linkText, madeBy, takeBytes, takeFiles, takeOf, takeOfLink } from "./take.ts";
 import type { Take } from "./take.ts";
+import { words } from "./words.ts";
 
 /** States of a take are kept every so often, to go back to: each is 30 kB. Of too many every other one is forgotten. */
 const KEEP_NS = 1_000_000_000;
 const MOST_KEPT = 128;
+/** How many times as accurate a second flight is (scene/sensitivity.py). */
+const FINER = 10;
 
 interface Done { readonly tNs: number; readonly entry: Entry }
 
@@ -431,6 +434,28 @@ export class Simulation implements Motion {
     this.#done.length = this.#next;
     this.#endNs = nowNs;
     this.#kept = this.#kept.filter((moment) => moment.timeNs <= nowNs);
+  }
+
+  sensitivity(): Sensitivity {
+    const accuracy = ["accuracy", "step", "integrator"], entries = this.#done.slice(0, this.#next).map(({ entry }) => entry);
+    const sets = entries.some((entry) => "set" in entry && accuracy.some((name) => Object.hasOwn(entry.set, name)));
+    if (sets) throw new Refused(words.measure.accuracySet);
+    const { order } = this.#declared.integrators.find(({ name }) => name === this.#initial["integrator"]) ?? { order: null };
+    const name = order === null ? "accuracy" : "step", present = Number(this.#initial[name]);
+    const value = order === null ? present / FINER : Math.round((present * 1e9) / FINER ** (1 / order)) / 1e9;
+    this.#parameters.converted(name, value);
+    const whole = this.#whole(), { timeNs } = this.#body, row = [...this.#body.flight.row];
+    try {
+      this.#initial = { ...this.#initial, [name]: value };
+      this.#choice = NO_GHOST;
+      this.#rewind();
+      this.#flyAgain(timeNs, whole.moment.next);
+      if (this.#body.failure !== "") throw new Refused(this.#body.failure);
+      const other = this.#body.flight.row, away = [0, 1, 2].map((k) => row[k]! - other[k]!);
+      return { attitude: this.#observed.angle(row, other), position: Math.hypot(...away), finer: [name, value] };
+    } finally {
+      this.#restore(whole);
+    }
   }
 
   reset(): void {

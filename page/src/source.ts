@@ -157,6 +157,9 @@ export interface Flying {
   readonly failure: string;
 }
 
+/** attitude [rad], position [m]; finer: the parameter, accuracy or step, that the second flight had, and its value. */
+export interface Sensitivity { readonly attitude: number; readonly position: number; readonly finer: readonly [string, number] }
+
 export interface Snapshot {
   readonly timeNs: number;
   readonly body: Flying;
@@ -284,6 +287,9 @@ export interface Motion {
   goOn(): void;
   /** To time 0 with the parameters now in force; a new take. */
   reset(): void;
+
+  /** How far now is from where a second flight of the take is, ten times as accurate. Throws Refused. */
+  sensitivity(): Sensitivity;
 
   take(): TakeFiles;
   /** SHA-256 as `rigid_proto simulate --json` prints it as state_hash, hexadecimal. */

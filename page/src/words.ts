@@ -88,6 +88,9 @@ export const english = {
     watch: "Stopwatch", start: "start", stop: "stop", clear: "clear", trace: "Trace", far: "farthest point", own: "a point I press",
     chalk: "Chalk", draw: "draw on the body", wipe: "wipe off", drawNote: "Drag over the body to draw; press again to pull it",
     com: "centre of mass", readings: "Readings", speed: "speed", spin: "spin",
+    sensitivity: "Sensitivity", again: "fly again, ten times as accurate", accuracySet: "Accuracy, step or integrator change within this take.",
+    moved: (degrees: string, metres: string, finer: string) => `With ${finer} the body is now ${degrees}° and ${metres} m from here.`,
+    chaos: "A small error has grown large: chaos.", holds: "The motion is as good as that.",
   },
   plots: { name: "Plots", energy: "Energy", omega: "ω in principal axes", momentum: "L in world axes", angle: "Angle to the ghost" },
   keep: {

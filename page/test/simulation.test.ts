@@ -261,3 +261,22 @@ test("observers hear of changes, and reset begins anew with the parameters in fo
   motion.set({ mass: 2 });
   assert.equal(heard, heardAll);
 });
+
+test("a second flight, ten times as accurate, tells chaos and leaves the take as it is", async () => {
+  const motion = await opened();
+  assert.equal(motion.openBody("t_handle"), null);
+  motion.advance(3 * S);
+  assert.ok(motion.sensitivity().attitude < 1e-8);
+  motion.reset();
+  assert.equal(motion.set({ accuracy: 1e-8, "string.frequency": 50, "string.damping_ratio": 0, "string.rest_length": 0, gravity: [0, 0, -9.81] }), null);
+  motion.reset();
+  assert.equal(motion.submit({ string: { attach: [0, 0, 0], target: [0, 0, 0.1] } }), null);
+  motion.advance(3 * S);
+  const before = await motion.hash(), script = motion.history().script, { attitude, position, finer } = motion.sensitivity();
+  assert.ok(attitude > 0.1 && position > 0.01, `${attitude} rad, ${position} m`);
+  assert.deepEqual(finer, ["accuracy", 1e-9]);
+  assert.equal(await motion.hash(), before);
+  assert.deepEqual(motion.history().script, script);
+  motion.set({ accuracy: 1e-7 });
+  assert.throws(() => motion.sensitivity(), { message: /within this take/ });
+});

@@ -61,7 +61,9 @@ def page_data() -> bytes:
         "parameters": [_declared(one) for one in _declarations()],
         "fields": {name: field_of(name) for name in SCENE_PARAMETERS},
         "models": INERTIA_MODELS,
-        "integrators": [{"name": name, "supports": _supported(name)} for name in INTEGRATORS],
+        "integrators": [
+            {"name": name, "supports": _supported(name), "order": one.order} for name, one in INTEGRATORS.items()
+        ],
         "room": ROOM,
         "numbers": _constants(),
         "words": words(),
