@@ -33,6 +33,8 @@ MCAP = ["mcap>=1.6,<2"]
 # Reads MJCF files.
 ROBOTS = ["mujoco>=3.3"]
 SWEEP = ["pyarrow>=15"]
+# Sweeps on a cluster.
+DASK = [*SWEEP, "distributed>=2025.1"]
 # Motion for other tools: Parquet, USD.
 EXPORT = ["pyarrow>=15", "usd-core>=25.5"]
 # Mass and tensor from recorded motion: our sessions by mcap, with which zstandard comes, other bags by rosbags.
@@ -110,7 +112,7 @@ setup(
     # What inspect, simulate, replay and the page need: `uvx --from WHEEL rigid_proto workbench` works.
     install_requires=["numpy>=1.26", "PyYAML>=6.0", "trimesh>=4.4", *MCAP, *WORKBENCH],
     extras_require={
-        "all": [*KERNELS, *RERUN, *MCAP, *MESHES, *ROBOTS, *WORKBENCH, *SWEEP, *IDENTIFY, *EXPORT],
+        "all": [*KERNELS, *RERUN, *MCAP, *MESHES, *ROBOTS, *WORKBENCH, *DASK, *IDENTIFY, *EXPORT],
         "ros": ROS,
         "kernels": KERNELS,
         "meshes": MESHES,
@@ -119,6 +121,7 @@ setup(
         "mcap": MCAP,
         "workbench": WORKBENCH,
         "sweep": SWEEP,
+        "dask": DASK,
         "identify": IDENTIFY,
         "export": EXPORT,
         "test": TEST,

@@ -56,6 +56,7 @@ ALLOWED = {
     "manifold3d": ("mesh.solids", "bodies.surfaces"),
     "rerun": ("rerun_view",),
     "rerun_bindings": ("rerun_view",),
+    "distributed": ("sweep.workers",),
     "pyarrow": ("rerun_view", "sweep.table", "export.table"),  # comes with rerun, as PIL does
     "PIL": ("rerun_view",),
     "pxr": ("export.usd",),

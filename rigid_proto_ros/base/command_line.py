@@ -82,12 +82,12 @@ FIRST_S, EVERY_S = 1.0, 0.2
 
 
 class Progress:
-    """``with Progress("reading cow.obj") as progress:`` shows how far the work is when it calls ``fraction``. shown
-    False shows nothing.
+    """``with Progress("reading cow.obj") as progress:`` shows how far the work is, and how long it still takes at its
+    present rate, when it calls ``fraction``. before: what was done before it began. shown False shows nothing.
     """
 
-    def __init__(self, what: str, shown: bool = True) -> None:
-        self.what = what
+    def __init__(self, what: str, shown: bool = True, before: float = 0.0) -> None:
+        self.what, self._before = what, before
         self._shown = shown and sys.stderr.isatty()
         self._started = time.monotonic()
         self._next = self._started + FIRST_S
@@ -98,8 +98,9 @@ class Progress:
         if self._shown and now >= self._next:
             self._next = now + EVERY_S
             percent = 100.0 * min(1.0, done / total) if total else 100.0
-            text = f"\r{self.what}: {percent:.0f} %, {now - self._started:.0f} s\033[K"
-            print(text, end="", file=sys.stderr, flush=True)
+            took, own = now - self._started, done - self._before
+            left = f", {took * (total - done) / own:.0f} s left" if own > 0.0 else ""
+            print(f"\r{self.what}: {percent:.0f} %, {took:.0f} s{left}\033[K", end="", file=sys.stderr, flush=True)
 
     def __enter__(self) -> Progress:
         return self

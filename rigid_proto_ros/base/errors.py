@@ -7,6 +7,7 @@ import difflib
 import os
 import sys
 from collections.abc import Iterable
+from typing import Any
 
 LONGEST = 4000
 """Characters of a text that is shown: a file's own may have millions."""
@@ -40,6 +41,10 @@ class InputError(ValueError):
             printable(f"{field}: got {received!r}; accepted: {accepted}" if accepted else f"{field}: {received}")
         )
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For another process."""
+        return type(self), (self.field, self.received, self.accepted)
+
 
 class MeshError(InputError):
     """A mesh that can't be read, or whose surface doesn't bound a solid where one is needed."""
@@ -55,6 +60,10 @@ class CommandRefused(InputError):
     def __init__(self, reason: str, field: str, received: object, accepted: str = "") -> None:
         self.reason = reason
         super().__init__(field, received, accepted)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For another process."""
+        return type(self), (self.reason, self.field, self.received, self.accepted)
 
 
 def tell(program: str, error: Exception) -> int:

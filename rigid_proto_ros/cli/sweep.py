@@ -27,6 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="FILE.parquet", help="the table (default: the study's name.parquet)")
     parser.add_argument("--row", type=int, metavar="N", help="simulate one row only")
     parser.add_argument("--as-scene", metavar="FILE.yaml", help="with --row: write the row as a scene, and its script")
+    parser.add_argument("--resume", action="store_true", help="go on behind the rows that the table has")
+    parser.add_argument("--dask", metavar="ADDRESS", default="", help="the workers of this Dask scheduler simulate")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -39,8 +41,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--as-scene", "needs --row")
     if args.as_scene and is_same_file(args.as_scene, args.study):
         raise InputError("--as-scene", args.as_scene, "another file than the study")
-    if args.output and args.row is not None:
-        raise InputError("--output", "can't be combined with --row, which writes no table")
+    for option in ("output", "resume", "dask"):
+        if getattr(args, option) and args.row is not None:
+            raise InputError(f"--{option}", "can't be combined with --row, which writes no table")
     if args.row is None:
         arrow()  # before anything is compiled
     study = read_study(args.study)
@@ -54,10 +57,10 @@ def _whole(study: Study, args: argparse.Namespace) -> int:
     if file.suffix != ".parquet":
         raise InputError("--output", str(file), "a file that ends in .parquet")
     try:
-        metadata = run_study(study, file)
+        metadata = run_study(study, file, dask=args.dask, resume=args.resume)
     except SweepInterrupted as stopped:
         if stopped.rows_done:
-            _print(f"{stopped.rows_done} of {study.rows} rows are in {file}")
+            _print(f"{stopped.rows_done} of {study.rows} rows are in {file}; --resume goes on behind them")
         raise
     if args.json:
         print(json.dumps({"table": str(file), **metadata}))

@@ -34,7 +34,7 @@ from ..scene.yaml_text import plain
 from ..simulation.commands import Command, nanoseconds
 from ..simulation.observer import Observer
 from ..simulation.quantities import DIFFERENCES
-from .table import cores
+from .workers import cores
 
 Scene = Scenario
 """A checked scene. It can be flown any number of times, and goes to other processes."""

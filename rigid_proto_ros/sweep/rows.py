@@ -34,7 +34,7 @@ from ..simulation.record import SCENE, SCENE_PARAMETERS, field_of
 from ..simulation.setup import Setup, check_command
 from ..simulation.simulation import Simulation
 from .sampling import Draw, as_text
-from .study import Study, Variation, Vary, body_mesh_of, vertex_number
+from .study import Study, Variation, Vary, vertex_number
 from .targets import Target
 
 _LOADS = {"force": FORCE, "impulse": FORCE, "push": FORCE, "torque": TORQUE, "angular_impulse": TORQUE}
@@ -67,7 +67,7 @@ class BatchMaker:
         typical = study.applied([vary.form.probes[-1] for vary in study.vary])
         parameters = study.parameters.replaced({"mass": 0.0} if study.density_decides else {})
         parameters = parameters.replaced(self._reference)
-        self._setup = setup = build_scenario(parameters, body_mesh_of(parameters)).setup
+        self._setup = setup = build_scenario(parameters, study.meshes.of(parameters)).setup
         self._table, entries = _commands_of(typical.script, setup)
         self._written = [_place_of(v, typical.script, entries) if v.target.entry else None for v in study.vary]
         if any(self._written) and not setup.integrator.supports_loads:
@@ -287,7 +287,7 @@ def _vertices(study: Study, columns: list[NDArray[Any]], uniforms: FloatArray) -
     of_mesh = {v.target.name: c for v, c in zip(study.vary, columns, strict=True) if v.target.name.startswith("mesh")}
     for i, uniform in enumerate(uniforms):
         try:
-            body_mesh = body_mesh_of(study.parameters.replaced({name: c[i] for name, c in of_mesh.items()}))
+            body_mesh = study.meshes.of(study.parameters.replaced({name: c[i] for name, c in of_mesh.items()}))
         except InputError:
             continue
         numbers[i] = vertex_number(uniform, body_mesh)

@@ -8,11 +8,12 @@ one another and count as one more grid; each combination is drawn ``samples`` ti
 from __future__ import annotations
 
 import copy
+import hashlib
 import math
 from collections import ChainMap
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from itertools import permutations
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,10 @@ from numpy.typing import NDArray
 
 from ..base.bundled import example_names, example_path, study_names, study_path
 from ..base.errors import InputError, did_you_mean
+from ..base.library import stamp
+from ..base.provenance import MOTION
 from ..base.vectors import IntArray
+from ..mesh.reading import Mesh, load_mesh
 from ..parameters.declarations import (
     READ_ONLY,
     Parameters,
@@ -46,7 +50,27 @@ from .targets import Target, read_target
 MAX_ROWS = 10_000_000
 _KEYS = ("scene", "script", "duration", "set", "vary", "reference", "seed", "samples", "watch", "measure")
 MESHES_KEPT = 16
-"""Meshes with their moments that a process keeps."""
+"""Meshes with their moments that a study keeps."""
+
+
+class Meshes:
+    """Meshes with their moments, each read once. contents: of some of them by name, instead of what the files hold."""
+
+    def __init__(self, contents: Mapping[str, Mesh] | None = None) -> None:
+        self._contents = dict(contents or {})
+        self._made = lru_cache(maxsize=MESHES_KEPT)(self._make)
+
+    def __reduce__(self) -> tuple[type[Meshes], tuple[dict[str, Mesh]]]:
+        """For another process they are made anew, from the same contents."""
+        return Meshes, (self._contents,)
+
+    def of(self, parameters: Parameters) -> BodyMesh | None:
+        """The mesh that the parameters name; raises MeshError."""
+        return self._made(parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback)
+
+    def _make(self, mesh: str, repair: bool, fallback: str) -> BodyMesh | None:
+        parameters = Parameters(mesh=mesh, mesh_repair=repair, mesh_fallback=fallback)
+        return load_body_mesh(parameters, self._contents.get(mesh))
 
 
 @dataclass(frozen=True)
@@ -55,11 +79,12 @@ class Variation:
 
     parameters: Parameters
     script: list[Any]
+    meshes: Meshes
 
     @property
     def scenario(self) -> Scenario:
         """The scenario of the parameters; raises InputError where no body or flight has them."""
-        return build_scenario(self.parameters, body_mesh_of(self.parameters))
+        return build_scenario(self.parameters, self.meshes.of(self.parameters))
 
     @property
     def commands(self) -> list[Command]:
@@ -96,6 +121,7 @@ class Study:
     vary: tuple[Vary, ...]
     reference: Mapping[str, Value] | None
     measures: Measures
+    meshes: Meshes = field(default_factory=Meshes)
 
     @property
     def density_decides(self) -> bool:
@@ -164,23 +190,34 @@ class Study:
         parameters = self.parameters.replaced(changes)
         for vary, value in pairs:
             if vary.is_random_vertex:
-                vary.target.put(values, entries, {"vertex": vertex_number(value, body_mesh_of(parameters))})
-        return Variation(parameters, entries)
+                vary.target.put(values, entries, {"vertex": vertex_number(value, self.meshes.of(parameters))})
+        return Variation(parameters, entries, self.meshes)
+
+    @cached_property
+    def contents(self) -> dict[str, Mesh]:
+        """The meshes that rows and references begin with, by name; raises MeshError."""
+        named = [self.parameters.mesh, (self.reference or {}).get("mesh", "")]
+        for vary in self.vary:
+            if vary.target.parameter == "mesh" and isinstance(vary.form, Levels):
+                named += vary.form.values
+        return {name: load_mesh(name) for name in map(str, named) if name}
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hash of all that its rows follow from: studies with the same have the same rows, to the bit."""
+        measures = self.measures
+        given = (
+            *(sorted(self.parameters.named().items()), self.script, self.duration_ns, self.seed, self.samples),
+            *([(vary.target.name, vary.form) for vary in self.vary], self.reference),
+            *(measures.columns, measures.table.tolist(), measures.sample_ns.tolist()),
+            *({name: mesh.sha256 for name, mesh in self.contents.items()}, MOTION, stamp()),
+        )
+        return hashlib.sha256(repr(given).encode()).hexdigest()
 
 
 def vertex_number(uniform: float, body_mesh: BodyMesh | None) -> int:
     """Which vertex a uniform number in [0, 1) chooses; 0 without a mesh, which is then refused for want of one."""
     return int(uniform * len(body_mesh.surface.vertices)) if body_mesh else 0
-
-
-def body_mesh_of(parameters: Parameters) -> BodyMesh | None:
-    """The mesh that the parameters name, with its moments; read once in a process."""
-    return _body_mesh(parameters.mesh, parameters.mesh_repair, parameters.mesh_fallback)
-
-
-@lru_cache(maxsize=MESHES_KEPT)
-def _body_mesh(mesh: str, repair: bool, fallback: str) -> BodyMesh | None:
-    return load_body_mesh(Parameters(mesh=mesh, mesh_repair=repair, mesh_fallback=fallback))
 
 
 def study_file(name: str) -> Path:

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""A study flown whole into a Parquet file: chunks of rows are flown by threads around the compiled batch, which leaves
-the interpreter's lock alone, and are written in order of rows as they get done.
+"""A study flown whole into a Parquet file: chunks of rows are written in order of rows as they get done, so that a
+table which was stopped has the first ones, and goes on behind them.
 """
 
 from __future__ import annotations
 
 import datetime
 import json
-import os
 from collections import deque
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -21,6 +20,7 @@ from ..base.provenance import cpu, versions
 from ..scene.script import expand_script
 from .rows import Chunk, run_chunk
 from .study import Study
+from .workers import Cluster, Flown, Threads, Workers
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -61,62 +61,86 @@ def as_arrow(chunk: Chunk) -> pa.Table:
     return pa.table(arrays)
 
 
-def cores() -> int:
-    """Processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def metadata_of(file: Path) -> dict[str, Any]:
+    """What a table says of itself. Raises InputError where it isn't a sweep's."""
+    pa, pq = arrow()
+    try:
+        metadata: dict[str, Any] = json.loads((pq.read_metadata(file).metadata or {})[KEY])
+    except (OSError, KeyError, ValueError, pa.ArrowException):
+        raise InputError("--resume", str(file), "the table of a sweep") from None
+    return metadata
 
 
-def run_study(study: Study, file: Path, *, progress: bool = True) -> dict[str, Any]:
-    """Fly all rows and write the table, which has its name when it is whole; returns its metadata. Raises
-    SweepInterrupted on Ctrl-C, with a readable table of the rows before.
+def run_study(
+    study: Study, file: Path, *, dask: str = "", resume: bool = False, progress: bool = True
+) -> dict[str, Any]:
+    """Fly all rows and write the table, which has its name when it is whole; returns its metadata. dask: address of a
+    scheduler whose workers fly them. resume: behind the rows that the table has already.
+
+    Raises SweepInterrupted on Ctrl-C, with a readable table of the rows before; InputError for a table to resume that
+    is of another study.
     """
     pa, pq = arrow()
-    threads = cores()
-    commands = len(expand_script(study.script, "script"))
-    step = max(1, min(CHUNK_ROWS, CHUNK_COMMANDS // max(1, commands), -(-study.rows // (2 * threads))))
-    starts = iter(range(0, study.rows, step))
-    done = simulated = failed = 0
-    interrupt: KeyboardInterrupt | None = None
+    before = metadata_of(file) if resume and file.is_file() else {}
+    if before and before.get("fingerprint") != study.fingerprint:
+        raise InputError("--resume", str(file), "a table of the same study, by the same kernels")
+    if before.get("complete"):
+        return before
     schema = as_arrow(run_chunk(study, 0, 0)).schema
     text = [name for name, kind in zip(schema.names, schema.types, strict=True) if kind == pa.string()]
-    pool, pending = ThreadPoolExecutor(threads), deque[Future[Chunk]]()
+    counts = {name: int(before.get(name, 0)) for name in ("rows_done", "rows_by_simulation", "rows_failed")}
+    interrupt: KeyboardInterrupt | None = None
+    workers: Workers = Cluster(study, dask) if dask else Threads(study)
     with (
         whole_file("--output", file) as beside,
         pq.ParquetWriter(beside, schema, use_dictionary=text) as writer,
-        Progress("sweep", shown=progress) as shown,
+        Progress("sweep", progress, counts["rows_done"]) as shown,
     ):
+        if before:
+            with pq.ParquetFile(file) as old:
+                for k in range(old.num_row_groups):
+                    writer.write_table(old.read_row_group(k))
         try:
-            while True:
-                while len(pending) < 2 * threads and (first := next(starts, None)) is not None:
-                    pending.append(pool.submit(run_chunk, study, first, min(first + step, study.rows)))
-                if not pending:
-                    break
-                chunk = pending.popleft().result()
+            for chunk in _chunks(study, counts["rows_done"], workers):
                 writer.write_table(as_arrow(chunk))
-                done += len(chunk)
-                simulated += chunk.simulated
-                failed += sum(reason is not None for reason in chunk.columns["failure"])
-                shown.fraction(done, study.rows)
+                counts["rows_done"] += len(chunk)
+                counts["rows_by_simulation"] += chunk.simulated
+                counts["rows_failed"] += sum(reason is not None for reason in chunk.columns["failure"])
+                shown.fraction(counts["rows_done"], study.rows)
         except KeyboardInterrupt as error:
             interrupt = error
-            if not done:
+            if not counts["rows_done"]:
                 raise SweepInterrupted(0) from error
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+            workers.close()
         metadata = {
             "study": study.name,
+            "fingerprint": study.fingerprint,
             "seed": study.seed,
             "rows": study.rows,
-            "rows_done": done,
-            "complete": done == study.rows,
-            "rows_failed": failed,
-            "rows_by_simulation": simulated,
-            "rows_by_compiled_batch": done - simulated,
+            "complete": counts["rows_done"] == study.rows,
+            **counts,
+            "rows_by_compiled_batch": counts["rows_done"] - counts["rows_by_simulation"],
             "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
             "cpu": cpu(),
             **versions(),
         }
         writer.add_key_value_metadata({KEY: json.dumps(metadata).encode()})
     if interrupt is not None:
-        raise SweepInterrupted(done) from interrupt
+        raise SweepInterrupted(counts["rows_done"]) from interrupt
     return metadata
+
+
+def _chunks(study: Study, first: int, workers: Workers) -> Iterator[Chunk]:
+    """The chunks of rows from ``first`` on, in their order; two for each worker are under way."""
+    commands = len(expand_script(study.script, "script"))
+    most = min(CHUNK_ROWS, CHUNK_COMMANDS // max(1, commands))
+    step = max(1, min(most, -(-(study.rows - first) // (2 * workers.count))))
+    starts = iter(range(first, study.rows, step))
+    pending = deque[Flown]()
+    while True:
+        while len(pending) < 2 * workers.count and (start := next(starts, None)) is not None:
+            pending.append(workers.submit(start, min(start + step, study.rows)))
+        if not pending:
+            return
+        yield pending.popleft().result()

@@ -43,8 +43,8 @@ def test_a_table_holds_every_row_in_order_and_what_it_was_made_with(tmp_path) ->
 INTERRUPTED = """
 import os, signal, sys, time
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.sweep import table
-fly, write = table.run_chunk, table.as_arrow
+from rigid_proto_ros.sweep import table, workers
+fly, write = workers.run_chunk, table.as_arrow
 def slow(*arguments):
     time.sleep(1.2)
     return fly(*arguments)
@@ -52,7 +52,7 @@ def interrupted(chunk):
     if len(chunk) and chunk.columns["row"][0] >= row:
         os.kill(os.getpid(), signal.SIGINT)
     return write(chunk)
-table.run_chunk, table.as_arrow, table.CHUNK_ROWS = slow, interrupted, 4
+workers.run_chunk, table.as_arrow, table.CHUNK_ROWS = slow, interrupted, 4
 row = int(sys.argv.pop())
 sys.exit(main())
 """
