@@ -60,8 +60,8 @@ lint: setup ## ruff and mypy
 
 pictures: setup run ## draw the pictures of README and lessons anew (needs mesa-vulkan-drivers and chromium)
 	.venv/bin/rigid_proto snapshot out/session.mcap --at 4.05 -o docs/flight.png
-	$(PY) docs/lessons/pictures.py
-	PYTHONPATH=test:test/page $(PY) docs/page_pictures.py docs
+	$(PY) tools/lesson_pictures.py
+	PYTHONPATH=test:test/page $(PY) tools/page_pictures.py docs
 	PYTHONPATH=test:test/page $(PY) tools/toy_picture.py docs/flight.webp
 
 site: setup ## site/: the page with a start page and one address a lesson, for any static host

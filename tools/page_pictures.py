@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The page's own pictures, drawn anew in headless Chromium: ``PYTHONPATH=test:test/page python docs/page_pictures.py docs``
-writes workbench.png and true_against_box.png there.
+"""The page's own pictures, drawn anew in headless Chromium: ``PYTHONPATH=test:test/page python tools/page_pictures.py
+docs`` writes workbench.png and true_against_box.png there.
 
 Simulated time goes on by as much as a picture shows, however long the browser takes for it.
 """

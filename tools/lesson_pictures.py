@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rigid_proto_ros.cli.main import main as rigid_proto
 
-HERE = Path(__file__).resolve().parent
+LESSONS = Path(__file__).resolve().parent.parent / "docs" / "lessons"
 SIZE = "1280x800"
 
 
@@ -43,9 +43,9 @@ def draw(page: Path) -> int:
 
 def main(names: list[str]) -> int:
     """Draw the pictures of these lessons, or of all; returns the first exit status that isn't 0."""
-    os.chdir(HERE.parent.parent)
+    os.chdir(LESSONS.parent.parent)
     Path("out/gallery").mkdir(parents=True, exist_ok=True)
-    pages = [HERE / f"{name}.md" for name in names] or sorted(p for p in HERE.glob("*.md") if p.stem != "README")
+    pages = [LESSONS / f"{name}.md" for name in names] or sorted(p for p in LESSONS.glob("*.md") if p.stem != "README")
     return next((status for page in pages if (status := draw(page))), 0)
 
 
