@@ -303,18 +303,37 @@ def test_with_letters_twice_as_large_nothing_is_cut_or_covered(browser: Any, siz
     page.close()
 
 
-@pytest.mark.stress
+KEPT = """async () => [
+  localStorage.length, sessionStorage.length, document.cookie, (await indexedDB.databases()).length, self.caches ? (await caches.keys()).length : 0,
+]"""
+"""What a browser keeps for a page, of all kinds."""
+
+
 def test_a_file_that_was_written_for_a_lesson_opens_in_it_and_two_of_them_share_nothing(
     browser: Any, tmp_path: Path
 ) -> None:
     file = tmp_path / "lesson.html"
     write_page(file, begins="lesson=hammer")
-    page = Opened(browser, address=file.as_uri())
-    page.page.wait_for_selector("#lesson .choice")
-    assert page.js("page.motion.body().name") == "hammer" and page.js("page.lessons.hidesCentre")
-    page.page.locator(".choice").nth(0).click()
-    other = page.context.new_page()
-    other.goto(file.as_uri())
-    other.wait_for_selector("#lesson .choice")
-    assert page.js("[localStorage.length, sessionStorage.length, document.cookie]") == [0, 0, ""]
-    page.close()
+    pages = [Opened(browser, address=file.as_uri())]
+    pages.append(pages[0].beside())
+    for page in pages:
+        page.page.wait_for_selector("#lesson .choice")
+        assert page.js("page.motion.body().name") == "hammer" and page.js("page.lessons.hidesCentre")
+    one, other = pages
+    one.page.bring_to_front()
+    one.page.locator(".choice").nth(0).click()
+    one.pause()
+    one.js("page.motion.set({ mass: 3 }); page.motion.submit({ at: 'head', impulse: [1, 0, 0] })")
+    one.page.locator("button[data-card=body]").click()
+    one.drawn(5)
+    other.page.bring_to_front()
+    other.drawn(5)
+    assert one.value("mass") == 3 and len(one.script) == 2 and one.now["timeNs"] > 0
+    assert other.value("mass") != 3 and other.script == [] and other.now["timeNs"] == 0
+    assert other.page.locator("#lesson .choice").count() == 3, "nobody has answered here"
+    for page in pages:
+        assert page.js(KEPT) == [0, 0, "", 0, 0]
+    one.page.reload()
+    one.page.wait_for_selector("#lesson .choice")
+    assert one.value("mass") != 3 and one.script == [], "nor does it share anything with what it was"
+    one.close()
