@@ -314,12 +314,16 @@ export class Picture {
     this.put(label, text, end.x + ux * (beyond + Math.abs(ux) * HALF_PX * text.length) * this.letter, end.y + uy * beyond * this.letter);
   }
 
-  /** A label as near to a place on the screen [px] as lies in what nothing covers, and above what another one says. */
+  /** A label as near to a place on the screen [px] as lies in what nothing covers; above another one that stands there,
+   * or beside it. */
   private put(label: Label, text: string, x: number, y: number): void {
     const { left, top, width, height } = this.free, half = HALF_PX * this.letter * text.length, line = LINE_PX * this.letter;
-    const atX = Math.max(left + half, Math.min(left + width - half, x));
-    let atY = Math.max(top + line, Math.min(top + height - line, y));
-    for (const one of this.said) if (Math.abs(one.x - atX) < one.half + half && Math.abs(one.y - atY) < 1.5 * line) atY = one.y + (atY > one.y || one.y - 1.5 * line < top ? 1.5 : -1.5) * line;
+    let atX = Math.max(left + half, Math.min(left + width - half, x)), atY = Math.max(top + line, Math.min(top + height - line, y));
+    for (const one of this.said) {
+      if (Math.abs(one.x - atX) >= one.half + half || Math.abs(one.y - atY) >= 1.5 * line) continue;
+      if (one.y - 1.5 * line >= top + line) atY = one.y - 1.5 * line;
+      else atX = one.x + (one.x + one.half + 2 * half <= left + width ? 1 : -1) * (one.half + half);
+    }
     this.said.push({ x: atX, y: atY, half });
     label.show(text, atX, atY);
   }
