@@ -11,6 +11,7 @@ import asyncio
 import gzip
 import hmac
 import http
+import io
 import ipaddress
 import logging
 import secrets
@@ -293,6 +294,20 @@ def addresses(host: str, port: int, path: str) -> tuple[str, str]:
     own = LOOPBACK if host in ("0.0.0.0", "::", "") else host
     outside = "" if host == "localhost" or _is_own(host) else f"http://{_in_address(lan)}:{port}/{path}"
     return f"http://{_in_address(own)}:{port}/{path}", outside
+
+
+def show_code(address: str) -> None:
+    """Draw an address as a QR code, for a camera, where stdout is a terminal."""
+    if not sys.stdout.isatty() or not sys.stdout.encoding.lower().startswith("utf"):
+        return
+    try:
+        import segno
+    except ImportError:
+        return
+    drawn = io.StringIO()
+    segno.make(address, micro=False).terminal(drawn, compact=True, border=2)
+    # Dark on light, whatever the terminal's own colours are.
+    print(*(f"\033[97;40m{line}\033[0m" for line in drawn.getvalue().splitlines()), sep="\n", flush=True)
 
 
 def _in_address(host: str) -> str:

@@ -180,8 +180,11 @@ class Taught(Opened):
         self.js("page.lessons.lookedMs = 0; page.lessons.look(page.motion.snapshot())")
 
     def again(self) -> None:
+        """From the start, where time stands: on a slow machine a step that only watches would be done before the pause."""
+        self.js("page.clock.held = 'held'")
         self.use(self.page.locator("#reset"))
         self.pause()
+        self.js("page.clock.held = ''")
 
     def place(self, contact: str, way: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[float, float]:
         """Where a contact is on the screen [px], a little of its size off it."""
