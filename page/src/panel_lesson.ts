@@ -15,7 +15,7 @@ import { words } from "./words.ts";
 
 /** [ms] Between two looks at whether a step is done: conditions go through all that was seen. */
 const LOOK_MS = 100;
-const TICK = "M9 16.200 4.800 12l-1.400 1.400L9 19 21 7l-1.400-1.400z", SCREEN = "M3 4h18v13H3zM5 6v9h14V6zM8 19h8v2H8z";
+const DOWN = "M7 10l5 5 5-5z", TICK = "M9 16.200 4.800 12l-1.400 1.400L9 19 21 7l-1.400-1.400z", SCREEN = "M3 4h18v13H3zM5 6v9h14V6zM8 19h8v2H8z";
 
 export class LessonPanel {
   readonly node = make("section", { id: "lesson", class: "card", "aria-labelledby": "question" });
@@ -61,7 +61,7 @@ export class LessonPanel {
     clock.setPaused(true);
     clock.held = words.lesson.first;
     look.trace = null;
-    look.poinsot = look.cones = false;
+    look.principal = look.poinsot = look.cones = false;
     desk.pointer.pulls = motion.values()["string.attached"] !== true;
     this.drawn = new Plots(desk.track(), course.plots);
     this.plots.replaceChildren(this.drawn.node);
@@ -146,7 +146,8 @@ export class LessonPanel {
     const { texts, course } = lesson, focused = document.activeElement instanceof HTMLElement && this.node.contains(document.activeElement) ? document.activeElement.dataset["key"] : undefined;
     const picker = make("select", { "aria-label": w.name, "data-key": "picker", change: () => { location.hash = hashOf({ language: addressOf(location.hash).language, lesson: picker.value, isClass: this.isClass && picker.value !== "" }); } },
       make("option", { value: "" }, `– ${w.none} –`), ...Object.entries(this.texts).filter(([name]) => name in COURSES).map(([name, { title }]) => make("option", { value: name, selected: name === lesson.name }, title)));
-    const head = make("div", { class: "head" }, picker,
+    // A list of the browser's own cuts a long title: what is chosen stands over it, in as many lines as it takes.
+    const head = make("div", { class: "head" }, make("div", { class: "picker" }, picker, make("span", { "aria-hidden": "true" }, texts.title, icon(DOWN))),
       button(icon(SCREEN), () => this.toggleClass(), { class: "close", "aria-pressed": String(this.isClass), "aria-label": w.class, title: w.classTitle, "data-key": "class" }),
       button("×", () => { location.hash = hashOf({ language: addressOf(location.hash).language }); }, { class: "close", "aria-label": w.leave, title: w.leave, "data-key": "leave" }));
     const question = make("h2", { id: "question", class: lesson.answer === null ? "" : "out", tabindex: -1, "data-key": "question" }, texts.question);

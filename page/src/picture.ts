@@ -31,8 +31,10 @@ const FRAMED = 0.69;
 const STRONG = 0.0135, PLAIN = 0.009, CORD = 0.0075;
 const LIGHT = new Vector3(-0.35, -0.5, 1);
 const MOST_TRACE = 4000;
-/** Size of labels, unless the reader has chosen a larger one. */
-const LETTER_PX = 17;
+/** Size of labels, unless the reader has chosen a larger one; half the width of a letter, and half the height of a line. */
+const LETTER_PX = 17, HALF_PX = 5.8, LINE_PX = 12;
+/** Of the weight: a string that pulls less is as good as slack. */
+const SLACK = 1e-3;
 /** What lies behind everything; lighter round the middle where that costs nothing. */
 const SKY = 0xf1f4f9, LIGHT_SKY = "#ffffff", DARK_SKY = "#dfe5f0";
 
@@ -142,6 +144,8 @@ export class Picture {
   /** Of labels, times the usual size. */
   private letter = 1;
   private reach = 0.5;
+  /** Where labels of this picture stand [px], with half their widths. */
+  private readonly said: { readonly x: number; readonly y: number; readonly half: number }[] = [];
 
   constructor(stage: HTMLElement, labelRoom: HTMLElement) {
     let renderer: Renderer | null = null;
@@ -287,6 +291,7 @@ export class Picture {
     paint(this.body, shown.model);
     paint(this.ghost, shown.ghostModel);
 
+    this.said.length = 0;
     this.drawMotion(body, at, shown);
     this.drawWeight(shown.hidesCentre ? [0, 0, 0] : shown.gravity, body, at);
     this.drawLoads(body, shown.blows);
@@ -301,15 +306,26 @@ export class Picture {
     else this.flat?.draw(eye, this.scene);
   }
 
-  /** A label at an arrow's tip: beyond it, and inside what is seen. */
+  /** A label at an arrow's tip, beyond it. */
   private tag(label: Label, text: string, tip: Vector3, from: Vector3, beyond = 17): void {
     const end = this.eye.project(tip, new Vector3()), start = this.eye.project(from, new Vector3());
     const dx = end.x - start.x, dy = end.y - start.y, length = Math.hypot(dx, dy);
     const [ux, uy] = length > 1 ? [dx / length, dy / length] : [0, -1];
-    const { letter } = this, room = 9 + 4.4 * letter * text.length;
-    label.show(text,
-      Math.max(room, Math.min(this.eye.width - room, end.x + ux * (beyond + Math.abs(ux) * 4 * text.length) * letter)),
-      Math.max(14 * letter, Math.min(this.eye.height - 14 * letter, end.y + uy * beyond * letter)));
+    this.put(label, text, end.x + ux * (beyond + Math.abs(ux) * HALF_PX * text.length) * this.letter, end.y + uy * beyond * this.letter);
+  }
+
+  /** A label as near to a place on the screen [px] as lies in what nothing covers; above another one that stands there,
+   * or beside it. */
+  private put(label: Label, text: string, x: number, y: number): void {
+    const { left, top, width, height } = this.free, half = HALF_PX * this.letter * text.length, line = LINE_PX * this.letter;
+    let atX = Math.max(left + half, Math.min(left + width - half, x)), atY = Math.max(top + line, Math.min(top + height - line, y));
+    for (const one of this.said) {
+      if (Math.abs(one.x - atX) >= one.half + half || Math.abs(one.y - atY) >= 1.5 * line) continue;
+      if (one.y - 1.5 * line >= top + line) atY = one.y - 1.5 * line;
+      else atX = one.x + (one.x + one.half + 2 * half <= left + width ? 1 : -1) * (one.half + half);
+    }
+    this.said.push({ x: atX, y: atY, half });
+    label.show(text, atX, atY);
   }
 
   private drawMotion(body: Flying, at: Vector3, shown: Shown): void {
@@ -381,11 +397,11 @@ export class Picture {
     if (down.length() > 0) down.normalize(); else down.set(0, 0, -1);
     cord.show(hand, knot, string.restLength, down, CORD * this.size * (aside ? 0.6 : 1));
     if (!label) return;
-    const text = `${short(string.tension)} N`, seen = this.eye.project(hand, new Vector3());
+    const isSlack = Math.abs(string.tension) < SLACK * flying!.massKg * Math.hypot(...gravity), text = `${isSlack ? "0" : short(string.tension)} N`, seen = this.eye.project(hand, new Vector3());
     if (this.inFree(seen.x, seen.y)) { this.tag(label, text, hand, knot, 24); return; }
     // A nail that isn't seen: beside the string, near the body.
     const at = this.eye.project(knot, new Vector3()), away = Math.hypot(seen.x - at.x, seen.y - at.y) || 1, up = 70 * this.letter;
-    label.show(text, at.x + (up * (seen.x - at.x)) / away + (16 + 4.4 * text.length) * this.letter, at.y + (up * (seen.y - at.y)) / away);
+    this.put(label, text, at.x + (up * (seen.x - at.x)) / away + (16 + HALF_PX * text.length) * this.letter, at.y + (up * (seen.y - at.y)) / away);
   }
 
   private drawShapes(shown: Shown, body: Flying, at: Vector3): void {
@@ -465,7 +481,7 @@ export class Picture {
       dot.node.classList.add("dot");
       dot.show(mark.isCentre ? "⊕" : "●", seen.x, seen.y);
       if (mark.isCentre) name.hide(); // its sign stands on the body, a name would cover it
-      else if (this.isNearTip(seen)) name.show(mark.text, seen.x + (14 + 4.4 * mark.text.length) * this.letter, seen.y);
+      else if (this.isNearTip(seen)) this.put(name, mark.text, seen.x + (16 + HALF_PX * mark.text.length) * this.letter, seen.y);
       else this.tag(name, mark.text, point, at, 20);
     }
   }

@@ -79,17 +79,18 @@ export class Track {
   }
 }
 
-interface Curve { readonly name: string; readonly colour: string; value(seen: Seen): number }
+/** key: its name in the plot's title. */
+interface Curve { readonly key: HTMLElement; readonly colour: string; value(seen: Seen): number }
 interface Plot { readonly kind: string; readonly title: string; readonly unit: string; readonly curves: readonly Curve[]; readonly canvas: HTMLCanvasElement }
 
 const principal = ({ now, info }: Seen, k: number): number =>
   info.axes[k]! * now.body.row[10]! + info.axes[3 + k]! * now.body.row[11]! + info.axes[6 + k]! * now.body.row[12]!;
 const AXES = ["#c93a27", "#16803f", "#2f63ad"] as const;
 
-/** Curves over the last seconds of the take, and where now is. */
 /** Of the largest value: a smaller one of the other sign is nothing at the end of an axis. */
 const SEEN = 1e-3;
 
+/** Curves over the last seconds of the take, and where now is. */
 export class Plots {
   readonly node: HTMLElement;
   private readonly plots: readonly Plot[];
@@ -98,23 +99,24 @@ export class Plots {
   constructor(track: Track, kinds: readonly string[] = ["energy", "omega", "momentum", "angle"]) {
     this.track = track;
     const plot = (kind: string, title: string, unit: string, curves: readonly Curve[]): Plot => ({ kind, title, unit, curves, canvas: make("canvas", { role: "img", "aria-label": title }) });
-    const energy = (name: string, colour: string, of: (e: Energies) => number): Curve => ({ name, colour, value: ({ now, gravity }) => of(energies(now.body, gravity)) });
+    const curve = (name: string, colour: string, value: (seen: Seen) => number): Curve => {
+      const key = make("span", {}, ` ${name}`);
+      key.style.color = colour;
+      return { key, colour, value };
+    };
+    const energy = (name: string, colour: string, of: (e: Energies) => number): Curve => curve(name, colour, ({ now, gravity }) => of(energies(now.body, gravity)));
     const whole = (e: Energies): number => e.spin + e.move + e.string + e.height;
     const all: Readonly<Record<string, Plot>> = {
       energy: plot("energy", words.plots.energy, "J", [
         energy(words.energy.spin, "#7a45d1", (e) => e.spin), energy(words.energy.move, "#0b7466", (e) => e.move), energy(words.energy.string, "#d1432f", (e) => e.string),
-        energy(words.energy.all, "#6b7385", whole), { name: words.energy.ghost, colour: "#2166b8", value: ({ now, gravity }) => (now.ghost ? whole(energies(now.ghost, gravity)) : NaN) }]),
-      omega: plot("omega", words.plots.omega, "rad/s", AXES.map((colour, k) => ({ name: `ω${"₁₂₃"[k]}`, colour, value: (seen) => principal(seen, k) }))),
-      momentum: plot("momentum", words.plots.momentum, "N m s", AXES.map((colour, k) => ({ name: `L${"xyz"[k]}`, colour, value: ({ now }) => now.body.momentum[k]! }))),
-      angle: plot("angle", words.plots.angle, "°", [{ name: words.angle.name, colour: "#2f63ad", value: ({ now }) => (now.angleToGhost * 180) / Math.PI }]),
+        energy(words.energy.all, "#6b7385", whole), curve(words.energy.ghost, "#2166b8", ({ now, gravity }) => (now.ghost ? whole(energies(now.ghost, gravity)) : NaN))]),
+      omega: plot("omega", words.plots.omega, "rad/s", AXES.map((colour, k) => curve(`ω${"₁₂₃"[k]}`, colour, (seen) => principal(seen, k)))),
+      momentum: plot("momentum", words.plots.momentum, "N m s", AXES.map((colour, k) => curve(`L${"xyz"[k]}`, colour, ({ now }) => now.body.momentum[k]!))),
+      angle: plot("angle", words.plots.angle, "°", [curve(words.angle.name, "#2f63ad", ({ now }) => (now.angleToGhost * 180) / Math.PI)]),
     };
     this.plots = kinds.flatMap((kind) => all[kind] ?? []);
     this.node = make("div", {}, ...this.plots.map(({ kind, title, unit, curves, canvas }) => make("div", { class: "plot", "data-mark": kind },
-      make("div", { class: "title" }, `${title} [${unit}]`, curves.length > 1 && make("span", {}, ...curves.map(({ name, colour }) => {
-        const key = make("span", {}, ` ${name}`);
-        key.style.color = colour;
-        return key;
-      }))), canvas)));
+      make("div", { class: "title" }, `${title} [${unit}]`, curves.length > 1 && make("span", {}, ...curves.map(({ key }) => key))), canvas)));
   }
 
   draw(timeNs: number): void {
@@ -127,12 +129,13 @@ export class Plots {
       const paper = canvas.getContext("2d")!;
       paper.setTransform(ratio, 0, 0, ratio, 0, 0);
       paper.clearRect(0, 0, width, height);
-      const lines = curves.map(({ value, colour }) => {
+      const lines = curves.map(({ key, value, colour }) => {
         const places: [number, number][] = [];
         for (let k = first; k < seen.length; k += step) {
           const at = value(seen[k]!);
           if (Number.isFinite(at)) places.push([((seen[k]!.now.timeNs - from) / (to - from)) * width, at]);
         }
+        key.hidden = !places.length; // of a ghost that isn't there
         return { colour, places };
       });
       let low = 0, high = 0;

@@ -35,7 +35,7 @@ export const english = {
   live: {
     yours: "You drive", others: "Somebody else drives", free: "Nobody drives: touch it", locked: "Its owner drives",
     away: "Not reached; trying again", lost: "The node isn't reached any more; trying again.", ask: "ask for it", asked: "asked",
-    asking: (n: number) => (n === 1 ? "somebody asks for the hand" : `${n} ask for the hand`), give: "give it", take: "take it",
+    asking: (n: number) => (n === 1 ? "somebody asks" : `${n} ask`), give: "give it", take: "take it",
     lock: "lock", unlock: "unlock", watching: (n: number) => `${n} look`,
     past: "This is the past: go to now first.", now: "to now", nowTitle: "What the node does now; to fly on from a moment: rigid_proto replay --at T --as-scene",
     ghost: "A node's ghost differs in tensor or integrator alone", files: "Files of one's own are opened where the node was started: its parameter mesh",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// A person at a lesson, without the page: buttons, hands and time, and how each step is done right, and wrong.
+// A person at a lesson, without the page: buttons, hands and time, and how each step is done right, and wrong. At the page
+// itself: lesson_browser.ts.
 
 import type { Data } from "../src/data.ts";
 import { NAMED, NO_GHOST } from "../src/ghosts.ts";
@@ -10,22 +11,30 @@ import type { GhostChoice, Motion, Vec3, Values } from "../src/source.ts";
 
 const S = 1e9;
 
+export type Shown = { -readonly [K in keyof Sight]: Sight[K] };
+
 export class Player {
   readonly motion: Motion;
   readonly lesson: Lesson;
-  sight: { -readonly [K in keyof Sight]: Sight[K] } = { turned: null, principal: false, poinsot: false, ghost: NO_GHOST, apart: false, trace: null, cards: [] };
+  readonly sight: Shown;
   /** [N s] of a poke: as the page has it, .9 of the body's size a second. */
   strength: number;
 
-  constructor(name: string, motion: Motion, data: Data) {
-    motion.openScene(name);
+  constructor(lesson: Lesson, motion: Motion, sight: Shown = { turned: null, principal: false, poinsot: false, ghost: NO_GHOST, apart: false, trace: null, cards: [] }) {
     this.motion = motion;
-    const course = COURSES[name];
-    if (!course) throw new Error(`${name} has no steps`);
-    this.lesson = new Lesson(name, data.declared.lessons[name]!, course, motion);
+    this.lesson = lesson;
+    this.sight = sight;
     const { massKg, length } = motion.body();
     this.strength = Number((1.8 * massKg * length).toPrecision(1));
-    this.look();
+  }
+
+  static at(name: string, motion: Motion, data: Data): Player {
+    motion.openScene(name);
+    const course = COURSES[name];
+    if (!course) throw new Error(`${name} has no steps`);
+    const player = new Player(new Lesson(name, data.declared.lessons[name]!, course, motion), motion);
+    player.look();
+    return player;
   }
 
   get done(): number { return this.lesson.done; }
@@ -236,4 +245,18 @@ export const WRONG: Readonly<Record<string, readonly (readonly Hand[])[]>> = {
 export function doRight(player: Player): void {
   const hand = BY_HAND[player.lesson.name]?.[player.done];
   if (hand) hand(player); else player.buttons();
+}
+
+/** Each wrong hand of a lesson, by a player who has just come to it; what it ticked. */
+export async function playWrong(name: string, comes: () => Promise<Player>): Promise<string[]> {
+  const ticked: string[] = [];
+  for (const [step, hands] of WRONG[name]!.entries()) for (const [k, hand] of hands.entries()) {
+    const player = await comes();
+    player.answer();
+    for (let before = 0; before < step; before++) doRight(player);
+    if (player.done !== step) ticked.push(`the right hands before step ${step + 1} ticked ${player.done}`);
+    hand(player);
+    if (player.done !== step) ticked.push(`wrong hand ${k + 1} of step ${step + 1}`);
+  }
+  return ticked;
 }

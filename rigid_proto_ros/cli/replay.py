@@ -28,6 +28,7 @@ EXAMPLES = (
         "rigid_proto replay out/flight.mcap --at 4 --as-scene out/branch.yaml",
         "the scene at 4 s, to continue with changes",
     ),
+    ("rigid_proto replay out/flight.mcap --as-scene out/take.yaml", "all of it as a scene and a poke script"),
     ("rigid_proto replay out/flight.mcap --publish states --speed 20", "publish its states over ROS, 20 times as fast"),
 )
 
@@ -57,7 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--as-scene",
         metavar="FILE.yaml",
-        help="write a scene that starts at the time --at, and a script of the loads that act then as FILE_script.yaml",
+        help="write the session as a scene and a poke script, FILE_script.yaml; with --at, a scene that starts at that "
+        "time, and a script of the loads that act then",
     )
     parser.add_argument("--publish", choices=("states", "commands"), help="publish the session over ROS")
     parser.add_argument(
@@ -68,8 +70,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print a summary of the session, and carry out the options."""
-    if (args.at is None) != (args.as_scene is None):
-        raise InputError("--at", "needs --as-scene FILE.yaml, and --as-scene needs --at T")
+    if args.at is not None and args.as_scene is None:
+        raise InputError("--at", "needs --as-scene FILE.yaml")
     if args.speed is not None and args.publish != "states":
         raise InputError("--speed", "needs --publish states; a running node has real_time_factor")
     for file in _recorded(args.record or ""):
@@ -92,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     if asked(args):
         _export(runs, args, given)
     if args.as_scene:
-        _branch(runs[-1], args, given)
+        _save_scene(runs[-1], args, given)
     status = _verify(runs, args) if args.verify else 0
     if status == 0 and args.publish:
         status = _publish(runs[-1], args)
@@ -189,25 +191,28 @@ def _given_scene(path: str | None, session: RecordedSession) -> Scenario | None:
     return read_scene(path, None, lambda text: print(f"rigid_proto: {text}", file=sys.stderr))
 
 
-def _branch(session: RecordedSession, args: argparse.Namespace, given: Scenario | None) -> None:
-    from ..session.as_script import branch_at, recorded_branch
+def _save_scene(session: RecordedSession, args: argparse.Namespace, given: Scenario | None) -> None:
+    from ..session.as_script import branch_at, recorded_branch, script_of_session
     from ..simulation.commands import nanoseconds
 
-    if session.missing and given is None:
-        accepted = "one that has them, or its scene by --scene FILE"
+    if session.missing and (given is None or args.at is None):
+        accepted = "one that has them" + (", or its scene by --scene FILE" if args.at is not None else "")
         raise InputError("--as-scene", f"a recording without {', '.join(session.missing)}", accepted)
-    if given is None:
-        branch = branch_at(session, nanoseconds(args.at))
+    if args.at is None:
+        saved, what = script_of_session(session), "scene and script"
+    elif given is None:
+        saved, what = branch_at(session, nanoseconds(args.at)), f"scene at {args.at:g} s"
     else:
-        branch, state_ns = recorded_branch(session, given, nanoseconds(args.at))
+        saved, state_ns = recorded_branch(session, given, nanoseconds(args.at))
+        what = f"scene at {args.at:g} s"
         print(f"  the state is that recorded at {state_ns / 1e9:.9g} s; what acts then isn't recorded")
     scene = Path(args.as_scene)
     script = scene.with_name(f"{scene.stem}_script.yaml")
-    for file, text in ((scene, branch.scene), (script, branch.script)):
+    for file, text in ((scene, saved.scene), (script, saved.script)):
         with whole_file("--as-scene", file) as path:
             path.write_text(text, encoding="utf-8")
     words = ["rigid_proto", "simulate", str(scene), "--script", str(script)]
-    print(f"  scene at {args.at:g} s: {shlex.join(words)}")
+    print(f"  {what}: {shlex.join(words)}")
 
 
 def _publish(session: RecordedSession, args: argparse.Namespace) -> int:

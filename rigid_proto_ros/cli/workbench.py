@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     if importlib.util.find_spec("websockets") is None:
         raise InputError("workbench", is_missing("websockets", "workbench"))
     from ..base.ports import LOOPBACK
-    from ..page.server import serve_page
+    from ..page.server import serve_page, show_code
     from ..parameters.declarations import Parameters
 
     page, default = page_text(values, script).encode(), Parameters().workbench_port
@@ -59,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"The workbench is at {own}   (Ctrl-C ends it)", flush=True)
     if others:
         print(f"Others open {others}: each has a body of their own, and nothing of this machine", flush=True)
+        show_code(others)
     if not args.no_browser and _has_display():
         webbrowser.open(own)
     threading.Event().wait()  # until a signal interrupts it

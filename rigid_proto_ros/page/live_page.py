@@ -44,17 +44,14 @@ from ..simulation.observer import (
     SceneChanged,
 )
 from .bundle import built_page
-from .data import USED, page_version
+from .data import is_of_page, page_version
 from .file import FORM, mesh_numbers
 from .watchers import (
     ANSWERS,
     COMMAND,
     LOOKING,
     PICTURE,
-    READY,
-    REFUSED,
     SAID,
-    SETTINGS,
     TOLD,
     read_frame,
     write_frame,
@@ -71,9 +68,6 @@ MOST_MESH = 24_000_000
 
 MOST_NOTED = 1024
 """Events that wait for the pages; of more the oldest are left out."""
-
-SETTABLE = frozenset({*USED, "real_time_factor"})
-"""What a page may set, beside ballast: none of them names a file but ``mesh``, which it may set to bundled ones."""
 
 KEPT = ("record", "publish_rate", "publish_clock", "publish_tf", "imu_contact", "schedule_horizon", "real_time_factor")
 """Parameters that another scene leaves as they are: how one looks at the motion, not the motion."""
@@ -134,25 +128,32 @@ class LivePage:
         self._last = b""
         self._holds = False
         self._writing = threading.Lock()
-        page = str(built_page())
+        about = {"name": live.name, "version": page_version()}
+        listen = {"host": host, "port": port, "default": PARAMETERS["workbench_port"].default}
+        settings = {"page": str(built_page()), "about": about, **listen}
         self._child = subprocess.Popen(
-            [sys.executable, "-m", "rigid_proto_ros.page.watchers"],
+            [sys.executable, "-m", "rigid_proto_ros.page.watchers", json.dumps(settings)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=with_this_package(),
         )
-        about = {"name": live.name, "version": page_version()}
-        settings = {"page": page, "host": host, "port": port, "about": about}
-        self._put(SETTINGS, {**settings, "default": PARAMETERS["workbench_port"].default})
-        self._ready = threading.Event()
-        self._refused: InputError | None = None
-        self.address = self.guests = ""
+        self.address, self.guests = self._listens()
         threading.Thread(target=self._read, name="page commands", daemon=True).start()
-        if not self._ready.wait(STARTING_S) or self._refused is not None:
-            self.close()
-            raise self._refused or InputError("workbench_port", "the page's process doesn't start")
         live.add_observer(self._told)
         threading.Thread(target=self._send, name="page pictures", daemon=True).start()
+
+    def _listens(self) -> tuple[str, str]:
+        """Where the child does, for its owner and for others. Raises InputError."""
+        assert self._child.stdout is not None
+        patience = threading.Timer(STARTING_S, self._child.kill)
+        patience.start()
+        frame = read_frame(self._child.stdout)
+        patience.cancel()
+        found = {} if frame is None else json.loads(frame[1])
+        if "address" in found:
+            return found["address"], found["guests"]
+        self.close()
+        raise InputError(*found.get("refused", ("workbench_port", "the page's process doesn't start")))
 
     def close(self) -> None:
         """End the pages."""
@@ -245,7 +246,7 @@ class LivePage:
                 mesh = None
                 self._say(f"the page doesn't show a mesh of more than {MOST_MESH // 1_000_000} MB")
             self._tell("mesh", mesh)
-        values = {name: value for name, value in scenario.parameters.named().items() if _is_shown(name)}
+        values = {name: value for name, value in scenario.parameters.named().items() if _is_settable(name)}
         values["mesh"] = _shown_name(scenario)
         record = base64.b64encode(scenario.setup.scene.tobytes()).decode()
         ghost = scenario.ghost
@@ -282,18 +283,8 @@ class LivePage:
                 self._look(json.loads(content))
             elif kind == SAID:
                 self._say(content.decode())
-            elif kind == READY:
-                ready = json.loads(content)
-                self.address, self.guests = ready["address"], ready["guests"]
-                self._ready.set()
-            elif kind == REFUSED:
-                self._refused = InputError(*json.loads(content))
-                self._ready.set()
         self._look(False)
-        if not self._ready.is_set():
-            self._refused = InputError("workbench_port", "the page's process has ended")
-            self._ready.set()
-        elif not self._closed:
+        if not self._closed:
             self._say("the page's process has ended, and the node goes on without it")
         if self._holds:
             with suppress(InputError):  # the simulation has ended
@@ -386,7 +377,7 @@ def check_entry(entry: Mapping[str, Any], mesh: str) -> None:
 def check_values(values: Mapping[str, Any], mesh: str) -> None:
     """Raises InputError for values that a page may not set."""
     for name, value in values.items():
-        if name not in SETTABLE and not name.startswith(("ballast.", "contacts.")):
+        if not _is_settable(name):
             raise InputError(name, value, "a parameter of body and motion; others are set at the node")
         if name == "mesh" and value not in ("", mesh, *body_names()):
             raise InputError(
@@ -394,8 +385,9 @@ def check_values(values: Mapping[str, Any], mesh: str) -> None:
             )
 
 
-def _is_shown(name: str) -> bool:
-    return name in SETTABLE or name.startswith(("ballast.", "contacts."))
+def _is_settable(name: str) -> bool:
+    """Whether a page shows and may set it; of these only ``mesh`` names a file, and it may set that to bundled ones."""
+    return is_of_page(name) or name == "real_time_factor"
 
 
 def _shown_name(scenario: Scenario) -> str:

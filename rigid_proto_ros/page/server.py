@@ -11,6 +11,7 @@ import asyncio
 import gzip
 import hmac
 import http
+import io
 import ipaddress
 import logging
 import secrets
@@ -42,8 +43,6 @@ OPENING_S = 20.0
 """Within which a client says what it wants, and has got the page."""
 CLOSING_S = 2.0
 """For the goodbye of a page's socket."""
-CUTTING_S = 0.2
-"""For that of one that broke the rules."""
 
 LINE_S = 1.0
 """[s] Between two lines about clients."""
@@ -230,8 +229,6 @@ class PageServer:
     async def _handle(self, connection: ServerConnection) -> None:
         assert self._on_socket is not None and connection.request is not None
         code = await self._on_socket(connection, connection.request.path.partition("?")[0].rpartition("/")[2])
-        if code != 1000:
-            connection.close_timeout = CUTTING_S
         await connection.close(code)
         sent = connection.protocol.close_sent  # by whom ever it was ended, what this server had to say
         ended = _ENDED.get(sent.code) if sent is not None else None
@@ -293,6 +290,20 @@ def addresses(host: str, port: int, path: str) -> tuple[str, str]:
     own = LOOPBACK if host in ("0.0.0.0", "::", "") else host
     outside = "" if host == "localhost" or _is_own(host) else f"http://{_in_address(lan)}:{port}/{path}"
     return f"http://{_in_address(own)}:{port}/{path}", outside
+
+
+def show_code(address: str) -> None:
+    """Draw an address as a QR code, for a camera, where stdout is a terminal."""
+    if not sys.stdout.isatty() or not sys.stdout.encoding.lower().startswith("utf"):
+        return
+    try:
+        import segno
+    except ImportError:
+        return
+    drawn = io.StringIO()
+    segno.make(address, micro=False).terminal(drawn, compact=True, border=2)
+    # Dark on light, whatever the terminal's own colours are.
+    print(*(f"\033[97;40m{line}\033[0m" for line in drawn.getvalue().splitlines()), sep="\n", flush=True)
 
 
 def _in_address(host: str) -> str:

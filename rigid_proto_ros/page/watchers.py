@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Those who look at a node's page, and the one who drives: ``python -m rigid_proto_ros.page.watchers``, a child of the
-node that ends when its stdin does, however the node has ended.
+node that ends when its stdin does, however the node has ended. Its settings are its argument.
 
-Between node and child go frames: length (4 bytes, little-endian), kind (1 byte), content. From the node: the settings
-first, then what all pages are told (texts, JSON objects; a key that is in KEPT is told to pages that open later, too),
-pictures (binary, passed on as they are), and answers. From a page come JSON objects:
+Between node and child go frames: length (4 bytes, little-endian), kind (1 byte), content. From the node: what all pages
+are told (texts, JSON objects; a key that is in KEPT is told to pages that open later, too), pictures (binary, passed on
+as they are), and answers. From the child: first where it listens, or why not. From a page come JSON objects:
 
     {"id": n, "entry": {...}}                                         an entry of a poke script without its time
     {"id": n, "time": "pause" | "resume" | "step" | "reset"}
@@ -37,9 +37,9 @@ from websockets.exceptions import ConnectionClosed
 from ..base.errors import InputError
 from .server import MOST_WATCHERS, PageServer, addresses, new_token
 
-SETTINGS, TOLD, PICTURE, ANSWERS = range(4)
+TOLD, PICTURE, ANSWERS = range(3)
 """Kinds of frames from the node."""
-COMMAND, LOOKING, SAID, READY, REFUSED = range(5)
+LISTENS, COMMAND, LOOKING, SAID = range(4)
 """Kinds of frames to the node."""
 
 HEAD = struct.Struct("<IB")
@@ -326,29 +326,23 @@ class _Child:
         # What a library prints doesn't come between frames.
         sys.stdout = sys.stderr
 
-    async def run(self) -> None:
+    async def run(self, settings: dict[str, Any]) -> None:
         """Serve until the node ends."""
-        first = await self._loop.run_in_executor(None, read_frame, self._in)
-        if first is None or first[0] != SETTINGS:
-            return
-        settings = json.loads(first[1])
-        threading.Thread(target=self._write, name="write", daemon=True).start()
-        owner, guest = new_token(), new_token()
+        owner, guest, host = new_token(), new_token(), settings["host"]
         watchers = Watchers(owner, guest, settings["about"], self.put)
         with open(settings["page"], "rb") as file:
             page = file.read()
-        host = settings["host"]
         tokens = {owner: "live", guest: "live"}
         server = PageServer(page, tokens, host, lambda line: self.put(SAID, line.encode()), watchers.watch)
         try:
             await server.begin(settings["port"], settings["default"])
         except InputError as error:
-            self.put(REFUSED, _json([error.field, error.received, error.accepted]))
-            await asyncio.sleep(1.0)
+            write_frame(self._out, LISTENS, _json({"refused": [error.field, error.received, error.accepted]}))
             return
-        own = addresses(host, server.port, f"live/{owner}")
+        own = addresses(host, server.port, f"live/{owner}")[0]
         others = addresses(host, server.port, f"live/{guest}")[1]
-        self.put(READY, _json({"address": own[0], "guests": others}))
+        write_frame(self._out, LISTENS, _json({"address": own, "guests": others}))
+        threading.Thread(target=self._write, name="write", daemon=True).start()
         await self._loop.run_in_executor(None, self._read, watchers)
 
     def put(self, kind: int, content: bytes) -> None:
@@ -377,12 +371,12 @@ def main() -> None:
     """Be the child."""
     # Ctrl-C is the node's: this process ends when that has ended.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    asyncio.run(_serve())
+    asyncio.run(_serve(json.loads(sys.argv[1])))
     os._exit(0)
 
 
-async def _serve() -> None:
-    await _Child().run()
+async def _serve(settings: dict[str, Any]) -> None:
+    await _Child().run(settings)
 
 
 if __name__ == "__main__":

@@ -213,6 +213,7 @@ def open_page(node: RigidBodyNode) -> Callable[[], None]:
     if importlib.util.find_spec("websockets") is None:
         raise InputError("viewer", is_missing("websockets", "workbench"))
     from ..page.live_page import LivePage
+    from ..page.server import show_code
 
     port, say = _asked_for("workbench_port", parameters.workbench_port), node.get_logger().warning
     try:
@@ -227,6 +228,7 @@ def open_page(node: RigidBodyNode) -> Callable[[], None]:
             f"others watch at {page.guests}: one at a time drives, and your own page can take the hand and lock it; "
             "they can't read or write files"
         )
+        show_code(page.guests)
     return page.close
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import logging
+import random
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -157,6 +158,47 @@ class Page:
         except ConnectionClosed:
             return True
         return False
+
+
+def random_take(page: Page, chance: random.Random, seconds: float) -> list[dict[str, Any]]:
+    """Hands of all kinds; the commands that were acknowledged."""
+    taken: list[dict[str, Any]] = []
+    end_s = time.monotonic() + seconds
+
+    def do(**command: Any) -> None:
+        if page.do(**command) is None:
+            taken.append(command)
+
+    def vector(size: float) -> list[float]:
+        return [chance.uniform(-size, size) for _ in range(3)]
+
+    while time.monotonic() < end_s:
+        kind = chance.randrange(9)
+        if kind < 2:
+            do(entry={"string": {"attach": vector(0.02), "target": vector(0.2)}})
+            for _ in range(chance.randrange(20)):
+                do(entry={"string": {"target": vector(0.2)}})
+                page.take(chance.uniform(0.0, 0.03))
+            do(entry={"string": "release"})
+            continue
+        command = (
+            {
+                "entry": {
+                    "at": {"point": vector(0.02)},
+                    "impulse": vector(0.01),
+                    "axes": chance.choice(["world", "body"]),
+                }
+            },
+            {"entry": {"at": "com", "force": vector(0.1), "torque": vector(0.001)}},
+            {"entry": {"set": {"mass": chance.uniform(0.05, 0.5)}}},
+            {"entry": {"set": {"scale": [chance.uniform(0.5, 2.0) for _ in range(3)]}}},
+            {"entry": {"set": {"inertia_model": chance.choice(["solid", "bounding_box", "shell"])}}},
+            {"time": chance.choice(["pause", "resume", "resume", "step"])},
+            {"entry": {"set": {"gravity": [0.0, 0.0, chance.choice([0.0, -1.62])]}}},
+        )[kind - 2]
+        do(**command)
+        page.take(chance.uniform(0.0, 0.05))
+    return taken
 
 
 def asked(port: int, path: str, *lines: str, method: str = "GET") -> tuple[int, dict[str, str], bytes]:

@@ -9,6 +9,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -70,15 +71,25 @@ class Opened:
         self, browser: Any, size: tuple[int, int] = (1280, 720), touch: bool = False, address: str = "", **context: Any
     ) -> None:
         self.context = browser.new_context(viewport={"width": size[0], "height": size[1]}, has_touch=touch, **context)
-        self.page = self.context.new_page()
-        self.page.set_default_timeout(PATIENCE_MS)
         self.faults: list[str] = []
         self.requests: list[str] = []
+        self.open(address or page_address())
+
+    def open(self, address: str) -> None:
+        """In a tab of its own."""
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(PATIENCE_MS)
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))
         self.page.on("console", lambda said: self.faults.append(said.text) if said.type == "error" else None)
         self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.goto(address or page_address())
+        self.page.goto(address)
         self.page.wait_for_function("window.page && page.times.first")
+
+    def beside(self) -> Opened:
+        """The same page once more, in another tab of the same browser."""
+        other = copy(self)
+        other.open(self.page.url)
+        return other
 
     def close(self) -> None:
         self.context.close()

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -18,13 +17,6 @@ import pytest
 pytest.importorskip("websockets", reason="websockets is not installed: no page of a node")
 
 from live_rig import Page, beside, until
-
-from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.scene.scenario_run import OfflineRun
-from rigid_proto_ros.scene.scene_file import read_scene_text
-from rigid_proto_ros.scene.script import parse_script
-from rigid_proto_ros.session.as_script import script_of_session
-from rigid_proto_ros.session.bag import read_runs
 
 TEST = Path(__file__).resolve().parents[1]
 
@@ -158,67 +150,3 @@ def test_the_pages_process_ends_when_the_nodes_is_killed(how: signal.Signals) ->
     node.send_signal(how)
     node.wait(20.0)
     child.wait(10.0)
-
-
-def random_take(page: Page, chance: random.Random, seconds: float) -> int:
-    """Hands of all kinds; how many commands were taken."""
-    taken, end_s = 0, time.monotonic() + seconds
-
-    def vector(size: float) -> list[float]:
-        return [chance.uniform(-size, size) for _ in range(3)]
-
-    while time.monotonic() < end_s:
-        kind = chance.randrange(9)
-        if kind < 2:
-            page.do(entry={"string": {"attach": vector(0.02), "target": vector(0.2)}})
-            for _ in range(chance.randrange(20)):
-                taken += page.do(entry={"string": {"target": vector(0.2)}}) is None
-                page.take(chance.uniform(0.0, 0.03))
-            page.do(entry={"string": "release"})
-            continue
-        command = (
-            {
-                "entry": {
-                    "at": {"point": vector(0.02)},
-                    "impulse": vector(0.01),
-                    "axes": chance.choice(["world", "body"]),
-                }
-            },
-            {"entry": {"at": "com", "force": vector(0.1), "torque": vector(0.001)}},
-            {"entry": {"set": {"mass": chance.uniform(0.05, 0.5)}}},
-            {"entry": {"set": {"scale": [chance.uniform(0.5, 2.0) for _ in range(3)]}}},
-            {"entry": {"set": {"inertia_model": chance.choice(["solid", "bounding_box", "shell"])}}},
-            {"time": chance.choice(["pause", "resume", "resume", "step"])},
-            {"entry": {"set": {"gravity": [0.0, 0.0, chance.choice([0.0, -1.62])]}}},
-        )[kind - 2]
-        taken += page.do(**command) is None
-        page.take(chance.uniform(0.0, 0.05))
-    return taken
-
-
-def check_recorded_takes(tmp_path: Path, count: int) -> None:
-    for number in range(count):
-        file, chance = tmp_path / f"take{number}.mcap", random.Random(number)
-        with beside({"record": str(file), "publish_rate": 200.0}) as flown:
-            with Page(flown.page.address) as page:
-                assert random_take(page, chance, 1.5) > 10
-            # To a time at which nothing was done: a state is told as it was before.
-            flown.live.pause(False)
-            time.sleep(0.1)
-            flown.live.pause(True)
-            last = flown.live.state
-        (session,) = read_runs(file)
-        saved = script_of_session(session)
-        run = OfflineRun(make_scenario(read_scene_text(saved.scene).values), parse_script(saved.script))
-        run.advance(last.time_ns)
-        assert not run.simulation.refused
-        assert run.simulation.state.sha256() == last.sha256(), number
-
-
-def test_three_recorded_live_takes_equal_simulate_with_their_script_to_the_bit(tmp_path: Path) -> None:
-    check_recorded_takes(tmp_path, 3)
-
-
-@pytest.mark.stress
-def test_ten_recorded_live_takes_equal_simulate_with_their_script_to_the_bit(tmp_path: Path) -> None:
-    check_recorded_takes(tmp_path, 10)

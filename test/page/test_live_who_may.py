@@ -5,16 +5,24 @@ from __future__ import annotations
 
 import json
 import os
+import pty
 import random
+import re
+import select
 import socket
 import struct
+import subprocess
+import sys
 import time
+from typing import Any
 
 import pytest
 
 pytest.importorskip("websockets", reason="websockets is not installed: no page of a node")
 
 from live_rig import Beside, Page, asked, beside, until
+from page_browser import Opened
+from ros_process import from_source
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from rigid_proto_ros.page.server import LINE_S, MOST_WATCHERS, forbidden
@@ -137,6 +145,53 @@ def test_no_page_names_a_file(flown: Beside, tmp_path) -> None:
         assert page.do(entry={"set": {"mesh": "t_handle"}}) is None
 
 
+# For others in the network
+
+BLOCKS = {" ": (1, 1), "▀": (0, 1), "▄": (1, 0), "█": (0, 0)}
+"""Dark (1) and light cells, one above the other, on a dark ground."""
+
+
+def workbench(output: int) -> subprocess.Popen:
+    words = ["-m", "rigid_proto_ros.cli.executables", "rigid_proto", "workbench", "--host", "0.0.0.0", "--no-browser"]
+    environment = from_source({**os.environ, "PYTHONIOENCODING": "utf-8"})
+    return subprocess.Popen([sys.executable, *words], env=environment, stdout=output, stderr=subprocess.DEVNULL)
+
+
+def test_on_a_terminal_the_address_for_others_is_also_a_code_for_a_camera() -> None:
+    segno = pytest.importorskip("segno")
+    terminal, end = pty.openpty()
+    served = workbench(end)
+    os.close(end)
+    said = b""
+    try:
+        while said.count(b"\x1b[97;40m") < 10 or not said.endswith(b"\n"):
+            said += os.read(terminal, 65536)
+        time.sleep(0.3)
+        said += os.read(terminal, 65536) if select.select([terminal], [], [], 0.0)[0] else b""
+    finally:
+        served.kill()
+        served.wait()
+        os.close(terminal)
+    lines = said.decode().splitlines()
+    (address,) = re.findall(r"Others open (http\S+):", said.decode())
+    rows = [line.removeprefix("\x1b[97;40m").removesuffix("\x1b[0m") for line in lines if line.startswith("\x1b")]
+    cells = [[BLOCKS[block][half] for block in row] for row in rows for half in (0, 1)]
+    code = [[int(cell) for cell in row] for row in segno.make(address, micro=False).matrix_iter(border=2)]
+    assert cells[: len(code)] == code
+
+
+def test_what_isnt_a_terminal_gets_the_address_in_words_alone() -> None:
+    served = workbench(subprocess.PIPE)
+    try:
+        said = [served.stdout.readline() for _ in range(2)]
+        time.sleep(0.3)
+        assert not select.select([served.stdout], [], [], 0.0)[0]
+    finally:
+        served.kill()
+        served.wait()
+    assert b"The workbench is at" in said[0] and b"Others open http://" in said[1] and b"\x1b" not in b"".join(said)
+
+
 # One hand
 
 
@@ -177,6 +232,38 @@ def test_a_guest_can_neither_take_nor_lock_and_the_owner_can(flown: Beside) -> N
             teacher.send({"hand": "give"})
             pupil.until(lambda: not pupil.told["hand"]["locked"], "end of the lock")
             assert pupil.do(entry={"set": {"mass": 0.6}}) is None
+
+
+@pytest.mark.stress
+@pytest.mark.drawn
+def test_the_hands_card_holds_what_owner_and_guest_are_told_in_a_small_window_and_stays_as_high(browser: Any) -> None:
+    with beside(host="0.0.0.0") as open_to_all:
+        guests = open_to_all.page.guests.replace(open_to_all.page.guests.split("/")[2].rpartition(":")[0], "127.0.0.1")
+        pages = [Opened(browser, address=at, bypass_csp=True) for at in (open_to_all.page.address, guests)]
+        owner, guest = pages
+        high = set()
+
+        def looked(said: str, page: Opened) -> None:
+            until(lambda: said in page.page.locator("#live").inner_text(), f"{said} on the page")
+            for each in pages:
+                each.page.bring_to_front()
+                each.drawn()
+                inside = "const card = document.getElementById('hand'); "
+                assert each.js(f"() => {{ {inside} return card.scrollHeight - card.clientHeight; }}") <= 0
+                high.add(round(each.page.locator("#hand").bounding_box()["height"]))
+
+        looked("2 look", owner)
+        guest.js("page.motion.set({ mass: 0.5 })")
+        looked("Somebody else drives", owner)
+        owner.page.get_by_role("button", name="take it").click()
+        looked("You drive", owner)
+        guest.page.get_by_role("button", name="ask for it").click()
+        looked("somebody asks", owner)
+        owner.page.get_by_role("button", name="lock").click()
+        looked("Its owner drives", guest)
+        assert len(high) == 1, "in every state"
+        for page in pages:
+            page.close()
 
 
 def test_a_string_is_released_when_its_hand_goes_or_loses_it(flown: Beside) -> None:

@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import re
+import threading
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +58,28 @@ def test_a_reader_plays_and_opens_a_lesson_by_its_address(site: Path, browser: A
     page.page.get_by_role("link", name="Play").click()
     page.page.wait_for_function("window.page && page.motion.snapshot().timeNs > 0")
     page.close()
+
+
+@pytest.mark.stress
+@pytest.mark.drawn
+def test_every_address_of_a_lesson_opens_in_it_as_a_host_serves_it(site: Path, browser: Any) -> None:
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(site))) as host:
+        threading.Thread(target=host.serve_forever, daemon=True).start()
+        at = f"http://127.0.0.1:{host.server_port}/"
+        for one in lessons():
+            page = Opened(browser, address=f"{at}{one.name}/")
+            page.page.wait_for_selector("#lesson .choice")
+            assert page.js("location.hash") == f"#lesson={one.name}"
+            assert page.page.locator("#question").inner_text() == one.question
+            # Its own file and nothing else, but for the icon that a browser asks every host for.
+            asked = {url.partition("#")[0] for url in page.requests if not url.startswith(("data:", "blob:"))}
+            assert asked - {f"{at}favicon.ico"} == {f"{at}{one.name}/", f"{at}{static_site.PAGE}"}
+            page.context.close()
+        host.shutdown()
 
 
 @pytest.mark.parametrize("published", ["", AT])

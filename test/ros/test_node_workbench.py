@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import json
+import random
 import re
 import sys
 from pathlib import Path
@@ -16,10 +18,12 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "page"))
 
 import numpy as np
 from command_rig import wrench_message
-from live_rig import Page, until
+from live_rig import Page, random_take, until
 from page_browser import Opened, chromium
 from ros_client import RosClient
-from ros_process import running_node, start_node
+from ros_process import run, running_node, start_node
+
+from rigid_proto_ros.motion.state import State
 
 ADDRESS = re.compile(r"the workbench is at (http://127\.0\.0\.1:\d+/live/\S+)")
 
@@ -121,6 +125,34 @@ def test_a_drag_in_the_browser_is_a_string_on_the_page_and_on_the_nodes_topics(b
         page.page.wait_for_function("page.motion.body().name === 'hammer'")
         until(lambda: list(client.get("mesh").values()) == ["hammer"], "mesh of the node")
         page.close()
+
+
+@pytest.mark.parametrize("number", [0, *(pytest.param(k, marks=pytest.mark.stress) for k in range(1, 10))])
+def test_a_take_by_hands_beside_a_node_is_flown_again_by_simulate_to_the_bit(ros_environment, tmp_path, number) -> None:
+    """Hands on a page's socket, the node's own recording, and the commands that anybody types afterwards."""
+
+    def typed(*words: object) -> str:
+        done = run("rigid_proto", *words, environment=ros_environment, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    values = {"viewer": "workbench", "record": "take.mcap", "initial.angular_velocity": [0.05, 0.1, 3.0]}
+    with running_node(ros_environment, tmp_path / "node", values) as node:
+        node.wait_for("the workbench is at")
+        with Page(ADDRESS.search(node.errors)[1]) as page:
+            page.until(lambda: page.pictures, "picture")
+            assert len(random_take(page, random.Random(number), 1.5)) > 10
+            # To a time at which nothing was done: a state is told as it was before.
+            assert page.do(time="resume") is None
+            page.take(0.1)
+            assert page.do(time="pause") is None
+            page.until(lambda: page.told["time"]["paused"], "pause")
+            page.take(0.2)
+            last = State(int(page.flight.now_ns), page.flight.row.copy())
+    typed("replay", "take.mcap", "--verify", "--as-scene", "again.yaml")
+    words = ("simulate", "again.yaml", "--script", "again_script.yaml", "--duration", repr(last.time_ns / 1e9))
+    again = json.loads(typed(*words, "--json"))
+    assert again["time_ns"] == last.time_ns and again["state_hash"] == last.sha256()
 
 
 def test_the_pages_process_ends_when_the_node_is_killed(ros_environment, tmp_path) -> None:

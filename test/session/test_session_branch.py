@@ -69,6 +69,19 @@ def test_a_branch_begins_with_the_recorded_state_and_flies_on_as_the_session_did
     assert differs(fly_on(tmp_path, until).simulation.state.row, at + until) < 1e-7
 
 
+def test_without_a_time_all_of_it_is_written_and_flown_again_to_the_bit(session, tmp_path, capsys):
+    assert main(["replay", str(session), "--as-scene", str(tmp_path / "x.yaml")]) == 0
+    scene, script = tmp_path / "x.yaml", tmp_path / "x_script.yaml"
+    assert capsys.readouterr().out.splitlines()[-1] == (
+        f"  scene and script: rigid_proto simulate {scene} --script {script}"
+    )
+    (recorded,) = read_runs(session)
+    last = fly_on(tmp_path, 5.0).simulation.state
+    assert last.time_ns == recorded.end_ns
+    for name, stamped in recorded.published.items():
+        assert PROJECTIONS[name](last.row.tolist()) == stamped.rows[-1].tolist(), name
+
+
 FEATURES = {
     "mesh": "t_handle",
     "density": 7850.0,
@@ -223,7 +236,6 @@ def test_a_string_tied_by_parameters_stays_tied_in_a_branch_that_begins_while_it
         ("--at -1 --as-scene x.yaml", "--at"),
         ("--at nan --as-scene x.yaml", "--at"),
         ("--at 1", "--as-scene"),
-        ("--as-scene x.yaml", "--at"),
     ],
 )
 def test_a_time_or_a_place_that_is_none_is_refused_and_nothing_written(
