@@ -84,7 +84,7 @@ bench: .venv-bench/.pins ## comparison with other tools; CSV with date, commit, 
 
 .venv-bench/.pins: benchmarks/requirements.txt $(wildcard requirements/*) | $(READY)
 	.venv/bin/python -m venv .venv-bench
-	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet -r requirements/base.txt $$(test -f requirements/ros.txt && echo -r requirements/ros.txt) -r benchmarks/requirements.txt
+	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --require-hashes -r requirements/run.txt -r requirements/ros.txt -r requirements/all.txt -r benchmarks/requirements.txt
 	.venv-bench/bin/python -m pip --disable-pip-version-check install --quiet --no-build-isolation --no-deps -e .
 	@touch $@
 
@@ -100,8 +100,14 @@ clean: ## everything that was made here, the environments included
 	rm -rf .venv .venv-bench build install log out dist site rigid_proto_ros/kernels/lib rigid_proto_ros/page/lib page/node_modules benchmarks/engines/node_modules *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-PINS := .venv/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate --no-header --no-emit-package pip
+# Each list leaves out what the lists before it have; a version's files are known by their hashes.
+LOCK = .venv/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --no-emit-package pip
+without = -c requirements/$(1).txt $$(sed -nE 's/^([^ ;]+)==.*/--no-emit-package \1/p' requirements/$(1).txt)
 pins: setup ## for developers: newest versions into requirements/*.txt
-	$(PINS) requirements/all.in -o requirements/base.txt
-	$(PINS) requirements/ros.in -c requirements/base.txt -o requirements/ros.txt
-	sed -i '1i # Exact pins, made by `make pins`.' requirements/base.txt requirements/ros.txt
+	$(LOCK) requirements/run.in -o requirements/run.txt
+	$(LOCK) requirements/ros.in $(call without,run) -o requirements/ros.txt
+	$(LOCK) requirements/all.in $(call without,run) $(call without,ros) -o requirements/all.txt
+	$(LOCK) requirements/numpy1.in --no-emit-package numpy -o requirements/numpy1.txt
+	$(LOCK) requirements/wasm.in -o requirements/wasm.txt
+	$(LOCK) benchmarks/requirements.in $(call without,run) $(call without,ros) $(call without,all) -o benchmarks/requirements.txt
+	sed -i '1i # Exact pins, made by `make pins`.' requirements/*.txt benchmarks/requirements.txt

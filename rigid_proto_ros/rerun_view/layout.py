@@ -106,7 +106,7 @@ class Finished:
 
 def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
     """The views of a running or a finished simulation, without those that have nothing to show."""
-    flight = _body_view(subject)
+    below = []
     if finished is None or finished.commanded:
         commands = rrb.TextLogView(
             origin="/",
@@ -114,20 +114,21 @@ def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
             name="Commands",
             columns=rrb.TextLogColumns(timeline_columns=[e.SIM_TIME], text_log_columns=["body"]),
         )
-        below = [commands]
+        below.append(commands)
         if finished is None or style.COMMANDED in finished.plotted:
             below.append(_plot(style.COMMANDED, finished))
-        flight = rrb.Vertical(flight, rrb.Horizontal(*below), row_shares=[4, 1])
-    turns_freely = subject.ghost or not (subject.dropped_term or subject.tied or subject.falls)
-    poinsot = [_poinsot_view()] if turns_freely else []
+    row_shares = [4, 1]
+    if subject.ghost or not (subject.dropped_term or subject.tied or subject.falls):
+        # It turns freely. Beside the commands there is more room than above the plots.
+        below = [_poinsot_view(), *([rrb.Vertical(*below)] if below else [])]
+        row_shares = [3, 2]
+    flight = _body_view(subject)
+    if below:
+        flight = rrb.Vertical(flight, rrb.Horizontal(*below), row_shares=row_shares)
     plots = [_plot(name, finished) for name in subject.plots if finished is None or name in finished.plotted]
     return rrb.Blueprint(
-        rrb.Horizontal(
-            flight,
-            # Nearly equal shares: a smaller plot has no room for the four lines of a legend.
-            rrb.Vertical(*poinsot, *plots, row_shares=[5] * len(poinsot) + [4] * len(plots)),
-            column_shares=[3, 2],
-        ),
+        # Three plots have room for the four lines of a legend in a window of 1200 x 675.
+        rrb.Horizontal(flight, rrb.Vertical(*plots), column_shares=[3, 2]),
         rrb.TimePanel(state="collapsed", timeline=e.SIM_TIME),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
@@ -170,7 +171,9 @@ def value_axis(low: float, high: float, least: float = 0.0) -> tuple[float, floa
 
 
 def _plot(name: str, finished: Finished | None) -> Any:
-    """Scalars of one entity over time. Curves end at the cursor, and room for the legend follows."""
+    """Scalars of one entity over time. Curves end at the cursor, and room for the legend follows: all plots show the
+    same time, without being linked, as linked ones know no room.
+    """
     boundary = rrb.TimeRangeBoundary
     # Ends relative to the cursor hold on both timelines, absolute ones on one alone.
     start = boundary.cursor_relative(seconds=-PLOTTED_SECONDS) if finished is None else boundary.infinite()
@@ -206,7 +209,7 @@ def _body_view(subject: Subject) -> Any:
 
 def _poinsot_view() -> Any:
     """The ellipsoid of inertia rolling on the invariable plane."""
-    name = "Poinsot: the inertia ellipsoid rolls on the invariable plane"
+    name = "Poinsot: the ellipsoid of inertia rolls"
     overrides = {"/" + style.POINSOT_HERPOLHODE: _last_seconds(HERPOLHODE_SECONDS)}
     eye, target = np.array([2.1, -1.65, 0.75]), np.array([0.0, 0.0, -0.35])
     return _view(style.POINSOT, "$origin/**", name, eye, target, overrides)

@@ -18,10 +18,13 @@ from typing import TYPE_CHECKING
 from ..base.errors import InputError
 from ..base.files import file_for_one_writer
 from ..base.provenance import cpu, versions
+from ..mesh.locate import resolve_mesh
+from ..motion.body import Body
 from ..parameters.declarations import Parameters
 from ..scene import cdr
 from ..scene.command_codec import frame_names
 from ..scene.scenario import mesh_file, mesh_sha256_of
+from ..scene.scene_file import read_scene_text
 from ..simulation.observer import (
     AccuracyFloor,
     Applied,
@@ -34,10 +37,25 @@ from ..simulation.observer import (
     Started,
 )
 from .mailbox import WritingObserver
-from .messages import DEFINITIONS, FLOOR, MADE_WITH, PROJECTIONS, TOPICS, applied_bytes, inertia_bytes, offered_qos
+from .messages import (
+    DEFINITIONS,
+    FLOOR,
+    MADE_WITH,
+    PROJECTIONS,
+    TOPICS,
+    TRANSFORM_NS,
+    applied_bytes,
+    description,
+    inertia_bytes,
+    offered_qos,
+    transform_bytes,
+)
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
+
+DRAWN = (".obj", ".stl", ".glb", ".gltf", ".dae")
+"""Meshes that viewers of bags read."""
 
 CHUNK_NS = 500_000_000
 """Simulated time that a chunk holds at most: what a cut inside it loses, also in a run faster than the clock."""
@@ -68,7 +86,9 @@ class McapObserver(WritingObserver):
         self._simulated_log = simulated_log
         self._run_begins_ns = self._latest_log_ns = self._chunk = self._run = 0
         self._world, self._body_frame = frame_names(parameters or Parameters(), node_name)
-        self._scene = ""
+        self._scene = self._mesh_sha256 = self._mesh = self._description = ""
+        self._body: Body | None = None
+        self._next_transform_ns = 0
         self._files = files
         self._attached: set[str] = set()
         self._writer: Writer | None = None
@@ -94,7 +114,7 @@ class McapObserver(WritingObserver):
         }
         self._channels = {
             name: writer.register_channel(
-                f"/{node_name.strip('/')}/{name}",
+                name if name.startswith("/") else f"/{node_name.strip('/')}/{name}",
                 "cdr",
                 schemas[message_type],
                 {"offered_qos_profiles": offered_qos(name)},
@@ -133,6 +153,7 @@ class McapObserver(WritingObserver):
             self._run_begins_ns = self._latest_log_ns + 1
             self._run += 1
             self._scene = ""
+            self._next_transform_ns = 0
             return
         log_time = self._run_begins_ns + event.time_ns if self._simulated_log else wall_ns
         self._latest_log_ns = max(self._latest_log_ns, log_time)
@@ -147,23 +168,48 @@ class McapObserver(WritingObserver):
                     (name, cdr.stamped_doubles(time_ns, self._world, PROJECTIONS[name](row)))
                     for name in ("pose", "twist")
                 ]
+                if time_ns >= self._next_transform_ns:
+                    self._next_transform_ns = time_ns + TRANSFORM_NS
+                    frames = (self._world, self._body_frame)
+                    messages.append(("/tf", transform_bytes(time_ns, frames, row[:7])))
             case Logged(_, line):
                 messages = [("events", cdr.string(line))]
             case Applied(time_ns, _, load, body, attitude):
                 messages = [("applied", applied_bytes(time_ns, self._body_frame, load, body, attitude))]
             case BodyChanged(time_ns, setup):
-                messages = [("inertia", inertia_bytes(time_ns, self._body_frame, setup.body))]
+                self._body = setup.body
+                messages = [("inertia", inertia_bytes(time_ns, self._body_frame, setup.body)), *self._described()]
             case AccuracyFloor(time_ns, floor):
                 # It only rises within a run: the last one says all.
                 writer.flush()
                 writer.add_metadata(FLOOR.format(self._run), {"time_ns": str(time_ns), "floor": floor})
             case Started(scene=scene) | SceneChanged(scene=scene) if scene != self._scene:
                 self._scene = scene
-                messages = [("scene", cdr.string(scene))]
+                self._find_mesh(scene)
+                messages = [("scene", cdr.string(scene)), *self._described()]
         for name, data in messages:
             writer.add_message(self._channels[name], log_time, data, log_time)
         if isinstance(event, Started | SceneChanged):
             self._attach_mesh(writer, log_time, event.scene)
+
+    def _find_mesh(self, scene: str) -> None:
+        """Note the URI of the mesh that a scene names, if viewers read it."""
+        sha256 = mesh_sha256_of(scene)
+        if sha256 == self._mesh_sha256:
+            return
+        self._mesh_sha256, self._mesh = sha256, ""
+        with suppress(InputError, OSError):
+            path = resolve_mesh(str(read_scene_text(scene).values.get("mesh", "")))
+            if path.suffix.lower() in DRAWN:
+                self._mesh = path.absolute().as_uri()
+
+    def _described(self) -> list[tuple[str, bytes]]:
+        """The body's description, if it is another one than the last."""
+        told = "" if self._body is None else description(self._body_frame, self._body, self._mesh)
+        if told == self._description:
+            return []
+        self._description = told
+        return [("robot_description", cdr.string(told))]
 
     def _attach_mesh(self, writer: Writer, log_time: int, scene: str) -> None:
         """The file of the mesh that a scene names, once."""

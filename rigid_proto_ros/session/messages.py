@@ -9,6 +9,7 @@ bit.
 from __future__ import annotations
 
 from collections.abc import Callable
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -32,6 +33,8 @@ _INERTIA = (
     "MSG: geometry_msgs/Inertia\nfloat64 m\ngeometry_msgs/Vector3 com\n"
     "float64 ixx\nfloat64 ixy\nfloat64 ixz\nfloat64 iyy\nfloat64 iyz\nfloat64 izz"
 )
+_TRANSFORMED = "MSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\nTransform transform"
+_TRANSFORM = "MSG: geometry_msgs/Transform\nVector3 translation\nQuaternion rotation"
 _SEPARATOR = "\n" + "=" * 80 + "\n"
 
 
@@ -54,6 +57,9 @@ DEFINITIONS = {
     "geometry_msgs/msg/InertiaStamped": _definition(
         "std_msgs/Header header\nInertia inertia", _HEADER, _TIME, _INERTIA, _VECTOR
     ),
+    "tf2_msgs/msg/TFMessage": _definition(
+        "geometry_msgs/TransformStamped[] transforms", _TRANSFORMED, _HEADER, _TIME, _TRANSFORM, _VECTOR, _QUATERNION
+    ),
 }
 """Message definitions (ros2msg) of the topics that we write."""
 
@@ -64,13 +70,20 @@ TOPICS = {
     "twist": "geometry_msgs/msg/TwistStamped",
     "applied": "geometry_msgs/msg/WrenchStamped",
     "inertia": "geometry_msgs/msg/InertiaStamped",
+    "robot_description": "std_msgs/msg/String",
+    "/tf": "tf2_msgs/msg/TFMessage",
 }
-"""Topics of a session that we write, below the node's name, and their types."""
+"""Topics of a session that we write, below the node's name where they don't begin with /, and their types. The last two
+are for viewers of bags: a session is never read from them.
+"""
+
+TRANSFORM_NS = 33_333_333
+"""Simulated time, at least, between two transforms of a recording."""
 
 STATE_DEPTH, EVENT_DEPTH = 10, 1000
 """Messages that the node's publishers of states and of events keep for a slow reader."""
 
-LATCHED = frozenset({"scene", "inertia"})
+LATCHED = frozenset({"scene", "inertia", "robot_description"})
 """Topics whose last message waits for subscribers that come later."""
 
 
@@ -175,6 +188,34 @@ def inertia_bytes(time_ns: int, body_frame: str, body: Body) -> bytes:
     (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = body.inertia.tolist()
     numbers = (body.mass, *body.center_of_mass.tolist(), ixx, ixy, ixz, iyy, iyz, izz)
     return cdr.stamped_doubles(time_ns, f"{body_frame}/mesh", numbers)
+
+
+def transform_bytes(time_ns: int, frames: tuple[str, str], pose: list[float]) -> bytes:
+    """A tf2_msgs/TFMessage of one transform: of the second frame in the first, pose (7,)."""
+    layout = cdr.Layout()
+    layout.pack("I", 1)
+    layout.pack("iI", *divmod(time_ns, 1_000_000_000))
+    for frame in frames:
+        layout.string(frame)
+    layout.pack("7d", *pose)
+    return bytes(layout.data)
+
+
+def description(body_frame: str, body: Body, mesh: str) -> str:
+    """The body as URDF, for viewers: a link at its COM, drawn as the mesh that this URI names, if any."""
+    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = body.inertia.tolist()
+    name, place = escape(body_frame, {'"': "&quot;"}), " ".join(map(str, (-body.center_of_mass).tolist()))
+    scale = " ".join(map(str, body.scale.tolist()))
+    drawn = (
+        f'<visual><origin xyz="{place}"/><geometry><mesh filename="{mesh}" scale="{scale}"/></geometry></visual>'
+        if mesh
+        else ""
+    )
+    inertia = f'ixx="{ixx}" ixy="{ixy}" ixz="{ixz}" iyy="{iyy}" iyz="{iyz}" izz="{izz}"'
+    return (
+        f'<robot name="{name}"><link name="{name}"><inertial><mass value="{body.mass}"/><inertia {inertia}/></inertial>'
+        f"{drawn}</link></robot>"
+    )
 
 
 def applied_bytes(time_ns: int, body_frame: str, load: Load, body: Body, attitude: Attitude) -> bytes:

@@ -15,10 +15,18 @@ pytest.importorskip("rclpy")
 pytest.importorskip("rerun")
 
 
+from rigid_proto_ros.base.bundled import scene_path
+from rigid_proto_ros.cli.demo import write_demo
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.ros.domain import hold_domain
+from rigid_proto_ros.scene.scenario import read_scene
+from rigid_proto_ros.scene.script import read_script
 from rigid_proto_ros.session.bag import read_runs
 
+BARE = """rigid_body:
+  ros__parameters: {mesh: "", inertia_model: explicit, explicit_inertia: {mass: 1.0, tensor: [1.0, 0.0, 0.0, 2.0, 0.0, 3.0]}}
+"""
 SESSION, VIEW = Path("out/session.mcap"), Path("out/session.rrd")
 
 
@@ -52,6 +60,26 @@ def test_a_bundled_body_flies_its_script_and_leaves_a_session_that_verifies_besi
     finally:
         if held is not None:
             held[1].close()
+
+
+def test_pokes_are_written_for_a_scene_and_for_a_mesh_whose_scene_is_written_too(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("out").mkdir()
+    bundled, pokes = write_demo("hammer")
+    assert bundled == scene_path("hammer") and not (tmp_path / "out" / "demo_scene.yaml").exists()
+    Path("part.obj").write_bytes(resolve_mesh("hammer").read_bytes())
+    alone, again = write_demo("part.obj")
+    assert read_scene(str(alone)).parameters.mesh == str(tmp_path / "part.obj")
+    # The scene gives its hammer another density: pushes are in proportion to the mass.
+    weights = [read_scene(name).setup.body.mass for name in ("hammer", "part.obj")]
+    pushes = []
+    for name in ("hammer", "part.obj"):
+        write_demo(name)
+        pushes.append(read_script(pokes)[0].force[0])
+    assert again == pokes and pushes[0] / pushes[1] == pytest.approx(weights[0] / weights[1])
+    Path("bare.yaml").write_text(BARE, "utf-8")
+    assert main(["demo", "bare.yaml"]) == 2
+    assert capsys.readouterr().err.strip() == "rigid_proto demo: demo: got 'bare.yaml'; accepted: a mesh, or a scene that has one"
 
 
 @pytest.mark.stress

@@ -17,6 +17,7 @@ from page_tools import kernels, packages
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.page import bundle
 from rigid_proto_ros.page.file import take_of, values_of_mesh, write_page
 
@@ -132,3 +133,7 @@ def test_a_lesson_as_a_file_begins_with_it_and_an_unknown_one_is_refused(page: s
     assert main(["lesson", "t_hndle", "--html", str(file)]) != 0
     assert main(["lesson", "t_handle", "--html", str(tmp_path / "lesson.txt")]) != 0
     assert not (tmp_path / "lesson.txt").exists()
+    # A mesh has no question: the page begins with it.
+    assert main(["lesson", str(resolve_mesh("hammer")), "--html", str(file)]) == 0
+    text = file.read_text("utf-8")
+    assert '<meta name="begin" content="">' in text and part(text, "take") != b""

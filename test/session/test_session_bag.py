@@ -33,7 +33,7 @@ from rigid_proto_ros.session.messages import DEFINITIONS, PROJECTIONS, read_stat
 from rigid_proto_ros.session.messages import TOPICS as WRITTEN
 
 ODOMETRY = "nav_msgs/msg/Odometry"
-RECORDED = {**WRITTEN, "odom": ODOMETRY}
+RECORDED = {**{name: kind for name, kind in WRITTEN.items() if name in TOPICS}, "odom": ODOMETRY}
 DEFINED = {**DEFINITIONS, ODOMETRY: "std_msgs/Header header\nstring child_frame_id\n"}
 """Odometry's own definition is longer; nothing here decodes it by its schema."""
 

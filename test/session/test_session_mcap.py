@@ -7,10 +7,13 @@ import hashlib
 import json
 import os
 import shlex
+import sys
 import threading
 import time
 import tracemalloc
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from subprocess import run
 
 import numpy as np
 import pytest
@@ -118,6 +121,42 @@ def test_events_scene_applied_and_inertia_are_there(flown):
     force = applied[0][1].wrench.force
     # In the body's axes.
     assert np.linalg.norm([force.x, force.y, force.z]) == pytest.approx(np.linalg.norm(pokes[0]["content"]["force"]))
+
+
+def test_viewers_of_bags_find_the_body_its_mesh_and_where_it_is(flown):
+    path, kept = flown
+    messages = decoded(path)
+    for _, message in messages["/tf"]:
+        (moved,) = message.transforms
+        row, place, turn = kept.states[stamp(moved.header)], moved.transform.translation, moved.transform.rotation
+        assert (moved.header.frame_id, moved.child_frame_id) == ("world", "rigid_body")
+        assert [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w] == row[:7]
+    # Thirty a second at most, whatever is published.
+    times = [log for log, _ in messages["/tf"]]
+    assert len(times) > 100 and np.diff(times).min() >= SECOND / 30 - 1
+    robots = [ElementTree.fromstring(message.data) for _, message in messages["/rigid_body/robot_description"]]
+    # One for each mass.
+    assert len(robots) == len(messages["/rigid_body/inertia"])
+    body = read_scene("t_handle").setup.body
+    link = robots[0].find("link")
+    assert link.get("name") == "rigid_body" and float(link.find("inertial/mass").get("value")) == body.mass
+    assert float(link.find("inertial/inertia").get("ixy")) == body.inertia[0, 1]
+    mesh, origin = link.find("visual/geometry/mesh"), link.find("visual/origin")
+    assert mesh.get("filename") == resolve_mesh("t_handle").absolute().as_uri()
+    assert [float(part) for part in origin.get("xyz").split()] == (-body.center_of_mass).tolist()
+
+
+@needs_rerun
+def test_reruns_converter_of_bags_draws_the_mesh_in_the_frame_that_the_transforms_move(flown, tmp_path):
+    from rerun.chunk import RrdReader
+
+    rerun = Path(sys.executable).with_name("rerun")
+    run([rerun, "mcap", "convert", flown[0], "-o", tmp_path / "seen.rrd"], check=True, capture_output=True)
+    columns: dict[str, set[str]] = {}
+    for chunk in RrdReader(tmp_path / "seen.rrd").stream():
+        columns.setdefault(chunk.entity_path, set()).update(chunk.to_record_batch().schema.names)
+    assert {"Transform3D:translation", "Transform3D:quaternion", "Transform3D:child_frame"} <= columns["/tf"]
+    assert {"Asset3D:blob", "CoordinateFrame:frame"} <= columns["/rigid_body/visual_geometries/rigid_body/visual_0"]
 
 
 def test_a_run_without_a_clock_is_logged_at_simulated_time_in_chunks_of_half_a_second(flown):
@@ -267,7 +306,7 @@ def test_channels_say_what_the_nodes_publishers_offer(flown):
     with open(path, "rb") as stream:
         channels = make_reader(stream).get_summary().channels.values()
     offered = {c.topic.rpartition("/")[2]: yaml.safe_load(c.metadata["offered_qos_profiles"]) for c in channels}
-    assert sorted(offered) == sorted(TOPICS)
+    assert sorted(offered) == sorted(name.strip("/") for name in TOPICS)
     for name, profiles in offered.items():
         (profile,) = profiles
         # The keys in the order in which rosbag2 writes them (rosbag2_storage/qos.cpp).
@@ -275,7 +314,7 @@ def test_channels_say_what_the_nodes_publishers_offer(flown):
             *("history", "depth", "reliability", "durability", "deadline", "lifespan"),
             *("liveliness", "liveliness_lease_duration", "avoid_ros_namespace_conventions"),
         ]
-        latched = name in ("scene", "inertia")
+        latched = name in ("scene", "inertia", "robot_description")
         assert profile["durability"] == ("transient_local" if latched else "volatile")
         assert profile["reliability"] == "reliable" and profile["history"] == "keep_last"
         assert profile["depth"] == (1 if latched else 10 if name in ("pose", "twist") else 1000)
@@ -284,7 +323,8 @@ def test_channels_say_what_the_nodes_publishers_offer(flown):
     rosbags = pytest.importorskip("rosbags.highlevel")
     with rosbags.AnyReader([path]) as bag:
         latched = {c.topic: c.ext.offered_qos_profiles[0].durability.name == "TRANSIENT_LOCAL" for c in bag.connections}
-    assert [topic for topic in sorted(latched) if latched[topic]] == ["/rigid_body/inertia", "/rigid_body/scene"]
+    kept = [f"/rigid_body/{name}" for name in ("inertia", "robot_description", "scene")]
+    assert [topic for topic in sorted(latched) if latched[topic]] == kept
 
 
 def test_verify_takes_no_more_memory_for_ten_times_as_long_a_recording(tmp_path):
