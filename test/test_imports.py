@@ -52,7 +52,7 @@ ALLOWED = {
     "yaml": ("scene", "session", "sweep", "ros", "cli"),
     "trimesh": ("mesh.assembly", "robots.link_shapes"),
     "collada": ("mesh.assembly",),
-    "mujoco": ("robots.mjcf",),
+    "mujoco": ("robots.mjcf_compiler",),
     "manifold3d": ("mesh.solids", "bodies.surfaces"),
     "rerun": ("rerun_view",),
     "rerun_bindings": ("rerun_view",),

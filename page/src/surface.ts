@@ -66,6 +66,12 @@ function turned(triangles: Int32Array): Int32Array {
   return found;
 }
 
+/** A bound, to two digits and not below itself. */
+function roundedUp(value: number): number {
+  const step = value > 0 ? 10 ** (Math.floor(Math.log10(value)) - 1) : 1e-12;
+  return Number((step * Math.ceil(value / step + 1e-9)).toPrecision(2));
+}
+
 /** Edges (e, 6) of triangles, components (m) and their count, and edges of an odd number of triangles and wound alike. */
 interface Connected {
   readonly corners: Matrix;
@@ -116,7 +122,6 @@ export class Surfaces {
       const message = numbers[0] === 1 ? text.replace("edges", "edge").replace("faces", "face").replace("corners", "corner") : text;
       findings.push({ code, severity, message: severity === "error" ? `${message}; ${words["remedy"]}` : message });
     };
-    if (near !== null) add("joined_corners", "info", near.found, Number(near.farthest.toPrecision(2)));
     if (odd > 0) add("open", "error", odd);
     if (flipped > 0) add("inconsistent_winding", "error", flipped);
     const inward = odd === 0 && flipped === 0 && whole < 0;
@@ -126,6 +131,12 @@ export class Surfaces {
       if (surplus > 0) add("duplicate_faces", "error", surplus);
       if (inward) add("inward", "warning");
       if (mesh.solid === undefined && surplus === 0 && !this.#fill(record, { ...mesh, triangles: enclosing }, 0, memory)) add("zero_volume", "error");
+    }
+    if (near !== null) {
+      const effect = record.known[0] === 1 ? kernels.effectOfStrips(vertices, separate.edges, near.farthest, record.solid) : -1;
+      const told = [near.found, Number(near.farthest.toPrecision(2))];
+      if (effect >= 0) add("joined_corners", "info", ...told, roundedUp(100 * effect));
+      else add("joined_corners_of_open", "info", ...told);
     }
     if (mesh.solid !== undefined) this.#take(record, mesh.solid);
     if (count > 1 || mesh.solid === undefined) findings.push({ code: "unchecked", severity: "info", message: words["unchecked"] ?? "" });

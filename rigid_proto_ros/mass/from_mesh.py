@@ -27,7 +27,7 @@ from ..base.vectors import Points, Triangles
 from ..mesh.reading import Mesh, load_mesh
 from ..mesh.solids import box_surface, can_unite, convex_hull, united_surface
 from ..mesh.topology import mesh_topology, turned_triangles
-from .moments import referenced_vertices
+from .moments import extent, referenced_vertices
 from .properties import MeshMoments, Surface
 from .repair import close_surface, repair_surface
 from .verdict import NESTED, WARNING, Finding, Verdict, check_surface
@@ -102,9 +102,10 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
         message = f"fallback: the mass properties are those of its {shape}"
         verdict.findings.append(Finding("fallback", WARNING, message))
     remedies = ("" if repair else "--repair (mesh_repair), ") + "--fallback hull|box (mesh_fallback)"
-    if verdict.usable and np.ptp(referenced_vertices(vertices, triangles), axis=0).min() == 0.0:
+    if verdict.usable and not verdict.closed and np.subtract(*extent(vertices, triangles)[:2]).max() == 0.0:
         remedies = "a mesh that isn't flat"
-    no_solid = "" if verdict.closed else f"{verdict.reason}; use {remedies}"
+    repaired = "".join(f"{one.message}, and then: " for one in verdict.findings if one.code == "repaired")
+    no_solid = "" if verdict.closed else f"{repaired}{verdict.reason}; use {remedies}"
     moments = MeshMoments(vertices, triangles, polygon_starts, no_solid=no_solid, name=mesh.name, stand_in=stand_in)
     return MeshBody(mesh, verdict, moments)
 

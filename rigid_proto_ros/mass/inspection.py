@@ -19,7 +19,7 @@ from ..base.errors import InputError
 from ..base.vectors import Matrix3, Vector3
 from .exact_moments import exact_solid_moments, relative_errors
 from .from_mesh import MeshBody
-from .moments import MODELS, referenced_vertices
+from .moments import MODELS, extent
 from .properties import MassProperties, scale_vector
 from .tensor import principal_axes
 from .verdict import INFO, WARNING, Finding
@@ -153,8 +153,8 @@ def inspect_mesh(
         nowhere = np.full(3, np.nan)
         return Inspection(body, s, model, {}, findings, refusal, None, None, nowhere, nowhere, None)
     moments = body.moments
-    points = referenced_vertices(body.vertices, body.moments.triangles) * s
-    lower, upper = points.min(axis=0), points.max(axis=0)
+    corners = [corner * s for corner in extent(body.vertices, body.moments.triangles)[:2]]
+    lower, upper = np.minimum(*corners), np.maximum(*corners)
     side = float(np.max(upper - lower))
     findings += [Finding("unexpected", INFO, text) for text in remarks(body, side)]
     if side > LARGE_M:
@@ -213,7 +213,7 @@ def verify_moments(body: MeshBody, scale: Vector3) -> dict[str, float]:
     unit = moments.mass_properties("solid", scale=scale, density=1.0)  # raises InputError if there is no solid
     vertices, triangles = moments.solid_surface()
     exact = exact_solid_moments(vertices, triangles, scale.tolist())
-    points = referenced_vertices(vertices, triangles) * scale
-    diagonal = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    lower, upper, _ = extent(vertices, triangles)
+    diagonal = float(np.linalg.norm((upper - lower) * scale))
     volume = moments.moments("solid").measure * float(np.prod(np.abs(scale)))
     return relative_errors(exact, volume, unit.center_of_mass, unit.inertia, diagonal)

@@ -671,6 +671,45 @@ def moments_of(
     return FOUND
 
 
+@njit(error_model="numpy", allocates=False)
+def largest_effect(solid: np.record, added: float, first: float, second: float) -> float:
+    """The largest change of volume, relative to itself, or of the tensor, relative to its largest entry, if a solid's
+    volume, first and second moments change by at most ``added``, ``first`` and ``second``; -1 where nothing can be
+    said.
+    """
+    volume: float = abs(solid.measure)
+    if not added < volume:
+        return -1.0
+    xx, yy, zz = abs(solid.second[0]), abs(solid.second[3]), abs(solid.second[5])
+    shifted = first * first / (volume - added)
+    of_tensor: float = (second + shifted) / max(yy + zz, xx + zz, xx + yy)
+    return max(added / volume, of_tensor)
+
+
+@exported("f8[:,:]", "i8[:,:]", "f8", MOMENTS, returns="f8", nogil=True)
+def effect_of_strips(vertices: Points, edges: IntArray, width: float, solid: np.record) -> float:
+    """The largest effect, see ``largest_effect``, that any way to close a solid by strips along the open ones of its
+    edges (e, 6) can have, if opposite corners lie at most ``width`` apart: -1 where nothing can be said.
+
+    A strip's area is at most (length + width) · width. Relative to the centroid, an element dA at the distance r adds
+    at most r dA/3 to the volume, r² dA/4 to the first and r³ dA/5 to the second moments.
+    """
+    far, whole = 0.0, 0.0
+    for e in range(edges.shape[0]):
+        if (edges[e, 2] + edges[e, 3]) & 1:
+            length, near, distant = 0.0, 0.0, 0.0  # squares
+            for k in range(3):
+                a, b = vertices[edges[e, 0], k], vertices[edges[e, 1], k]
+                middle = solid.reference[k] + solid.center[k]
+                length += (b - a) * (b - a)
+                near += (a - middle) * (a - middle)
+                distant += (b - middle) * (b - middle)
+            whole += (math.sqrt(length) + width) * width
+            far = max(far, near, distant)
+    reach = math.sqrt(far) + width
+    return largest_effect(solid, whole * reach / 3.0, whole * reach * reach / 4.0, whole * reach * reach * reach / 5.0)
+
+
 def _moments(code: int, numbers: FloatArray, vertices: Points) -> Moments:
     """What a kernel has found, numbers (16,); raises MeshError where there is nothing."""
     if code != FOUND:
@@ -723,6 +762,19 @@ def mesh_moments(
     used = np.empty(len(vertices) if number in (POINTS, BOX) else 0, np.bool_)
     room = np.empty(max(ROOM, 3 * len(vertices)) if number in (SOLID, SHELL) else 0)
     return _moments(moments_of(number, vertices, triangles, starts, scale, used, room, found), numbers, vertices)
+
+
+def extent(vertices: Points, triangles: Triangles) -> tuple[Vector3, Vector3, int]:
+    """Lower and upper corner (3,) of the box around the vertices (n, 3) that triangles (m, 3) use, and how many these
+    are; raises MeshError where there are none, for coordinates of theirs that aren't finite, and for a vertex number
+    out of range.
+    """
+    used, lower, upper = np.empty(len(vertices), np.bool_), np.empty(3), np.empty(3)
+    vertices, triangles = np.ascontiguousarray(vertices), np.ascontiguousarray(triangles, dtype=np.int64)
+    code = bounding_box(vertices, triangles, used, lower, upper)
+    if code != FOUND:
+        raise MeshError("mesh", _REASONS[code].format(len(vertices) - 1))
+    return lower, upper, int(np.count_nonzero(used))
 
 
 def referenced_vertices(vertices: Points, triangles: Triangles) -> Points:

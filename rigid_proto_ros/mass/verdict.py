@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.errors import MeshError
 from ..base.vectors import BoolArray, FloatArray, Points, Triangles
-from ..mesh.intersection import Nesting, component_nesting
+from ..mesh.intersection import MAX_SELF_CROSSING, Nesting, component_nesting
 from ..mesh.solids import can_unite, united_surface
 from ..mesh.topology import (
     Components,
@@ -24,7 +24,7 @@ from ..mesh.topology import (
     surplus_copies,
     turned_triangles,
 )
-from .moments import Moments, referenced_vertices, solid_moments
+from .moments import effect_of_strips, extent, largest_effect, solid_moments
 
 INFO, WARNING, ERROR = "info", "warning", "error"
 NESTED = "nested_components"
@@ -44,8 +44,6 @@ GAP = 5e-3
 """Part of the diagonal up to which what keeps a surface open is called a gap, not a hole."""
 MAX_RIM = 20_000
 """Unbalanced edges up to which caps are tried; following more takes too long."""
-MAX_SELF_CROSSING = 20_000
-"""Triangles above which a single component isn't examined for self-intersection."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +89,10 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _check_edges(verdict: Verdict, topology: Topology, vertices: Points) -> None:
-    """Check for open edges, inconsistent winding and duplicate faces, and for the effect of closing holes."""
+def _check_edges(verdict: Verdict, topology: Topology, vertices: Points, size: float) -> None:
+    """Check for open edges, inconsistent winding and duplicate faces, and for the effect of closing holes; ``size``:
+    the box's diagonal.
+    """
     verdict.watertight = topology.odd == 0
     verdict.winding_consistent = topology.flipped == 0
     surplus = int(np.count_nonzero(surplus_copies(topology)))
@@ -116,11 +116,13 @@ def _check_edges(verdict: Verdict, topology: Topology, vertices: Points) -> None
         rim = len(topology.boundary)
         edges = counted(rim, "boundary edge")
         wide = mesh_topology(vertices, topology.corners, GAP)
-        gap = "" if wide.odd else f" at gaps up to {wide.farthest:.2g} wide"
         if topology.odd > rim:
             edges += f" and {counted(topology.odd - rim, 'edge')} of 3 or more faces"
-        remedy = f"--repair (mesh_repair) welds {f'gaps up to {WELD:g} of the size' if gap else 'edges'} and caps holes"
-        verdict.add("open", ERROR, f"open surface with {edges}{gap}{known}", remedy)
+        remedy = "--repair (mesh_repair) welds edges and caps holes"
+        if not wide.odd:
+            edges += f" at gaps up to {wide.farthest:.2g} wide, {wide.farthest / size:.2g} of the size"
+            edges += f" (--repair welds up to {WELD:g} of it, and caps what is wider as holes)"
+        verdict.add("open", ERROR, f"open surface with {edges}{known}", remedy)
         known = ""
     if topology.flipped:
         edges = f"{counted(topology.flipped, 'edge')} used twice in the same direction"
@@ -139,21 +141,13 @@ def _tell_joined(verdict: Verdict, topology: Topology, vertices: Points) -> None
 
 
 def _joined_effect(topology: Topology, vertices: Points) -> float | None:
-    """The largest change of volume, relative to itself, or of the tensor, relative to its largest entry, by any way to
-    close what joining closed: strips along the open edges, no wider than the corners are apart. None for a surface
-    without a volume.
-
-    As in ``_hole_effect``; the strips' area is at most (length + width) · width for each edge.
-    """
+    """See ``effect_of_strips``; None for a surface without a volume."""
     try:
         moments = solid_moments(vertices, topology.corners)
     except MeshError:
         return None
-    ends = vertices[topology.seam[:, :2]]
-    lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
-    reach = float(np.max(np.linalg.norm(ends - moments.centroid, axis=2))) + topology.farthest
-    area = float(np.sum(lengths + topology.farthest)) * topology.farthest
-    return _effect(moments, [area * reach**k / (k + 2) for k in (1, 2, 3)])
+    effect = effect_of_strips(vertices, topology.seam, topology.farthest, moments.record)
+    return effect if effect >= 0.0 else None
 
 
 def _hole_effect(topology: Topology, vertices: Points) -> float | None:
@@ -173,20 +167,8 @@ def _hole_effect(topology: Topology, vertices: Points) -> float | None:
     a, b, c = (vertices[caps[:, k]] - moments.centroid for k in range(3))
     areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     reach = np.sqrt(np.max([np.sum(corner**2, axis=1) for corner in (a, b, c)], axis=0))
-    return _effect(moments, [float(np.sum(areas * reach**k)) / (k + 2) for k in (1, 2, 3)])
-
-
-def _effect(moments: Moments, most: list[float]) -> float | None:
-    """The largest relative change of volume or tensor where volume, first and second moments change by at most
-    ``most``; None where nothing can be said.
-    """
-    volume = abs(moments.measure)
-    added, first, second = most
-    if not added < volume:
-        return None
-    xx, _, _, yy, _, zz = np.abs(moments.second)
-    shifted = first * first / (volume - added)
-    return float(max(added / volume, (second + shifted) / max(yy + zz, xx + zz, xx + yy)))
+    effect = largest_effect(moments.record, *(float(np.sum(areas * reach**k)) / (k + 2) for k in (1, 2, 3)))
+    return effect if effect >= 0.0 else None
 
 
 def _rounded_up(value: float) -> str:
@@ -198,12 +180,15 @@ def _rounded_up(value: float) -> str:
 def _check_components(verdict: Verdict, topology: Topology, sums: Components, vertices: Points) -> None:
     """Check balanced surfaces for orientation, cavities, parts that count twice, and self-intersection."""
     count, volume = topology.components, sums.volume
-    whole = float(np.sum(volume))
+    whole, is_large = float(np.sum(volume)), len(topology.corners) > MAX_SELF_CROSSING
     verdict.inward = whole < 0.0
+    if is_large:
+        message = f"whether the surface passes through itself isn't examined beyond {MAX_SELF_CROSSING} triangles"
+        verdict.add("self_crossing_unchecked", INFO, message)
     if count > MAX_NESTED_COMPONENTS:
         message = f"{count} components are too many to check whether some overlap or lie inside others"
         verdict.add("components_unchecked", WARNING, message)
-    elif count > 1 or len(topology.corners) <= MAX_SELF_CROSSING:
+    elif count > 1 or not is_large:
         nesting = component_nesting(vertices, topology, sums)
         if nesting.complete:
             _check_winding(verdict, nesting, volume)
@@ -311,7 +296,8 @@ def _check_size(verdict: Verdict, side: float) -> None:
 def check_surface(vertices: Points, triangles: Triangles) -> Verdict:
     """The verdict on triangles (m, 3) over vertices (n, 3)."""
     verdict = Verdict()
-    bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    finite = np.isfinite(vertices)
+    bad = np.zeros(0, np.int64) if finite.all() else np.flatnonzero(~finite.all(axis=1))
     if len(triangles) == 0 or len(bad):
         verdict.usable = verdict.watertight = verdict.winding_consistent = False
         if len(bad):
@@ -320,11 +306,11 @@ def check_surface(vertices: Points, triangles: Triangles) -> Verdict:
         else:
             verdict.add("no_faces", ERROR, "the mesh has no faces")
         return verdict
-    points = referenced_vertices(vertices, triangles)
-    if len(points) < len(vertices):
-        message = f"vertices that belong to no face carry no mass: {len(vertices) - len(points)}"
+    lower, upper, used = extent(vertices, triangles)
+    if used < len(vertices):
+        message = f"vertices that belong to no face carry no mass: {len(vertices) - used}"
         verdict.add("unreferenced_vertices", INFO, message)
-    sides = points.max(axis=0) - points.min(axis=0)
+    sides = upper - lower
     topology = mesh_topology(vertices, triangles)
     verdict.components = topology.components
     _check_size(verdict, float(sides.max()))
@@ -332,7 +318,7 @@ def check_surface(vertices: Points, triangles: Triangles) -> Verdict:
         return verdict
     diagonal = float(np.linalg.norm(sides))
     sums = component_sums(vertices, topology)
-    _check_edges(verdict, topology, vertices)
+    _check_edges(verdict, topology, vertices, diagonal)
     if not len(topology.unbalanced):
         empty = abs(float(np.sum(sums.volume))) <= NO_VOLUME * diagonal**3 and _no_volume(vertices, triangles, diagonal)
         if topology.components > 1 or not empty:

@@ -29,6 +29,9 @@ WORK_LIMIT = 100_000_000
 """Visited boxes after which a result is reported as undecided: about a second."""
 TEST = 10
 """Cost of a test of two triangles, in visited boxes."""
+MAX_SELF_CROSSING = 20_000
+"""Triangles above which nobody looks whether a component passes through itself: no number depends on it, and it takes
+three times as long as reading the file."""
 TOUCHING = 1e-9
 """Fraction of the triangles' size up to which a distance or an overlap counts as rounding error."""
 SAMPLES = 24
@@ -37,6 +40,8 @@ NEAR = 1e-9
 """Fraction of a triangle's size, or of the mesh's, within which a hit near an edge, or near the ray's origin, is
 uncertain."""
 _CELLS = 1 << 20  # cells of the curve along each axis
+_SEVERAL, _NONE = -1, -2  # components below a node
+_KEY_BITS, _DIGIT_BITS, _DIGITS = 60, 10, 1 << 10  # of a place on the curve, sorted in an even number of digits
 _SPREADING = ((32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F), (4, 0x10C30C30C30C30C3),
               (2, 0x1249249249249249))  # fmt: skip  # put two zeros between the bits of a number
 
@@ -86,27 +91,89 @@ def _largest(a: _Vector) -> float:
     return max(abs(a[0]), abs(a[1]), abs(a[2]))
 
 
-def hierarchy(vertices: Points, corners: Triangles) -> Hierarchy:
-    """The hierarchy of triangles (m, 3); an empty node's lower corner lies above its upper one."""
-    points = vertices[corners]
-    own = np.concatenate([points.min(axis=1), points.max(axis=1)], axis=1)
-    lower, upper = own[:, :3].min(axis=0), own[:, 3:].max(axis=0)
-    side = np.maximum(upper - lower, 1e-290)  # one cell where the quotient would overflow
-    x = ((0.5 * own[:, :3] + 0.5 * own[:, 3:] - lower) * ((_CELLS - 1) / side)).astype(np.int64)
+@njit(error_model="numpy", allocates=False)
+def _spread_bits(x: int) -> int:
+    """x with two zeros between its bits."""
     for shift, mask in _SPREADING:
         x = (x | (x << shift)) & mask
-    order = np.argsort(x[:, 0] | x[:, 1] << 1 | x[:, 2] << 2, kind="stable")
-    own, leaves = own[order], 1
-    while leaves * LEAF < len(order):
+    return x
+
+
+@njit(error_model="numpy", allocates=False)
+def _enclose(boxes: FloatArray, i: int, others: FloatArray, j: int) -> None:
+    """Extend box i to hold box j of ``others``."""
+    for k in range(3):
+        boxes[i, k] = min(boxes[i, k], others[j, k])
+        boxes[i, k + 3] = max(boxes[i, k + 3], others[j, k + 3])
+
+
+@njit(error_model="numpy", allocates=False)
+def _sort(keys: IntArray, values: IntArray, keys_room: IntArray, values_room: IntArray) -> None:
+    """Sort keys (m,), none negative, and values (m,) with them, digit by digit; equal keys keep their order."""
+    starts = local_integers(_DIGITS)
+    for digit in range(0, _KEY_BITS, 2 * _DIGIT_BITS):
+        for shift in (digit, digit + _DIGIT_BITS):  # there and back
+            for d in range(_DIGITS):
+                starts[d] = 0
+            for i in range(keys.shape[0]):
+                starts[(keys[i] >> shift) & (_DIGITS - 1)] += 1
+            place = 0
+            for d in range(_DIGITS):
+                starts[d], place = place, place + starts[d]
+            for i in range(keys.shape[0]):
+                d = (keys[i] >> shift) & (_DIGITS - 1)
+                keys_room[starts[d]], values_room[starts[d]] = keys[i], values[i]
+                starts[d] += 1
+            keys, keys_room, values, values_room = keys_room, keys, values_room, values
+
+
+@exported("f8[:,:]", "i8[:,:]", "i8[:]", "f8[:,:]", "i8[:]", "f8[:,:]", "f8[:,:]", nogil=True)
+def build_hierarchy(
+    vertices: Points,
+    corners: Triangles,
+    room: IntArray,
+    unsorted: FloatArray,
+    order: IntArray,
+    own: FloatArray,
+    boxes: FloatArray,
+) -> None:
+    """Fill the Hierarchy of triangles (m, 3); boxes (2·leaves − 1, 6) for a power of two of leaves that hold them all.
+    room (3·m,) and unsorted (m, 6): workspace.
+    """
+    m, leaves = corners.shape[0], (boxes.shape[0] + 1) // 2
+    keys, keys_room, order_room = room[:m], room[m : 2 * m], room[2 * m : 3 * m]
+    for node in range(boxes.shape[0]):
+        for k in range(3):
+            boxes[node, k], boxes[node, k + 3] = np.inf, -np.inf
+    for t in range(m):
+        a, b, c = vertices[corners[t, 0]], vertices[corners[t, 1]], vertices[corners[t, 2]]
+        for k in range(3):
+            unsorted[t, k], unsorted[t, k + 3] = min(a[k], b[k], c[k]), max(a[k], b[k], c[k])
+        _enclose(boxes, 0, unsorted, t)
+    for t in range(m):
+        key = 0
+        for k in range(3):
+            side = max(boxes[0, k + 3] - boxes[0, k], 1e-290)  # one cell where the quotient would overflow
+            middle = 0.5 * unsorted[t, k] + 0.5 * unsorted[t, k + 3]
+            key |= _spread_bits(int((middle - boxes[0, k]) * ((_CELLS - 1) / side))) << k
+        keys[t], order[t] = key, t
+    _sort(keys, order, keys_room, order_room)
+    for i in range(m):
+        for k in range(6):
+            own[i, k] = unsorted[order[i], k]
+        _enclose(boxes, leaves - 1 + i // LEAF, own, i)
+    for node in range(leaves - 2, -1, -1):
+        _enclose(boxes, node, boxes, 2 * node + 1)
+        _enclose(boxes, node, boxes, 2 * node + 2)
+
+
+def hierarchy(vertices: Points, corners: Triangles) -> Hierarchy:
+    """The hierarchy of triangles (m, 3); an empty node's lower corner lies above its upper one."""
+    m, leaves = len(corners), 1
+    while leaves * LEAF < m:
         leaves *= 2
-    level = np.full((leaves * LEAF, 6), [np.inf] * 3 + [-np.inf] * 3)
-    level[: len(own)] = own
-    boxes, size = np.empty((2 * leaves - 1, 6)), LEAF
-    while leaves > 0:
-        level = level.reshape(leaves, size, 6)
-        level = np.concatenate([level[:, :, :3].min(axis=1), level[:, :, 3:].max(axis=1)], axis=1)
-        boxes[leaves - 1 : 2 * leaves - 1] = level
-        leaves, size = leaves // 2, 2
+    order, own, boxes = np.empty(m, np.int64), np.empty((m, 6)), np.empty((2 * leaves - 1, 6))
+    build_hierarchy(vertices, corners, np.empty(3 * m, np.int64), np.empty((m, 6)), order, own, boxes)
     return order, own, boxes
 
 
@@ -182,7 +249,62 @@ def _share_a_corner(corners: Triangles, i: int, j: int) -> bool:
     return False
 
 
-@exported(*("f8[:,:]", "i8[:,:]", "i8[:]", "i8[:]", "f8[:,:]", "f8[:,:]", "i8", "b1[:,:]"), returns="i8 b1", nogil=True)
+@njit(error_model="numpy", allocates=False)
+def _components_of_nodes(component: IntArray, order: IntArray, of_node: IntArray) -> None:
+    """Fill of_node (2·leaves − 1,) with the component of all triangles below a node, -1 where there are several, -2
+    where there are none.
+    """
+    inner = of_node.shape[0] // 2
+    for leaf in range(inner + 1):
+        of_node[inner + leaf] = _NONE
+        for i in range(leaf * LEAF, min((leaf + 1) * LEAF, order.shape[0])):
+            c, before = component[order[i]], of_node[inner + leaf]
+            of_node[inner + leaf] = c if before in (c, _NONE) else _SEVERAL
+    for node in range(inner - 1, -1, -1):
+        one, other = of_node[2 * node + 1], of_node[2 * node + 2]
+        of_node[node] = one if one == other or other == _NONE else _SEVERAL
+
+
+@njit(error_model="numpy", allocates=False)
+def _leaves_cross(
+    vertices: Points,
+    corners: Triangles,
+    component: IntArray,
+    order: IntArray,
+    own: FloatArray,
+    boxes: FloatArray,
+    a: int,
+    b: int,
+    also_within: bool,
+    crossing: BoolArray,
+) -> tuple[int, int]:
+    """Pairs of one triangle of leaf a with a later one of leaf b that intersect, as ``crossings`` counts them, and how
+    many pairs were tested.
+    """
+    within, tests = 0, 0
+    for i in range(a * LEAF, min((a + 1) * LEAF, order.shape[0])):
+        if not _boxes_meet(boxes, boxes.shape[0] // 2 + b, own, i):
+            continue
+        s = order[i]
+        for j in range(max(i + 1, b * LEAF), min((b + 1) * LEAF, order.shape[0])):
+            t = order[j]
+            c, d = component[s], component[t]
+            if not _boxes_meet(own, i, own, j) or crossing[c, d]:
+                continue
+            if c == d and (not also_within or _share_a_corner(corners, s, t)):
+                continue
+            tests += 1
+            if triangles_cross(vertices, corners, s, t):
+                within += c == d
+                crossing[c, d] = crossing[d, c] = c != d
+    return within, tests
+
+
+@exported(
+    *("f8[:,:]", "i8[:,:]", "i8[:]", "i8[:]", "f8[:,:]", "f8[:,:]", "i8[:]", "b1", "i8", "b1[:,:]"),
+    returns="i8 b1",
+    nogil=True,
+)
 def crossings(
     vertices: Points,
     corners: Triangles,
@@ -190,42 +312,45 @@ def crossings(
     order: IntArray,
     own: FloatArray,
     boxes: FloatArray,
+    of_node: IntArray,
+    also_within: bool,
     limit: int,
     crossing: BoolArray,
 ) -> tuple[int, bool]:
-    """Number of intersecting pairs of triangles of one component without a common corner, and whether ``limit`` visits
-    sufficed; fills ``crossing`` (k, k) with which components intersect. corners (m, 3): over welded vertices; component
-    (m,); order, own and boxes: the Hierarchy.
+    """Number of intersecting pairs of triangles of one component without a common corner, if ``also_within``, and
+    whether ``limit`` visits sufficed; fills ``crossing`` (k, k) with which components intersect. corners (m, 3): over
+    welded vertices; component (m,); order, own and boxes: the Hierarchy; of_node (2·leaves − 1,): workspace.
+
+    Both nodes of a pair have the same level, so that each pair is visited once.
     """
     inner = boxes.shape[0] // 2
     for c in range(crossing.shape[0]):
         for d in range(crossing.shape[0]):
             crossing[c, d] = False
+    _components_of_nodes(component, order, of_node)
     within, visits = 0, 0
-    stack = local_integers(64)
-    for i in range(order.shape[0]):
-        s = order[i]
-        stack[0] = 0
-        top = 1
-        while top > 0:
-            top -= 1
-            node = stack[top]
-            visits += 1
-            if not _boxes_meet(boxes, node, own, i):
-                continue
-            if node < inner:
-                stack[top], stack[top + 1] = 2 * node + 1, 2 * node + 2
-                top += 2
-                continue
-            for j in range(max(i + 1, (node - inner) * LEAF), min((node - inner + 1) * LEAF, order.shape[0])):
-                t = order[j]
-                c, d = component[s], component[t]
-                if crossing[c, d] or not _boxes_meet(own, i, own, j) or (c == d and _share_a_corner(corners, s, t)):
-                    continue
-                visits += TEST
-                if triangles_cross(vertices, corners, s, t):
-                    within += c == d
-                    crossing[c, d] = crossing[d, c] = c != d
+    stack = local_integers(512)  # at most three pairs wait a level, beside the four of the last one
+    stack[0], stack[1] = 0, 0
+    top = 2
+    while top > 0:
+        top -= 2
+        a, b = stack[top], stack[top + 1]
+        visits += 1
+        if not also_within and of_node[a] == of_node[b] >= 0:
+            continue
+        if a != b and not _boxes_meet(boxes, a, boxes, b):
+            continue
+        if a < inner:
+            for one in (2 * a + 1, 2 * a + 2):
+                for other in (2 * b + 1, 2 * b + 2):
+                    if other >= one:
+                        stack[top], stack[top + 1] = one, other
+                        top += 2
+            continue
+        found, tests = _leaves_cross(
+            vertices, corners, component, order, own, boxes, a - inner, b - inner, also_within, crossing
+        )
+        within, visits = within + found, visits + TEST * tests
         if visits > limit:
             return within, False
     return within, True
@@ -368,11 +493,12 @@ def sides_of_components(
 @dataclass(frozen=True)
 class Nesting:
     """inside (k, k) bool: component i lies in component j. crossing (k, k) bool: their surfaces intersect. within:
-    pairs of triangles of one component that intersect. complete: False if the work limit was reached before."""
+    pairs of triangles of one component that intersect, None of a mesh of more than MAX_SELF_CROSSING. complete: False
+    if the work limit was reached before."""
 
     inside: BoolArray
     crossing: BoolArray
-    within: int
+    within: int | None
     complete: bool
 
     @property
@@ -392,7 +518,9 @@ def component_nesting(vertices: Points, topology: Topology, sums: Components) ->
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     order, own, boxes = hierarchy(vertices, topology.corners)
     found = np.empty((count, count), dtype=bool)
-    within, complete = crossings(vertices, topology.corners, component, order, own, boxes, WORK_LIMIT, found)
+    examined = len(component) <= MAX_SELF_CROSSING
+    tree = order, own, boxes, np.empty(len(boxes), np.int64)
+    within, complete = crossings(vertices, topology.corners, component, *tree, examined, WORK_LIMIT, found)
     near = np.all((sums.lower[:, None] <= sums.upper[None]) & (sums.lower[None] <= sums.upper[:, None]), axis=2)
     np.fill_diagonal(near, False)
     inside = np.zeros((count, count), dtype=bool)
@@ -404,10 +532,10 @@ def component_nesting(vertices: Points, topology: Topology, sums: Components) ->
         reach = NEAR * float(np.linalg.norm(sums.upper.max(axis=0) - sums.lower.min(axis=0)))
         outside, inner = np.empty_like(near), np.empty_like(near)
         room = np.empty(count, np.int64), np.empty((2, count), dtype=bool)
-        tree = order, boxes, samples
-        decided = sides_of_components(vertices, topology.corners, component, *tree, near, reach, outside, inner, *room)
+        rays = order, boxes, samples
+        decided = sides_of_components(vertices, topology.corners, component, *rays, near, reach, outside, inner, *room)
         on_both_sides = outside & inner
         found = found | on_both_sides | on_both_sides.T
         inside = inner & ~outside & ~found
         complete = complete and decided
-    return Nesting(inside, found, int(within), bool(complete))
+    return Nesting(inside, found, int(within) if examined else None, bool(complete))

@@ -157,7 +157,9 @@ def _surfaces() -> dict[str, str]:
         "remedy": "it flies as shell, points or box with a mass; "
         "or weld and cap it: rigid_proto inspect FILE --repair says what that gives",
         "duplicate_faces": "{0} duplicate faces, which would count twice",
-        "joined_corners": "{0} corners at open edges joined to others up to {1} away",
+        "joined_corners": "{0} corners at open edges joined to others up to {1} away; volume and tensor depend on it "
+        "by at most {2} %",
+        "joined_corners_of_open": "{0} corners at open edges joined to others up to {1} away",
         "unchecked": "whether it passes through itself isn't judged here; rigid_proto inspect does",
         "size": said(1e70 * tetrahedron, faces, "size").replace("1e+70", "{0:.3g}"),
     }

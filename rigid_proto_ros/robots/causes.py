@@ -42,6 +42,8 @@ _FACTORS = {
 }
 _LARGEST_POWER = 9
 """Of ten, by which a single entry may be off: from kg m² to g mm²."""
+AT_ORIGIN = "COM left at the link's origin", "COM at the mesh's origin"
+"""Causes of a COM that may be no slip: frames are often put at the COM on purpose."""
 
 
 _TURNS = [
@@ -199,8 +201,8 @@ def explain_center(given: Vector3, truth: MassProperties, parts: LinkShapes) -> 
     """The usual mistake that turns the true COM into ``given`` (3,) [m, link axes]; empty when none does."""
     com, use = truth.center_of_mass, parts.first.pose
     guesses = [
-        ("COM left at the link's origin", np.zeros(3)),
-        ("COM at the mesh's origin", use.position),
+        (AT_ORIGIN[0], np.zeros(3)),
+        (AT_ORIGIN[1], use.position),
         ("COM in mesh coordinates: the mesh's pose in the link left out", use.rotation.T @ (com - use.position)),
         ("COM in mm", 1000.0 * com),
         ("COM in cm", 100.0 * com),

@@ -6,7 +6,8 @@
 * unknown: it can't be compared, for want of a shape that encloses a volume, or because something that the link shows
   can't be found or read;
 * uniform: it is the uniform solid's, to the tolerance and the digits printed;
-* explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py);
+* explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py); a COM at an
+  origin explains a tensor that fits, or one that no mass inside the shapes has, and no other;
 * not judged: all shapes are primitives, which often stand in for the parts that were weighed or drawn;
 * impossible for its shape: no mass distribution inside the link's shapes has it;
 * not uniform: it isn't the uniform solid's, but some distribution inside the shapes has it.
@@ -38,7 +39,7 @@ from ..mass.tensor import check_tensor
 from ..mesh.locate import Search
 from ..mesh.reading import load_mesh
 from ..mesh.solids import convex_hull
-from .causes import LIMIT, explain_center, explain_inertia
+from .causes import AT_ORIGIN, LIMIT, explain_center, explain_inertia
 from .link_shapes import LinkShapes, Meshes
 from .reading import COLLISION, HERE, VISUAL, Link, Shape, check_finite, check_inertial, read_robot
 
@@ -204,13 +205,17 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
         center_left > tolerance,
     ):
         causes = ()  # by half they say nothing, where the shapes may be those of something else
+    # A COM at an origin is a slip where the tensor is that of the shapes, or a slip of it. Beside another tensor, as of
+    # a body weighed or computed with its densities, the frame may have been put at the COM on purpose.
+    on_purpose = inertia_left > tolerance and not of_tensor and set(causes) <= set(AT_ORIGIN)
+    off = max(inertia_left, center_left) > tolerance
     density = link.mass / sum(solid.mass for solid in parts.solids)
     note = f"density {density:.4g} kg/m³"
     if not 1.0 <= density <= 25000.0:
         note += ", which no solid has; check the units of mesh and mass"
     return replace(
         plain,
-        status=EXPLAINED if causes else NOT_UNIFORM if max(inertia_left, center_left) > tolerance else UNIFORM,
+        status=EXPLAINED if causes and not on_purpose else NOT_UNIFORM if off else UNIFORM,
         center_of_mass_error=float(np.max(offset)) / parts.diagonal,
         inertia_error=inertia_error,
         ratio=ratio,
@@ -292,9 +297,12 @@ def _possible(
         note = f"its shapes are primitives only: not judged against them; {diagnosis.note}"
         return replace(diagnosis, status=NOT_JUDGED, note=note)
     if diagnosis.status != UNIFORM and inside and (reason := beyond_shapes(link, np.concatenate(inside))):
-        if diagnosis.status == EXPLAINED:
-            return replace(diagnosis, causes=(*diagnosis.causes, reason))
-        return replace(diagnosis, status=BEYOND_SHAPE, causes=(reason, *diagnosis.causes))
+        if diagnosis.causes:
+            return replace(diagnosis, status=EXPLAINED, causes=(*diagnosis.causes, reason))
+        return replace(diagnosis, status=BEYOND_SHAPE, causes=(reason,))
+    if diagnosis.status == NOT_UNIFORM and diagnosis.causes:
+        told = f"{diagnosis.causes[0]}: maybe on purpose, since the tensor isn't that of the shapes either"
+        return replace(diagnosis, causes=(), info=(*diagnosis.info, told))
     return diagnosis
 
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from mass_solids import sphere
 from mesh_files import CUBE_TRIANGLES, CUBE_VERTICES, obj, stl
 
+from rigid_proto_ros.base.errors import MeshError
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.inspection import verify_moments
 from rigid_proto_ros.mass.moments import referenced_vertices
@@ -118,3 +119,12 @@ def test_an_stl_whose_corners_are_rounded_each_for_itself_has_its_solids_mass(tm
     body = mesh_body(str(tmp_path / "cube.stl"))
     assert body.verdict.closed and body.verdict.joined > 0
     assert body.moments.mass_properties(density=1000.0).mass == pytest.approx(1000.0, rel=1e-6)
+
+
+def test_a_gap_is_told_with_what_repair_would_do_and_did(tmp_path):
+    vertices, triangles = apart(CUBE_VERTICES, CUBE_TRIANGLES, 1e-3 * DIAGONAL)
+    body = mesh_body(read_mesh(obj(vertices, triangles), MADE))
+    assert "of the size (--repair welds up to 1e-05 of it, and caps what is wider as holes)" in body.verdict.reason
+    repaired = mesh_body(read_mesh(obj(vertices, triangles), MADE), repair=True)
+    with pytest.raises(MeshError, match="repaired: capped 12 holes with 36 edges; .*, and then: "):
+        repaired.moments.mass_properties(mass=1.0)

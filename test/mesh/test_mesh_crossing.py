@@ -31,10 +31,14 @@ def exactly_cross(first: np.ndarray, second: np.ndarray) -> bool:
     return any(pierces(s[k], s[(k + 1) % 3], t) for s, t in ((p, q), (q, p)) for k in range(3))
 
 
-def found(points: np.ndarray, corners: np.ndarray, component: np.ndarray, limit: int = WORK_LIMIT) -> tuple:
+def found(
+    points: np.ndarray, corners: np.ndarray, component: np.ndarray, limit: int = WORK_LIMIT, also_within: bool = True
+) -> tuple:
     count = int(component.max()) + 1
     crossing = np.empty((count, count), dtype=bool)
-    within, complete = crossings(points, corners, component, *hierarchy(points, corners), limit, crossing)
+    tree = hierarchy(points, corners)
+    of_node = np.empty(len(tree[2]), np.int64)
+    within, complete = crossings(points, corners, component, *tree, of_node, also_within, limit, crossing)
     return within, crossing, complete
 
 
@@ -62,6 +66,8 @@ def test_crossing_triangles_are_those_that_exact_arithmetic_finds():
     assert complete and np.array_equal(crossing, expected) and crossing.any() and not crossing.all()
     assert within == sum(component[i] == component[j] for i, j in pairs)
     assert not found(points, corners, component, 10)[2]
+    none, crossing, complete = found(points, corners, component, also_within=False)
+    assert complete and none == 0 and np.array_equal(crossing, expected)
 
 
 def test_triangles_that_share_a_corner_do_not_cross():

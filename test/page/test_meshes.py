@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -165,7 +166,14 @@ def test_corners_that_differ_by_rounding_count_as_joined_on_the_page_too(page_fi
     told = on_the_page(page_file, tmp_path)
     assert told["cracked.obj"]["closed"] and not told["gaping.obj"]["closed"]
     mesh = load_mesh(str(tmp_path / "cracked.obj"))
-    moments = mesh_body(mesh).moments.moments("solid")
+    body = mesh_body(mesh)
+    said = [
+        re.split(r"([\d.]+(?:e-?\d+)?)", text)
+        for text in (body.verdict.findings[0].message, told["cracked.obj"]["messages"][0])
+    ]
+    assert said[0][::2] == said[1][::2] and "depend on it by at most" in said[0][4]
+    assert list(map(float, said[0][1::2])) == list(map(float, said[1][1::2]))
+    moments = body.moments.moments("solid")
     flat = [moments.measure, *moments.reference, *moments.center, *moments.center_low, *moments.second]
     assert told["cracked.obj"]["moments"][0] == [float(x) for x in flat]
     check_moments({"moments": told["cracked.obj"]["moments"]}, mesh, MODELS[1:])

@@ -190,9 +190,8 @@ def test_a_bounding_boxs_tensor_is_recognised(capsys, tmp_path):
 def test_a_mesh_may_be_named_for_the_link_that_shows_it(capsys, tmp_path, truth):
     status, (link,) = compare(capsys, tmp_path, urdf(*truth, mesh="lost/folder/hammer.stl"), "hammer")
     assert (status, link["link"]) == (0, "head")
-    # A little more about every axis: a body of this shape can have it, the uniform one doesn't.
     com, six = truth
-    other = urdf(com, six + 0.03 * max(six) * np.array([1, 0, 0, 1, 0, 1]), mesh="lost/folder/hammer.stl")
+    other = urdf(com, heavier_ends(six), mesh="lost/folder/hammer.stl")
     assert compare(capsys, tmp_path, other, "hammer")[0] == 1
     assert compare(capsys, tmp_path, other, "hammer", "--tolerance", "0.1")[0] == 0
 
@@ -243,3 +242,45 @@ def test_what_a_comparison_would_pass_over_is_refused(capsys, tmp_path, truth, a
     said = capsys.readouterr()
     option = next(word for word in arguments if word.startswith("--"))
     assert not said.out and said.err.count("\n") == 1 and option.lstrip("-") in said.err
+
+
+def heavier_ends(six):
+    """A tensor that a body of this shape can have, and the uniform one hasn't."""
+    return six + 0.03 * max(six) * np.array([1, 0, 0, 1, 0, 1])
+
+
+@pytest.mark.parametrize(
+    ("tensor", "word"),
+    [
+        (lambda six: six, "explained"),  # the <origin> was forgotten: the tensor is that of these shapes
+        (lambda six: 1e6 * six, "explained"),
+        (lambda six: np.array([1e-3, 0, 0, 1e-3, 0, 1e-3]), "explained"),  # a placeholder, and so is the COM
+        (heavier_ends, "not uniform"),
+        (lambda six: six * [9, 1, 1, 9, 1, 9], "explained"),  # no mass inside the shapes is so wide
+    ],
+    ids=["uniform tensor", "wrong unit", "placeholder", "weighed", "too wide"],
+)
+@pytest.mark.parametrize("stated", ['<origin xyz="0 0 0"/>', ""], ids=["origin 0 0 0", "no origin"])
+def test_a_com_at_the_links_origin_is_a_slip_unless_the_tensor_is_another_bodys(
+    capsys, tmp_path, truth, tensor, word, stated
+):
+    # The link's origin lies inside the mesh, 3 mm from its centroid.
+    com, six = truth
+    at = com - [0.003, 0, 0]
+    text = urdf(com, tensor(six)).replace(f'xyz="{words(POSITION)}"', f'xyz="{words(POSITION - at)}"')
+    text = text.replace(f'<origin xyz="{words(com)}"/>', stated)
+    status, (link,) = compare(capsys, tmp_path, text)
+    assert (link["status"], status) == (word, word == "explained")
+    told = link["causes"] if status else link["info"]
+    assert any(line.startswith("COM left at the link's origin") for line in told), (link["causes"], link["info"])
+    fixed = tmp_path / "fixed.urdf"
+    main(["inspect", "--compare", str(tmp_path / "robot.xml"), "--fix", str(fixed)])
+    assert (fixed.read_text() == text) == (word == "not uniform")
+
+
+def test_a_com_at_the_links_origin_outside_its_shapes_is_a_slip_whatever_the_tensor(capsys, tmp_path, truth):
+    com, six = truth
+    far = urdf(com, heavier_ends(six)).replace(f'xyz="{words(POSITION)}"', 'xyz="9 0 0"')
+    status, (link,) = compare(capsys, tmp_path, far.replace(f'<origin xyz="{words(com)}"/>', ""))
+    assert (status, link["status"]) == (1, "explained")
+    assert link["causes"][0] == "COM left at the link's origin" and "outside the hull" in link["causes"][1]

@@ -2,6 +2,9 @@
 """Files that were misread or refused without need: MJCF as MuJoCo compiles it, SDF as Gazebo takes it."""
 
 import os
+import resource
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from test_composite_inertia import as_one_body, assert_same
 
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.robots import mjcf, mjcf_compiler
 from rigid_proto_ros.robots.composite_inertia import lump_robot
 from rigid_proto_ros.robots.diagnosis import compare_robot
 from rigid_proto_ros.robots.reading import read_robot
@@ -101,13 +105,88 @@ PARTS = '<asset><model name="m" file="part.xml"/></asset>'
     ],
 )
 def test_an_mjcf_that_grows_beyond_all_measure_is_refused_before_mujoco_reads_it(tmp_path, monkeypatch, text):
-    mujoco = pytest.importorskip("mujoco")
-    monkeypatch.setattr(mujoco.MjSpec, "from_string", lambda _: pytest.fail("MuJoCo was asked"))
+    pytest.importorskip("mujoco")
+    monkeypatch.setattr(mjcf, "ask", lambda _: pytest.fail("MuJoCo was asked"))
     grown = '<replicate count="1000"><geom size=".1"/></replicate>'
     (tmp_path / "part.xml").write_text(f"<mujoco><worldbody><body>{grown}</body></worldbody></mujoco>")
     (tmp_path / "model.xml").write_text(f"<mujoco>{text}</mujoco>")
     with pytest.raises(InputError, match=r"replicates to \S+ elements'; accepted: at most 20000"):
         compare_robot(tmp_path / "model.xml")
+
+
+WORLD = "<mujoco>{}<worldbody>{}</worldbody></mujoco>"
+BALL = '<body><joint/><geom size=".1"/></body>'
+MODEST = {
+    "memory asked for": WORLD.format('<size memory="500G"/>', BALL),
+    "user data": WORLD.format('<size nuserdata="2000000000"/>', BALL),
+    "user data of each geom": WORLD.format('<size nuser_geom="1000000000"/>', BALL),
+    "user data of many": WORLD.format('<size nuser_body="1000000"/>', 3000 * "<body/>" + BALL),
+    "key frames": WORLD.format('<size nkey="100000000"/>', BALL),
+    "a plate made": WORLD.format(
+        '<asset><mesh name="m" builtin="plate" params="20000 20000"/></asset>', '<geom type="mesh" mesh="m"/>' + BALL
+    ),
+    "a wedge made": WORLD.format(
+        '<asset><mesh name="m" builtin="wedge" params="20000 20000 20 20 .5"/></asset>',
+        '<geom type="mesh" mesh="m"/>' + BALL,
+    ),
+    "replicated up to the limit": WORLD.format("", f'<replicate count="4900" offset="1 0 0">{BALL}</replicate>'),
+    "a grid up to the limit": WORLD.format(
+        "", '<body name="b"><flexcomp type="grid" name="f" dim="3" count="26 26 26" spacing="1 1 1" mass="1"/></body>'
+    ),
+    "a cloth up to the limit": WORLD.format(
+        "", '<body name="b"><flexcomp type="grid" name="f" dim="2" count="140 140 1" spacing="1 1 1" mass="1"/></body>'
+    ),
+    "a rope up to the limit": WORLD.format(
+        "", '<body name="b"><flexcomp type="grid" name="f" dim="1" count="19000 1 1" spacing="1 1 1" mass="1"/></body>'
+    ),
+    "cells of a grid": WORLD.format(
+        "",
+        '<body name="b"><flexcomp type="grid" name="f" dim="3" count="8 8 8" spacing="1 1 1" mass="1" dof="trilinear" '
+        'cellcount="2000 2000 2000"/></body>',
+    ),
+    "a disc without count": WORLD.format(
+        "", '<body name="b"><flexcomp type="disc" name="f" dim="2" count="130 130 1" spacing="1 1 1" mass="1"/></body>'
+    ),
+    "samples of a sensor": WORLD.format("", BALL.replace("<joint/>", '<joint name="j"/>')).replace(
+        "</mujoco>", '<sensor><jointpos joint="j" nsample="1000000000" delay=".1"/></sensor></mujoco>'
+    ),
+}
+"""MJCFs of a few lines whose counts are small, or aren't counted, and that may take minutes and gigabytes."""
+
+
+def judged_within_limits(path) -> float:
+    """That the file is judged or refused in one line within what is said; seconds of a core."""
+    code = (
+        "import sys; from rigid_proto_ros.cli.main import main; sys.exit(main(['inspect', '--compare', sys.argv[1]]))"
+    )
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=False)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert done.returncode in (0, 2), done.stderr
+    assert done.stderr.count("\n") == (done.returncode == 2), done.stderr
+    assert after.ru_maxrss <= mjcf_compiler.MEMORY_BYTES / 1024  # of the largest child so far
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("name", MODEST)
+def test_no_small_mjcf_takes_more_than_ten_seconds_and_a_gibibyte(tmp_path, name):
+    pytest.importorskip("mujoco")
+    (tmp_path / "model.xml").write_text(MODEST[name])
+    assert judged_within_limits(tmp_path / "model.xml") <= mjcf_compiler.CPU_S + 5.0
+
+
+def test_an_mjcf_that_takes_too_long_or_too_much_is_refused(tmp_path, monkeypatch):
+    pytest.importorskip("mujoco")
+    limited = "what MuJoCo compiles in"
+    path = tmp_path / "model.xml"
+    path.write_text(MODEST["a plate made"])
+    with pytest.raises(InputError, match="what MuJoCo reads"):
+        read_robot(path)
+    path.write_text(MODEST["key frames"])
+    monkeypatch.setattr(mjcf_compiler, "WALL_S", 1.5)
+    with pytest.raises(InputError, match=limited):
+        read_robot(path)
 
 
 def test_an_mjcf_too_deep_or_with_a_pipe_to_include_is_refused(tmp_path):
