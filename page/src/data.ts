@@ -14,6 +14,7 @@ export interface Words {
   readonly rate: readonly string[];
   readonly magnitude: string;
   readonly pull: string;
+  readonly freeEnd: string;
   readonly integrator: string;
   readonly needs: readonly string[];
   readonly unresolved: Readonly<Record<string, string>>;
@@ -28,7 +29,7 @@ export interface Constants {
   readonly command: Readonly<Record<"HELD_WRENCH" | "PULSE" | "IMPULSE" | "CLEAR" | "TIE_STRING" | "MOVE_STRING" | "RELEASE_STRING" | "SET_STATE" | "NO_SLOT" | "UNNAMED_SLOT", number>>;
   readonly operation: Readonly<Record<"FLY" | "BEGIN" | "CUT" | "END_DUE" | "FINISH", number>>;
   readonly flight: Readonly<Record<"REACHED" | "NEVER", number>>;
-  readonly refusal: Readonly<Record<"NO_MOMENTS" | "SCALE" | "MASS" | "TENSOR" | "ORIENTATION" | "INTEGRATOR" | "RATE" | "MAGNITUDE" | "PULL" | "UNRESOLVED" | "OUT_OF_BOUNDS", number>>;
+  readonly refusal: Readonly<Record<"NO_MOMENTS" | "SCALE" | "MASS" | "TENSOR" | "ORIENTATION" | "INTEGRATOR" | "RATE" | "MAGNITUDE" | "PULL" | "UNRESOLVED" | "OUT_OF_BOUNDS" | "AT_FREE_END", number>>;
   readonly load: Readonly<Record<"WORLD_AXES" | "BODY_AXES" | "NORMAL_AXES" | "AT_COM" | "AT_POINT" | "AT_VERTEX" | "ON_RAY" | "LOAD" | "LOAD_AXES" | "PLACE" | "POINT" | "FORCE" | "TORQUE" | "NORMAL" | "FORCE_WORLD" | "FORCE_BODY", number>>;
   readonly body: Readonly<Record<"MASS" | "COM" | "INERTIA" | "MOMENTS" | "AXES" | "BODY_SCALE" | "LENGTH" | "BODY", number>>;
   readonly string: Readonly<Record<"KNOT" | "ORIGIN" | "TARGET" | "REST" | "PUSHES", number>>;

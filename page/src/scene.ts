@@ -86,6 +86,8 @@ export class Refusals {
         return filled(words.magnitude, { 0: a, 1: b, 2: c });
       case refusal.PULL:
         return filled(words.pull, { 0: a, 1: b, 2: c });
+      case refusal.AT_FREE_END:
+        return filled(words.freeEnd, { 0: a, 1: b, 2: c });
       case refusal.UNRESOLVED:
         return filled(words.unresolved[String(detail)] ?? "", { 0: frame, 1: String(vertices - 1) });
       default:

@@ -98,17 +98,24 @@ def _turning(body: BodyRow, rx: float, ry: float, rz: float, x: float, y: float,
 
 
 @njit(error_model="numpy", allocates=False)
+def least_span(rx: float, ry: float, rz: float, row: StateRow, rest_length: float) -> float:
+    """Length [m] up to which a span from the point r [m, body axes] has no direction: NO_DIRECTION rest lengths, or the
+    rounding error of the positions that it connects.
+    """
+    size = length_of(row[0], row[1], row[2]) + length_of(rx, ry, rz)
+    return max(NO_DIRECTION * rest_length, ROUNDINGS * 2.0**-52 * size)
+
+
+@njit(error_model="numpy", allocates=False)
 def effective_mass(
     body: BodyRow, rx: float, ry: float, rz: float, row: StateRow, span: Vector, rest_length: float
 ) -> float:
     """m_eff [kg] of the point r [m, body axes] of a body (BODY,) along ``span`` [world]. The mean of 1/m_eff over all
-    directions is used if the span has no direction: shorter than NO_DIRECTION rest lengths, or than the rounding error
-    of the positions that it connects.
+    directions is used if the span has no direction (``least_span``).
     """
     x, y, z = span
     length = length_of(x, y, z)
-    size = length_of(row[0], row[1], row[2]) + length_of(rx, ry, rz)
-    if length > max(NO_DIRECTION * rest_length, ROUNDINGS * 2.0**-52 * size):
+    if length > least_span(rx, ry, rz, row, rest_length):
         a, b, c, d, e, f, g, h, i = matrix_elements(row[3], row[4], row[5], row[6])
         nx, ny, nz = a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
         turning = _turning(body, rx, ry, rz, nx / length, ny / length, nz / length)

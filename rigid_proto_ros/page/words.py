@@ -41,6 +41,7 @@ def words() -> dict[str, Any]:
         "rate": [_refused(rf.RATE, k, numbers) for k in range(len(rf.RATES))],
         "magnitude": _refused(rf.MAGNITUDE, 0, numbers),
         "pull": _refused(rf.PULL, 0, numbers),
+        "freeEnd": _refused(rf.AT_FREE_END, 0, numbers),
         "integrator": _integrator(),
         "needs": NEEDS,
         "unresolved": {

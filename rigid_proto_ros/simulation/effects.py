@@ -36,7 +36,7 @@ from .commands import CLEAR, MOVE_STRING, RELEASE_STRING, SET_STATE, TIE_STRING
 from .flight import EVENT, FLIGHT, LOAD_ROW
 from .record import MESH, SCENE, make_body, meets, needs_of, set_rules
 from .refusals import REFUSAL, refuse
-from .string_control import change_string, follows_rates, move_knot, move_string
+from .string_control import begins_clear, change_string, follows_rates, move_knot, move_string
 
 FLY, BEGIN, APPLY, CUT, FINISH, END_DUE, END_ALL = range(7)
 """Operations of a call, at the flight's current time. APPLY: apply the commands put last. CUT: end the segment,
@@ -193,6 +193,9 @@ def _may_follow(
     for k in range(3):
         moved = moved or new.string_attach[k] != old.string_attach[k]
     if not follows_rates(new, body, tied, new.string_attach if moved else flight.string_attach, refusal):
+        return False
+    ties = new.string_attached and not old.string_attached
+    if ties and not begins_clear(new, body, flight.row, new.string_attach, new.string_target, refusal):
         return False
     # Where the next reset ties it.
     return not new.string_attached or follows_rates(new, body, True, new.string_attach, refusal)

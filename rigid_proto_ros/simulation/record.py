@@ -43,7 +43,7 @@ from ..parameters.declarations import PARAMETERS, PATTERNS, Parameter
 from . import refusals as rf
 from .flight import FLIGHT, NEVER
 from .refusals import REFUSAL, refuse, refuse_tensor
-from .string_control import follows_rates, tie
+from .string_control import begins_clear, follows_rates, tie
 
 MAX_BALLASTS = 32
 
@@ -354,5 +354,7 @@ def begin_with_body(scene: np.record, flight: np.record, refusal: np.record) -> 
     if not follows_rates(scene, body, scene.string_attached, scene.string_attach, refusal):
         return False
     if scene.string_attached:
+        if not begins_clear(scene, body, flight.row, scene.string_attach, scene.string_target, refusal):
+            return False
         tie(scene, flight, scene.string_target, 0, scene.initial_string_mass)
     return True

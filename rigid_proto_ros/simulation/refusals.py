@@ -37,7 +37,8 @@ REFUSAL = record_type(
     PULL,  # of a string's target; numbers: the target
     UNRESOLVED,  # detail: why a load's point wasn't found (motion/loads.py)
     OUT_OF_BOUNDS,  # detail: place of the number in SCENE (simulation/record.py); numbers: the number
-) = range(12)
+    AT_FREE_END,  # of a string that pushes; numbers: the target
+) = range(13)
 
 RATES = (
     ("linear_damping", "N s/m"),
@@ -70,7 +71,7 @@ def refuse_tensor(refusal: np.record, flaw: int, inertia: Matrix3, given: int) -
 
 
 def refused_command(refusal: np.record) -> CommandRefused:
-    """The error that says an INTEGRATOR, RATE, MAGNITUDE or PULL."""
+    """The error that says an INTEGRATOR, RATE, MAGNITUDE, PULL or AT_FREE_END."""
     a, b, c = refusal.numbers.tolist()
     if refusal.code == INTEGRATOR:
         try:
@@ -90,6 +91,9 @@ def refused_command(refusal: np.record) -> CommandRefused:
         received = f"{a:.3g} m/s² and {b:.3g} rad/s²"
         accepted = f"at most {MAX_ACCELERATION:g} of each for a body of {c:g} kg"
         return CommandRefused("magnitude", "wrench", received, accepted)
+    if refusal.code == AT_FREE_END:
+        accepted = "a target away from the knot, where a string that pushes has a direction"
+        return CommandRefused("integrator", "string target", [a, b, c], accepted)
     accepted = f"a target that pulls with at most {MAX_ACCELERATION:g} m/s²"
     return CommandRefused("magnitude", "string target", [a, b, c], accepted)
 

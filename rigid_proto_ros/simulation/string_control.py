@@ -12,9 +12,11 @@ import math
 import numpy as np
 
 from ..base.compilation import copy_numbers, local_numbers, njit
-from ..base.vectors import FloatArray, Triangles, Vector3
-from ..motion.body import AXES, BODY_SCALE, COM, LENGTH, MASS, MAX_ACCELERATION, MOMENTS, BodyRow, arm
+from ..base.rotation import rotate
+from ..base.vectors import FloatArray, StateRow, Triangles, Vector3
+from ..motion.body import AXES, BODY_SCALE, COM, INERTIA, LENGTH, MASS, MAX_ACCELERATION, MOMENTS, BodyRow, arm
 from ..motion.integrators.auto import FASTEST
+from ..motion.integrators.string_law import APPROACH
 from ..motion.state import to_body_axes
 from ..motion.string import (
     KNOT,
@@ -29,6 +31,8 @@ from ..motion.string import (
     effective_mass,
     energy_of,
     free_end_at,
+    least_span,
+    length_of,
     most_yielding,
     span_of,
     spring_of,
@@ -37,6 +41,12 @@ from ..motion.surface import nearest_point
 from . import refusals as rf
 from .flight import NEVER
 from .refusals import refuse
+
+CLEAR_S = 4e-9
+"""[s] Some of the shortest steps."""
+
+ALIKE = 2.0**-40
+"""Part of its size by which two bodies' numbers may differ by rounding, made in two ways."""
 
 MESH_AXES, OF_BODY, OF_WORLD = 0.0, 1.0, 2.0
 """Coordinates of the point at which a command ties the string: of the mesh, from the COM in body axes, or of the
@@ -83,6 +93,28 @@ def follows_rates(scene: np.record, body: BodyRow, tied: bool, knot: Vector3, re
     damping, ratio = 2.0 * math.sqrt(stiffness * mass) * yields, scene.string_damping_ratio
     most = FASTEST / damping if damping > 0.0 else math.inf
     return good and _follows(rf.STRING_DAMPING_RATIO, ratio, most, ratio * damping, refusal)
+
+
+@njit(error_model="numpy", allocates=False)
+def begins_clear(
+    scene: np.record, body: BodyRow, row: StateRow, knot: Vector3, end: Vector3, refusal: np.record
+) -> bool:
+    """Whether a string tied at ``knot`` (3,) [mesh coordinates] with its free end at ``end`` (3,) [m, world] begins
+    with a direction, as one that pushes must: the knot is away from the free end, and stays so for CLEAR_S.
+    """
+    rest, frequency = scene.string_rest_length, scene.string_frequency
+    if rest == 0.0 or not scene.string_bilateral:
+        return True
+    rx, ry, rz = arm(body, knot[0], knot[1], knot[2])
+    distance = length_of(*span_of(rx, ry, rz, row, end[0], end[1], end[2]))
+    x, y, z = row[10], row[11], row[12]
+    vx, vy, vz = rotate(row[3], row[4], row[5], row[6], y * rz - z * ry, z * rx - x * rz, x * ry - y * rx)
+    speed = abs(vx + row[7]) + abs(vy + row[8]) + abs(vz + row[9])
+    square = frequency * frequency if frequency > 0.0 else scene.string_stiffness / body[MASS]
+    moves = CLEAR_S * (speed + CLEAR_S * square * rest)
+    if distance > least_span(rx, ry, rz, row, rest) and moves <= APPROACH * distance:
+        return True
+    return refuse(refusal, rf.AT_FREE_END, 0, end[0], end[1], end[2])
 
 
 @njit(error_model="numpy", allocates=False)
@@ -196,6 +228,8 @@ def move_string(scene: np.record, flight: np.record, target: Vector3, refusal: n
     else:
         if not follows_rates(scene, flight.body, True, flight.string_attach, refusal):
             return False
+        if not begins_clear(scene, flight.body, flight.row, flight.string_attach, target, refusal):
+            return False
         tie(scene, flight, target, flight.string_timeout_ns, 0.0)
     if _pulls_within_limits(flight, refusal):
         return True
@@ -235,7 +269,11 @@ def move_knot(
         nearest_point(vertices, triangles, attach, foot)
         copy_numbers(foot, attach)
     if flight.tied:
+        end = local_numbers(3)
+        (end[0], end[1], end[2]), _ = _free_end(flight)
         if not follows_rates(scene, flight.body, True, attach, refusal):
+            return False
+        if not begins_clear(scene, flight.body, flight.row, attach, end, refusal):
             return False
         copy_numbers(flight.string, before)
         mass = flight.string_mass
@@ -251,6 +289,18 @@ def move_knot(
 @njit(error_model="numpy", allocates=False)
 def _same(a: Vector3, b: Vector3) -> bool:
     return bool(a[0] == b[0] and a[1] == b[1] and a[2] == b[2])
+
+
+@njit(error_model="numpy", allocates=False)
+def _alike(a: BodyRow, b: BodyRow) -> bool:
+    """Whether two bodies (BODY,) are the same but for rounding: which of two ways made their numbers doesn't count."""
+    length, inertia = ALIKE * (a[LENGTH] + abs(a[COM]) + abs(a[COM + 1]) + abs(a[COM + 2])), ALIKE * a[MOMENTS + 2]
+    same = bool(abs(a[MASS] - b[MASS]) <= ALIKE * a[MASS])
+    for k in range(3):
+        same = same and abs(a[COM + k] - b[COM + k]) <= length and a[BODY_SCALE + k] == b[BODY_SCALE + k]
+    for k in range(9):
+        same = same and abs(a[INERTIA + k] - b[INERTIA + k]) <= inertia
+    return same
 
 
 @njit(error_model="numpy", allocates=False)
@@ -280,7 +330,5 @@ def change_string(old: np.record, new: np.record, flight: np.record, old_body: B
     same = same and old.string_damping_ratio == new.string_damping_ratio
     same = same and old.string_rest_length == new.string_rest_length and old.string_bilateral == new.string_bilateral
     # Each change of parameters makes a new body, mostly with the same numbers.
-    for k in range(LENGTH):
-        same = same and old_body[k] == flight.body[k]
-    if not same:
+    if not (same and _alike(old_body, flight.body)):
         _take_spring(new, flight, 0.0)

@@ -259,15 +259,14 @@ def test_a_string_that_was_let_go_is_tied_again_by_the_next_target(released):
     assert simulation.string.free_end(201 * MS).tolist() == [0.5, 0.0, 0.0]
 
 
-@pytest.mark.parametrize("rest_length", [0.0, 0.5])
-def test_without_a_mesh_the_knot_is_where_it_was_asked_for_and_at_the_free_end_no_singularity(rest_length):
+AT_KNOT = {"mesh": "", "inertia_model": "explicit", "string__target": SCENE["initial.position"]}
+"""The free end is where the knot is."""
+
+
+@pytest.mark.parametrize(("rest_length", "bilateral"), [(0.0, True), (0.5, False)])
+def test_without_a_mesh_the_knot_is_where_it_was_asked_for_and_at_the_free_end_no_singularity(rest_length, bilateral):
     simulation, _ = simulated(
-        mesh="",
-        inertia_model="explicit",
-        string__attached=True,
-        string__target=SCENE["initial.position"],
-        string__rest_length=rest_length,
-        string__bilateral=True,
+        **AT_KNOT, string__attached=True, string__rest_length=rest_length, string__bilateral=bilateral
     )
     simulation.advance(MS)
     assert not simulation.failure and simulation.state.linear_velocity.tolist() == [0.0, 0.0, 0.0]
@@ -275,6 +274,47 @@ def test_without_a_mesh_the_knot_is_where_it_was_asked_for_and_at_the_free_end_n
     simulation.advance(2 * MS)
     assert simulation.string.attach == (1.0, 2.0, 3.0)
     assert np.isfinite([simulation.potential_energy, simulation.hand_work, simulation.string_heat]).all()
+
+
+@pytest.mark.parametrize("away", [0.0, 1e-14, 1e-11])
+def test_a_string_that_pushes_is_not_tied_where_it_has_no_direction(away):
+    """At the start, by parameters, by a target and by a knot; the motion goes on as if nobody had tried."""
+    pushing = {**AT_KNOT, "string__rest_length": 0.5, "string__bilateral": True}
+    place = np.array(SCENE["initial.position"]) + [away, 0.0, 0.0]
+    pushing["string__target"] = place.tolist()
+    moving = {"initial.linear_velocity": [0.0, 1.0, 0.0]}
+    with pytest.raises(CommandRefused, match="string target: got .* a target away from the knot"):
+        simulated(**pushing, **moving, string__attached=True)
+    simulation, scenario = simulated(**pushing, **moving)
+    with pytest.raises(CommandRefused, match="away from the knot"):
+        simulation.check_change(scenario.with_changes({"string.attached": True}).setup)
+    simulation.submit(MoveString(tuple(place)))
+    simulation.advance(MS)
+    assert simulation.string is None and simulation.refused["integrator"] == 1
+    far = tuple(simulation.state.position + [0.0, 0.0, 1.0])
+    simulation.submit(MoveString(far))
+    simulation.advance(2 * MS)
+    knot = simulation.string.attach
+    simulation.submit(TieString("world", far))
+    simulation.advance(3 * MS)
+    assert simulation.string.attach == knot and simulation.refused["integrator"] == 2 and not simulation.failure
+
+
+def test_the_last_bit_of_a_body_does_not_decide_whether_its_string_is_computed_anew():
+    """The same mass by another way: a stiffness that goes by the effective mass, which has changed with the attitude."""
+    simulation, scenario = simulated(string__frequency=5.0)
+    simulation.submit(MoveString((1.0, 2.0, 3.0)))
+    simulation.advance(100 * MS)
+    before, mass = simulation.string.stiffness, scenario.setup.body.mass
+    for changed in (mass, np.nextafter(mass, np.inf).item(), np.nextafter(mass, 0.0).item()):
+        after = scenario.with_changes({"mass": changed})
+        simulation.submit(Change({}, lambda after=after: after.setup))
+        simulation.act()
+        assert simulation.string.stiffness == before
+    after = scenario.with_changes({"mass": mass * (1 + 1e-9)})
+    simulation.submit(Change({}, lambda: after.setup))
+    simulation.act()
+    assert simulation.string.stiffness != before
 
 
 @given(

@@ -40,7 +40,7 @@ this series.
 _NEGLIGIBLE = 1e-19
 """Fraction of the squared rest length below which the highest terms of |a|² are neglected."""
 
-_APPROACH = 0.75
+APPROACH = 0.75
 """Largest motion of the knot of a string that pushes in one step, as a fraction of its distance from the free end."""
 
 
@@ -326,7 +326,7 @@ def clear_of_the_end(c: FloatArray, p: np.record, degree: int, distance: float, 
     free end, stays clear of it.
     """
     if p.has_string and p.bilateral and p.rest_length != 0.0:
-        while h * 1e9 >= 1.0 and _moves(c, degree, h) > max(_APPROACH * distance, NO_DIRECTION * p.rest_length):
+        while h * 1e9 >= 1.0 and _moves(c, degree, h) > max(APPROACH * distance, NO_DIRECTION * p.rest_length):
             h *= 0.5
     return h
 
