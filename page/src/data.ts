@@ -24,21 +24,6 @@ export interface Words {
   readonly atStart: string;
 }
 
-/** Numbers that kernels know things by, under Python's names. */
-export interface Constants {
-  readonly command: Readonly<Record<"HELD_WRENCH" | "PULSE" | "IMPULSE" | "CLEAR" | "TIE_STRING" | "MOVE_STRING" | "RELEASE_STRING" | "SET_STATE" | "NO_SLOT" | "UNNAMED_SLOT", number>>;
-  readonly operation: Readonly<Record<"FLY" | "BEGIN" | "CUT" | "END_DUE" | "FINISH", number>>;
-  readonly flight: Readonly<Record<"REACHED" | "NEVER", number>>;
-  readonly refusal: Readonly<Record<"NO_MOMENTS" | "SCALE" | "MASS" | "TENSOR" | "ORIENTATION" | "INTEGRATOR" | "RATE" | "MAGNITUDE" | "PULL" | "UNRESOLVED" | "OUT_OF_BOUNDS" | "AT_FREE_END", number>>;
-  readonly load: Readonly<Record<"WORLD_AXES" | "BODY_AXES" | "NORMAL_AXES" | "AT_COM" | "AT_POINT" | "AT_VERTEX" | "ON_RAY" | "LOAD" | "LOAD_AXES" | "PLACE" | "POINT" | "FORCE" | "TORQUE" | "NORMAL" | "FORCE_WORLD" | "FORCE_BODY", number>>;
-  readonly body: Readonly<Record<"MASS" | "COM" | "INERTIA" | "MOMENTS" | "AXES" | "BODY_SCALE" | "LENGTH" | "BODY", number>>;
-  readonly string: Readonly<Record<"KNOT" | "ORIGIN" | "TARGET" | "REST" | "PUSHES", number>>;
-  readonly quantity: Readonly<Record<"KINETIC" | "POTENTIAL" | "INERTIA" | "STATE" | "CONTEXT", number>>;
-  readonly moments: Readonly<Record<"FOUND" | "ROOM", number>>;
-  readonly tensor: Readonly<Record<"NEARLY", number>>;
-  readonly scene: Readonly<Record<"MAX_BALLASTS", number>>;
-}
-
 interface Packed { readonly at: number; readonly vertices: number; readonly triangles: number; readonly digits: number }
 
 export interface Declarations {
@@ -51,7 +36,6 @@ export interface Declarations {
   readonly integrators: readonly { readonly name: string; readonly supports: readonly number[]; readonly order: number | null }[];
   /** doubles of an integrator's workspace */
   readonly room: number;
-  readonly numbers: Constants;
   readonly words: Words;
   readonly bodies: Readonly<Record<string, Packed>>;
   readonly scenes: Readonly<Record<string, { readonly title: string; readonly values: Readonly<Record<string, Value>> }>>;

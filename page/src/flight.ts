@@ -4,7 +4,7 @@
 // flight is what rigid_proto_ros/simulation/simulation.py does, in the same order: the same bits follow.
 
 import type { Declarations } from "./data.ts";
-import { Event, Flight, LoadRow, Scene } from "./kernels.ts";
+import { Event, Flight, LoadRow, NUMBERS, Scene } from "./kernels.ts";
 import type { Kernels, Vector } from "./kernels.ts";
 import { filled, Refused } from "./numbers.ts";
 import { fillScene, Refusals } from "./scene.ts";
@@ -70,7 +70,7 @@ export class Flown {
   }
 
   slotName(number: number): string {
-    return this.#slots[number - this.#declared.numbers.command.UNNAMED_SLOT - 1] ?? "";
+    return this.#slots[number - NUMBERS.command.UNNAMED_SLOT - 1] ?? "";
   }
 
   /** Begin at time 0 with all values, on the surface that is in place. Throws Refused, and then all is as it was. */
@@ -82,12 +82,12 @@ export class Flown {
     memory.u1(this.#room.at, 8 * this.#room.n).fill(0);
     this.values = values;
     this.failure = "";
-    this.#operate(this.#declared.numbers.operation.BEGIN);
+    this.#operate(NUMBERS.operation.BEGIN);
   }
 
   /** Whether there is a flight of these values; its scene is in newScene, and its start in scratch. Throws Refused. */
   #check(values: Values): void {
-    const memory = this.#kernels.memory, placed = this.#placed, { refusal } = this.#declared.numbers;
+    const memory = this.#kernels.memory, placed = this.#placed, { refusal } = NUMBERS;
     fillScene(this.#newScene, values, this.#declared);
     for (;;) {
       memory.u1(this.#scratch.at, Flight.SIZE).fill(0);
@@ -101,25 +101,25 @@ export class Flown {
 
   /** Fly on; stops in the last good state where the motion fails. */
   fly(untilNs: number): void {
-    const { operation, flight } = this.#declared.numbers;
+    const { operation, flight } = NUMBERS;
     if (this.failure !== "" || untilNs <= this.timeNs) return;
     this.#none();
     if (this.#operate(operation.FLY, untilNs) === flight.REACHED) return;
     const [words, pushes] = this.#declared.words.failure;
     this.failure = filled(words, { 0: this.flight.committedNs * 1e-9 });
-    const string = this.flight.string, { REST, PUSHES } = this.#declared.numbers.string;
+    const string = this.flight.string, { REST, PUSHES } = NUMBERS.string;
     if (this.flight.tied && string[PUSHES] !== 0 && string[REST] !== 0) this.failure += pushes;
     this.#operate(operation.FINISH);
   }
 
   /** End what ends now; whether anything did. */
   endDue(): boolean {
-    return this.#operate(this.#declared.numbers.operation.END_DUE) !== 0;
+    return this.#operate(NUMBERS.operation.END_DUE) !== 0;
   }
 
   /** A new segment: after all that was done at one time. */
   cut(): void {
-    this.#operate(this.#declared.numbers.operation.CUT);
+    this.#operate(NUMBERS.operation.CUT);
   }
 
   /** Do a command now. Throws Refused. */
@@ -139,7 +139,7 @@ export class Flown {
   }
 
   #put(number: number, command: Load): void {
-    const row = this.load(number), { NO_SLOT, UNNAMED_SLOT } = this.#declared.numbers.command;
+    const row = this.load(number), { NO_SLOT, UNNAMED_SLOT } = NUMBERS.command;
     row.memory.u1(row.at, LoadRow.SIZE).fill(0);
     row.atNs = this.timeNs;
     row.durationNs = command.durationNs;

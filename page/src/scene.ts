@@ -3,7 +3,7 @@
 // From parameters to the record of a scene, and from a refusal of kernels to words.
 
 import type { Declarations } from "./data.ts";
-import { Refusal, Scene } from "./kernels.ts";
+import { NUMBERS, Refusal, Scene } from "./kernels.ts";
 import type { Kernels } from "./kernels.ts";
 import { filled, Refused, shown } from "./numbers.ts";
 import type { Value, Values } from "./source.ts";
@@ -26,7 +26,7 @@ export function fillScene(scene: Scene, values: Values, declared: Declarations):
   }
   const points = Object.keys(values).filter((name) => name.startsWith(BALLAST)).sort().map((name) => values[name]);
   const heavy = points.filter((point): point is readonly number[] => Array.isArray(point) && point[0] !== 0);
-  const most = declared.numbers.scene.MAX_BALLASTS;
+  const most = NUMBERS.scene.MAX_BALLASTS;
   if (heavy.length > most) {
     throw new Refused(filled(declared.words.accepted, { 0: "ballast", 1: shown(`${heavy.length} point masses`), 2: `at most ${most} with a mass` }));
   }
@@ -64,7 +64,7 @@ export class Refusals {
 
   /** The line that says why. values: of the scene that was refused; frame: of the load; vertices: how many there are. */
   words(values: Values, frame = "", vertices = 0): string {
-    const { words, numbers, models } = this.#declared, { refusal } = numbers;
+    const { words, models } = this.#declared, { refusal } = NUMBERS;
     const { code, detail } = this.record;
     const [a = 0, b = 0, c = 0] = this.record.numbers;
     switch (code) {

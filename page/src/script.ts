@@ -3,6 +3,7 @@
 // Entries of poke scripts: read as commands for kernels, and written as the files that Python reads.
 
 import type { Declarations } from "./data.ts";
+import { NUMBERS } from "./kernels.ts";
 import { filled, flow, nanoseconds, Refused, repr, shown, Whole } from "./numbers.ts";
 import type { At, Entry, Values, Vec3, Wrench } from "./source.ts";
 
@@ -46,7 +47,7 @@ export class Script {
       return [this.#load(fields, false, contacts)];
     }
     this.#fields(entry, "entry", ["t", kind]);
-    const content = fields[kind], { command } = this.#declared.numbers;
+    const content = fields[kind], { command } = NUMBERS;
     switch (kind) {
       case "wrench":
         return [this.#load(this.#fields(content, kind, KEYS), true, contacts)];
@@ -84,7 +85,7 @@ export class Script {
   }
 
   #plain(kind: number, load: readonly number[]): Load {
-    const whole = [...load, ...new Array<number>(this.#declared.numbers.load.LOAD - load.length).fill(0)];
+    const whole = [...load, ...new Array<number>(NUMBERS.load.LOAD - load.length).fill(0)];
     return { kind, durationNs: -1, slot: null, load: whole, frame: "" };
   }
 
@@ -96,7 +97,7 @@ export class Script {
   }
 
   #string(content: unknown, contacts: Values): Command[] {
-    const { command } = this.#declared.numbers;
+    const { command } = NUMBERS;
     if (content === "release") return [this.#plain(command.RELEASE_STRING, [])];
     const fields = this.#fields(content, "string", ["attach", "target"]);
     const found: Command[] = [];
@@ -118,11 +119,11 @@ export class Script {
     if ("orientation_xyzw" in fields && !numbers.slice(3, 7).some((x) => x !== 0)) {
       throw this.#refused("state, orientation_xyzw", fields["orientation_xyzw"], "four numbers, not all zero");
     }
-    return this.#plain(this.#declared.numbers.command.SET_STATE, [bits, ...numbers]);
+    return this.#plain(NUMBERS.command.SET_STATE, [bits, ...numbers]);
   }
 
   #load(fields: Fields, held: boolean, contacts: Values): Load {
-    const { command, load } = this.#declared.numbers;
+    const { command, load } = NUMBERS;
     const impulse = "impulse" in fields || "angular_impulse" in fields;
     const lasting = "force" in fields || "push" in fields || "torque" in fields;
     const durationS = "duration" in fields ? this.#number(fields["duration"], "duration", 1e-9, LONGEST_S) : null;
@@ -134,7 +135,7 @@ export class Script {
     const [forceKey, torqueKey] = impulse ? ["impulse", "angular_impulse"] : ["force", "torque"];
     const torque = torqueKey in fields ? this.#numbers(fields[torqueKey], torqueKey, 3) : ZERO;
     let force: readonly number[] = forceKey in fields ? this.#numbers(fields[forceKey], forceKey, 3) : ZERO;
-    let number = axes === "world" ? load.WORLD_AXES : load.BODY_AXES;
+    let number: number = axes === "world" ? load.WORLD_AXES : load.BODY_AXES;
     const place = this.#place(fields["at"] ?? "com", contacts);
     if ("push" in fields) {
       if ("force" in fields || "axes" in fields || "torque" in fields) throw this.#refused("entry", Object.keys(fields), "push without force, axes and torque: it acts along the inward normal");
@@ -154,7 +155,7 @@ export class Script {
 
   /** Kind of place, its three numbers, and three of a ray's direction or zeros. */
   #place(at: unknown, contacts: Values): number[] {
-    const { load } = this.#declared.numbers;
+    const { load } = NUMBERS;
     if (at === "com") return [load.AT_COM, ...ZERO, ...ZERO];
     if (at === "origin") return [load.AT_POINT, ...ZERO, ...ZERO];
     if (typeof at === "string") return [load.AT_POINT, ...this.#contact(at, contacts), ...ZERO];

@@ -8,7 +8,7 @@ import { fileWith } from "./file.ts";
 import { Flown } from "./flight.ts";
 import type { Kept } from "./flight.ts";
 import { NO_GHOST } from "./ghosts.ts";
-import { Kernels } from "./kernels.ts";
+import { Kernels, NUMBERS } from "./kernels.ts";
 import { readMesh } from "./meshes.ts";
 import { filled, nanoseconds, Refused, shown } from "./numbers.ts";
 import { Parameters } from "./parameters.ts";
@@ -136,7 +136,7 @@ export class Simulation implements Motion {
       const side = Math.max(...new Float64Array(surface.record.slice(8, 32).buffer));
       const unit = scale ?? (side > this.#declared.longest ? 0.001 : 1);
       const values: Values = { ...this.#withoutPoints(), mesh: mesh.name, scale: [unit, unit, unit] };
-      const mass = this.#body.flight.body[this.#declared.numbers.body.MASS] ?? 1;
+      const mass = this.#body.flight.body[NUMBERS.body.MASS] ?? 1;
       const shell: Values | null = surface.closed ? null : { mass, inertia_model: "shell", inertia_model_com: "model" };
       this.#start({ ...values, ...shell }, this.#choice, mesh, []);
       this.#asShell = shell === null ? null : { shell, before: Object.fromEntries(Object.keys(shell).map((name) => [name, values[name] ?? 0])) };

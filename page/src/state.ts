@@ -3,7 +3,7 @@
 // What there is to see of a flight at one time, and of its body: numbers of kernels, put into the world's axes.
 
 import type { Declarations } from "./data.ts";
-import { Flight, Problem, Scene } from "./kernels.ts";
+import { Flight, NUMBERS, Problem, Scene } from "./kernels.ts";
 import type { Kernels, Matrix, Vector } from "./kernels.ts";
 import type { Flown } from "./flight.ts";
 import type { Refusals } from "./scene.ts";
@@ -44,7 +44,7 @@ export class Observed {
   readonly #three: readonly [Vector, Vector, Vector];
 
   constructor(kernels: Kernels, declared: Declarations, placed: Placed, surfaces: Surfaces, refusals: Refusals) {
-    const memory = kernels.memory, { quantity, body } = declared.numbers;
+    const memory = kernels.memory, { quantity, body } = NUMBERS;
     this.#kernels = kernels;
     this.#declared = declared;
     this.#placed = placed;
@@ -79,7 +79,7 @@ export class Observed {
   }
 
   flying(flown: Flown): Flying {
-    const kernels = this.#kernels, memory = kernels.memory, { quantity, body } = this.#declared.numbers;
+    const kernels = this.#kernels, memory = kernels.memory, { quantity, body } = NUMBERS;
     const { flight, scene } = flown, row = [...flight.row], own = flight.body;
     kernels.stateOf(scene, flight, this.#state);
     const inertia: Vector = { at: this.#state.at + 8 * quantity.INERTIA, n: 9 };
@@ -105,7 +105,7 @@ export class Observed {
   }
 
   #acting(flown: Flown, number: number, place: BodyPlace): Acting {
-    const { command, load } = this.#declared.numbers, row = flown.load(number);
+    const { command, load } = NUMBERS, row = flown.load(number);
     const of = row.load, share = row.share, inWorld = of[load.LOAD_AXES] === load.WORLD_AXES;
     const torque = triple(of, load.TORQUE);
     return {
@@ -114,12 +114,12 @@ export class Observed {
       point: of[load.PLACE] === load.AT_COM ? place.position : toWorld(place, triple(of, load.POINT)),
       force: plus(triple(share, load.FORCE_WORLD), times(place.rotation, triple(share, load.FORCE_BODY))),
       torque: inWorld ? torque : times(place.rotation, torque),
-      endNs: endOf(row.endNs, this.#declared),
+      endNs: endOf(row.endNs),
     };
   }
 
   #string(flown: Flown, place: BodyPlace): StringNow {
-    const { string } = this.#declared.numbers, flight = flown.flight, row = flight.string;
+    const { string } = NUMBERS, flight = flown.flight, row = flight.string;
     const attach = triple(row, string.KNOT), target = triple(row, string.TARGET), origin = triple(row, string.ORIGIN);
     const whole = flight.stringEndNs - flight.stringBeginNs;
     const part = whole > 0 ? Math.min(1, (flight.nowNs - flight.stringBeginNs) / whole) : 1;
@@ -132,7 +132,7 @@ export class Observed {
       force,
       tension: Math.hypot(...force),
       restLength: row[string.REST] ?? 0,
-      releaseNs: endOf(flight.stringReleaseNs, this.#declared),
+      releaseNs: endOf(flight.stringReleaseNs),
     };
   }
 
@@ -143,19 +143,19 @@ export class Observed {
     const [x, y, z] = kernels.accelerationsNow(copy, this.#problem, this.#variables);
     copy.tied = false;
     const [a, b, c] = kernels.accelerationsNow(copy, this.#problem, this.#variables);
-    const mass = copy.body[this.#declared.numbers.body.MASS] ?? 0;
+    const mass = copy.body[NUMBERS.body.MASS] ?? 0;
     return [mass * (x - a), mass * (y - b), mass * (z - c)];
   }
 
   /** Where a point [mesh] is [m, world]. */
   worldPoint(flown: Flown, point: Vec3): Vec3 {
-    const row = flown.flight.row, own = flown.flight.body, { body } = this.#declared.numbers;
+    const row = flown.flight.row, own = flown.flight.body, { body } = NUMBERS;
     return toWorld({ rotation: this.rotation([...row.subarray(3, 7)]), position: triple(row), com: triple(own, body.COM), scale: triple(own, body.BODY_SCALE) }, point);
   }
 
   /** Where a ray [world] first meets the body. */
   firstHit(flown: Flown, origin: Vec3, direction: Vec3): Hit | null {
-    const memory = this.#kernels.memory, { body } = this.#declared.numbers, { placed } = { placed: this.#placed };
+    const memory = this.#kernels.memory, { body } = NUMBERS, { placed } = { placed: this.#placed };
     const row = flown.flight.row, own = flown.flight.body, [from, way, found] = this.#three;
     const place: BodyPlace = { rotation: this.rotation([...row.subarray(3, 7)]), position: triple(row), com: triple(own, body.COM), scale: triple(own, body.BODY_SCALE) };
     memory.f8(from.at, 3).set(toMesh(place, origin));
@@ -178,7 +178,7 @@ export class Observed {
 
   /** The body of a flight, on the surface that is in place. */
   info(flown: Flown): BodyInfo {
-    const { body } = this.#declared.numbers, row = flown.flight.body, surface = this.#placed.surface;
+    const { body } = NUMBERS, row = flown.flight.body, surface = this.#placed.surface;
     const values = flown.values, scale = triple(row, body.BODY_SCALE);
     let models: readonly Model[] | null = null;
     const listed = (): readonly Model[] => (models ??= this.models(flown));
@@ -215,7 +215,7 @@ export class Observed {
   }
 
   #model(model: Model["model"], number: number, flown: Flown): Model {
-    const { body, refusal } = this.#declared.numbers, placed = this.#placed, memory = this.#kernels.memory;
+    const { body, refusal } = NUMBERS, placed = this.#placed, memory = this.#kernels.memory;
     let made = this.#kernels.makeBody(this.#scene, placed.record, this.#body, this.#refusals.record);
     for (let tries = 0; !made && tries < 2 && this.#refusals.code === refusal.NO_MOMENTS && placed.surface !== null; tries++) {
       if (!this.#surfaces.provide(placed.record, placed.surface, this.#refusals.record.detail, this.#scene.scale)) break;
@@ -256,6 +256,6 @@ function toMesh(place: BodyPlace, point: Vec3): Vec3 {
 }
 
 /** Infinity for what ends at no time. */
-function endOf(timeNs: number, declared: Declarations): number {
-  return timeNs >= declared.numbers.flight.NEVER / 4 ? Infinity : timeNs;
+function endOf(timeNs: number): number {
+  return timeNs >= NUMBERS.flight.NEVER / 4 ? Infinity : timeNs;
 }

@@ -3,7 +3,7 @@
 // The surface of a body: what kernels judge of it, its moments, and its place in their memory.
 
 import type { Declarations } from "./data.ts";
-import { Mesh } from "./kernels.ts";
+import { Mesh, NUMBERS } from "./kernels.ts";
 import type { Kernels, Matrix, Memory, Moments, Vector } from "./kernels.ts";
 import { filled, Refused } from "./numbers.ts";
 import type { Finding } from "./source.ts";
@@ -196,7 +196,7 @@ export class Surfaces {
     }
     if (mesh.triangles.length === 0) throw refused("no_faces");
     if (bad > 0) throw refused("nonfinite", { 0: String(bad), 1: String(mesh.vertices.length / 3) });
-    if (this.#kernels.boundingBox(vertices, triangles, used, lower, upper) !== this.#declared.numbers.moments.FOUND) throw refused("no_faces");
+    if (this.#kernels.boundingBox(vertices, triangles, used, lower, upper) !== NUMBERS.moments.FOUND) throw refused("no_faces");
     const low = memory.f8(lower.at, 3), high = memory.f8(upper.at, 3);
     const extent: [number, number, number] = [0, 1, 2].map((k) => (high[k] ?? 0) - (low[k] ?? 0)) as [number, number, number];
     memory.release(mark);
@@ -216,7 +216,7 @@ export class Surfaces {
   }
 
   #fill(record: Mesh, mesh: MeshNumbers, model: number, memory: Memory, scale?: Float64Array): boolean {
-    const kernels = this.#kernels, { moments } = this.#declared.numbers;
+    const kernels = this.#kernels, { moments } = NUMBERS;
     const n = mesh.vertices.length / 3;
     const stretch = memory.numbers(3), sizes = [0, 1, 2].map((k) => Math.abs(scale?.[k] ?? 1));
     memory.f8(stretch.at, 3).set(this.#declared.models[model] === "shell" ? sizes.map((s) => s / (sizes[0] ?? 1)) : [1, 1, 1]);

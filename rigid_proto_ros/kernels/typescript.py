@@ -3,8 +3,15 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
+from ..mass import moments as of_mesh
+from ..mass import tensor as of_tensor
+from ..motion import body as of_body
+from ..motion import loads as of_load
+from ..motion import string as of_string
+from ..simulation import commands, effects, flight, quantities, record, refusals
 from .layouts import description
 
 _HEAD = """\
@@ -119,6 +126,31 @@ export class Kernels {
     return new Kernels(instance.exports as unknown as Exports);
   }
 """
+_NUMBERS: dict[str, tuple[Any, str]] = {
+    "command": (
+        commands,
+        "HELD_WRENCH PULSE IMPULSE CLEAR TIE_STRING MOVE_STRING RELEASE_STRING SET_STATE NO_SLOT UNNAMED_SLOT",
+    ),
+    "operation": (effects, "FLY BEGIN CUT END_DUE FINISH"),
+    "flight": (flight, "REACHED NEVER"),
+    "refusal": (
+        refusals,
+        "NO_MOMENTS SCALE MASS TENSOR ORIENTATION INTEGRATOR RATE MAGNITUDE PULL UNRESOLVED OUT_OF_BOUNDS "
+        "AT_FREE_END",
+    ),
+    "load": (
+        of_load,
+        "WORLD_AXES BODY_AXES NORMAL_AXES AT_COM AT_POINT AT_VERTEX ON_RAY LOAD LOAD_AXES PLACE POINT FORCE TORQUE "
+        "NORMAL FORCE_WORLD FORCE_BODY",
+    ),
+    "body": (of_body, "MASS COM INERTIA MOMENTS AXES BODY_SCALE LENGTH BODY"),
+    "string": (of_string, "KNOT ORIGIN TARGET REST PUSHES"),
+    "quantity": (quantities, "KINETIC POTENTIAL INERTIA STATE CONTEXT"),
+    "moments": (of_mesh, "FOUND ROOM"),
+    "tensor": (of_tensor, "NEARLY"),
+    "scene": (record, "MAX_BALLASTS"),
+}
+"""Numbers that kernels know things by: of each part the module, and their names there."""
 _SUFFIX = {"f8": "F8", "f4": "F4", "i8": "I8", "i4": "I4", "u1": "U1", "b1": "B1"}
 _SHAPES = {1: ("Vector", ("n",)), 2: ("Matrix", ("n", "m")), 3: ("Array3", ("n", "m", "k"))}
 _RESERVED = {"default", "new", "function", "class", "var", "with", "in", "this", "delete", "case", "enum"}
@@ -131,10 +163,16 @@ def source() -> str:
     exports = "\n".join(f"  {name}(block: number): void;" for name in kernels)
     slots = [len(of["returns"]) + sum(map(_slots, of["arguments"].values())) for of in kernels.values()]
     loader = _LOADER.replace("@EXPORTS@", exports).replace("@BLOCK@", str(8 * max(slots)))
-    parts = [_HEAD.replace("@STAMP@", described["stamp"])]
+    parts = [_HEAD.replace("@STAMP@", described["stamp"]), _numbers()]
     parts += [_record(name, of) for name, of in records.items()]
     parts += [loader, *(_kernel(name, of) for name, of in kernels.items()), "}\n"]
     return "".join(parts)
+
+
+def _numbers() -> str:
+    named = {part: {name: int(getattr(of, name)) for name in names.split()} for part, (of, names) in _NUMBERS.items()}
+    about = "/** Numbers that kernels know things by, under Python's names. */"
+    return f"{about}\nexport const NUMBERS = {json.dumps(named, indent=2)} as const;\n\n"
 
 
 def class_name(record: str) -> str:

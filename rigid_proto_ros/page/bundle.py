@@ -66,9 +66,8 @@ def _wait_for(lock: IO[str]) -> None:
 
 def page_stamp() -> str:
     """Hash of all that the page is made from."""
-    digest = hashlib.sha256(
-        f"{kernels_stamp()} {source_stamp(str(Path(__file__).with_name('data.py'))).hex()}".encode()
-    )
+    writers = [PACKAGE_FOLDER / name for name in ("page/data.py", "kernels/typescript.py")]
+    digest = hashlib.sha256(f"{kernels_stamp()} {source_stamp(*map(str, writers)).hex()}".encode())
     sources = [file for file in sorted((SOURCE / "src").rglob("*.*")) if file.name != GENERATED]
     sources += [SOURCE / name for name in ("page.html", "build.mjs", "package-lock.json")]
     bundled = [*map(scene_path, scene_names()), *map(resolve_mesh, body_names())]

@@ -19,18 +19,13 @@ from ..base.bundled import body_names, scene_path
 from ..base.library import stamp
 from ..base.vectors import FloatArray, IntArray
 from ..mass import INERTIA_MODELS
-from ..mass import moments as of_mesh
-from ..mass import tensor as of_tensor
 from ..mesh.reading import Mesh, load_mesh
-from ..motion import body as of_body
-from ..motion import loads as of_load
-from ..motion import string as of_string
 from ..motion.integrators import INTEGRATORS
 from ..motion.integrators.stepping import ROOM
+from ..motion.loads import NEEDS
 from ..parameters.declarations import PARAMETERS, PATTERNS, Parameter
 from ..scene.lessons import Lesson, lessons
 from ..scene.scene_file import scene_values
-from ..simulation import commands, effects, flight, quantities, record, refusals
 from ..simulation.record import SCENE_PARAMETERS, field_of
 from .words import words
 
@@ -65,7 +60,6 @@ def page_data() -> bytes:
             {"name": name, "supports": _supported(name), "order": one.order} for name, one in INTEGRATORS.items()
         ],
         "room": ROOM,
-        "numbers": _constants(),
         "words": words(),
         "bodies": bodies,
         "scenes": {one.name: {"title": one.title, "values": bundled_values(one.name)} for one in lessons()},
@@ -112,36 +106,6 @@ def _texts(one: Lesson) -> dict[str, Any]:
     }
 
 
-_CONSTANTS: dict[str, tuple[Any, str]] = {
-    "command": (
-        commands,
-        "HELD_WRENCH PULSE IMPULSE CLEAR TIE_STRING MOVE_STRING RELEASE_STRING SET_STATE NO_SLOT UNNAMED_SLOT",
-    ),
-    "operation": (effects, "FLY BEGIN CUT END_DUE FINISH"),
-    "flight": (flight, "REACHED NEVER"),
-    "refusal": (
-        refusals,
-        "NO_MOMENTS SCALE MASS TENSOR ORIENTATION INTEGRATOR RATE MAGNITUDE PULL UNRESOLVED OUT_OF_BOUNDS AT_FREE_END",
-    ),
-    "load": (
-        of_load,
-        "WORLD_AXES BODY_AXES NORMAL_AXES AT_COM AT_POINT AT_VERTEX ON_RAY LOAD LOAD_AXES PLACE POINT FORCE TORQUE "
-        "NORMAL FORCE_WORLD FORCE_BODY",
-    ),
-    "body": (of_body, "MASS COM INERTIA MOMENTS AXES BODY_SCALE LENGTH BODY"),
-    "string": (of_string, "KNOT ORIGIN TARGET REST PUSHES"),
-    "quantity": (quantities, "KINETIC POTENTIAL INERTIA STATE CONTEXT"),
-    "moments": (of_mesh, "FOUND ROOM"),
-    "tensor": (of_tensor, "NEARLY"),
-    "scene": (record, "MAX_BALLASTS"),
-}
-"""Numbers that kernels know things by: of each part the module, and their names there."""
-
-
-def _constants() -> dict[str, dict[str, int]]:
-    return {part: {name: int(getattr(of, name)) for name in names.split()} for part, (of, names) in _CONSTANTS.items()}
-
-
 def _declarations() -> Iterable[Parameter]:
     yield from (PARAMETERS[name] for name in USED)
     yield from (PATTERNS["ballast."], PATTERNS["contacts."])
@@ -166,7 +130,7 @@ def _declared(one: Parameter) -> dict[str, Any]:
 
 def _supported(name: str) -> list[int]:
     """Numbers of the needs (motion/loads.py, NEEDS) that an integrator meets."""
-    return [k for k, need in enumerate(of_load.NEEDS) if need in INTEGRATORS[name].supports]
+    return [k for k, need in enumerate(NEEDS) if need in INTEGRATORS[name].supports]
 
 
 # Meshes, packed: a bundled one has a few decimals, and neighbours are near each other.

@@ -325,7 +325,7 @@ def test_a_file_that_was_written_for_a_lesson_opens_in_it_and_two_of_them_share_
     one.pause()
     one.js("page.motion.set({ mass: 3 }); page.motion.submit({ at: 'head', impulse: [1, 0, 0] })")
     one.page.locator("button[data-card=body]").click()
-    one.drawn(5)
+    one.fly(0.1)
     other.page.bring_to_front()
     other.drawn(5)
     assert one.value("mass") == 3 and len(one.script) == 2 and one.now["timeNs"] > 0
