@@ -10,6 +10,7 @@ import sys
 from typing import Any
 
 from ..base.errors import InputError
+from ..mass.engines import ENGINES
 from ..mass.from_mesh import FALLBACKS, mesh_body
 from ..mass.inspection import Inspection, as_json, inspect_mesh, verify_moments
 from ..mass.moments import MODELS
@@ -38,6 +39,7 @@ EXAMPLES = (
         "rigid_proto inspect part.stl --scale 0.001 --mass 1.2 --urdf",
         "a part drawn in mm that weighs 1.2 kg, as a URDF <inertial>",
     ),
+    ("rigid_proto inspect hammer --density 7850 --for unity", "mass, COM and tensor as lines to paste"),
     ("rigid_proto inspect hammer --verify", "the errors against exact rational arithmetic"),
     ("rigid_proto inspect --compare robot.urdf", "the errors of a robot's inertials"),
     (
@@ -85,6 +87,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output.add_argument("--urdf", action="store_true", help="a URDF <inertial> on stdout")
     output.add_argument("--sdf", action="store_true", help="an SDF <inertial> on stdout")
     output.add_argument("--mjcf", action="store_true", help="an MJCF <inertial> on stdout")
+    output.add_argument(
+        "--for", dest="engine", choices=ENGINES, help="what an engine or format takes, in its axes, units and words"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

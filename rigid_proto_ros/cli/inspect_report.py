@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base.vectors import Matrix3
+from ..mass.engines import engine_text
 from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mass.inspection import Inspection
 from ..mass.properties import MassProperties
@@ -99,7 +100,12 @@ def tensor_rows(inertia: Matrix3) -> list[tuple[str, ...]]:
 
 
 def print_inertial(args: argparse.Namespace, properties: MassProperties) -> bool:
-    """Print the <inertial> that the command's options ask for; False where they ask for none."""
+    """Print the <inertial>, or the text for an engine, that the command's options ask for; False where they ask for
+    none.
+    """
+    if args.engine is not None:
+        print(engine_text(args.engine, properties), end="")
+        return True
     exports = {"urdf": urdf_inertial, "sdf": sdf_inertial, "mjcf": mjcf_inertial}
     for name, export in exports.items():
         if getattr(args, name):

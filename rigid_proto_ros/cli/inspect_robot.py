@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.errors import InputError, printable
 from ..base.files import is_same_file, whole_file
+from ..base.rotation import quaternion_from_matrix
 from ..mass.properties import scale_vector
 from ..mass.tensor import principal_axes, six_from_tensor
 from ..mesh.solids import hull_is_missing
@@ -52,7 +53,7 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
 
 def given(args: argparse.Namespace, name: str) -> bool:
     """Whether an option was given, also as 0."""
-    value = getattr(args, name.replace("-", "_"))
+    value = getattr(args, {"for": "engine"}.get(name, name.replace("-", "_")))
     return value is not None and value is not False
 
 
@@ -93,7 +94,7 @@ def compare(args: argparse.Namespace) -> int:
 
 def _check_options(args: argparse.Namespace) -> None:
     """Refuse options that ``--compare`` doesn't go with, or that need another one."""
-    _refuse(args, "compare", "lump", "as-scene", "verify", "urdf", "sdf", "mjcf", "model", "ballast", "mass")
+    _refuse(args, "compare", "lump", "as-scene", "verify", "urdf", "sdf", "mjcf", "for", "model", "ballast", "mass")
     _refuse(args, "compare", "repair", "fallback")
     if args.scale and not args.mesh:
         raise InputError("--scale", "needs the MESH of one link; the robot's file gives the scales of its own meshes")
@@ -232,6 +233,7 @@ def _lump_as_dict(robot: str, whole: Lump) -> dict[str, Any]:
         **whole.properties.as_dict(),
         "principal_moments": moments.tolist(),
         "principal_axes": axes.tolist(),
+        "principal_orientation_xyzw": quaternion_from_matrix(axes).tolist(),
         "links": dict(whole.links),
         "massless": list(whole.massless),
         "absent": list(whole.absent),

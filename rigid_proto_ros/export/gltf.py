@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..base.errors import InputError
 from ..base.files import whole_file
+from ..base.rotation import quaternion_from_matrix
 from ..base.vectors import FloatArray, IntArray, Points, Vector3
 from ..mass.moments import referenced_vertices
+from ..mass.tensor import principal_axes
 from ..mesh.locate import resolve_mesh
 from ..picture import style
 from ..picture.backend import DrawnMesh
@@ -36,6 +38,7 @@ LINES, TRIANGLES = 1, 4
 COMPONENTS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 MAGIC = b"glTF"
+PHYSICS = "KHR_physics_rigid_bodies"
 
 LISTS = ("bufferViews", "accessors", "images", "samplers", "textures", "materials", "meshes", "nodes")
 """Of a document, whose items name each other by number."""
@@ -170,7 +173,9 @@ def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
             translation=track.positions[0].tolist(),
             rotation=track.attitudes[0].tolist(),
             extras=_mass_properties(record.setups(kind)[0]),
+            extensions={PHYSICS: {"motion": _rigid_motion(record.setups(kind)[0])}},
         )
+        document.extensions["extensionsUsed"].add(PHYSICS)
         document.animate(node, "translation", seconds, track.positions)
         document.animate(node, "rotation", seconds, track.attitudes)
         if track.surface is not None:
@@ -206,6 +211,20 @@ def _mass_properties(setup: Setup) -> dict[str, Any]:
         "center_of_mass": setup.body.center_of_mass.tolist(),
         "inertia": setup.body.inertia.tolist(),
         "inertia_model": setup.inertia_model,
+    }
+
+
+def _rigid_motion(setup: Setup) -> dict[str, Any]:
+    """The body at the start as KHR_physics_rigid_bodies has it. It follows the animation until somebody sets
+    isKinematic to false: then a physics engine moves it.
+    """
+    moments, axes = principal_axes(setup.body.inertia)
+    return {
+        "isKinematic": True,
+        "mass": setup.body.mass,
+        "centerOfMass": [0.0, 0.0, 0.0],
+        "inertiaDiagonal": moments.tolist(),
+        "inertiaOrientation": quaternion_from_matrix(axes).tolist(),
     }
 
 

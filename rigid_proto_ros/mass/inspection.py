@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import InputError
+from ..base.rotation import quaternion_from_matrix
 from ..base.vectors import Matrix3, Vector3
 from .exact_moments import exact_solid_moments, relative_errors
 from .from_mesh import MeshBody
@@ -26,8 +27,8 @@ from .verdict import INFO, WARNING, Finding
 
 JSON_KEYS = (
     *("mesh", "vertices", "triangles", "watertight", "winding_consistent", "components", "volume", "area", "mass"),
-    *("density", "center_of_mass", "inertia", "principal_moments", "principal_axes", "bounding_box", "models"),
-    "verdict",
+    *("density", "center_of_mass", "inertia", "principal_moments", "principal_axes"),
+    *("principal_orientation_xyzw", "bounding_box", "models", "verdict"),
 )
 
 
@@ -201,6 +202,7 @@ def as_json(inspection: Inspection) -> dict[str, Any]:
         **chosen.as_dict(),
         "principal_moments": moments.tolist(),
         "principal_axes": axes.tolist(),
+        "principal_orientation_xyzw": quaternion_from_matrix(axes).tolist(),
         "bounding_box": {"min": inspection.lower.tolist(), "max": inspection.upper.tolist()},
         "models": {name: inspection.models[name].as_dict() if name in inspection.models else None for name in MODELS},
         "verdict": verdict,

@@ -42,8 +42,10 @@ _FACTORS = {
 }
 _LARGEST_POWER = 9
 """Of ten, by which a single entry may be off: from kg m² to g mm²."""
-AT_ORIGIN = "COM left at the link's origin", "COM at the mesh's origin"
-"""Causes of a COM that may be no slip: frames are often put at the COM on purpose."""
+OTHER_SHAPES = "the bounding box", "the shell", "the convex hull"
+WEAK = ("COM left at the link's origin", "COM at the mesh's origin", *(f"COM that of {name}" for name in OTHER_SHAPES))
+"""Causes of a COM that are none by themselves: frames are often put at the COM on purpose, and the centres of other
+shapes lie near by."""
 
 
 _TURNS = [
@@ -57,11 +59,12 @@ _QUARTER_TURNS = [turn for turn in _TURNS if np.linalg.det(turn) > 0.0]
 
 def _other_shapes(parts: LinkShapes, mass: float) -> Iterator[tuple[str, MassProperties]]:
     """What other tools and habits put in the place of the solid, in the link's axes."""
-    yield "the bounding box", parts.box(mass)
+    box, shell, hull = OTHER_SHAPES
+    yield box, parts.box(mass)
     with contextlib.suppress(InputError):  # of primitives
-        yield "the shell", parts.shell(mass)
+        yield shell, parts.shell(mass)
     with contextlib.suppress(InputError):  # of points in one plane
-        yield "the convex hull", MeshMoments(*convex_hull(parts.points)).mass_properties(mass=mass)
+        yield hull, MeshMoments(*convex_hull(parts.points)).mass_properties(mass=mass)
 
 
 def _mistakes(truth: MassProperties, stated: Vector3, parts: LinkShapes) -> Iterator[tuple[str, Matrix3]]:
@@ -201,8 +204,8 @@ def explain_center(given: Vector3, truth: MassProperties, parts: LinkShapes) -> 
     """The usual mistake that turns the true COM into ``given`` (3,) [m, link axes]; empty when none does."""
     com, use = truth.center_of_mass, parts.first.pose
     guesses = [
-        (AT_ORIGIN[0], np.zeros(3)),
-        (AT_ORIGIN[1], use.position),
+        (WEAK[0], np.zeros(3)),
+        (WEAK[1], use.position),
         ("COM in mesh coordinates: the mesh's pose in the link left out", use.rotation.T @ (com - use.position)),
         ("COM in mm", 1000.0 * com),
         ("COM in cm", 100.0 * com),

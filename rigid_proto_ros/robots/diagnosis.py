@@ -7,7 +7,8 @@
   can't be found or read;
 * uniform: it is the uniform solid's, to the tolerance and the digits printed;
 * explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py); a COM at an
-  origin explains a tensor that fits, or one that no mass inside the shapes has, and no other;
+  origin, or that of box, shell or hull, counts only beside a tensor that fits, that is explained, or that no mass
+  inside the shapes has;
 * not judged: all shapes are primitives, which often stand in for the parts that were weighed or drawn;
 * impossible for its shape: no mass distribution inside the link's shapes has it;
 * not uniform: it isn't the uniform solid's, but some distribution inside the shapes has it.
@@ -39,7 +40,7 @@ from ..mass.tensor import check_tensor
 from ..mesh.locate import Search
 from ..mesh.reading import load_mesh
 from ..mesh.solids import convex_hull
-from .causes import AT_ORIGIN, LIMIT, explain_center, explain_inertia
+from .causes import LIMIT, WEAK, explain_center, explain_inertia
 from .link_shapes import LinkShapes, Meshes
 from .reading import COLLISION, HERE, VISUAL, Link, Shape, check_finite, check_inertial, read_robot
 
@@ -205,9 +206,9 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
         center_left > tolerance,
     ):
         causes = ()  # by half they say nothing, where the shapes may be those of something else
-    # A COM at an origin is a slip where the tensor is that of the shapes, or a slip of it. Beside another tensor, as of
-    # a body weighed or computed with its densities, the frame may have been put at the COM on purpose.
-    on_purpose = inertia_left > tolerance and not of_tensor and set(causes) <= set(AT_ORIGIN)
+    # A COM at an origin, or that of the hull, is a slip where the tensor is that of the shapes, or a slip of it. Beside
+    # another tensor, as of a body weighed or computed with its densities, it may be right.
+    is_weak = inertia_left > tolerance and not of_tensor and set(causes) <= set(WEAK)
     off = max(inertia_left, center_left) > tolerance
     density = link.mass / sum(solid.mass for solid in parts.solids)
     note = f"density {density:.4g} kg/m³"
@@ -215,7 +216,7 @@ def _compared(link: Link, parts: LinkShapes, tolerance: float, role: str) -> Lin
         note += ", which no solid has; check the units of mesh and mass"
     return replace(
         plain,
-        status=EXPLAINED if causes and not on_purpose else NOT_UNIFORM if off else UNIFORM,
+        status=EXPLAINED if causes and not is_weak else NOT_UNIFORM if off else UNIFORM,
         center_of_mass_error=float(np.max(offset)) / parts.diagonal,
         inertia_error=inertia_error,
         ratio=ratio,
@@ -301,7 +302,7 @@ def _possible(
             return replace(diagnosis, status=EXPLAINED, causes=(*diagnosis.causes, reason))
         return replace(diagnosis, status=BEYOND_SHAPE, causes=(reason,))
     if diagnosis.status == NOT_UNIFORM and diagnosis.causes:
-        told = f"{diagnosis.causes[0]}: maybe on purpose, since the tensor isn't that of the shapes either"
+        told = f"{diagnosis.causes[0]}: maybe on purpose or by chance, since the tensor isn't that of the shapes either"
         return replace(diagnosis, causes=(), info=(*diagnosis.info, told))
     return diagnosis
 

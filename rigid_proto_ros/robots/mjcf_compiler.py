@@ -60,7 +60,8 @@ class Answer:
 def ask(question: Question) -> Answer:
     """The answer of a new process; raises InputError for what MuJoCo refuses, or doesn't finish within the limits."""
     environment = {**with_this_package(), "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, "-c", "from rigid_proto_ros.robots.mjcf_compiler import main; main()"]
+    # -P: nothing is imported from the working folder, which may be a stranger's.
+    command = [sys.executable, "-P", "-c", "from rigid_proto_ros.robots.mjcf_compiler import main; main()"]
     try:
         done = subprocess.run(
             command,

@@ -187,6 +187,13 @@ def test_the_ghost_flies_beside_the_body_with_a_centre_of_its_own(tmp_path):
     offset = np.array(nodes["body mesh"]["translation"]) - nodes["ghost mesh"]["translation"]
     assert np.allclose(offset, box - true)
     assert nodes["ghost"]["extras"]["inertia_model"] == "bounding_box"
+    assert "KHR_physics_rigid_bodies" in player.document["extensionsUsed"]
+    for name in ("body", "ghost"):
+        own, motion = nodes[name]["extras"], nodes[name]["extensions"]["KHR_physics_rigid_bodies"]["motion"]
+        R = Rotation.from_quat(motion["inertiaOrientation"]).as_matrix()
+        inertia = R @ np.diag(motion["inertiaDiagonal"]) @ R.T
+        assert np.max(np.abs(inertia - own["inertia"])) <= 1e-14 * np.max(own["inertia"])
+        assert (motion["mass"], motion["centerOfMass"], motion["isKinematic"]) == (own["mass"], [0, 0, 0], True)
 
 
 def test_a_ghost_that_is_gone_is_not_seen_until_it_comes_back(tmp_path):
@@ -293,7 +300,7 @@ def test_a_glb_with_a_lamp_keeps_it(tmp_path):
     cube.node.update(name="cube", extensions={"KHR_lights_punctual": {"light": 0}})
     cube.json |= {"extensions": lamps, "extensionsUsed": list(lamps)}
     made = flown(tmp_path, cube.glb()).document
-    assert made["extensions"] == lamps and made["extensionsUsed"] == list(lamps)
+    assert made["extensions"] == lamps and set(made["extensionsUsed"]) == {*lamps, "KHR_physics_rigid_bodies"}
 
 
 @pytest.mark.parametrize("without", ["scenes", "buffers"])

@@ -284,3 +284,14 @@ def test_a_com_at_the_links_origin_outside_its_shapes_is_a_slip_whatever_the_ten
     status, (link,) = compare(capsys, tmp_path, far.replace(f'<origin xyz="{words(com)}"/>', ""))
     assert (status, link["status"]) == (1, "explained")
     assert link["causes"][0] == "COM left at the link's origin" and "outside the hull" in link["causes"][1]
+
+
+def test_a_com_that_happens_to_be_the_shells_condemns_no_other_tensor(capsys, tmp_path):
+    shell, solid = (
+        mesh_body("hammer").moments.mass_properties(model, scale=SCALE, mass=MASS) for model in ("shell", "solid")
+    )
+    R = rotation_from_rpy(*RPY)
+    six = heavier_ends(np.array(six_from_tensor(R @ solid.inertia @ R.T)))
+    status, (link,) = compare(capsys, tmp_path, urdf(R @ shell.center_of_mass + POSITION, six))
+    assert (status, link["status"], link["causes"]) == (0, "not uniform", [])
+    assert link["info"][-1].startswith("COM that of the shell: maybe")

@@ -189,6 +189,15 @@ def test_an_mjcf_that_takes_too_long_or_too_much_is_refused(tmp_path, monkeypatc
         read_robot(path)
 
 
+def test_mujoco_is_not_taken_from_the_folder_of_a_robot(tmp_path, monkeypatch):
+    pytest.importorskip("mujoco")
+    (tmp_path / "mujoco.py").write_text("raise SystemExit(3)")
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    (tmp_path / "model.xml").write_text(WORLD.format("", f'<body name="b">{SIX_KG}<geom size=".1"/></body>'))
+    monkeypatch.chdir(tmp_path)
+    assert [link.name for link in read_robot(tmp_path / "model.xml").links] == ["b"]
+
+
 def test_an_mjcf_too_deep_or_with_a_pipe_to_include_is_refused(tmp_path):
     pytest.importorskip("mujoco")
     os.mkfifo(tmp_path / "pipe.xml")

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""Mass properties in physics engines: what each computes of a mesh by itself, and whether it takes what
+``rigid_proto inspect --for`` prints.
+
+benchmarks/engines/inertia.mjs asks the engines that npm has, MuJoCo is asked here. A body of 2.5 kg in the shape of the
+bundled L bracket gets an impulse beside its centre of mass, so that it translates and turns, and flies for 0.1 s; motion
+of the exact one is in closed form, since it turns by less than 0.01 rad.
+
+    python benchmarks/engine_inertia.py
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent))
+
+from result_table import ResultTable
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.mass.engines import engine_text
+from rigid_proto_ros.mass.from_mesh import MeshBody, mesh_body
+from rigid_proto_ros.mass.inspection import model_difference
+from rigid_proto_ros.mass.properties import MassProperties
+from rigid_proto_ros.mass.tensor import tensor_from_six
+from rigid_proto_ros.page.bundle import installed_node
+
+MESH, MASS = "l_bracket", 2.5
+TAKERS = ("rapier", "jolt", "physx", "havok")
+"""Engines that fly with what is printed for them."""
+IMPULSE = np.array([0.2, -0.3, 0.15])
+BESIDE = np.array([4e-4, 2e-4, -3e-4])
+"""[N s] and [m] from the centre of mass: about 0.1 m/s and 0.07 rad/s, slow enough that ω × Iω changes little."""
+STEP_S, STEPS = 0.01, 10
+COLUMNS = (
+    *("engine", "shape", "first_moment", "second_moment", "third_moment", "axes_turned_deg", "center_off_mm"),
+    *("spin_error", "position_error"),
+)
+"""first_moment to third_moment: relative errors of the principal moments, ascending. spin_error, position_error: of a
+flight with the numbers printed for the engine, relative to the exact ones."""
+
+
+def taken(body: MeshBody, properties: MassProperties) -> dict:
+    """What the engines of npm answer."""
+    folder = HERE / "engines"
+    asked = {
+        "texts": {name: engine_text(name, properties) for name in TAKERS},
+        "impulse": IMPULSE.tolist(),
+        "point": (properties.center_of_mass + BESIDE).tolist(),
+        "step_s": STEP_S,
+        "steps": STEPS,
+        "surface": {"vertices": body.vertices.tolist(), "triangles": body.triangles.tolist()},
+        "mass": properties.mass,
+    }
+    command = [installed_node(folder), folder / "inertia.mjs"]
+    text = json.dumps(asked)
+    done = subprocess.run(command, input=text, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+def flight_errors(row: dict, properties: MassProperties) -> dict[str, float]:
+    """Errors of the spin and of the way of the body's origin, relative to the exact ones."""
+    spin = np.linalg.solve(properties.inertia, np.cross(BESIDE, IMPULSE))
+    way = (IMPULSE / properties.mass - np.cross(spin, properties.center_of_mass)) * STEP_S * STEPS
+    return {
+        "spin_error": float(np.linalg.norm(np.array(row["omega"]) - spin) / np.linalg.norm(spin)),
+        "position_error": float(np.linalg.norm(np.array(row["position"]) - way) / np.linalg.norm(way)),
+    }
+
+
+def differences(own: MassProperties, true: MassProperties) -> dict[str, float]:
+    """How far what an engine computes is off."""
+    difference = model_difference(own, true)
+    names = ("first_moment", "second_moment", "third_moment")
+    return {
+        **dict(zip(names, difference.principal_moments.tolist(), strict=True)),
+        "axes_turned_deg": float(np.degrees(difference.axes_turned)),
+        "center_off_mm": 1e3 * float(np.linalg.norm(difference.center_of_mass)),
+    }
+
+
+def in_mujoco(body: MeshBody) -> dict[str, MassProperties]:
+    """What MuJoCo computes of the mesh, by its words for how."""
+    import mujoco
+
+    found = {}
+    for how in ("legacy", "exact", "convex"):
+        spec = mujoco.MjSpec()
+        mesh = spec.add_mesh(name="m", uservert=body.vertices.ravel(), userface=body.triangles.ravel())
+        mesh.inertia = getattr(mujoco.mjtMeshInertia, f"mjMESH_INERTIA_{how.upper()}")
+        spec.worldbody.add_body().add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="m", mass=MASS)
+        model = spec.compile()
+        R = matrix_from_quaternion(np.roll(model.body_iquat[1], -1))
+        inertia = R @ np.diag(model.body_inertia[1]) @ R.T
+        found[how] = MassProperties(float(model.body_mass[1]), model.body_ipos[1].copy(), inertia)
+    return found
+
+
+def main() -> int:
+    """Ask, measure and write the table; returns the exit status."""
+    table = ResultTable(HERE / "results" / "engine_inertia.csv", COLUMNS)
+    body = mesh_body(MESH)
+    properties = body.moments.mass_properties(mass=MASS)
+    for engine, row in taken(body, properties).items():
+        if "why" in row:
+            raise RuntimeError(f"{engine}: {row['why']}")
+        for shape, own in row["own"].items():
+            found = MassProperties(own["mass"], np.array(own["center"]), tensor_from_six(own["tensor"]))
+            table.add({"engine": engine, "shape": shape, **differences(found, properties)})
+        if "omega" in row:
+            table.add({"engine": engine, "shape": "as printed", **flight_errors(row, properties)})
+    for how, found in in_mujoco(body).items():
+        table.add({"engine": "mujoco", "shape": how, **differences(found, properties)})
+    box = body.moments.mass_properties("bounding_box", mass=MASS)
+    table.add({"engine": "any", "shape": "bounding box", **differences(box, properties)})
+    table.write()
+    for row in table.rows:
+        print(*(f"{row[name]:.4g}" if isinstance(row[name], float) else row[name] for name in COLUMNS), sep="  ")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: MIT
+"""What is printed for an engine is the body in that engine's axes, units and words."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.cli.main import main
+from rigid_proto_ros.mass.engines import ENGINES, diagonal_error, engine_text
+from rigid_proto_ros.mass.from_mesh import mesh_body
+from rigid_proto_ros.mass.properties import MassProperties
+
+MASS = 2.5
+NUMBER = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
+
+
+@pytest.fixture(scope="module")
+def body():
+    return mesh_body("l_bracket")  # not symmetric about any plane of its axes
+
+
+@pytest.fixture(scope="module")
+def properties(body) -> MassProperties:
+    return body.moments.mass_properties(mass=MASS)
+
+
+def numbers(text: str, name: str) -> list[np.ndarray]:
+    """The numbers in brackets after a name, as often as it occurs."""
+    found = re.findall(rf"\b{name}\W*[(\[]([^()\[\]]*)[)\]]", text)
+    return [np.array([float(word) for word in re.findall(NUMBER, each)]) for each in found]
+
+
+def tensor(moments, rotation) -> np.ndarray:
+    R = matrix_from_quaternion(rotation)
+    return R @ np.diag(moments) @ R.T
+
+
+def assert_is(true: MassProperties, mass, center, moments, rotation) -> None:
+    assert mass == pytest.approx(true.mass, rel=1e-8)
+    assert center == pytest.approx(true.center_of_mass, rel=1e-7)
+    assert np.linalg.norm(rotation) == pytest.approx(1.0, abs=1e-8)
+    largest = np.max(np.abs(true.inertia))
+    assert np.max(np.abs(tensor(moments, rotation) - true.inertia)) <= 1e-7 * largest
+
+
+def test_unity_gets_the_mesh_that_its_importer_makes_of_the_file(body, properties):
+    # Rigidbody.inertiaTensor is the diagonal in axes turned by inertiaTensorRotation; x of an .obj is mirrored.
+    text = engine_text("unity", properties)
+    mirrored = body.moments.mass_properties(mass=MASS, scale=(-1.0, 1.0, 1.0))
+    center, moments = numbers(text, "Vector3")
+    (mass,) = re.findall(rf"body\.mass = ({NUMBER})f;", text)
+    assert_is(mirrored, float(mass), center, moments, numbers(text, "Quaternion")[0])
+
+
+def test_unreal_gets_the_mesh_that_its_importer_makes_of_the_file(body, properties):
+    # Centimetres and kg cm², y mirrored; the transform of the mass is where the diagonal stands.
+    text = engine_text("unreal", properties)
+    mirrored = body.moments.mass_properties(mass=MASS, scale=(100.0, -100.0, 100.0))
+    moments, center = numbers(text, "FVector")
+    (mass,) = re.findall(rf"SetMass_AssumesLocked\(actor, ({NUMBER})f\)", text)
+    assert_is(mirrored, float(mass), center, moments, numbers(text, "FQuat")[0])
+
+
+def test_godot_gets_the_diagonal_how_far_it_is_off_and_how_nothing_is_lost(properties):
+    text = engine_text("godot", properties)
+    center, diagonal, principal_center, moments = numbers(text, "Vector3")
+    assert center == pytest.approx(properties.center_of_mass, rel=1e-8)
+    assert diagonal == pytest.approx(np.diag(properties.inertia), rel=1e-8)
+    off = properties.inertia - np.diag(diagonal)
+    assert np.max(np.abs(off)) / np.max(properties.inertia) == pytest.approx(0.2353, abs=1e-3)
+    assert "off by 24 %" in text and diagonal_error(properties.inertia) == pytest.approx(0.2353, abs=1e-3)
+    (turn,) = numbers(text, "Quaternion")  # of the body's children: from the mesh's axes to the principal ones
+    R = matrix_from_quaternion(turn)
+    assert principal_center == pytest.approx(R @ properties.center_of_mass, rel=1e-6, abs=1e-9)
+    assert np.max(np.abs(R @ properties.inertia @ R.T - np.diag(moments))) <= 1e-7 * np.max(moments)
+
+
+def test_a_body_whose_products_are_zero_gets_no_line_about_them():
+    plain = MassProperties(1.0, np.zeros(3), np.diag([0.3, 0.5, 0.7]))
+    assert engine_text("godot", plain).count("#") == 1
+
+
+@pytest.mark.parametrize(
+    ("engine", "vector", "quaternion", "per_kg"),
+    [("physx", "PxVec3", "PxQuat", 1.0), ("babylon", "Vector3", "Quaternion", MASS)],
+)
+def test_moments_and_rotation_are_the_tensor(properties, engine, vector, quaternion, per_kg):
+    text = engine_text(engine, properties)
+    center, moments = numbers(text, vector)
+    assert_is(properties, MASS, center, moments * per_kg, numbers(text, quaternion)[0])
+    assert "2.5" in text
+
+
+def test_rapier_havok_and_jolt_get_rows_in_their_order(properties):
+    rapier = [float(word) for word in re.findall(NUMBER, engine_text("rapier", properties).splitlines()[1])]
+    assert_is(properties, rapier[0], rapier[1:4], rapier[4:7], rapier[7:])
+    havok = json.loads(engine_text("havok", properties).partition("body, ")[2].rstrip(");\n"))
+    assert_is(properties, havok[1], havok[0], MASS * np.array(havok[2]), havok[3])
+    jolt = engine_text("jolt", properties)
+    columns = np.array(numbers(jolt, "Vec4"))
+    assert columns[:3, :3] == pytest.approx(properties.inertia, rel=1e-7, abs=1e-12)
+    assert columns[:, 3].tolist() == [0, 0, 0, 1] and columns[3, :3].tolist() == [0, 0, 0]
+    assert numbers(jolt, "Vec3")[0] == pytest.approx(properties.center_of_mass, rel=1e-8)
+
+
+def test_usd_is_read_back_by_its_own_library(properties):
+    pxr = pytest.importorskip("pxr")
+    from pxr import Sdf, Usd, UsdPhysics
+
+    assert pxr
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    head = "#usda 1.0\n(\n  metersPerUnit = 1\n  kilogramsPerUnit = 1\n)\n"
+    text = engine_text("usd", properties)
+    assert layer.ImportFromString(head + text.replace("over", "def Xform"))
+    stage = Usd.Stage.Open(layer)
+    prim = stage.GetPrimAtPath("/body")
+    assert prim.HasAPI(UsdPhysics.RigidBodyAPI)
+    mass = UsdPhysics.MassAPI(prim)
+    turn = mass.GetPrincipalAxesAttr().Get()
+    rotation = np.array([*turn.GetImaginary(), turn.GetReal()])
+    center, moments = np.array(mass.GetCenterOfMassAttr().Get()), np.array(mass.GetDiagonalInertiaAttr().Get())
+    assert mass.GetMassAttr().Get() == MASS
+    assert center == pytest.approx(properties.center_of_mass, rel=1e-6)
+    assert np.max(np.abs(tensor(moments, rotation / np.linalg.norm(rotation)) - properties.inertia)) <= 1e-6 * 0.0033
+
+
+def test_gltf_is_a_nodes_extension(properties):
+    text = engine_text("gltf", properties).splitlines()[1]
+    motion = json.loads("{" + text + "}")["extensions"]["KHR_physics_rigid_bodies"]["motion"]
+    assert set(motion) == {"mass", "centerOfMass", "inertiaDiagonal", "inertiaOrientation"}
+    assert_is(properties, *(motion[name] for name in ("mass", "centerOfMass", "inertiaDiagonal", "inertiaOrientation")))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_command_prints_one_comment_and_the_lines(capsys, engine):
+    assert main(["inspect", "l_bracket", "--mass", "2.5", "--for", engine]) == 0
+    told = capsys.readouterr()
+    first, *lines = told.out.splitlines()
+    assert first.startswith(("// ", "# ")) and ("kg m²" in first or "kg cm²" in first)
+    assert lines and not any(line.startswith("//") for line in lines) and told.err == ""
+
+
+def test_the_command_has_the_rotation_in_its_json_and_refuses_what_has_no_solid(capsys, tmp_path):
+    assert main(["inspect", "l_bracket", "--mass", "2.5", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    R = matrix_from_quaternion(told["principal_orientation_xyzw"])
+    assert np.allclose(R, told["principal_axes"], atol=1e-14)
+    (tmp_path / "open.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n")
+    assert main(["inspect", str(tmp_path / "open.obj"), "--for", "unity"]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and said.err.count("\n") == 1
