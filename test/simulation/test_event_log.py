@@ -3,11 +3,13 @@
 
 import json
 
-from flights import SECOND, EventLines, flight, wrench
+import pytest
+from flights import SECOND, EventLines, flight, flight_setup, wrench
 
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.simulation import observer
 from rigid_proto_ros.simulation.observer import Logged, Observer, Observers
+from rigid_proto_ros.simulation.simulation import Simulation
 
 BODY = make_body(2.0, (0.0, 0.0, 0.0), ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9)))
 
@@ -55,3 +57,21 @@ def test_events_chained_later_give_the_hash_of_those_chained_at_once(monkeypatch
     # Lines that were read carry the whole chain, those that nobody read included.
     assert fickle.lines == [line for line in reader.lines if line in fickle.lines]
     assert 0 < len(fickle.lines) < 50
+
+
+def test_a_simulation_without_an_observer_chains_nothing_however_many_events_there_are(monkeypatch):
+    """A chained event costs several times what the command does."""
+
+    def chained(*_):
+        raise AssertionError("an event was chained")
+
+    monkeypatch.setattr(observer.EventLog, "_chain", chained)
+    monkeypatch.setattr(observer, "MOST_NOTED", 7)
+    alone = Simulation(flight_setup(BODY))
+    for number in range(20):
+        alone.submit(wrench("body", (0.1, 0.2 * number, 0.0)), number * SECOND // 1000)
+    alone.advance(SECOND)
+    assert alone.events.count == 20
+    # It says so, and gives no hash of a part.
+    with pytest.raises(RuntimeError, match="no chain of events was kept"):
+        _ = alone.events.sha256
