@@ -30,12 +30,15 @@ from ..scene.scenario import Scenario, read_scene
 from ..scene.scenario_run import OfflineRun
 from ..scene.script import MAX_TIME_S, expand_entry
 from ..scene.yaml_text import plain
-from ..simulation.commands import nanoseconds
+from ..simulation.commands import Command, nanoseconds
 from ..simulation.observer import Observer
 from .table import cores
 
 Scene = Scenario
 """A checked scene. It can be flown any number of times, and goes to other processes."""
+
+Commands = tuple[Command, ...]
+"""What ``read_command`` makes of an entry."""
 
 Value = TypeVar("Value")
 Result = TypeVar("Result")
@@ -44,6 +47,13 @@ Result = TypeVar("Result")
 def load_scene(name: str, settings: Mapping[str, object] | None = None) -> Scene:
     """A scene file by path or bundled name, parameters on top as ``{"gravity": [0, 0, -9.81]}``; raises InputError."""
     return read_scene(name, plain(settings or {}), lambda warning: print(warning, file=sys.stderr))
+
+
+def read_command(entry: Mapping[str, object]) -> Commands:
+    """An entry of a poke script, read once: it can be given to any flight, any number of times. Raises InputError."""
+    if not isinstance(entry, (dict, Mapping)):  # a mapping's own check is slow
+        raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
+    return tuple(expand_entry(dict(entry), "command", now_ns=0))
 
 
 class Flight:
@@ -69,10 +79,19 @@ class Flight:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def command(self, entry: Mapping[str, object]) -> None:
-        """Let an entry of a poke script act now, after those given before; with ``t`` at that time [s, simulated] or
-        later. Raises InputError for one that can't be taken.
+    def reset(self, scene: Scene | None = None) -> None:
+        """Begin again at time 0, with another scene if one is given, in a tenth of a new flight's time; what was
+        commanded is dropped, and a recording has another run.
         """
+        self._run.restart(scene)
+
+    def command(self, entry: Mapping[str, object] | Commands) -> None:
+        """Let an entry of a poke script, or one that ``read_command`` has read, act now, after those given before; with
+        ``t`` at that time [s, simulated] or later. Raises InputError for one that can't be taken.
+        """
+        if isinstance(entry, tuple):
+            self._run.submit(entry)
+            return
         if not isinstance(entry, (dict, Mapping)):  # a mapping's own check is slow
             raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
         self._run.submit(expand_entry(dict(entry), "command", now_ns=self._run.simulation.time_ns))

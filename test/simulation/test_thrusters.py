@@ -11,8 +11,7 @@ from rigid_proto_ros.scene.scenario import make_scenario
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
 from rigid_proto_ros.session.recorded_session import Resimulation
-from rigid_proto_ros.simulation.observer import EventLog
-from rigid_proto_ros.simulation.observer import LoadBegan, LoadEnded, Logged
+from rigid_proto_ros.simulation.observer import EventLog, LoadBegan, LoadEnded, Logged
 
 BODY = {
     "mesh": "",
