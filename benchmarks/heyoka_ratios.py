@@ -3,7 +3,7 @@
 
 Each problem is flown from three starts, to two ends each. The error of a tool at an accuracy or tolerance is the largest of
 the six flights, its time their mean; times at an error are read off the two curves (log-log). `kernel` is the compiled loop over steps, one call from Python as heyoka's propagate_until is; `simulation` is
-Simulation.advance with its commands and segments; `sweep` is a row of a sweep's compiled block, its body and end state
+Simulation.advance with its commands and segments; `flight` is `Flight`, reset and commanded; `sweep` is a row of a sweep's compiled block, its body and end state
 included, on one core. What heyoka compiles, one system and tolerance at a time, isn't counted.
 
     python benchmarks/heyoka_ratios.py [--only P2,damped,...] [--seconds 20]
@@ -34,7 +34,7 @@ from rigid_proto_ros.simulation.commands import HELD_WRENCH, IMPULSE, NO_SLOT, P
 from rigid_proto_ros.simulation.flight import LOAD_ROW
 from rigid_proto_ros.simulation.quantities import CODE, MEASURE
 from rigid_proto_ros.simulation.record import SCENE
-from work_precision_ours import first_segment, prepare_simulation, setup_of
+from work_precision_ours import first_segment, prepare_flight, prepare_simulation, setup_of
 from work_precision_ratios import time_at_error
 
 TARGETS = (1e-6, 1e-8, 1e-10)
@@ -126,6 +126,7 @@ def sweep_runs(problem: Problem, accuracy: float):
 
 CURVES = {
     "sweep": sweep_runs,
+    "flight": whole(prepare_flight),
     "heyoka": whole(peers_heyoka.prepare),
     "heyoka batch": batch_runs,
     "kernel": kernel_runs,

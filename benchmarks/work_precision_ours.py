@@ -23,14 +23,18 @@ from flights import StringSettings, flight_setup
 from peers import Contestant, Run
 from problems import Problem, Wrench
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.base.rotation import rotate
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import INTEGRATORS
+from rigid_proto_ros.scene.scenario import make_scenario
+from rigid_proto_ros.scene.yaml_text import plain
 from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.simulation.effects import BEGIN
 from rigid_proto_ros.simulation.flight import steps_of_segment
 from rigid_proto_ros.simulation.setup import Setup
 from rigid_proto_ros.simulation.simulation import Simulation
+from rigid_proto_ros.sweep.flights import Flight, Scene, read_command
 
 ADAPTIVE = ("auto",)
 """Integrators that take an accuracy instead of a step."""
@@ -146,6 +150,56 @@ def prepare_simulation(problem: Problem, step: float, integrator: str) -> Run | 
     if simulation.refused:
         return None
     return Run(restart, advance, row, lambda: simulation.steps)
+
+
+def scene_of(problem: Problem, accuracy: float) -> Scene:
+    """The problem as a scene for ``Flight``."""
+    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = np.array(problem.inertia).tolist()
+    row = problem.row
+    values = {
+        "mesh": "",
+        "inertia_model": "explicit",
+        "explicit_inertia.mass": problem.mass,
+        "explicit_inertia.tensor": [ixx, ixy, ixz, iyy, iyz, izz],
+        "initial.position": row[:3],
+        "initial.orientation_xyzw": row[3:7],
+        "initial.linear_velocity": row[7:10],
+        "initial.angular_velocity": rotate(*row[3:7], *row[10:13]),
+        "gravity": problem.gravity,
+        "linear_damping": problem.linear_damping,
+        "angular_damping": problem.angular_damping,
+        "accuracy": accuracy,
+        "wrench_timeout": 0.0,
+        "string.timeout": 0.0,
+    }
+    if problem.spring is not None:
+        string = _string(problem)
+        names = ("attached", "attach", "target", "stiffness", "damping_ratio", "rest_length", "bilateral")
+        values |= {f"string.{name}": getattr(string, name) for name in names}
+    return make_scenario(plain(values))
+
+
+def prepare_flight(problem: Problem, accuracy: float) -> Run:
+    """A ``Flight`` that is reset, as a user of Python flies it many times: commands are read once."""
+    flight, commands = Flight(scene_of(problem, accuracy)), []
+    for w in problem.wrenches:
+        at, begin = {"at": {"point": list(map(float, w.point))}, "axes": w.axes}, float(w.begin)
+        force, torque = list(map(float, w.force)), list(map(float, w.torque))
+        if w.impulse:
+            commands.append(read_command({"t": begin, **at, "impulse": force, "angular_impulse": torque}))
+        elif w.end is None:
+            commands.append(read_command({"t": begin, "wrench": {**at, "force": force, "torque": torque}}))
+        else:
+            duration = (round(w.end * 1e9) - round(w.begin * 1e9)) / 1e9
+            commands.append(read_command({"t": begin, **at, "force": force, "torque": torque, "duration": duration}))
+
+    def restart():
+        flight.reset()
+        for command in commands:
+            flight.command(command)
+
+    restart()
+    return Run(restart, flight.step, lambda: flight.sample().row, lambda: 0)
 
 
 @dataclass

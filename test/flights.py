@@ -143,8 +143,8 @@ def put_body(setup: Setup, body: Body) -> None:
 
 
 def flight(body: Body, **values) -> Simulation:
-    """A Simulation of ``flight_setup(body, **values)``."""
-    return Simulation(flight_setup(body, **values))
+    """A Simulation of ``flight_setup(body, **values)``, whose events are chained."""
+    return Simulation(flight_setup(body, **values), Observer())
 
 
 def spinning(angular_velocity_body, orientation_xyzw=(0.0, 0.0, 0.0, 1.0)) -> np.ndarray:

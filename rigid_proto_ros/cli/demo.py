@@ -116,7 +116,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def write_demo(name: str) -> tuple[Path, Path]:
-    """Write demo_pokes.yaml for a scene or a mesh, and for a mesh demo_scene.yaml; returns the paths of scene and pokes.
+    """Write demo_pokes.yaml for a scene or a mesh, and for a mesh demo_scene.yaml; returns both paths.
 
     A mesh alone spins about an axis close to its intermediate principal axis; pokes act at the COM and at the vertex
     farthest from the COM. Raises InputError for what can't be simulated.

@@ -85,6 +85,8 @@ def converted(changes: list[RosParameter]) -> list[RosParameter]:
                 raise InputError(change.name, change.value, "true or false")
             result.append(change)
             continue
+        if change.type_ == RosParameter.Type.NOT_SET:
+            raise InputError(change.name, "can't be deleted; a ballast that there is can be")
         result.append(ros_parameter(change.name, parameter_named(change.name).convert(change.value)))
     return result
 

@@ -270,6 +270,19 @@ class OfflineRun(ScenarioRun):
             if isinstance(command, Change) and "publish_rate" in command.content:
                 heappush(self._rates_ns, when_ns)
 
+    def restart(self, scenario: Scenario | None = None) -> None:
+        """Begin again at time 0, with another scenario if one is given; what waits is dropped."""
+        if scenario is not None:
+            self.scenario = scenario
+            self.publications = Publications(scenario.parameters.publish_rate)
+        self.publications.restart()
+        self._submitted = 0
+        self._rates_ns.clear()
+        self.simulation.reset(self.scenario.setup)
+        if self._is_observed:
+            self.announce()
+            self.begin_ghost()
+
     def _all_checked(self, commands: Sequence[Command]) -> list[tuple[Command, Scenario]]:
         taken: list[tuple[Command, Scenario]] = []
         try:

@@ -256,10 +256,12 @@ MOST_NOTED = 10_000
 
 class EventLog:
     """Counts and chains the events of one run. Those that nobody reads as they happen are chained when somebody
-    asks.
+    asks; one that isn't ``chained`` only counts until its first line is asked for, and has no hash then if events came
+    before.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, chained: bool = True) -> None:
+        self._chained = chained
         self.reset()
 
     def reset(self) -> None:
@@ -271,11 +273,13 @@ class EventLog:
     @property
     def sha256(self) -> str:
         """Hash of the chain so far, in hex."""
+        self._need_chain()
         self._chain_noted()
         return self._hash.hexdigest() if self._hash else hashlib.sha256().hexdigest()
 
     def append(self, time_ns: int, kind: str, content: Mapping[str, Any]) -> str:
         """Add an event and return its line."""
+        self._need_chain()
         self._chain_noted()
         self.count += 1
         line = self._chain(time_ns, kind, content)
@@ -283,10 +287,17 @@ class EventLog:
 
     def note(self, time_ns: int, event: Command | tuple[str, dict[str, Any]]) -> None:
         """Add an event whose line nobody wants now: a command that has acted, or kind and content of another one."""
-        self._noted.append((time_ns, event))
         self.count += 1
+        if not self._chained:
+            return
+        self._noted.append((time_ns, event))
         if len(self._noted) >= MOST_NOTED:
             self._chain_noted()
+
+    def _need_chain(self) -> None:
+        if not self._chained and self.count:
+            raise RuntimeError("no chain of events was kept: the simulation began without an observer")
+        self._chained = True
 
     def _chain_noted(self) -> None:
         noted, self._noted = self._noted, []

@@ -20,6 +20,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from numbers import Real
 from pathlib import Path
 from typing import TypeVar
@@ -39,6 +40,9 @@ from .workers import cores
 Scene = Scenario
 """A checked scene. It can be flown any number of times, and goes to other processes."""
 
+Commands = tuple[Command, ...]
+"""What ``read_command`` makes of an entry."""
+
 MOST_GIVEN = 100_000
 """Commands of a flight that are kept for ``Flight.sensitivity``: some tens of megabytes."""
 
@@ -49,6 +53,15 @@ Result = TypeVar("Result")
 def load_scene(name: str, settings: Mapping[str, object] | None = None) -> Scene:
     """A scene file by path or bundled name, parameters on top as ``{"gravity": [0, 0, -9.81]}``; raises InputError."""
     return read_scene(name, plain(settings or {}), lambda warning: print(warning, file=sys.stderr))
+
+
+def read_command(entry: Mapping[str, object], now_ns: int = 0) -> Commands:
+    """An entry of a poke script, read once: it can be given to any flight, any number of times, and acts at its ``t``,
+    or ``now_ns``, or later. Raises InputError.
+    """
+    if not isinstance(entry, (dict, Mapping)):  # a mapping's own check is slow
+        raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
+    return tuple(expand_entry(dict(entry), "command", now_ns=now_ns))
 
 
 class Flight:
@@ -68,7 +81,7 @@ class Flight:
         self._observer = observer
         self._scene = scene
         self._run = OfflineRun(scene, observer=observer)
-        self._given: list[Command] = []
+        self._given: list[tuple[int, Command]] = []  # and when they act
 
     def __enter__(self) -> Flight:
         return self
@@ -76,16 +89,23 @@ class Flight:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def command(self, entry: Mapping[str, object]) -> None:
-        """Let an entry of a poke script act now, after those given before; with ``t`` at that time [s, simulated] or
-        later. Raises InputError for one that can't be taken.
+    def reset(self, scene: Scene | None = None) -> None:
+        """Begin again at time 0 of the scene, or of another one, in a tenth of a new flight's time; what was commanded
+        is dropped, and a recording has another run.
         """
-        if not isinstance(entry, (dict, Mapping)):  # a mapping's own check is slow
-            raise InputError("command", entry, "a mapping such as {'force': [0, 0, 1]}")
-        commands = expand_entry(dict(entry), "command", now_ns=self._run.simulation.time_ns)
+        self._scene = scene or self._scene
+        self._given.clear()
+        self._run.restart(self._scene)
+
+    def command(self, entry: Mapping[str, object] | Commands) -> None:
+        """Let an entry of a poke script, or one that ``read_command`` has read, act now, after those given before; with
+        ``t`` at that time [s, simulated] or later. Raises InputError for one that can't be taken.
+        """
+        commands = entry if isinstance(entry, tuple) else read_command(entry, self._run.simulation.time_ns)
         self._run.submit(commands)
         if len(self._given) <= MOST_GIVEN:
-            self._given += commands
+            now_ns = self._run.simulation.time_ns
+            self._given += [(max(now_ns, command.stamp_ns), command) for command in commands]
 
     def step(self, seconds: float) -> State:
         """Simulate so long, and return the state at the end. Raises InputError for no such time, when the motion fails,
@@ -131,7 +151,8 @@ class Flight:
         """
         if len(self._given) > MOST_GIVEN:
             raise InputError("sensitivity", "more commands", f"a flight of at most {MOST_GIVEN} commands")
-        found = sensitivity_of(self._run.simulation, self._scene, self._given)
+        given = [replace(command, stamp_ns=when_ns) for when_ns, command in self._given]
+        found = sensitivity_of(self._run.simulation, self._scene, given)
         if found["attitude"] is None:
             raise InputError("sensitivity", self._run.simulation.failure or "a second flight that stops")
         return {name: found[name] for name in DIFFERENCES}

@@ -79,7 +79,10 @@ def test_pokes_are_written_for_a_scene_and_for_a_mesh_whose_scene_is_written_too
     assert again == pokes and pushes[0] / pushes[1] == pytest.approx(weights[0] / weights[1])
     Path("bare.yaml").write_text(BARE, "utf-8")
     assert main(["demo", "bare.yaml"]) == 2
-    assert capsys.readouterr().err.strip() == "rigid_proto demo: demo: got 'bare.yaml'; accepted: a mesh, or a scene that has one"
+    assert (
+        capsys.readouterr().err.strip()
+        == "rigid_proto demo: demo: got 'bare.yaml'; accepted: a mesh, or a scene that has one"
+    )
 
 
 @pytest.mark.stress

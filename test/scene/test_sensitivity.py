@@ -15,7 +15,7 @@ from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import expand_script
 from rigid_proto_ros.scene.sensitivity import finer, sensitivity_of
 from rigid_proto_ros.simulation.quantities import attitude_angle
-from rigid_proto_ros.sweep.flights import Flight
+from rigid_proto_ros.sweep.flights import Flight, read_command
 from rigid_proto_ros.sweep.rows import run_chunk
 from rigid_proto_ros.sweep.study import make_study
 
@@ -134,6 +134,23 @@ def test_a_flight_from_python_tells_its_own():
     assert 0.0 < found["attitude"] < 1e-3
     assert found == {name: expected[name] for name in found}
     assert flight.sample().time_ns == 2_000_000_000
+
+
+def test_a_flight_that_begins_again_and_commands_read_once_are_repeated_when_they_acted():
+    scenario = make_scenario({**REGULAR, "accuracy": 1e-4})
+    poke = read_command({"wrench": {"axes": "body", "torque": [0.0, 1e-4, 0.0], "duration": 0.3}})
+    flight, fresh = Flight(scenario), Flight(scenario)
+    flight.command({"set": {"mass": 1.0}})
+    flight.step(0.5)
+    flight.reset()
+    for one in (flight, fresh):
+        for _ in range(4):
+            one.step(0.4)
+            one.command(poke)
+        one.step(0.4)
+    assert (flight.sample().row == fresh.sample().row).all()
+    assert 0.0 < flight.sensitivity()["attitude"] < 1e-3
+    assert flight.sensitivity() == fresh.sensitivity()
 
 
 def test_a_sweep_has_it_as_columns_of_the_batch_and_of_the_simulation_alike():

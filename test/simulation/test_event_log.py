@@ -3,12 +3,14 @@
 
 import json
 
-from flights import SECOND, EventLines, Heard, flight, wrench
+import pytest
+from flights import SECOND, EventLines, Heard, flight, flight_setup, wrench
 
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.simulation import observer
 from rigid_proto_ros.simulation.commands import ClearWrench, MoveString, ReleaseString, TieString
 from rigid_proto_ros.simulation.observer import Acted, Logged, Observer, Observers
+from rigid_proto_ros.simulation.simulation import Simulation
 
 BODY = make_body(2.0, (0.0, 0.0, 0.0), ((1.6, 0.15, -0.1), (0.15, 2.1, 0.2), (-0.1, 0.2, 2.9)))
 
@@ -77,3 +79,21 @@ def test_commands_that_acted_are_told_as_they_were_given_in_their_order_whoever_
         assert [(event.time_ns, event.command) for event in heard.events] == [
             (number * SECOND // 100, command) for number, command in enumerate(commands)
         ]
+
+
+def test_a_simulation_without_an_observer_chains_nothing_however_many_events_there_are(monkeypatch):
+    """A chained event costs several times what the command does."""
+
+    def chained(*_):
+        raise AssertionError("an event was chained")
+
+    monkeypatch.setattr(observer.EventLog, "_chain", chained)
+    monkeypatch.setattr(observer, "MOST_NOTED", 7)
+    alone = Simulation(flight_setup(BODY))
+    for number in range(20):
+        alone.submit(wrench("body", (0.1, 0.2 * number, 0.0)), number * SECOND // 1000)
+    alone.advance(SECOND)
+    assert alone.events.count == 20
+    # It says so, and gives no hash of a part.
+    with pytest.raises(RuntimeError, match="no chain of events was kept"):
+        _ = alone.events.sha256

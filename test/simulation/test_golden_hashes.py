@@ -39,6 +39,7 @@ from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script, read_script
 from rigid_proto_ros.scene.sensor_noise import imu_noise
+from rigid_proto_ros.simulation.observer import EventLog
 from rigid_proto_ros.simulation.simulation import Simulation
 from rigid_proto_ros.sweep.rows import run_chunk
 from rigid_proto_ros.sweep.sampling import row_uniforms
@@ -127,6 +128,7 @@ def digest(*parts: object) -> str:
 def flown(simulation: Simulation, until_ns: int) -> str:
     """Hash of the states at 8 times, the counts, and the chain of events."""
     found = []
+    simulation.events = EventLog()  # chained, also without an observer
     for k in range(1, 9):
         state = simulation.advance(until_ns * k // 8)
         found.append(f"{state.sha256()} {(simulation.steps, simulation.force_evaluations, simulation.events.count)}")

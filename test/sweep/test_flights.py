@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
-from rigid_proto_ros.sweep.flights import Flight, fly_all, load_scene
+from rigid_proto_ros.sweep.flights import Flight, fly_all, load_scene, read_command
 
 SCRIPT = [
     {"t": 0.0, "at": "tip", "push": 0.05, "duration": 0.2},
@@ -197,3 +198,41 @@ def test_simulated_time_ends_where_that_of_commands_does() -> None:
 def test_a_command_that_is_no_entry_is_refused(entry) -> None:
     with pytest.raises(InputError, match="command: .*a mapping such as"):
         Flight(load_scene("t_handle")).command(entry)
+
+
+def test_a_flight_that_was_reset_flies_as_a_new_one_and_a_command_read_once_as_its_entry() -> None:
+    scene = load_scene("t_handle")
+    entries = [
+        {"t": 0.3, "at": "tip", "force": [0.05, 0, 0]},
+        {"set": {"mass": 0.3}, "t": 0.5},
+        {"impulse": [0, 0, 1e-3]},
+    ]
+    read = [read_command(entry) for entry in entries]
+    again = Flight(scene)
+    for other in (scene, scene.with_changes({"mass": 0.2, "string.attached": True}), scene):
+        again.reset(other)
+        new = Flight(other)
+        for entry, command in zip(entries, read, strict=True):
+            new.command(entry)
+            again.command(command)
+        assert again.sample().time_ns == 0
+        assert again.step(2.0).row.tobytes() == new.step(2.0).row.tobytes()
+    # What was commanded is dropped.
+    again.command({"t": 5.0, "force": [1, 0, 0]})
+    again.reset(scene)
+    assert again.step(6.0).row.tobytes() == Flight(scene).step(6.0).row.tobytes()
+
+
+def test_each_run_of_a_flight_that_is_reset_is_recorded_and_verified(tmp_path) -> None:
+    pytest.importorskip("mcap")
+    from rigid_proto_ros.session.bag import read_runs
+
+    path, poke = tmp_path / "s.mcap", read_command({"t": 0.1, "at": "tip", "force": [0.05, 0, 0]})
+    with Flight(load_scene("t_handle"), record=path) as flight:
+        for number in range(3):
+            flight.command(poke)
+            flight.step(0.5)
+            if number < 2:
+                flight.reset(load_scene("t_handle", {"mass": 0.1 + number}))
+    assert [len(run.times) for run in read_runs(path)] == [51, 51, 51]
+    assert main(["replay", str(path), "--verify"]) == 0
