@@ -15,7 +15,7 @@ from pathlib import Path
 from .. import __version__
 from .library import stamp
 
-MOTION = "2026-11-26d"
+MOTION = "2026-11-28"
 """Since when the motion has had its present bits, with a letter from the second time on one day: versions with the same
 give the same ones, on any machine.
 """

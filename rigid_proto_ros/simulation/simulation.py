@@ -285,9 +285,7 @@ class Simulation:
         if not (self._wants_loads or observer.wants(Logged) or arrays.integers[NOTEWORTHY]):
             for pending in due:
                 self.events.note(pending.time_ns, pending.command)
-            if Acted in observer.takes:
-                for pending in due:
-                    observer.on(Acted(pending.time_ns, pending.command))
+            self._tell_acted(due)
             return
         first = arrays.first_due
         for number, (now_ns, what, load_id, row) in enumerate(arrays.last_events()):
@@ -316,6 +314,11 @@ class Simulation:
             else:
                 kind = "impulse" if command.flight_kind == IMPULSE else command.kind
                 self._notify_load(load_id, kind, load_of_bytes(pending.row))
+
+    def _tell_acted(self, due: Sequence[Pending]) -> None:
+        if Acted in self.observer.takes:
+            for pending in due:
+                self.observer.on(Acted(pending.time_ns, pending.command))
 
     def _log_timeout(self, of: str, which: object) -> None:
         if of in self.logged_timeouts:
