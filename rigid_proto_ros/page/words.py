@@ -122,7 +122,12 @@ def _failures() -> list[str]:
         "initial.angular_velocity": [1e99, 1e99, 0.0],
     }
     values |= {"explicit_inertia.tensor": [1.0, 0.0, 0.0, 2.0, 0.0, 3.0]}
-    string = {"string.attached": True, "string.bilateral": True, "string.rest_length": 1.0}
+    string = {
+        "string.attached": True,
+        "string.bilateral": True,
+        "string.rest_length": 1.0,
+        "string.target": [1.0, 0.0, 0.0],
+    }
     found = []
     for added in ({}, string):
         simulation = Simulation(make_scenario({**values, **added}).setup)
