@@ -31,7 +31,7 @@ TEST = 10
 """Cost of a test of two triangles, in visited boxes."""
 MAX_SELF_CROSSING = 20_000
 """Triangles above which nobody looks whether a component passes through itself: no number depends on it, and it takes
-three times as long as reading the file."""
+four to eight times as long as reading the file."""
 TOUCHING = 1e-9
 """Fraction of the triangles' size up to which a distance or an overlap counts as rounding error."""
 SAMPLES = 24

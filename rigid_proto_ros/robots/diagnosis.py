@@ -4,7 +4,7 @@
 * frame: mass 0 and no shape, as of a link that only marks a place;
 * impossible: no body has it (mass > 0, tensor positive definite, A + B >= C);
 * unknown: it can't be compared, for want of a shape that encloses a volume, or because something that the link shows
-  can't be found or read;
+  can't be found or read; or only its shapes condemn it, and no longer if meshes are turned upright as their files say;
 * uniform: it is the uniform solid's, to the tolerance and the digits printed;
 * explained: it isn't the uniform solid's, and a usual mistake turns that one into it (robots/causes.py); a COM at an
   origin, or that of box, shell or hull, counts only beside a tensor that fits, that is explained, or that no mass
@@ -248,13 +248,25 @@ def diagnose(link: Link, meshes: Meshes, tolerance: float = LIMIT) -> LinkDiagno
         name = shapes[missing][0].file or shapes[missing][0].kind if missing else ""
         bare = LinkDiagnosis(link.name, name, UNKNOWN, link.mass, note=note, judged_by=missing)
         return _possible(link, bare, [])
+    best, verdict = _judged(link, readable, tolerance)
+    by_shape_alone = verdict.status in (BEYOND_SHAPE, EXPLAINED) and best.status != EXPLAINED
+    if by_shape_alone and any(parts.upright() for parts in readable.values()):
+        turned = {role: parts.upright() or parts for role, parts in readable.items()}
+        if _judged(link, turned, tolerance)[1].status not in WRONG:
+            note = f"{verdict.causes[-1]}, but not if its meshes are turned upright as their files say: programs differ"
+            verdict = replace(verdict, status=UNKNOWN, causes=(), note=note)
+    told = _remarks(readable[VISUAL if VISUAL in readable else COLLISION])
+    return replace(verdict, info=(*lost.values(), *told, *verdict.info))
+
+
+def _judged(link: Link, readable: dict[str, LinkShapes], tolerance: float) -> tuple[LinkDiagnosis, LinkDiagnosis]:
+    """The diagnosis by the role's shapes that count, and the same once it is known whether these can have the link's
+    inertial.
+    """
     found = [_compared(link, parts, tolerance, role) for role, parts in readable.items()]
+    best = min(found, key=lambda one: _weight(one, readable[one.judged_by]))
     only_primitives = all(parts.are_primitives for parts in readable.values())
-    best = replace(
-        min(found, key=lambda one: _weight(one, readable[one.judged_by])),
-        info=(*lost.values(), *_remarks(readable[VISUAL if VISUAL in readable else COLLISION])),
-    )
-    return _possible(link, best, [parts.points for parts in readable.values()], only_primitives)
+    return best, _possible(link, best, [parts.points for parts in readable.values()], only_primitives)
 
 
 def missing_inertial(link: Link, meshes: Meshes, density: float) -> MassProperties:

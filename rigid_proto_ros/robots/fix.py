@@ -16,7 +16,7 @@ from ..mass.export import mjcf_inertial, sdf_inertial, urdf_inertial
 from ..mass.properties import MassProperties
 from ..mass.tensor import SIX
 from ..mesh.locate import Search
-from .diagnosis import FRAME, NOT_JUDGED, NOT_UNIFORM, UNIFORM, LinkDiagnosis, diagnose, missing_inertial
+from .diagnosis import FRAME, NOT_JUDGED, NOT_UNIFORM, UNIFORM, UNKNOWN, LinkDiagnosis, diagnose, missing_inertial
 from .link_shapes import Meshes
 from .reading import MAX_BYTES, NO_INERTIAL, Link, parse_xml, robot_of
 
@@ -60,7 +60,7 @@ def _reason_to_leave(link: Link, diagnosis: LinkDiagnosis, places: dict[int, tup
         return "it is possible for its shapes; --all replaces it by that of the uniform solid"
     if diagnosis.status == NOT_JUDGED and not everything:
         return "its shapes are primitives only, which often stand in for others; --all replaces it by that of theirs"
-    if link.problem or diagnosis.expected is None:
+    if link.problem or diagnosis.expected is None or diagnosis.status == UNKNOWN:
         return diagnosis.note or "its mass isn't a positive number"
     if link.element is None or id(link.element) not in places:
         return "it is in another file, or its body has no name"

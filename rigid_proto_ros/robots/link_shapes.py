@@ -163,6 +163,13 @@ class Meshes:
         return LinkShapes(taken)
 
 
+_UPRIGHT = {
+    "X": Pose(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]), np.zeros(3)),
+    "Y": Pose(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]), np.zeros(3)),
+}
+"""Poses in which z is up of what a COLLADA file has with x or y up."""
+
+
 class LinkShapes:
     """Shapes, meshes with their body, in a link's frame; points (n, 3): their vertices, round primitives as inscribed
     surfaces.
@@ -187,6 +194,18 @@ class LinkShapes:
     def diagonal(self) -> float:
         """Diagonal of the box, in the link's axes, around all."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    def upright(self) -> LinkShapes | None:
+        """The same with those meshes turned whose file says that another axis than z is up, which some programs do and
+        others don't; None where no file says so.
+        """
+        turns = [_UPRIGHT.get(body.mesh.up_axis) if body else None for _, body in self.parts]
+        if not any(turns):
+            return None
+        poses = (shape.pose @ turn if turn else shape.pose for (shape, _), turn in zip(self.parts, turns, strict=True))
+        return LinkShapes(
+            [(replace(shape, pose=pose), body) for (shape, body), pose in zip(self.parts, poses, strict=True)]
+        )
 
     @cached_property
     def solids(self) -> list[MassProperties]:

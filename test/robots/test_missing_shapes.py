@@ -4,7 +4,7 @@
 import json
 
 import pytest
-from mesh_files import CUBE_VERTICES, obj
+from mesh_files import CUBE_VERTICES, collada, obj
 
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.robots.diagnosis import compare_robot
@@ -80,3 +80,31 @@ def test_collision_shapes_judge_a_link_that_shows_nothing(tmp_path):
 def test_a_link_without_an_inertial_and_mesh_says_both(tmp_path):
     (link,) = compare_robot(robot(tmp_path, mesh("visual", GONE), ""))
     assert link.status == "unknown" and link.note.startswith("no <inertial>; visual mesh not found")
+
+
+ROD = '<visual><geometry><mesh filename="rod.dae" scale="0.2 1 0.2"/></geometry></visual>'
+"""A rod along y, from the link's origin; upright, as its file says it is with y up, it stands along z."""
+
+
+@pytest.mark.parametrize(
+    ("up", "com", "moments", "word"),
+    [
+        ("Y_UP", "0.1 -0.1 0.5", (0.45, 0.45, 0.04), "unknown"),  # a standing rod, heavier in the middle
+        ("Z_UP", "0.1 -0.1 0.5", (0.45, 0.45, 0.04), "impossible for its shape"),
+        ("Y_UP", "0.1 0.5 0.1", (0.45, 0.04, 0.45), "not uniform"),  # lying, as its numbers are
+        ("Y_UP", "0.1 9.0 0.1", (0.45, 0.04, 0.45), "impossible for its shape"),  # either way
+        ("Y_UP", "0.1 0.5 0.1", (0.52e6, 0.04e6, 0.52e6), "explained"),  # by the rod as it lies
+    ],
+)
+def test_a_mesh_that_some_programs_turn_upright_condemns_what_is_wrong_either_way(tmp_path, up, com, moments, word):
+    pytest.importorskip("collada")
+    data = collada('<node><instance_geometry url="#cube"/></node>')
+    (tmp_path / "rod.dae").write_bytes(data.replace(b"</asset>", f"<up_axis>{up}</up_axis></asset>".encode()))
+    x, y, z = moments
+    own = f'<origin xyz="{com}"/><mass value="6.00000"/><inertia ixx="{x:.6f}" iyy="{y:.6f}" izz="{z:.6f}"/>'
+    path = robot(tmp_path, ROD, f"<inertial>{own}</inertial>")
+    (link,) = compare_robot(path)
+    assert link.status == word, link
+    assert ("turned upright" in link.note) == (word == "unknown")
+    main(["inspect", "--compare", str(path), "--fix", str(tmp_path / "fixed.urdf")])
+    assert ((tmp_path / "fixed.urdf").read_bytes() == path.read_bytes()) == (word in ("unknown", "not uniform"))
