@@ -43,6 +43,8 @@ OPENING_S = 20.0
 """Within which a client says what it wants, and has got the page."""
 CLOSING_S = 2.0
 """For the goodbye of a page's socket."""
+CUTTING_S = 0.2
+"""For that of one that broke the rules, and may not answer it."""
 
 LINE_S = 1.0
 """[s] Between two lines about clients."""
@@ -229,6 +231,8 @@ class PageServer:
     async def _handle(self, connection: ServerConnection) -> None:
         assert self._on_socket is not None and connection.request is not None
         code = await self._on_socket(connection, connection.request.path.partition("?")[0].rpartition("/")[2])
+        if code != 1000:
+            connection.close_timeout = CUTTING_S
         await connection.close(code)
         sent = connection.protocol.close_sent  # by whom ever it was ended, what this server had to say
         ended = _ENDED.get(sent.code) if sent is not None else None
