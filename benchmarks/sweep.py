@@ -29,7 +29,8 @@ from result_table import ResultTable
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.sweep.rows import run_chunk
 from rigid_proto_ros.sweep.study import Study, make_study
-from rigid_proto_ros.sweep.table import cores, run_study
+from rigid_proto_ros.sweep.table import run_study
+from rigid_proto_ros.sweep.workers import cores
 
 POKES = [(1.0, 0.1), (4.0, 0.2)]
 """When each poke begins and how long it lasts [s]: multiples of every MuJoCo step below."""

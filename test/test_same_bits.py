@@ -46,7 +46,8 @@ ALLOWED = {
     ("scene/sensor_noise.py", "np.random"): "noise, which moves nothing",
     ("sweep/sampling.py", "**"): "of decimal numbers, whose digits are fixed",
     ("sweep/sampling.py", "np.random"): "whole numbers of Philox, which the golden hashes compare",
-    **{(f"sweep/{name}.py", "sum"): FRACTIONS for name in ("study", "table")},
+    ("scene/sensitivity.py", "**"): "of a step's length, rounded to nanoseconds",
+    **{(f"sweep/{name}.py", "sum"): FRACTIONS for name in ("study", "table", "workers")},
 }
 """What stands there all the same, and why."""
 

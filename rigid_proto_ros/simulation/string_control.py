@@ -99,11 +99,12 @@ def follows_rates(scene: np.record, body: BodyRow, tied: bool, knot: Vector3, re
 def begins_clear(
     scene: np.record, body: BodyRow, row: StateRow, knot: Vector3, end: Vector3, refusal: np.record
 ) -> bool:
-    """Whether a string tied at ``knot`` (3,) [mesh coordinates] with its free end at ``end`` (3,) [m, world] begins
-    with a direction, as one that pushes must: the knot is away from the free end, and stays so for CLEAR_S.
+    """Whether an integrator that chooses its own steps can begin with a string tied at ``knot`` (3,) [mesh coordinates]
+    with its free end at ``end`` (3,) [m, world]: one that pushes has a direction where the knot is away from the free
+    end, and stays so for CLEAR_S.
     """
     rest, frequency = scene.string_rest_length, scene.string_frequency
-    if rest == 0.0 or not scene.string_bilateral:
+    if scene.integrator != rf.AUTO or rest == 0.0 or not scene.string_bilateral:
         return True
     rx, ry, rz = arm(body, knot[0], knot[1], knot[2])
     distance = length_of(*span_of(rx, ry, rz, row, end[0], end[1], end[2]))
