@@ -119,8 +119,7 @@ def main() -> int:
     box = body.moments.mass_properties("bounding_box", mass=MASS)
     table.add({"engine": "any", "shape": "bounding box", **differences(box, properties)})
     table.write()
-    for row in table.rows:
-        print(*(f"{row[name]:.4g}" if isinstance(row[name], float) else row[name] for name in COLUMNS), sep="  ")
+    table.show()
     return 0
 
 

@@ -150,8 +150,7 @@ def main() -> int:
         for way, states in flown.items():
             table.add({**of_ours, "way": way, "step_s": step_s, **measures(states)})
     table.write()
-    for row in table.rows:
-        print(*(f"{row[name]:.4g}" if isinstance(row[name], float) else row[name] for name in COLUMNS), sep="  ")
+    table.show()
     return 0
 
 

@@ -18,6 +18,7 @@ class ResultTable:
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
         self.path = path
+        self._own = columns
         self.columns = (*columns, *PROVENANCE)
         self.rows: list[dict] = []
         self._provenance = provenance()
@@ -27,6 +28,11 @@ class ResultTable:
         if unknown:
             raise ValueError(f"columns {sorted(unknown)}: not of this table")
         self.rows.append({**dict.fromkeys(self.columns, float("nan")), **row, **self._provenance})
+
+    def show(self) -> None:
+        """Print the rows without what they depend on."""
+        for row in self.rows:
+            print(*(f"{row[name]:.4g}" if isinstance(row[name], float) else row[name] for name in self._own), sep="  ")
 
     def write(self) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)

@@ -13,6 +13,7 @@
 
 import { createRequire } from "node:module";
 import { readFileSync } from "node:fs";
+import { emptyWorld } from "./jolt_world.mjs";
 
 const packages = createRequire(import.meta.url);
 const BALL = 0.1;
@@ -71,15 +72,7 @@ export const ENGINES = [
       const jolt = await (await import("jolt-physics")).default();
       return ({ mass, moments, rotation, omega }, step_s, { gyroscopic }) => {
         withoutAxes("this way of Jolt", { rotation });
-        const settings = new jolt.JoltSettings();
-        settings.mMaxWorkerThreads = 0;
-        const layers = new jolt.ObjectLayerPairFilterTable(1), broad = new jolt.BroadPhaseLayerInterfaceTable(1, 1);
-        broad.MapObjectToBroadPhaseLayer(0, new jolt.BroadPhaseLayer(0));
-        settings.mObjectLayerPairFilter = layers;
-        settings.mBroadPhaseLayerInterface = broad;
-        settings.mObjectVsBroadPhaseLayerFilter = new jolt.ObjectVsBroadPhaseLayerFilterTable(broad, 1, layers, 1);
-        const world = new jolt.JoltInterface(settings), bodies = world.GetPhysicsSystem().GetBodyInterface();
-        world.GetPhysicsSystem().SetGravity(new jolt.Vec3(0, 0, 0));
+        const { world, bodies } = emptyWorld(jolt);
         const about = new jolt.BodyCreationSettings(new jolt.SphereShape(BALL), new jolt.RVec3(0, 0, 0), new jolt.Quat(0, 0, 0, 1), jolt.EMotionType_Dynamic, 0);
         const [x, y, z] = moments;
         about.mOverrideMassProperties = jolt.EOverrideMassProperties_MassAndInertiaProvided;

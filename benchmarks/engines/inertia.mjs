@@ -14,6 +14,7 @@
 
 import { createRequire } from "node:module";
 import { readFileSync } from "node:fs";
+import { emptyWorld } from "./jolt_world.mjs";
 
 const packages = createRequire(import.meta.url);
 const BALL = 0.01;
@@ -70,15 +71,7 @@ const ENGINES = {
 
   async jolt({ texts, impulse, point, step_s, steps, surface, mass }) {
     const jolt = await (await import("jolt-physics")).default();
-    const settings = new jolt.JoltSettings();
-    settings.mMaxWorkerThreads = 0;
-    const layers = new jolt.ObjectLayerPairFilterTable(1), broad = new jolt.BroadPhaseLayerInterfaceTable(1, 1);
-    broad.MapObjectToBroadPhaseLayer(0, new jolt.BroadPhaseLayer(0));
-    settings.mObjectLayerPairFilter = layers;
-    settings.mBroadPhaseLayerInterface = broad;
-    settings.mObjectVsBroadPhaseLayerFilter = new jolt.ObjectVsBroadPhaseLayerFilterTable(broad, 1, layers, 1);
-    const world = new jolt.JoltInterface(settings), bodies = world.GetPhysicsSystem().GetBodyInterface();
-    world.GetPhysicsSystem().SetGravity(new jolt.Vec3(0, 0, 0));
+    const { world, bodies } = emptyWorld(jolt);
     const [center] = named(texts.jolt, "Vec3"), columns = named(texts.jolt, "Vec4").slice(0, 3);
     const moved = new jolt.OffsetCenterOfMassShapeSettings(new jolt.Vec3(...center), new jolt.SphereShapeSettings(BALL)).Create().Get();
     const about = new jolt.BodyCreationSettings(moved, new jolt.RVec3(0, 0, 0), new jolt.Quat(0, 0, 0, 1), jolt.EMotionType_Dynamic, 0);
