@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.bundled import example_names, example_path, study_names, study_path
-from ..base.errors import InputError, did_you_mean
+from ..base.errors import InputError, MeshError, did_you_mean
 from ..base.library import stamp
 from ..base.provenance import MOTION
 from ..base.vectors import IntArray
@@ -54,13 +54,15 @@ MESHES_KEPT = 16
 
 
 class Meshes:
-    """Meshes with their moments, each read once. contents: of some of them by name, instead of what the files hold."""
+    """Meshes with their moments, each read once. contents: of some of them by name, instead of what the files hold, or
+    why they can't be read.
+    """
 
-    def __init__(self, contents: Mapping[str, Mesh] | None = None) -> None:
+    def __init__(self, contents: Mapping[str, Mesh | MeshError] | None = None) -> None:
         self._contents = dict(contents or {})
         self._made = lru_cache(maxsize=MESHES_KEPT)(self._make)
 
-    def __reduce__(self) -> tuple[type[Meshes], tuple[dict[str, Mesh]]]:
+    def __reduce__(self) -> tuple[type[Meshes], tuple[dict[str, Mesh | MeshError]]]:
         """For another process they are made anew, from the same contents."""
         return Meshes, (self._contents,)
 
@@ -70,7 +72,10 @@ class Meshes:
 
     def _make(self, mesh: str, repair: bool, fallback: str) -> BodyMesh | None:
         parameters = Parameters(mesh=mesh, mesh_repair=repair, mesh_fallback=fallback)
-        return load_body_mesh(parameters, self._contents.get(mesh))
+        given = self._contents.get(mesh)
+        if isinstance(given, MeshError):
+            raise given
+        return load_body_mesh(parameters, given)
 
 
 @dataclass(frozen=True)
@@ -194,13 +199,19 @@ class Study:
         return Variation(parameters, entries, self.meshes)
 
     @cached_property
-    def contents(self) -> dict[str, Mesh]:
-        """The meshes that rows and references begin with, by name; raises MeshError."""
+    def contents(self) -> dict[str, Mesh | MeshError]:
+        """The meshes that rows and references begin with, by name, or why one can't be read, which fails its rows."""
         named = [self.parameters.mesh, (self.reference or {}).get("mesh", "")]
         for vary in self.vary:
             if vary.target.parameter == "mesh" and isinstance(vary.form, Levels):
                 named += vary.form.values
-        return {name: load_mesh(name) for name in map(str, named) if name}
+        found: dict[str, Mesh | MeshError] = {}
+        for name in filter(None, map(str, named)):
+            try:
+                found[name] = load_mesh(name)
+            except MeshError as error:
+                found[name] = error
+        return found
 
     @cached_property
     def fingerprint(self) -> str:
@@ -210,7 +221,8 @@ class Study:
             *(sorted(self.parameters.named().items()), self.script, self.duration_ns, self.seed, self.samples),
             *([(vary.target.name, vary.form) for vary in self.vary], self.reference),
             *(measures.columns, measures.table.tolist(), measures.sample_ns.tolist()),
-            *({name: mesh.sha256 for name, mesh in self.contents.items()}, MOTION, stamp()),
+            {name: mesh.sha256 if isinstance(mesh, Mesh) else str(mesh) for name, mesh in self.contents.items()},
+            *(MOTION, stamp()),
         )
         return hashlib.sha256(repr(given).encode()).hexdigest()
 

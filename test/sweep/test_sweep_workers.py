@@ -25,6 +25,8 @@ from rigid_proto_ros.sweep.table import SweepInterrupted, metadata_of, run_study
 
 pq = pytest.importorskip("pyarrow.parquet")
 
+MISSING = {"scene": "hammer", "duration": 0.1, "vary": {"mesh": {"grid": ["hammer", "no_such_file.obj"]}}}
+
 
 def stopped_at(monkeypatch: pytest.MonkeyPatch, own: Study, file: Path, row: int, **options: Any) -> None:
     """Run a study until Ctrl-C comes at this row."""
@@ -90,6 +92,14 @@ def test_a_file_with_another_mesh_is_another_study(tmp_path) -> None:
     assert study(spec).fingerprint != first
 
 
+def test_a_mesh_that_cannot_be_read_fails_its_rows_and_no_others(tmp_path) -> None:
+    own = study(MISSING)
+    metadata = run_study(own, tmp_path / "t.parquet", progress=False)
+    assert (metadata["rows_done"], metadata["rows_failed"]) == (2, 1)
+    failures = pq.read_table(tmp_path / "t.parquet")["failure"].to_pylist()
+    assert failures[0] is None and "no_such_file.obj" in failures[1]
+
+
 @pytest.mark.parametrize("error", [InputError("mass", -1, "more"), CommandRefused("stamp", "t", 1, "less")])
 def test_a_refusal_comes_whole_from_another_process(error: InputError) -> None:
     found = pickle.loads(pickle.dumps(error))
@@ -136,6 +146,12 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_table(cluster, tmp_path, m
     assert lost
     assert pq.read_table("there.parquet").equals(pq.read_table("here.parquet"))
     assert {**there, "date": ""} == {**here, "date": ""}
+
+
+def test_a_mesh_that_cannot_be_read_here_fails_its_rows_there_too(cluster, tmp_path) -> None:
+    run_study(study(MISSING), tmp_path / "here.parquet", progress=False)
+    run_study(study(MISSING), tmp_path / "there.parquet", dask=cluster.scheduler_address, progress=False)
+    assert pq.read_table(tmp_path / "there.parquet").equals(pq.read_table(tmp_path / "here.parquet"))
 
 
 def test_ctrl_c_leaves_a_table_of_the_cluster_to_go_on_from(cluster, tmp_path, monkeypatch) -> None:
