@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 .DEFAULT_GOAL := help
-.PHONY: always help setup kernels run up workbench test lint pictures site wheel build bench stress soak clean pins
+.PHONY: always help setup kernels run up workbench test lint pictures site wheel sdist release version build bench stress soak clean pins
 SHELL := /bin/bash
 # A make that a test starts has its own jobs.
 unexport MAKEFLAGS MFLAGS
@@ -74,6 +74,19 @@ wheel: setup ## dist/: a wheel with the kernels of this machine's architecture
 	@$(PY) -m rigid_proto_ros.kernels wheel
 	@$(PY) -m rigid_proto_ros.page wheel
 	$(PY) -m pip --disable-pip-version-check wheel --quiet --no-deps --no-build-isolation -w dist .
+
+sdist: setup ## dist/: the sources as one file, from which pip builds
+	@mkdir -p dist && $(PY) setup.py --quiet sdist --dist-dir dist
+
+# A tag names what is in it: the version that package.xml has, and nothing uncommitted.
+release: setup ## dist/: wheel, sdist and the site of the tag that is checked out
+	@[ "$$(git describe --exact-match --tags HEAD 2>/dev/null)" = "v$$($(MAKE) -s version)" ] || { echo "make release: HEAD isn't tagged v$$($(MAKE) -s version), the version in package.xml; check that tag out, or set the version and tag it" >&2; exit 1; }
+	@[ -z "$$(git status --porcelain)" ] || { echo "make release: there are uncommitted changes: $$(git status --porcelain | head -3)" >&2; exit 1; }
+	@$(MAKE) -s wheel sdist site
+	@tar -czf "dist/rigid_proto_ros-$$($(MAKE) -s version)-site.tar.gz" site
+
+version: ## the version, which stands in package.xml
+	@sed -n 's|.*<version>\(.*\)</version>.*|\1|p' package.xml
 
 build: setup ## colcon build into build/, install/ and log/; then: source install/setup.bash
 	$(ROS) $(PY) -m colcon build --packages-select rigid_proto_ros

@@ -17,9 +17,9 @@ except ImportError:  # before version 70, as beside colcon; a wheel isn't made t
 
 NAME = "rigid_proto_ros"
 SHARE = f"share/{NAME}"
-VERSION = next(
-    line.split('"')[1] for line in Path(NAME, "__init__.py").read_text("utf-8").splitlines() if "__version__" in line
-)
+HERE = Path(__file__).resolve().parent
+"""Where the sources are: `colcon build --symlink-install` runs a link to this file elsewhere."""
+VERSION = (HERE / "package.xml").read_text("utf-8").partition("<version>")[2].partition("</version>")[0]
 
 # Real rclpy on Fast DDS from PyPI. An extra, and not part of `all`, because a machine with a ROS
 # installation must keep that one's. Jazzy's has no wheels for Python 3.14, Kilted's has.
@@ -83,7 +83,7 @@ def environments_python() -> str:
     builds, the active virtual environment's is taken, else that of `make setup`, else its own.
     """
     places = [Path(os.environ["VIRTUAL_ENV"])] if os.environ.get("VIRTUAL_ENV") else []
-    places.append(Path(__file__).resolve().parent / ".venv")
+    places.append(HERE / ".venv")
     found = [str(place / "bin" / "python3") for place in places if (place / "bin" / "python3").is_file()]
     # Not sys.prefix: colcon sets it to the folder that it installs into.
     if (Path(sys.executable).parent.parent / "pyvenv.cfg").is_file() or not found:
@@ -131,8 +131,7 @@ setup(
     maintainer="rigid_proto_ros developers",
     maintainer_email="rigid-proto-ros@users.noreply.github.com",
     description="Prototype the properties of a rigid body: exact inertia from a mesh, flight under wrenches, Rerun",
-    # Beside this very file: `colcon build --symlink-install` runs a link to it elsewhere.
-    long_description=Path(__file__).resolve().with_name("README.md").read_text("utf-8"),
+    long_description=(HERE / "README.md").read_text("utf-8"),
     long_description_content_type="text/markdown",
     **({"license_expression": "MIT"} if int(setuptools.__version__.partition(".")[0]) >= 77 else {"license": "MIT"}),
     license_files=["LICENSE"],

@@ -12,7 +12,6 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from .. import __version__
 from .library import stamp
 
 MOTION = "2026-11-28"
@@ -49,6 +48,8 @@ def versions(*others: str) -> dict[str, str]:
     """Versions by name: of this package, of Python, of what it computes with and of ``others``, as far as they are
     installed; with them the kind of machine and the C library.
     """
+    from .. import __version__
+
     found = {
         "rigid_proto_ros": __version__,
         "motion": MOTION,

@@ -12,7 +12,6 @@ import importlib
 import io
 import sys
 
-from .. import __version__
 from ..base import interrupts
 from ..base.command_line import Parser
 from ..base.errors import tell
@@ -37,6 +36,16 @@ EXAMPLES = (
 )
 
 
+class ShowVersion(argparse.Action):
+    """Print the package's version, which is looked up only then."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from .. import __version__
+
+        print(__version__)
+        parser.exit()
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run one command and return its exit status."""
     own_process = argv is None
@@ -46,7 +55,7 @@ def main(argv: list[str] | None = None) -> int:
         description="Inspect a mesh, simulate it as a rigid body, record and replay the motion.",
         examples=EXAMPLES,
     )
-    parser.add_argument("--version", action="version", version=__version__)
+    parser.add_argument("--version", action=ShowVersion, nargs=0, help="show the version and exit")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
     for name, summary in COMMANDS.items():
         command = subparsers.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")

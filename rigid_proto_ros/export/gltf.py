@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
 from ..base.errors import InputError
 from ..base.files import whole_file
 from ..base.rotation import quaternion_from_matrix
@@ -139,6 +138,8 @@ class Document:
 
     def binary(self) -> bytes:
         """The file's bytes."""
+        from .. import __version__
+
         animation = {"name": "flight", "channels": self._channels, "samplers": self._samplers}
         parts: dict[str, Any] = {
             "asset": {"version": "2.0", "generator": f"rigid_proto_ros {__version__}"},

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..base.bundled import body_names, scene_path
 from ..base.library import stamp
 from ..base.vectors import FloatArray, IntArray
@@ -73,6 +72,8 @@ def page_data() -> bytes:
 
 def page_version() -> str:
     """What a page says of itself and of what it makes: pages of one version have the same kernels, so the same bits."""
+    from .. import __version__
+
     return f"{__version__}+{stamp().partition('-')[2][:7]}"
 
 
