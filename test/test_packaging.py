@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tarfile
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -253,6 +254,22 @@ def test_package_xml_and_recipe_agree_with_the_package() -> None:
     needed = [Requirement(text) for text in metadata.requires or []]
     asked = {r.name.lower(): r.specifier for r in map(Requirement, recipe["requirements"]["run"]) if r.name != "python"}
     assert asked == {r.name.lower(): r.specifier for r in needed if "extra" not in str(r.marker)}
+
+
+@pytest.mark.skipif(not (SOURCE / ".git").exists(), reason="not run from a clone")
+def test_the_source_archive_has_all_that_is_committed_but_what_the_host_reads(tmp_path: Path) -> None:
+    names = run("git", "ls-files", cwd=SOURCE).stdout.splitlines()
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(SOURCE / name, tmp_path / name)
+    run(sys.executable, "setup.py", "--quiet", "sdist", cwd=tmp_path)
+    (archive,) = (tmp_path / "dist").iterdir()
+    assert archive.name == f"rigid_proto_ros-{rigid_proto_ros.__version__}.tar.gz"
+    with tarfile.open(archive) as opened:
+        packed = {one.name.partition("/")[2] for one in opened if one.isfile()}
+    made = {"PKG-INFO"} | {name for name in packed if name.startswith("rigid_proto_ros.egg-info/")}
+    hosts = {name for name in names if name.startswith((".ci/", ".github/")) or name == ".gitignore"}
+    assert packed - made - {"setup.cfg"} == set(names) - hosts - {"setup.cfg"}
 
 
 @pytest.mark.stress
