@@ -2,7 +2,8 @@
 """Records every call of an exported kernel into a file, for replay_calls.mjs: what it was given and what it made of it.
 
     recorded_calls.py FILE scenes FIRST COUNT      random scenes of these seeds
-    recorded_calls.py FILE others                  tests that call the kernels that scenes don't
+    recorded_calls.py FILE some                    tests that call the kernels that scenes don't, each at least once
+    recorded_calls.py FILE others                  more of these tests
     recorded_calls.py FILE golden BEGINNING        the computations of the golden hashes whose names begin so
     recorded_calls.py FILE mesh PATH OFFSET        verdict and moments of all models of a mesh, moved along each axis
 
@@ -23,6 +24,7 @@ import struct
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -218,24 +220,42 @@ def call_small_ones() -> None:
             difference(code, vectors[0], vectors[1])
 
 
-OTHERS = (
-    "mass/test_mass_models.py mass/test_inertia_tensor.py mesh/test_mesh_verdict.py mesh/test_mesh_formats.py",
-    "motion/test_surface.py simulation/test_live_body.py",
-    "identify/test_fitting.py::test_a_poked_throw_tells_all_ten_parameters sweep/test_sweep_bits.py",
+SOME = (
+    "mass/test_mass_models.py",
+    "mass/test_inertia_tensor.py",
+    "mesh/test_mesh_verdict.py::test_repair_welds_a_torn_surface_and_caps_flat_holes_exactly",
+    "mesh/test_mesh_verdict.py::test_repair_turns_faces_to_agree",
+    "mesh/test_mesh_verdict.py::test_copies_that_close_the_surface_stay_and_those_that_spoil_it_go",
+    "mesh/test_mesh_verdict.py::test_a_flat_mesh_is_told_no_remedy_that_does_not_help",
+    "motion/test_surface.py",
+    "identify/test_fitting.py::test_a_poked_throw_tells_all_ten_parameters",
+    "sweep/test_sweep_bits.py::test_rows_have_the_bits_of_the_simulation_whatever_chunk_they_are_in[pokes]",
+    "sweep/test_sweep_bits.py::test_energies_and_momentum_are_those_of_the_body_and_gravity_in_force",
 )
 """Tests of this suite that call the other kernels: of meshes, sweeps and identification."""
+OTHERS = (
+    *("mass/test_mass_models.py", "mass/test_inertia_tensor.py", "mesh/test_mesh_verdict.py"),
+    *("mesh/test_mesh_formats.py", "motion/test_surface.py", "simulation/test_live_body.py"),
+    *("identify/test_fitting.py::test_a_poked_throw_tells_all_ten_parameters", "sweep/test_sweep_bits.py"),
+)
 
 
-def others() -> None:
+def run_tests(*names: str) -> None:
     """Kernels that scenes don't call."""
     import pytest
 
     call_small_ones()
     # Whether they pass is told where they run by themselves.
-    pytest.main(["-q", "-p", "no:cacheprovider", *" ".join(OTHERS).split()])
+    pytest.main(["-q", "-p", "no:cacheprovider", *names])
 
 
-SOURCES = {"scenes": (scenes, 2), "others": (others, 0), "golden": (golden, 1), "mesh": (mesh, 2)}
+SOURCES = {
+    "scenes": (scenes, 2),
+    "some": (partial(run_tests, *SOME), 0),
+    "others": (partial(run_tests, *OTHERS), 0),
+    "golden": (golden, 1),
+    "mesh": (mesh, 2),
+}
 """What can be recorded, and how many words it takes."""
 
 
