@@ -302,8 +302,14 @@ SHAPED = {
 }
 
 
-@pytest.mark.parametrize("word", ["nan", "1e999", "1e200", "1 2", "x"])
-@pytest.mark.parametrize("file_format", SHAPED)
+WORDS = ("nan", "1e999", "1e200", "1 2", "x")
+IN_PROCESSES = [pytest.param("xml", word, marks=[pytest.mark.stress] if word != "nan" else []) for word in WORDS]
+"""MuJoCo compiles each in a process of its own."""
+
+
+@pytest.mark.parametrize(
+    ("file_format", "word"), [*((kind, word) for kind in ("urdf", "sdf") for word in WORDS), *IN_PROCESSES]
+)
 def test_numbers_that_no_robot_has_are_named(tmp_path, capsys, file_format, word):
     if file_format == "xml":
         pytest.importorskip("mujoco")

@@ -329,7 +329,7 @@ def test_channels_say_what_the_nodes_publishers_offer(flown):
 
 def test_verify_takes_no_more_memory_for_ten_times_as_long_a_recording(tmp_path):
     script, peaks = tmp_path / "script.yaml", []
-    for seconds in (3, 30):
+    for seconds in (1, 10):
         session = tmp_path / f"{seconds}.mcap"
         script.write_text(f"- {{t: 0, at: com, impulse: [1e-6, 0, 0], repeat: {100 * seconds}, every: 0.01}}\n")
         flown = ["--script", str(script), "--duration", str(seconds), "--set", "publish_rate=1000"]
