@@ -9,7 +9,7 @@ import pytest
 
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.mass.engines import ENGINES, diagonal_error, engine_text
+from rigid_proto_ros.mass.engines import FORMS, engine_text
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.properties import MassProperties
 
@@ -71,16 +71,25 @@ def test_godot_gets_the_diagonal_how_far_it_is_off_and_how_nothing_is_lost(prope
     assert diagonal == pytest.approx(np.diag(properties.inertia), rel=1e-8)
     off = properties.inertia - np.diag(diagonal)
     assert np.max(np.abs(off)) / np.max(properties.inertia) == pytest.approx(0.2353, abs=1e-3)
-    assert "off by 24 %" in text and diagonal_error(properties.inertia) == pytest.approx(0.2353, abs=1e-3)
-    (turn,) = numbers(text, "Quaternion")  # of the body's children: from the mesh's axes to the principal ones
-    R = matrix_from_quaternion(turn)
+    assert "off by 24 %" in text
+    (axes,) = numbers(text, "Quaternion")
+    assert ").inverse()" in text  # so turned, the body's children have the principal axes along the body's
+    R = matrix_from_quaternion(axes).T
     assert principal_center == pytest.approx(R @ properties.center_of_mass, rel=1e-6, abs=1e-9)
     assert np.max(np.abs(R @ properties.inertia @ R.T - np.diag(moments))) <= 1e-7 * np.max(moments)
 
 
-def test_a_body_whose_products_are_zero_gets_no_line_about_them():
+@pytest.mark.parametrize(("engine", "comment"), [("godot", "#"), ("unreal", "//")])
+def test_what_cant_say_products_tells_how_far_it_is_off_where_there_are_any(properties, engine, comment):
     plain = MassProperties(1.0, np.zeros(3), np.diag([0.3, 0.5, 0.7]))
-    assert engine_text("godot", plain).count("#") == 1
+    assert engine_text(engine, plain).count(comment) == 1
+    rounded = MassProperties(1.0, np.zeros(3), plain.inertia + 5e-8 * 0.7 * (1.0 - np.eye(3)))
+    assert engine_text(engine, rounded).count(comment) == 1
+    slight = MassProperties(1.0, np.zeros(3), plain.inertia + 1.2e-6 * 0.7 * (1.0 - np.eye(3)))
+    assert "off by 0.00012 %" in engine_text(engine, slight)
+    assert "products of inertia" in engine_text(engine, properties).lower() and "off by 24 %" in engine_text(
+        engine, properties
+    )
 
 
 @pytest.mark.parametrize(
@@ -134,13 +143,15 @@ def test_gltf_is_a_nodes_extension(properties):
     assert_is(properties, *(motion[name] for name in ("mass", "centerOfMass", "inertiaDiagonal", "inertiaOrientation")))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FORMS)
 def test_the_command_prints_one_comment_and_the_lines(capsys, engine):
     assert main(["inspect", "l_bracket", "--mass", "2.5", "--for", engine]) == 0
     told = capsys.readouterr()
     first, *lines = told.out.splitlines()
     assert first.startswith(("// ", "# ")) and ("kg m²" in first or "kg cm²" in first)
-    assert lines and not any(line.startswith("//") for line in lines) and told.err == ""
+    says = [k for k, line in enumerate(lines) if not line.startswith(("//", "#"))]
+    assert says == list(range(max(says) + 1)) and told.err == ""
+    assert not re.search(r"\{\w+(:f)?\}|\bnan\b|\binf\b", told.out)
 
 
 def test_the_command_has_the_rotation_in_its_json_and_refuses_what_has_no_solid(capsys, tmp_path):
