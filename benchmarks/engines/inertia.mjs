@@ -3,9 +3,10 @@
 // What `rigid_proto inspect --for ENGINE` prints, taken by the engine itself: node inertia.mjs < JSON, which answers with
 // JSON.
 //
-// Asked: {texts: {rapier, jolt, physx, havok}, impulse, point, step_s, steps}: a body at rest whose axes are the world's
-// gets an impulse [N s] at a point [m], and flies. Answered by engine: {position, velocity, omega}, of the body's origin,
-// of its centre of mass where the engine says that, and [rad/s], after the steps; or {why}.
+// Asked: {texts: {rapier, jolt, physx, havok, babylon}, glb, center, impulse, point, step_s, steps}: a body at rest whose
+// axes are the world's gets an impulse [N s] at a point [m], and flies. glb: a flight's file (base64), whose body node Babylon's own
+// loader reads; center [m]: the centre of mass. Answered by engine: {position, velocity, omega}, of the body's origin, of
+// its centre of mass where the engine says that, and [rad/s], after the steps; or {why}.
 //
 // With {surface: {vertices, triangles}, mass}: also what each engine computes from the mesh by itself, by engine and
 // shape, at that mass: {mass, center, tensor}, [kg], [m] and [kg m²] about the centre, six entries as URDF has them.
@@ -139,6 +140,42 @@ const ENGINES = {
     return { ...flown, own };
   },
 
+  async babylon({ texts, impulse, point, step_s, steps }) {
+    const { scene, step, asBody, Vector3, Quaternion, TransformNode } = await babylonWorld();
+    const node = new TransformNode("body", scene), body = asBody(node);
+    new Function("BABYLON", "body", texts.babylon)({ Vector3, Quaternion }, body);
+    body.applyImpulse(Vector3.FromArray(impulse), Vector3.FromArray(point));
+    for (let k = 0; k < steps; k++) step(step_s);
+    return { position: node.position.asArray(), velocity: body.getLinearVelocity().asArray(), omega: body.getAngularVelocity().asArray(), own: {} };
+  },
+
+  async gltf({ glb, center, impulse, point, step_s, steps }) {
+    const { scene, step, asBody, Vector3, Quaternion } = await babylonWorld();
+    const { registerGLTFExtension } = await import("@babylonjs/loaders/glTF/2.0/glTFLoaderExtensionRegistry.js");
+    const { ImportMeshAsync } = await import("@babylonjs/core/Loading/sceneLoader.js");
+    await import("@babylonjs/loaders/glTF/2.0/glTFLoader.js");
+    const name = "KHR_physics_rigid_bodies", motions = new Map();
+    registerGLTFExtension(name, true, (loader) => ({
+      name, enabled: true, dispose() {},
+      loadNodeAsync(context, node, assign) {
+        const motion = node.extensions?.[name]?.motion;
+        return motion ? loader.loadNodeAsync(context, node, (made) => { motions.set(made.name, motion); assign(made); }) : null;
+      },
+    }));
+    await ImportMeshAsync(`data:model/gltf-binary;base64,${glb}`, scene, { pluginExtension: ".glb" });
+    for (const group of scene.animationGroups) group.stop();
+    const node = scene.getNodeByName("body"), { mass, centerOfMass, inertiaDiagonal, inertiaOrientation } = motions.get("body");
+    const body = asBody(node), moments = Vector3.FromArray(inertiaDiagonal).scale(1 / mass); // Babylon takes those of 1 kg
+    body.setMassProperties({ mass, centerOfMass: Vector3.FromArray(centerOfMass), inertia: moments, inertiaOrientation: Quaternion.FromArray(inertiaOrientation) });
+    // The file has y up: the world's axes here are those of its root.
+    const up = node.parent.absoluteRotationQuaternion, turned = (v) => Vector3.FromArray(v).applyRotationQuaternion(up);
+    const back = (v) => v.applyRotationQuaternion(Quaternion.Inverse(up)).asArray();
+    body.applyImpulse(turned(impulse), turned(minus(point, center)));
+    for (let k = 0; k < steps; k++) step(step_s);
+    const origin = Vector3.TransformCoordinates(Vector3.FromArray(center).scale(-1), node.computeWorldMatrix(true)).add(turned(center));
+    return { position: back(origin), velocity: back(body.getLinearVelocity()), omega: back(body.getAngularVelocity()), own: {} };
+  },
+
   async bullet({ surface, mass }) {
     const own = {};
     if (surface) {
@@ -164,8 +201,7 @@ const ENGINES = {
   },
 
   async havok({ texts, impulse, point, step_s, steps, surface, mass }) {
-    const wasmBinary = readFileSync(packages.resolve("@babylonjs/havok/lib/esm/HavokPhysics.wasm"));
-    const havok = await (await import("@babylonjs/havok")).default({ wasmBinary });
+    const havok = await havokModule();
     const done = ([result, value]) => {
       if (result !== havok.Result.RESULT_OK) throw new Error(`Havok refuses: ${String(result)}`);
       return value;
@@ -194,6 +230,30 @@ const ENGINES = {
     return { ...flown, own };
   },
 };
+
+async function havokModule() {
+  return (await import("@babylonjs/havok")).default({ wasmBinary: readFileSync(packages.resolve("@babylonjs/havok/lib/esm/HavokPhysics.wasm")) });
+}
+
+/** A scene of Babylon's without a screen, its physics Havok's: step(seconds), and asBody(node), a ball that nothing slows. */
+async function babylonWorld() {
+  const part = (path) => import(`@babylonjs/core/${path}.js`);
+  const [{ NullEngine }, { Scene }, { Vector3, Quaternion }, { TransformNode }] = await Promise.all(["Engines/nullEngine", "scene", "Maths/math.vector", "Meshes/transformNode"].map(part));
+  const [{ PhysicsBody }, { PhysicsShapeSphere }, { PhysicsMotionType }, { HavokPlugin }] = await Promise.all(["physicsBody", "physicsShape", "IPhysicsEnginePlugin", "Plugins/havokPlugin"].map((name) => part(`Physics/v2/${name}`)));
+  await Promise.all(["Physics/joinedPhysicsEngineComponent", "Physics/v2/physicsEngineComponent"].map(part));
+  const scene = new Scene(new NullEngine()), plugin = new HavokPlugin(true, await havokModule()), bodies = [];
+  scene.useRightHandedSystem = true;
+  scene.enablePhysics(Vector3.Zero(), plugin);
+  const asBody = (node) => {
+    const body = new PhysicsBody(node, PhysicsMotionType.DYNAMIC, false, scene);
+    body.shape = new PhysicsShapeSphere(Vector3.Zero(), BALL, scene);
+    body.setAngularDamping(0);
+    body.setLinearDamping(0);
+    bodies.push(body);
+    return body;
+  };
+  return { scene, step: (seconds) => plugin.executeStep(seconds, bodies), asBody, Vector3, Quaternion, TransformNode };
+}
 
 /** Calls what is built for browsers alone, and refuses Node by its process; it uses no window. */
 async function asInBrowser(make, options) {
