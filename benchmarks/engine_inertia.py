@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 from contextlib import redirect_stdout
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -43,8 +44,20 @@ IMPULSE = np.array([0.2, -0.3, 0.15])
 BESIDE = np.array([4e-4, 2e-4, -3e-4])
 """[N s] and [m] from the centre of mass: about 0.1 m/s and 0.07 rad/s, slow enough that ω × Iω changes little."""
 STEP_S, STEPS = 0.01, 10
+PRINTED, READ = "as printed", "a flight's .glb"
+"""What a body flies with."""
 COLUMNS = (
-    *("engine", "shape", "first_moment", "second_moment", "third_moment", "axes_turned_deg", "center_off_mm"),
+    *(
+        "engine",
+        "package",
+        "version",
+        "shape",
+        "first_moment",
+        "second_moment",
+        "third_moment",
+        "axes_turned_deg",
+        "center_off_mm",
+    ),
     *("spin_error", "position_error"),
 )
 """first_moment to third_moment: relative errors of the principal moments, ascending. spin_error, position_error: of a
@@ -120,8 +133,26 @@ def flown_in_bullet(properties: MassProperties) -> dict:
     return {"position": list(origin), "omega": list(omega)}
 
 
-FLOWN = {"mujoco": flown_in_mujoco, "bullet": flown_in_bullet}
-"""Engines of PyPI, by the names that their rows have."""
+FLOWN = {"mujoco": flown_in_mujoco, "pybullet": flown_in_bullet}
+"""Engines by their packages on PyPI."""
+
+PACKAGES = {
+    "rapier": "@dimforge/rapier3d-compat",
+    "jolt": "jolt-physics",
+    "physx": "physx-js-webidl",
+    "babylon": "@babylonjs/core",
+    "gltf": "@babylonjs/loaders",
+    "bullet": "ammojs-typed",
+    "cannon": "cannon-es",
+    "havok": "@babylonjs/havok",
+}
+"""Of npm."""
+
+
+def package(engine: str) -> dict[str, str]:
+    """The engine's name, its package, and the version that is installed."""
+    pinned = json.loads((HERE / "engines" / "package.json").read_text("utf-8"))["dependencies"]
+    return {"engine": engine, "package": PACKAGES[engine], "version": pinned[PACKAGES[engine]]}
 
 
 def flight_errors(row: dict, properties: MassProperties) -> dict[str, float]:
@@ -172,13 +203,16 @@ def main() -> int:
             raise RuntimeError(f"{engine}: {row['why']}")
         for shape, own in row["own"].items():
             found = MassProperties(own["mass"], np.array(own["center"]), tensor_from_six(own["tensor"]))
-            table.add({"engine": engine, "shape": shape, **differences(found, properties)})
+            table.add({**package(engine), "shape": shape, **differences(found, properties)})
         if "omega" in row:
-            table.add({"engine": engine, "shape": "as printed", **flight_errors(row, properties)})
+            shape = READ if engine == "gltf" else PRINTED
+            table.add({**package(engine), "shape": shape, **flight_errors(row, properties)})
     for engine, flown in FLOWN.items():
-        table.add({"engine": engine, "shape": "as printed", **flight_errors(flown(properties), properties)})
+        of_pypi = {"engine": engine, "package": engine, "version": version(engine)}
+        table.add({**of_pypi, "shape": PRINTED, **flight_errors(flown(properties), properties)})
     for how, found in in_mujoco(body).items():
-        table.add({"engine": "mujoco", "shape": how, **differences(found, properties)})
+        of_pypi = {"engine": "mujoco", "package": "mujoco", "version": version("mujoco")}
+        table.add({**of_pypi, "shape": f"inertia {how}", **differences(found, properties)})
     box = body.moments.mass_properties("bounding_box", mass=MASS)
     table.add({"engine": "any", "shape": "bounding box", **differences(box, properties)})
     table.write()

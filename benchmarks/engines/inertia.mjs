@@ -55,15 +55,15 @@ const ENGINES = {
     const own = {};
     if (surface) {
       const vertices = Float32Array.from(surface.vertices.flat()), triangles = Uint32Array.from(surface.triangles.flat());
-      const shapes = { trimesh: () => rapier.ColliderDesc.trimesh(vertices, triangles), hull: () => rapier.ColliderDesc.convexHull(vertices) };
+      const shapes = { trimesh: () => rapier.ColliderDesc.trimesh(vertices, triangles), "convex hull": () => rapier.ColliderDesc.convexHull(vertices) };
       for (const [name, shape] of Object.entries(shapes)) {
-        for (const [way, collider] of Object.entries({ "": shape().setDensity(1000), ", setMass": shape().setMass(mass) })) {
+        for (const [way, collider] of Object.entries({ "by density": shape().setDensity(1000), "by setMass": shape().setMass(mass) })) {
           const one = world.createRigidBody(rapier.RigidBodyDesc.dynamic());
           world.createCollider(collider, one);
           one.recomputeMassPropertiesFromColliders();
           world.step(); // which takes the properties
           const { m11, m12, m13, m22, m23, m33 } = one.effectiveAngularInertia(), scale = mass / one.mass();
-          own[name + way] = { mass, center: list(one.localCom()), tensor: [m11, m12, m13, m22, m23, m33].map((value) => value * scale) };
+          own[`${name} ${way}`] = { mass, center: list(one.localCom()), tensor: [m11, m12, m13, m22, m23, m33].map((value) => value * scale) };
         }
       }
     }
@@ -94,7 +94,7 @@ const ENGINES = {
       for (const vertex of surface.vertices) hull.mPoints.push_back(new jolt.Vec3(...vertex));
       const shape = hull.Create().Get(), found = shape.GetMassProperties(), scale = mass / found.mMass;
       const [x, y, z] = [0, 1, 2].map((k) => listOf(found.mInertia.GetColumn3(k)));
-      own.hull = { mass, center: listOf(shape.GetCenterOfMass()), tensor: [...x, y[1], y[2], z[2]].map((value) => value * scale) };
+      own["convex hull"] = { mass, center: listOf(shape.GetCenterOfMass()), tensor: [...x, y[1], y[2], z[2]].map((value) => value * scale) };
     }
     return { ...flown, own };
   },
@@ -135,7 +135,7 @@ const ENGINES = {
       one.attachShape(physics.createShape(new px.PxConvexMeshGeometry(hull), physics.createMaterial(0.5, 0.5, 0), true));
       px.PxRigidBodyExt.prototype.setMassAndUpdateInertia(one, mass);
       const pose = one.getCMassLocalPose();
-      own.hull = { mass, center: list(pose.p), tensor: six(list(one.getMassSpaceInertiaTensor()), [pose.q.x, pose.q.y, pose.q.z, pose.q.w]) };
+      own["convex hull"] = { mass, center: list(pose.p), tensor: six(list(one.getMassSpaceInertiaTensor()), [pose.q.x, pose.q.y, pose.q.z, pose.q.w]) };
     }
     return { ...flown, own };
   },
@@ -184,7 +184,7 @@ const ENGINES = {
       hull.setMargin(0);
       for (const vertex of surface.vertices) hull.addPoint(new ammo.btVector3(...vertex), true);
       hull.calculateLocalInertia(mass, tensor);
-      own.hull = { mass, center: [0, 0, 0], tensor: [tensor.x(), 0, 0, tensor.y(), 0, tensor.z()] };
+      own["convex hull"] = { mass, center: [0, 0, 0], tensor: [tensor.x(), 0, 0, tensor.y(), 0, tensor.z()] };
     }
     return { own };
   },
@@ -195,7 +195,7 @@ const ENGINES = {
       const cannon = await import("cannon-es");
       const vertices = surface.vertices.map((vertex) => new cannon.Vec3(...vertex));
       const body = new cannon.Body({ mass, shape: new cannon.ConvexPolyhedron({ vertices, faces: surface.triangles }) });
-      own.mesh = { mass, center: [0, 0, 0], tensor: [body.inertia.x, 0, 0, body.inertia.y, 0, body.inertia.z] };
+      own.ConvexPolyhedron = { mass, center: [0, 0, 0], tensor: [body.inertia.x, 0, 0, body.inertia.y, 0, body.inertia.z] };
     }
     return { own };
   },
@@ -225,7 +225,7 @@ const ENGINES = {
       new Float32Array(havok.HEAPU8.buffer, at, bytes.length).set(bytes);
       const hull = done(havok.HP_Shape_CreateConvexHull(at, surface.vertices.length));
       const [center, , moments, rotation] = done(havok.HP_Shape_BuildMassProperties(hull));
-      own.hull = { mass, center, tensor: six(moments.map((moment) => moment * mass), rotation) };
+      own["convex hull"] = { mass, center, tensor: six(moments.map((moment) => moment * mass), rotation) };
     }
     return { ...flown, own };
   },

@@ -28,7 +28,8 @@ precision can."""
 class Form:
     """What an engine takes. place: where the text goes, in the engine's words; text: its lines, with places for
     ``numbers``, ``{A}`` or ``{A:f}`` with the suffix of single precision; products: a comment for bodies with products
-    of inertia, where the lines or the engine's editor can't say them, or "". mirrored: axis that the engine's importers mirror, or ""; per_m: its units of length in a metre.
+    of inertia, where the lines or the engine's editor can't say them, or "". mirrored: axis that the engine's importers
+    mirror, or ""; per_m: its units of length in a metre.
     """
 
     place: str

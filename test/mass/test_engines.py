@@ -46,22 +46,47 @@ def assert_is(true: MassProperties, mass, center, moments, rotation) -> None:
     assert np.max(np.abs(tensor(moments, rotation) - true.inertia)) <= 1e-7 * largest
 
 
-def test_unity_gets_the_mesh_that_its_importer_makes_of_the_file(body, properties):
-    # Rigidbody.inertiaTensor is the diagonal in axes turned by inertiaTensorRotation; x of an .obj is mirrored.
-    text = engine_text("unity", properties)
+# Four masses of 1 kg at the corners of a tetrahedron, whose sums docs/engines.md does by hand: about (0.2, 0.1, 0.3),
+# Σx² = 0.48, Σy² = 0.12, Σz² = 1.08, Σxy = -0.08, Σxz = -0.24, Σyz = -0.12.
+FOUR = "v 0 0 0\nv 0.8 0 0\nv 0 0.4 0\nv 0 0 1.2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.fixture(scope="module")
+def four(tmp_path_factory) -> MassProperties:
+    file = tmp_path_factory.mktemp("four") / "four.obj"
+    file.write_text(FOUR)
+    return mesh_body(str(file)).moments.mass_properties("points", mass=4.0)
+
+
+def symmetric(xx, yy, zz, xy, xz, yz) -> np.ndarray:
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def test_unity_gets_principal_moments_and_their_turn_with_x_negated(four, body, properties):
+    # Rigidbody.inertiaTensor is the diagonal in axes turned by inertiaTensorRotation. Products with x change their signs.
+    by_hand = MassProperties(4.0, np.array([-0.2, 0.1, 0.3]), symmetric(1.2, 1.56, 0.6, -0.08, -0.24, 0.12))
     mirrored = body.moments.mass_properties(mass=MASS, scale=(-1.0, 1.0, 1.0))
-    center, moments = numbers(text, "Vector3")
-    (mass,) = re.findall(rf"body\.mass = ({NUMBER})f;", text)
-    assert_is(mirrored, float(mass), center, moments, numbers(text, "Quaternion")[0])
+    for text, true in ((engine_text("unity", four), by_hand), (engine_text("unity", properties), mirrored)):
+        center, moments = numbers(text, "Vector3")
+        (mass,) = re.findall(rf"body\.mass = ({NUMBER})f;", text)
+        assert_is(true, float(mass), center, moments, numbers(text, "Quaternion")[0])
 
 
-def test_unreal_gets_the_mesh_that_its_importer_makes_of_the_file(body, properties):
-    # Centimetres and kg cm², y mirrored; the transform of the mass is where the diagonal stands.
-    text = engine_text("unreal", properties)
+def test_unreal_gets_centimetres_principal_moments_and_their_turn_with_y_negated(four, body, properties):
+    # The transform of the mass is where the diagonal stands. Products with y change their signs.
+    by_hand = MassProperties(4.0, np.array([20.0, -10.0, 30.0]), symmetric(12000, 15600, 6000, -800, 2400, -1200))
     mirrored = body.moments.mass_properties(mass=MASS, scale=(100.0, -100.0, 100.0))
-    moments, center = numbers(text, "FVector")
-    (mass,) = re.findall(rf"SetMass_AssumesLocked\(actor, ({NUMBER})f\)", text)
-    assert_is(mirrored, float(mass), center, moments, numbers(text, "FQuat")[0])
+    for text, true in ((engine_text("unreal", four), by_hand), (engine_text("unreal", properties), mirrored)):
+        moments, center = numbers(text, "FVector")
+        (mass,) = re.findall(rf"SetMass_AssumesLocked\(actor, ({NUMBER})f\)", text)
+        assert_is(true, float(mass), center, moments, numbers(text, "FQuat")[0])
+
+
+def test_godot_gets_the_diagonal_in_the_axes_of_the_mesh(four):
+    text = engine_text("godot", four)
+    center, diagonal = numbers(text, "Vector3")[:2]
+    assert center == pytest.approx([0.2, 0.1, 0.3]) and diagonal == pytest.approx([1.2, 1.56, 0.6])
+    assert re.search(r"^mass = 4$", text, re.MULTILINE) and f"off by {100 * 0.24 / 1.56:.2g} %" in text
 
 
 def test_godot_gets_the_diagonal_how_far_it_is_off_and_how_nothing_is_lost(properties):
