@@ -15,6 +15,7 @@ from page_tools import TESTS, kernels, run_node
 from rigid_proto_ros.base.bundled import PACKAGE_FOLDER, body_names
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.mass.engines import FORMS, engine_text
+from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.properties import explicit_mass_properties
 
 BODIES: list[dict[str, Any]] = [
@@ -32,21 +33,17 @@ def answered(page_file: Path, bodies: list[Any]) -> list[Any]:
     return json.loads(run_node(TESTS / "asked.ts", kernels(), page_file, input=asked))["bodies"]
 
 
-def printed(capsys: pytest.CaptureFixture[str], mesh: str, values: dict[str, Any]) -> dict[str, str]:
-    """By the command line, for each engine."""
+def printed(capsys: pytest.CaptureFixture[str], engine: str, mesh: str, values: dict[str, Any]) -> str:
+    """By the command line."""
     options: list[str] = []
     for name in ("mass", "density", "scale"):
         if name in values:
             options += [f"--{name}", *map(repr, values[name] if name == "scale" else [values[name]])]
-    options += ["--model", values.get("inertia_model", "solid")]
     for name in values:
         if name.startswith("ballast."):
             options += ["--ballast", *map(repr, values[name])]
-    texts = {}
-    for engine in FORMS:
-        assert main(["inspect", mesh, *options, "--for", engine]) == 0
-        texts[engine] = capsys.readouterr().out
-    return texts
+    assert main(["inspect", mesh, *options, "--model", values.get("inertia_model", "solid"), "--for", engine]) == 0
+    return capsys.readouterr().out
 
 
 def test_bodies_at_hand_are_written_as_the_command_line_prints_them(page_file: Path, capsys, tmp_path: Path) -> None:
@@ -57,27 +54,41 @@ def test_bodies_at_hand_are_written_as_the_command_line_prints_them(page_file: P
         "near.stl": stl_text(*bracket),
         "own.obj": (PACKAGE_FOLDER / "bodies" / "l_bracket.obj").read_bytes(),
     }
-    meshes = [
+    of_bundled = [(values, None) for values in BODIES]
+    of_own = [
         ({"mass": 2.5, "scale": [1.0, 2.0, 0.5]}, {"name": name, "text": text.decode()}) for name, text in own.items()
     ]
-    found = answered(page_file, [*((values, None) for values in BODIES), *meshes])
-    for values, texts in zip(BODIES, found, strict=False):
-        assert texts == printed(capsys, values["mesh"], values), values
-    for (values, file), texts in zip(meshes, found[len(BODIES) :], strict=True):
-        path = tmp_path / file["name"]
-        path.write_text(file["text"])
-        assert texts == printed(capsys, str(path), values), file["name"]
+    found = answered(page_file, of_bundled + of_own)
+    for (values, file), texts in zip(of_bundled + of_own, found, strict=True):
+        mesh = values.get("mesh", "")
+        if file is not None:
+            mesh = str(tmp_path / file["name"])
+            Path(mesh).write_text(file["text"])
+        ballast = [values[name] for name in values if name.startswith("ballast.")]
+        given = {name: values[name] for name in ("mass", "density", "scale") if name in values}
+        properties = mesh_body(mesh).moments.mass_properties(
+            values.get("inertia_model", "solid"), ballast=ballast, **given
+        )
+        assert texts == {engine: engine_text(engine, properties) for engine in FORMS}, values
+    # By the command, which is the same for all, an engine a body, from those with options on.
+    for engine, values, texts in zip(FORMS, reversed(BODIES), reversed(found[: len(BODIES)]), strict=False):
+        assert texts[engine] == printed(capsys, engine, values["mesh"], values)
 
 
-@pytest.mark.parametrize(
-    "tensor",
-    [[0.02, 0.0, 0.0, 0.03, 0.0, 0.04], [0.02, 0.004, -0.003, 0.03, 0.001, 0.04], [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]],
+TENSORS = (
+    [0.02, 0.0, 0.0, 0.03, 0.0, 0.04],
+    [0.02, 0.004, -0.003, 0.03, 0.001, 0.04],
+    [1.0, 0.0, 0.0, 1.0, 0.0, 1.0],
+    [0.02, 2e-9, 0.0, 0.03, 0.0, 0.04],
+    [3e-9, 0.0, 1e-10, 3e-9, 0.0, 3e-9],
 )
-def test_numbers_of_ones_own_are_written_as_python_has_them(page_file: Path, tensor: list[float]) -> None:
-    values = {
-        "mesh": "t_handle", "inertia_model": "explicit", "explicit_inertia.mass": 2.0, "scale": 2.0,
-        "explicit_inertia.center_of_mass": [0.0, -0.25, 1 / 3], "explicit_inertia.tensor": tensor,
-    }  # fmt: skip
-    (texts,) = answered(page_file, [(values, None)])
-    properties = explicit_mass_properties(2.0, [0.0, -0.25, 1 / 3], tensor, scale=(2.0, 2.0, 2.0))
-    assert texts == {engine: engine_text(engine, properties) for engine in FORMS}
+
+
+def test_numbers_of_ones_own_are_written_as_python_has_them(page_file: Path) -> None:
+    center = [0.0, -0.25, 1 / 3]
+    own = {"mesh": "t_handle", "inertia_model": "explicit", "scale": 2.0, "explicit_inertia.mass": 2.0}
+    own["explicit_inertia.center_of_mass"] = center
+    found = answered(page_file, [({**own, "explicit_inertia.tensor": tensor}, None) for tensor in TENSORS])
+    for tensor, texts in zip(TENSORS, found, strict=True):
+        properties = explicit_mass_properties(2.0, center, tensor, scale=(2.0, 2.0, 2.0))
+        assert texts == {engine: engine_text(engine, properties) for engine in FORMS}, tensor
