@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Mass properties in physics engines: what each computes of a mesh by itself, and whether it takes what
-``rigid_proto inspect --for`` prints.
+``rigid_proto inspect --for`` prints, ``--mjcf`` and ``--urdf`` for MuJoCo and Bullet, and a flight's .glb.
 
-benchmarks/engines/inertia.mjs asks the engines that npm has, MuJoCo is asked here. A body of 2.5 kg in the shape of the
+benchmarks/engines/inertia.mjs asks the engines that npm has, MuJoCo and Bullet of PyPI are asked here. A body of 2.5 kg in the shape of the
 bundled L bracket gets an impulse beside its centre of mass, so that it translates and turns, and flies for 0.1 s; motion
 of the exact one is in closed form, since it turns by less than 0.01 rad.
 
@@ -11,9 +11,14 @@ of the exact one is in closed form, since it turns by less than 0.01 rad.
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import subprocess
 import sys
+import tempfile
+from contextlib import redirect_stdout
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +28,9 @@ sys.path.insert(0, str(HERE.parent))
 
 from result_table import ResultTable
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
+from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.mass.engines import engine_text
+from rigid_proto_ros.mass.export import mjcf_inertial, urdf_inertial
 from rigid_proto_ros.mass.from_mesh import MeshBody, mesh_body
 from rigid_proto_ros.mass.inspection import model_difference
 from rigid_proto_ros.mass.properties import MassProperties
@@ -31,14 +38,26 @@ from rigid_proto_ros.mass.tensor import tensor_from_six
 from rigid_proto_ros.page.bundle import installed_node
 
 MESH, MASS = "l_bracket", 2.5
-TAKERS = ("rapier", "jolt", "physx", "havok")
-"""Engines that fly with what is printed for them."""
+TAKERS = ("rapier", "jolt", "physx", "havok", "babylon")
+"""Engines of npm that fly with what is printed for them; a .glb of a flight, which Babylon reads, flies beside them."""
 IMPULSE = np.array([0.2, -0.3, 0.15])
 BESIDE = np.array([4e-4, 2e-4, -3e-4])
 """[N s] and [m] from the centre of mass: about 0.1 m/s and 0.07 rad/s, slow enough that ω × Iω changes little."""
 STEP_S, STEPS = 0.01, 10
+PRINTED, READ = "as printed", "a flight's .glb"
+"""What a body flies with."""
 COLUMNS = (
-    *("engine", "shape", "first_moment", "second_moment", "third_moment", "axes_turned_deg", "center_off_mm"),
+    *(
+        "engine",
+        "package",
+        "version",
+        "shape",
+        "first_moment",
+        "second_moment",
+        "third_moment",
+        "axes_turned_deg",
+        "center_off_mm",
+    ),
     *("spin_error", "position_error"),
 )
 """first_moment to third_moment: relative errors of the principal moments, ascending. spin_error, position_error: of a
@@ -50,6 +69,8 @@ def taken(body: MeshBody, properties: MassProperties) -> dict:
     folder = HERE / "engines"
     asked = {
         "texts": {name: engine_text(name, properties) for name in TAKERS},
+        "glb": base64.b64encode(glb()).decode(),
+        "center": properties.center_of_mass.tolist(),
         "impulse": IMPULSE.tolist(),
         "point": (properties.center_of_mass + BESIDE).tolist(),
         "step_s": STEP_S,
@@ -61,6 +82,77 @@ def taken(body: MeshBody, properties: MassProperties) -> dict:
     text = json.dumps(asked)
     done = subprocess.run(command, input=text, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
+
+
+def glb() -> bytes:
+    """A flight of the body as a file; at its start the body's axes are the world's, and so is its centre of mass."""
+    with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()):
+        file = Path(folder) / "flight.glb"
+        command = ["simulate", MESH, "--set", f"mass={MASS}", "--duration", "0.1", "--gltf", str(file)]
+        if status := rigid_proto(command):
+            raise RuntimeError(f"rigid_proto {' '.join(command)}: exit {status}")
+        return file.read_bytes()
+
+
+def flown_in_mujoco(properties: MassProperties) -> dict:
+    """With the <inertial> of ``inspect --mjcf``."""
+    import mujoco
+
+    options = f'<option gravity="0 0 0" timestep="{STEP_S}"/>'
+    body = f"<body><freejoint/>{mjcf_inertial(properties)}</body>"
+    model = mujoco.MjModel.from_xml_string(f"<mujoco>{options}<worldbody>{body}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    data.xfrc_applied[1] = np.append(IMPULSE, np.cross(BESIDE, IMPULSE)) / STEP_S
+    for _ in range(STEPS):
+        mujoco.mj_step(model, data)
+        data.xfrc_applied[:] = 0.0
+    R = matrix_from_quaternion(np.roll(data.qpos[3:7], -1))
+    return {"position": data.qpos[:3].tolist(), "omega": (R @ data.qvel[3:6]).tolist()}
+
+
+def flown_in_bullet(properties: MassProperties) -> dict:
+    """With the <inertial> of ``inspect --urdf``."""
+    import pybullet
+
+    client = pybullet.connect(pybullet.DIRECT)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "body.urdf"
+        file.write_text(f'<robot name="body"><link name="body">{urdf_inertial(properties)}</link></robot>')
+        body = pybullet.loadURDF(str(file), flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
+    pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP_S)
+    pybullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
+    place, turn = pybullet.getDynamicsInfo(body, -1)[3:5]  # of the principal axes in the link's
+    force, point = (IMPULSE / STEP_S).tolist(), (properties.center_of_mass + BESIDE).tolist()
+    pybullet.applyExternalForce(body, -1, force, point, pybullet.WORLD_FRAME)
+    for _ in range(STEPS):
+        pybullet.stepSimulation()
+    pose = pybullet.getBasePositionAndOrientation(body)
+    origin, _ = pybullet.multiplyTransforms(*pose, *pybullet.invertTransform(place, turn))
+    omega = pybullet.getBaseVelocity(body)[1]
+    pybullet.disconnect(client)
+    return {"position": list(origin), "omega": list(omega)}
+
+
+FLOWN = {"mujoco": flown_in_mujoco, "pybullet": flown_in_bullet}
+"""Engines by their packages on PyPI."""
+
+PACKAGES = {
+    "rapier": "@dimforge/rapier3d-compat",
+    "jolt": "jolt-physics",
+    "physx": "physx-js-webidl",
+    "babylon": "@babylonjs/core",
+    "gltf": "@babylonjs/loaders",
+    "bullet": "ammojs-typed",
+    "cannon": "cannon-es",
+    "havok": "@babylonjs/havok",
+}
+"""Of npm."""
+
+
+def package(engine: str) -> dict[str, str]:
+    """The engine's name, its package, and the version that is installed."""
+    pinned = json.loads((HERE / "engines" / "package.json").read_text("utf-8"))["dependencies"]
+    return {"engine": engine, "package": PACKAGES[engine], "version": pinned[PACKAGES[engine]]}
 
 
 def flight_errors(row: dict, properties: MassProperties) -> dict[str, float]:
@@ -111,11 +203,16 @@ def main() -> int:
             raise RuntimeError(f"{engine}: {row['why']}")
         for shape, own in row["own"].items():
             found = MassProperties(own["mass"], np.array(own["center"]), tensor_from_six(own["tensor"]))
-            table.add({"engine": engine, "shape": shape, **differences(found, properties)})
+            table.add({**package(engine), "shape": shape, **differences(found, properties)})
         if "omega" in row:
-            table.add({"engine": engine, "shape": "as printed", **flight_errors(row, properties)})
+            shape = READ if engine == "gltf" else PRINTED
+            table.add({**package(engine), "shape": shape, **flight_errors(row, properties)})
+    for engine, flown in FLOWN.items():
+        of_pypi = {"engine": engine, "package": engine, "version": version(engine)}
+        table.add({**of_pypi, "shape": PRINTED, **flight_errors(flown(properties), properties)})
     for how, found in in_mujoco(body).items():
-        table.add({"engine": "mujoco", "shape": how, **differences(found, properties)})
+        of_pypi = {"engine": "mujoco", "package": "mujoco", "version": version("mujoco")}
+        table.add({**of_pypi, "shape": f"inertia {how}", **differences(found, properties)})
     box = body.moments.mass_properties("bounding_box", mass=MASS)
     table.add({"engine": "any", "shape": "bounding box", **differences(box, properties)})
     table.write()

@@ -340,6 +340,56 @@ def engines() -> str:
 
 _STEPS = {0.0166667: "1/60 s", 0.001: "1 ms"}
 
+_ENGINES = {
+    "rapier": "Rapier",
+    "jolt": "Jolt",
+    "physx": "PhysX",
+    "babylon": "Babylon with Havok",
+    "gltf": "Babylon's loader, with Havok",
+    "bullet": "Bullet",
+    "pybullet": "Bullet",
+    "cannon": "cannon-es",
+    "havok": "Havok",
+    "mujoco": "MuJoCo",
+}
+
+
+def engine_flights() -> str:
+    """Bodies that flew in engines with what is printed for them, from the last benchmark's own numbers."""
+    measured = [row for row in read_rows(RESULTS / "engine_inertia.csv") if not math.isnan(row["spin_error"])]
+    others = {"gltf": "a flight's .glb", "mujoco": "`--mjcf`", "pybullet": "`--urdf`"}
+    rows = (
+        (
+            others.get(row["engine"], f"`--for {row['engine']}`"),
+            f"{_ENGINES[row['engine']]} ({row['package']} {row['version']})",
+            f"{row['spin_error']:.0e}",
+            f"{row['position_error']:.0e}",
+        )
+        for row in measured
+    )
+    table = _table(("flown with", "in", "spin off by", "way off by"), rows)
+    return f"{_measured_on(measured[0])}.\n\n{table}"
+
+
+def engine_inertia() -> str:
+    """What engines compute of the L bracket by themselves, from the last benchmark's own numbers."""
+    measured = [row for row in read_rows(RESULTS / "engine_inertia.csv") if math.isnan(row["spin_error"])]
+    rows = []
+    for row in measured:
+        moments = (100.0 * row[f"{name}_moment"] for name in ("first", "second", "third"))
+        turned = f"{abs(row['axes_turned_deg']):.1f}°"
+        name = f"{_ENGINES.get(row['engine'], '')}, {row['shape']}, {row['package']} {row['version']}"
+        rows.append(
+            (
+                "the bounding box about its own centre" if row["engine"] == "any" else name,
+                ", ".join(f"{moment:+.1f}" for moment in moments).replace("-0.0", "+0.0") + " %",
+                f"**{turned}**" if row["axes_turned_deg"] > 45.0 else turned,
+                f"{row['center_off_mm']:.1f} mm",
+            )
+        )
+    head = ("engine, shape", "principal moments", "axes turned by", "centre of mass off by")
+    return f"{_measured_on(measured[0])}.\n\n{_table(head, rows)}"
+
 
 def _flown_in_engine(row: dict) -> tuple[str, ...]:
     if row["why"]:
@@ -430,6 +480,8 @@ TABLES = {
     "identification": identification,
     "figures": figures,
     "engines": engines,
+    "engine_flights": engine_flights,
+    "engine_inertia": engine_inertia,
     "site": lambda: site_line(address()),
 }
 

@@ -3,9 +3,10 @@
 // What `rigid_proto inspect --for ENGINE` prints, taken by the engine itself: node inertia.mjs < JSON, which answers with
 // JSON.
 //
-// Asked: {texts: {rapier, jolt, physx, havok}, impulse, point, step_s, steps}: a body at rest whose axes are the world's
-// gets an impulse [N s] at a point [m], and flies. Answered by engine: {position, velocity, omega}, of the body's origin,
-// of its centre of mass where the engine says that, and [rad/s], after the steps; or {why}.
+// Asked: {texts: {rapier, jolt, physx, havok, babylon}, glb, center, impulse, point, step_s, steps}: a body at rest whose
+// axes are the world's gets an impulse [N s] at a point [m], and flies. glb: a flight's file (base64), whose body node Babylon's own
+// loader reads; center [m]: the centre of mass. Answered by engine: {position, velocity, omega}, of the body's origin, of
+// its centre of mass where the engine says that, and [rad/s], after the steps; or {why}.
 //
 // With {surface: {vertices, triangles}, mass}: also what each engine computes from the mesh by itself, by engine and
 // shape, at that mass: {mass, center, tensor}, [kg], [m] and [kg m²] about the centre, six entries as URDF has them.
@@ -54,15 +55,15 @@ const ENGINES = {
     const own = {};
     if (surface) {
       const vertices = Float32Array.from(surface.vertices.flat()), triangles = Uint32Array.from(surface.triangles.flat());
-      const shapes = { trimesh: () => rapier.ColliderDesc.trimesh(vertices, triangles), hull: () => rapier.ColliderDesc.convexHull(vertices) };
+      const shapes = { trimesh: () => rapier.ColliderDesc.trimesh(vertices, triangles), "convex hull": () => rapier.ColliderDesc.convexHull(vertices) };
       for (const [name, shape] of Object.entries(shapes)) {
-        for (const [way, collider] of Object.entries({ "": shape().setDensity(1000), ", setMass": shape().setMass(mass) })) {
+        for (const [way, collider] of Object.entries({ "by density": shape().setDensity(1000), "by setMass": shape().setMass(mass) })) {
           const one = world.createRigidBody(rapier.RigidBodyDesc.dynamic());
           world.createCollider(collider, one);
           one.recomputeMassPropertiesFromColliders();
           world.step(); // which takes the properties
           const { m11, m12, m13, m22, m23, m33 } = one.effectiveAngularInertia(), scale = mass / one.mass();
-          own[name + way] = { mass, center: list(one.localCom()), tensor: [m11, m12, m13, m22, m23, m33].map((value) => value * scale) };
+          own[`${name} ${way}`] = { mass, center: list(one.localCom()), tensor: [m11, m12, m13, m22, m23, m33].map((value) => value * scale) };
         }
       }
     }
@@ -93,7 +94,7 @@ const ENGINES = {
       for (const vertex of surface.vertices) hull.mPoints.push_back(new jolt.Vec3(...vertex));
       const shape = hull.Create().Get(), found = shape.GetMassProperties(), scale = mass / found.mMass;
       const [x, y, z] = [0, 1, 2].map((k) => listOf(found.mInertia.GetColumn3(k)));
-      own.hull = { mass, center: listOf(shape.GetCenterOfMass()), tensor: [...x, y[1], y[2], z[2]].map((value) => value * scale) };
+      own["convex hull"] = { mass, center: listOf(shape.GetCenterOfMass()), tensor: [...x, y[1], y[2], z[2]].map((value) => value * scale) };
     }
     return { ...flown, own };
   },
@@ -134,9 +135,45 @@ const ENGINES = {
       one.attachShape(physics.createShape(new px.PxConvexMeshGeometry(hull), physics.createMaterial(0.5, 0.5, 0), true));
       px.PxRigidBodyExt.prototype.setMassAndUpdateInertia(one, mass);
       const pose = one.getCMassLocalPose();
-      own.hull = { mass, center: list(pose.p), tensor: six(list(one.getMassSpaceInertiaTensor()), [pose.q.x, pose.q.y, pose.q.z, pose.q.w]) };
+      own["convex hull"] = { mass, center: list(pose.p), tensor: six(list(one.getMassSpaceInertiaTensor()), [pose.q.x, pose.q.y, pose.q.z, pose.q.w]) };
     }
     return { ...flown, own };
+  },
+
+  async babylon({ texts, impulse, point, step_s, steps }) {
+    const { scene, step, asBody, Vector3, Quaternion, TransformNode } = await babylonWorld();
+    const node = new TransformNode("body", scene), body = asBody(node);
+    new Function("BABYLON", "body", texts.babylon)({ Vector3, Quaternion }, body);
+    body.applyImpulse(Vector3.FromArray(impulse), Vector3.FromArray(point));
+    for (let k = 0; k < steps; k++) step(step_s);
+    return { position: node.position.asArray(), velocity: body.getLinearVelocity().asArray(), omega: body.getAngularVelocity().asArray(), own: {} };
+  },
+
+  async gltf({ glb, center, impulse, point, step_s, steps }) {
+    const { scene, step, asBody, Vector3, Quaternion } = await babylonWorld();
+    const { registerGLTFExtension } = await import("@babylonjs/loaders/glTF/2.0/glTFLoaderExtensionRegistry.js");
+    const { ImportMeshAsync } = await import("@babylonjs/core/Loading/sceneLoader.js");
+    await import("@babylonjs/loaders/glTF/2.0/glTFLoader.js");
+    const name = "KHR_physics_rigid_bodies", motions = new Map();
+    registerGLTFExtension(name, true, (loader) => ({
+      name, enabled: true, dispose() {},
+      loadNodeAsync(context, node, assign) {
+        const motion = node.extensions?.[name]?.motion;
+        return motion ? loader.loadNodeAsync(context, node, (made) => { motions.set(made.name, motion); assign(made); }) : null;
+      },
+    }));
+    await ImportMeshAsync(`data:model/gltf-binary;base64,${glb}`, scene, { pluginExtension: ".glb" });
+    for (const group of scene.animationGroups) group.stop();
+    const node = scene.getNodeByName("body"), { mass, centerOfMass, inertiaDiagonal, inertiaOrientation } = motions.get("body");
+    const body = asBody(node), moments = Vector3.FromArray(inertiaDiagonal).scale(1 / mass); // Babylon takes those of 1 kg
+    body.setMassProperties({ mass, centerOfMass: Vector3.FromArray(centerOfMass), inertia: moments, inertiaOrientation: Quaternion.FromArray(inertiaOrientation) });
+    // The file has y up: the world's axes here are those of its root.
+    const up = node.parent.absoluteRotationQuaternion, turned = (v) => Vector3.FromArray(v).applyRotationQuaternion(up);
+    const back = (v) => v.applyRotationQuaternion(Quaternion.Inverse(up)).asArray();
+    body.applyImpulse(turned(impulse), turned(minus(point, center)));
+    for (let k = 0; k < steps; k++) step(step_s);
+    const origin = Vector3.TransformCoordinates(Vector3.FromArray(center).scale(-1), node.computeWorldMatrix(true)).add(turned(center));
+    return { position: back(origin), velocity: back(body.getLinearVelocity()), omega: back(body.getAngularVelocity()), own: {} };
   },
 
   async bullet({ surface, mass }) {
@@ -147,7 +184,7 @@ const ENGINES = {
       hull.setMargin(0);
       for (const vertex of surface.vertices) hull.addPoint(new ammo.btVector3(...vertex), true);
       hull.calculateLocalInertia(mass, tensor);
-      own.hull = { mass, center: [0, 0, 0], tensor: [tensor.x(), 0, 0, tensor.y(), 0, tensor.z()] };
+      own["convex hull"] = { mass, center: [0, 0, 0], tensor: [tensor.x(), 0, 0, tensor.y(), 0, tensor.z()] };
     }
     return { own };
   },
@@ -158,14 +195,13 @@ const ENGINES = {
       const cannon = await import("cannon-es");
       const vertices = surface.vertices.map((vertex) => new cannon.Vec3(...vertex));
       const body = new cannon.Body({ mass, shape: new cannon.ConvexPolyhedron({ vertices, faces: surface.triangles }) });
-      own.mesh = { mass, center: [0, 0, 0], tensor: [body.inertia.x, 0, 0, body.inertia.y, 0, body.inertia.z] };
+      own.ConvexPolyhedron = { mass, center: [0, 0, 0], tensor: [body.inertia.x, 0, 0, body.inertia.y, 0, body.inertia.z] };
     }
     return { own };
   },
 
   async havok({ texts, impulse, point, step_s, steps, surface, mass }) {
-    const wasmBinary = readFileSync(packages.resolve("@babylonjs/havok/lib/esm/HavokPhysics.wasm"));
-    const havok = await (await import("@babylonjs/havok")).default({ wasmBinary });
+    const havok = await havokModule();
     const done = ([result, value]) => {
       if (result !== havok.Result.RESULT_OK) throw new Error(`Havok refuses: ${String(result)}`);
       return value;
@@ -189,11 +225,35 @@ const ENGINES = {
       new Float32Array(havok.HEAPU8.buffer, at, bytes.length).set(bytes);
       const hull = done(havok.HP_Shape_CreateConvexHull(at, surface.vertices.length));
       const [center, , moments, rotation] = done(havok.HP_Shape_BuildMassProperties(hull));
-      own.hull = { mass, center, tensor: six(moments.map((moment) => moment * mass), rotation) };
+      own["convex hull"] = { mass, center, tensor: six(moments.map((moment) => moment * mass), rotation) };
     }
     return { ...flown, own };
   },
 };
+
+async function havokModule() {
+  return (await import("@babylonjs/havok")).default({ wasmBinary: readFileSync(packages.resolve("@babylonjs/havok/lib/esm/HavokPhysics.wasm")) });
+}
+
+/** A scene of Babylon's without a screen, its physics Havok's: step(seconds), and asBody(node), a ball that nothing slows. */
+async function babylonWorld() {
+  const part = (path) => import(`@babylonjs/core/${path}.js`);
+  const [{ NullEngine }, { Scene }, { Vector3, Quaternion }, { TransformNode }] = await Promise.all(["Engines/nullEngine", "scene", "Maths/math.vector", "Meshes/transformNode"].map(part));
+  const [{ PhysicsBody }, { PhysicsShapeSphere }, { PhysicsMotionType }, { HavokPlugin }] = await Promise.all(["physicsBody", "physicsShape", "IPhysicsEnginePlugin", "Plugins/havokPlugin"].map((name) => part(`Physics/v2/${name}`)));
+  await Promise.all(["Physics/joinedPhysicsEngineComponent", "Physics/v2/physicsEngineComponent"].map(part));
+  const scene = new Scene(new NullEngine()), plugin = new HavokPlugin(true, await havokModule()), bodies = [];
+  scene.useRightHandedSystem = true;
+  scene.enablePhysics(Vector3.Zero(), plugin);
+  const asBody = (node) => {
+    const body = new PhysicsBody(node, PhysicsMotionType.DYNAMIC, false, scene);
+    body.shape = new PhysicsShapeSphere(Vector3.Zero(), BALL, scene);
+    body.setAngularDamping(0);
+    body.setLinearDamping(0);
+    bodies.push(body);
+    return body;
+  };
+  return { scene, step: (seconds) => plugin.executeStep(seconds, bodies), asBody, Vector3, Quaternion, TransformNode };
+}
 
 /** Calls what is built for browsers alone, and refuses Node by its process; it uses no window. */
 async function asInBrowser(make, options) {

@@ -24,6 +24,16 @@ export interface Words {
   readonly atStart: string;
 }
 
+/** What an engine takes, and how (rigid_proto_ros/mass/engines.py, Form). saysNone: products [%] that needn't be said. */
+export interface Form {
+  readonly engine: string;
+  readonly text: string;
+  readonly products: string;
+  readonly mirrored: string;
+  readonly perM: number;
+  readonly saysNone: number;
+}
+
 interface Packed { readonly at: number; readonly vertices: number; readonly triangles: number; readonly digits: number }
 
 export interface Declarations {
@@ -40,6 +50,7 @@ export interface Declarations {
   readonly bodies: Readonly<Record<string, Packed>>;
   readonly scenes: Readonly<Record<string, { readonly title: string; readonly values: Readonly<Record<string, Value>> }>>;
   readonly lessons: Readonly<Record<string, LessonTexts>>;
+  readonly forms: Readonly<Record<string, Form>>;
   readonly start: string;
   /** longest side of a mesh file [mesh units] above which its unit is taken for a millimetre */
   readonly longest: number;

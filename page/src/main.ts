@@ -53,7 +53,7 @@ export interface Probe {
   readonly drags: number[];
 }
 
-function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, address: string, app: HTMLElement, scriptMs: number): Probe {
+function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, forms: Desk["forms"], address: string, app: HTMLElement, scriptMs: number): Probe {
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
   const stage = make("div", { id: "stage", tabindex: 0, role: "application", "aria-label": words.picture.name }), labels = make("div", { id: "labels", "aria-hidden": "true" });
   const aim = make("div", { class: "label", hidden: true }, "⊕"), hint = make("div", { id: "hint", "aria-hidden": "true" }, icon(HAND), words.picture.pull);
@@ -100,7 +100,7 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, add
   };
   // A lesson is a take of one's own: beside a node there is none.
   const named = Object.entries(motion.node ? {} : texts).filter(([name]) => name in COURSES).map(([name, { title }]) => ({ name, title }));
-  const desk: Desk = { motion, picture, pointer, clock, look, restart, lessons: named, track: () => track, later: (name, act) => { waiting.set(name, act); }, told, open, lively };
+  const desk: Desk = { motion, picture, pointer, clock, look, restart, lessons: named, forms, track: () => track, later: (name, act) => { waiting.set(name, act); }, told, open, lively };
   const panel = new Panel(desk, () => { moved = true; }), lessons = new LessonPanel(desk, panel, texts);
   const drop = make("div", { id: "drop", hidden: true }, words.body.drop);
   app.append(panel.node, drop, make("div", { id: "say", role: "status", "aria-live": "polite" }));
@@ -257,7 +257,8 @@ async function start(): Promise<void> {
     const refusal = asked.take ? await motion.openLink(asked.take) : null;
     // Who was sent nothing sees what a box in place of the truth does.
     if (!take && !asked.take && !motion.node) motion.setGhost({ inertia_model: "bounding_box" });
-    const probe = begin(motion, { ...new Data(data).declared.lessons, ...LANGUAGES[language]?.lessons }, address, app, scriptMs);
+    const { lessons, forms } = new Data(data).declared;
+    const probe = begin(motion, { ...lessons, ...LANGUAGES[language]?.lessons }, forms, address, app, scriptMs);
     if (refusal ?? motion.notice()) say(refusal ?? motion.notice(), 12);
     Object.assign(window, { page: probe });
   } catch (error) {

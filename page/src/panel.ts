@@ -3,6 +3,7 @@
 // The first screen: the switch, what the hand can change, readings; and the cards that open beside the picture.
 
 import type { Clock } from "./clock.ts";
+import type { Form } from "./data.ts";
 import { bodyCard } from "./panel_body.ts";
 import { button, icon, make, say, slider, type Slider } from "./panel_elements.ts";
 import { ghostCard } from "./panel_ghost.ts";
@@ -44,6 +45,8 @@ export interface Desk {
   readonly clock: Clock;
   readonly look: Look;
   readonly lessons: readonly Bundled[];
+  /** What engines take, by the names of `inspect --for`. */
+  readonly forms: Readonly<Record<string, Form>>;
   track(): Track;
   /** Do this before the next picture; what was asked for under the same name before then isn't done. */
   later(name: string, act: () => void): void;

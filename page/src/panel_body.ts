@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 
+import { engineText } from "./forms.ts";
 import type { Card, Desk } from "./panel.ts";
-import { button, choice, make, numberField, say } from "./panel_elements.ts";
+import { button, choice, copied, make, numberField, say } from "./panel_elements.ts";
 import type { Model, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
@@ -45,6 +46,10 @@ export function bodyCard(desk: Desk): Card {
   const own = make("div", {}, make("div", { class: "field" }, w.fixed, make("span", {}, ownMass.node, " kg")), make("div", { class: "field" }, w.centre, make("span", { class: "trio" }, ...centre.map(({ node: field }) => field))),
     ...[0, 3].map((from) => make("div", { class: "field" }, ...[0, 1, 2].map((k) => make("label", {}, `I${NAMES[from + k]}`, tensor[from + k]!.node)))), make("p", { class: "note" }, w.ownNote));
   const table = make("table", { "data-mark": "moments", tabindex: -1 }), ballast = make("div");
+  const lines = make("textarea", { class: "text", readonly: true, hidden: true, rows: 7, spellcheck: "false", "aria-label": w.lines });
+  const written = (): string => (lines.value = engineText(desk.forms[engines.select.value]!, motion.body()));
+  const engines = choice(w.copyFor, Object.entries(desk.forms).map(([name, { engine }]) => [name, engine] as const), written);
+  const copy = button(w.copy, () => { lines.hidden = false; void copied(written(), lines); });
   let heavy = 0.1;
   const kilograms = numberField(w.ballast, (value) => { heavy = value; kilograms.show(value); return null; }, "kg");
   const stick = button(w.add, () => {
@@ -78,6 +83,7 @@ export function bodyCard(desk: Desk): Card {
     ballast.replaceChildren(...stuck.map(([name, value]) => make("div", { class: "field" }, `${short((value as readonly number[])[0]!)} kg`,
       button(w.remove, () => desk.told(motion.set({ [name]: [0, ...((value as readonly number[]).slice(1) as unknown as Vec3)] }))))));
     kilograms.show(heavy);
+    if (!lines.hidden) written();
   };
   const rows = (model: Model, truth: Model | undefined): HTMLElement[] => {
     const own = make("tr", {}, make("th", { scope: "row" }, w.models[model.model] ?? model.model), ...model.moments.map((moment) => make("td", {}, short(moment))));
@@ -89,7 +95,7 @@ export function bodyCard(desk: Desk): Card {
     make("h3", {}, w.bundled), bodies, scenes.node,
     ...(motion.can.openFiles ? [make("h3", {}, w.own), make("div", { class: "row" }, button(w.choose, () => file.click()), file), units.node, make("p", { class: "note" }, w.formats)] : []), verdict, facts,
     make("h3", {}, w.mass), make("div", { class: "field" }, w.fixed, make("span", {}, mass.node, " kg")), make("div", { class: "field" }, w.dense, make("span", {}, density.node, " kg/m³")), models.node, own,
-    make("h3", {}, w.table), table,
+    make("h3", {}, w.table), table, make("div", { class: "row" }, engines.node, copy), lines,
     make("h3", {}, w.ballast), make("div", { class: "field", "data-mark": "ballast" }, make("span", {}, kilograms.node, " kg"), stick), ballast);
   return { node, changed, closed: () => { desk.pointer.claim = null; } };
 }

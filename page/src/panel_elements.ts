@@ -123,6 +123,12 @@ export function choice(name: string, options: readonly (readonly [string, string
   return { node: make("label", { class: "field" }, make("span", {}, name), select), select, show(value) { select.value = value; } };
 }
 
+/** Put a text onto the clipboard; where there is none, it is shown to be copied by hand. */
+export async function copied(text: string, shown: HTMLInputElement | HTMLTextAreaElement): Promise<void> {
+  try { await navigator.clipboard.writeText(text); say(words.keep.copied, 3); }
+  catch { shown.hidden = false; shown.value = text; shown.select(); say(words.keep.linked, 3); }
+}
+
 /** Save bytes as a file. */
 export function save(name: string, content: Blob): void {
   const url = URL.createObjectURL(content), link = make("a", { href: url, download: name });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 
 import type { Card, Desk } from "./panel.ts";
-import { button, make, save, say } from "./panel_elements.ts";
+import { button, copied, make, save, say } from "./panel_elements.ts";
 import { Track } from "./plots.ts";
 import { words } from "./words.ts";
 
@@ -13,9 +13,7 @@ export function keepCard(desk: Desk): Card {
   const share = async (): Promise<void> => {
     const text = await motion.link();
     if (!text) { say(w.ownMesh); return; }
-    const address = `${location.href.split("#")[0]}#${text}`;
-    try { await navigator.clipboard.writeText(address); say(w.copied, 3); }
-    catch { link.hidden = false; link.value = address; link.select(); say(w.linked, 3); }
+    await copied(`${location.href.split("#")[0]}#${text}`, link);
   };
   const take = (): void => {
     const files = motion.take();

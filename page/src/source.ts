@@ -96,6 +96,8 @@ export interface BodyInfo {
   readonly moments: Vec3;
   /** 9 numbers row by row: principal axes as columns, in body axes, in the order of the moments */
   readonly axes: readonly number[];
+  /** x y z w: turns principal axes into body axes */
+  readonly turn: readonly number[];
   /** [m^3] of the solid as scaled; NaN where the surface bounds none */
   readonly volume: number;
   /** [m]: half the diagonal of the bounding box as scaled */

@@ -193,6 +193,7 @@ export class Observed {
       inertia: [...row.slice(body.INERTIA, body.INERTIA + 9)],
       moments: triple(row, body.MOMENTS),
       axes: [...row.slice(body.AXES, body.AXES + 9)],
+      turn: [...row.slice(body.QUATERNION, body.QUATERNION + 4)],
       volume: surface?.closed === true ? this.#placed.record.solid.measure * Math.abs(scale[0] * scale[1] * scale[2]) : NaN,
       length: row[body.LENGTH] ?? 1,
       findings: surface?.findings ?? [],

@@ -56,6 +56,7 @@ export const english = {
     table: "Moments [kg m²]", beside: "beside the truth", ballast: "Ballast", add: "stick on",
     addTitle: "Then press the place of the body", press: "Press the place on the body", remove: "remove", none: "none",
     centre: "centre", ownNote: "Mass and tensor of your own, about the centre of mass, in the mesh's axes [kg m²].",
+    copyFor: "Copy for", copy: "copy", lines: "Mass, centre and tensor as an engine takes them",
     facts: (vertices: number, triangles: number, litres: string) => `${vertices} vertices, ${triangles} triangles${litres ? `, ${litres} l` : ""}`,
   },
   world: {

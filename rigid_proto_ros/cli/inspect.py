@@ -10,7 +10,7 @@ import sys
 from typing import Any
 
 from ..base.errors import InputError
-from ..mass.engines import ENGINES
+from ..mass.engines import FORMS
 from ..mass.from_mesh import FALLBACKS, mesh_body
 from ..mass.inspection import Inspection, as_json, inspect_mesh, verify_moments
 from ..mass.moments import MODELS
@@ -88,7 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output.add_argument("--sdf", action="store_true", help="an SDF <inertial> on stdout")
     output.add_argument("--mjcf", action="store_true", help="an MJCF <inertial> on stdout")
     output.add_argument(
-        "--for", dest="engine", choices=ENGINES, help="what an engine or format takes, in its axes, units and words"
+        "--for", dest="engine", choices=FORMS, help="what an engine or format takes, in its axes, units and words"
     )
 
 

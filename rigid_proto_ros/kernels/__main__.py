@@ -15,16 +15,21 @@ import fcntl
 import gc
 import gzip
 import os
+import re
+import shutil
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..base.errors import InputError, one_of, tell
 from ..base.files import whole_file
 from ..base.library import KINDS, carried_folder, check_own, file_name, kernels_folder, stamp, target
+
+UNUSED_DAYS = 30
+"""After so long without use, kernels of other sources are removed."""
 
 
 def main() -> int:
@@ -94,9 +99,22 @@ def build(kinds: list[str], folder: Path) -> None:
         with tempfile.TemporaryDirectory(dir=folder) as work:
             made = linked(kind, object_code(whole, TARGETS[kind]), Path(work))
             os.replace(made, folder / file_name(kind))
+    remove_unused(kept)
     clear = "\r\033[K" if sys.stderr.isatty() else ""
     sizes = [f"{kind} {size(folder / file_name(kind))}" for kind in kinds]
     print(f"{clear}kernels built in {time.monotonic() - began:.0f} s: {', '.join(sizes)}", file=sys.stderr, flush=True)
+
+
+def remove_unused(kept: Path) -> None:
+    """Remove kernels beside ``kept`` of which no file was read or written for UNUSED_DAYS. Others' folders stay."""
+    oldest = time.time() - UNUSED_DAYS * 86_400
+    for folder in kept.parent.iterdir():
+        if folder == kept or not re.fullmatch(r"\d+-[0-9a-f]{20}", folder.name):
+            continue
+        with suppress(OSError):
+            files = [file.stat() for file in folder.iterdir()]
+            if all(max(file.st_atime, file.st_mtime) < oldest for file in files):
+                shutil.rmtree(folder)
 
 
 def describe(layouts: Path, typescript: str | None) -> None:

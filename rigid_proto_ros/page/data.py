@@ -18,6 +18,7 @@ from ..base.bundled import body_names, scene_path
 from ..base.library import stamp
 from ..base.vectors import FloatArray, IntArray
 from ..mass import INERTIA_MODELS
+from ..mass.engines import FORMS, SAYS_NO_PRODUCTS, Form
 from ..mesh.reading import Mesh, load_mesh
 from ..motion.integrators import INTEGRATORS
 from ..motion.integrators.stepping import ROOM
@@ -63,6 +64,7 @@ def page_data() -> bytes:
         "bodies": bodies,
         "scenes": {one.name: {"title": one.title, "values": bundled_values(one.name)} for one in lessons()},
         "lessons": {one.name: _texts(one) for one in lessons()},
+        "forms": {name: _form(form) for name, form in FORMS.items()},
         "start": START,
         "longest": LONGEST,
     }
@@ -104,6 +106,18 @@ def _texts(one: Lesson) -> dict[str, Any]:
         "answer": one.answer,
         "steps": one.sentences,
         "reason": one.reason,
+    }
+
+
+def _form(form: Form) -> dict[str, Any]:
+    """What an engine takes, as page/src/forms.ts reads it."""
+    return {
+        "engine": form.engine,
+        "text": form.lines,
+        "products": form.products,
+        "mirrored": form.mirrored,
+        "perM": form.per_m,
+        "saysNone": SAYS_NO_PRODUCTS,
     }
 
 

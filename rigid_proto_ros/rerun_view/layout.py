@@ -120,7 +120,9 @@ def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
     row_shares = [4, 1]
     if subject.ghost or not (subject.dropped_term or subject.tied or subject.falls):
         # It turns freely. Beside the commands there is more room than above the plots.
-        below = [_poinsot_view(), *([rrb.Vertical(*below)] if below else [])]
+        # Six commands, as `make run` has, are seen without scrolling in a window of 1600 x 900.
+        listed = [rrb.Vertical(*below, row_shares=[3, 2][: len(below)])] if below else []
+        below = [_poinsot_view(), *listed]
         row_shares = [3, 2]
     flight = _body_view(subject)
     if below:

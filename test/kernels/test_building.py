@@ -8,10 +8,15 @@ import shutil
 import struct
 import subprocess
 import sys
+import time
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+
+from rigid_proto_ros.kernels.__main__ import remove_unused
+
+MONTH_AGO = time.time() - 31 * 86_400
 
 OF_ONE_MODULE = """
 import sys
@@ -74,12 +79,33 @@ def build(folder: Path, **environment: str) -> subprocess.Popen:
     return ran(f"{OF_ONE_MODULE}\nsys.argv = ['x']; sys.exit(program.main())", folder, **environment)
 
 
+def unused(folder: Path) -> Path:
+    """Kernels, built and read last 31 days ago."""
+    folder.mkdir()
+    for file in (folder / "kernels.bc", folder / "kernels-x86-64-v3.so"):
+        file.write_bytes(b"")
+        os.utime(file, (MONTH_AGO, MONTH_AGO))
+    return file
+
+
+def test_kernels_that_were_used_within_a_month_and_what_isnt_kernels_stay(tmp_path: Path) -> None:
+    names = [f"1-{digit * 20}" for digit in "0123"]
+    gone, read, written, kept, others = (unused(tmp_path / name) for name in (*names, "somebody's"))
+    os.utime(read, (time.time(), MONTH_AGO))
+    os.utime(written, (MONTH_AGO, time.time()))
+    remove_unused(kept.parent)
+    left = {folder.name for folder in tmp_path.iterdir()}
+    assert left == {file.parent.name for file in (read, written, kept, others)} and not gone.exists()
+
+
 def test_two_builds_at_once_make_one_library_and_both_find_it(tmp_path: Path) -> None:
+    old = unused(tmp_path / f"1-{'0' * 20}")
     both = [build(tmp_path), build(tmp_path)]
     said = [process.communicate() for process in both]
     assert [process.returncode for process in both] == [0, 0], said
     assert said[0][0] == said[1][0] and sum("built in" in err for _, err in said) == 1
     (made,) = tmp_path.rglob("*.so")
+    assert not old.parent.exists()
     assert oct(made.parent.stat().st_mode & 0o777) == "0o700"
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.cli.main import main
-from rigid_proto_ros.mass.engines import ENGINES, diagonal_error, engine_text
+from rigid_proto_ros.mass.engines import FORMS, engine_text
 from rigid_proto_ros.mass.from_mesh import mesh_body
 from rigid_proto_ros.mass.properties import MassProperties
 
@@ -46,22 +46,47 @@ def assert_is(true: MassProperties, mass, center, moments, rotation) -> None:
     assert np.max(np.abs(tensor(moments, rotation) - true.inertia)) <= 1e-7 * largest
 
 
-def test_unity_gets_the_mesh_that_its_importer_makes_of_the_file(body, properties):
-    # Rigidbody.inertiaTensor is the diagonal in axes turned by inertiaTensorRotation; x of an .obj is mirrored.
-    text = engine_text("unity", properties)
+# Four masses of 1 kg at the corners of a tetrahedron, whose sums docs/engines.md does by hand: about (0.2, 0.1, 0.3),
+# Σx² = 0.48, Σy² = 0.12, Σz² = 1.08, Σxy = -0.08, Σxz = -0.24, Σyz = -0.12.
+FOUR = "v 0 0 0\nv 0.8 0 0\nv 0 0.4 0\nv 0 0 1.2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.fixture(scope="module")
+def four(tmp_path_factory) -> MassProperties:
+    file = tmp_path_factory.mktemp("four") / "four.obj"
+    file.write_text(FOUR)
+    return mesh_body(str(file)).moments.mass_properties("points", mass=4.0)
+
+
+def symmetric(xx, yy, zz, xy, xz, yz) -> np.ndarray:
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def test_unity_gets_principal_moments_and_their_turn_with_x_negated(four, body, properties):
+    # Rigidbody.inertiaTensor is the diagonal in axes turned by inertiaTensorRotation. Products with x change their signs.
+    by_hand = MassProperties(4.0, np.array([-0.2, 0.1, 0.3]), symmetric(1.2, 1.56, 0.6, -0.08, -0.24, 0.12))
     mirrored = body.moments.mass_properties(mass=MASS, scale=(-1.0, 1.0, 1.0))
-    center, moments = numbers(text, "Vector3")
-    (mass,) = re.findall(rf"body\.mass = ({NUMBER})f;", text)
-    assert_is(mirrored, float(mass), center, moments, numbers(text, "Quaternion")[0])
+    for text, true in ((engine_text("unity", four), by_hand), (engine_text("unity", properties), mirrored)):
+        center, moments = numbers(text, "Vector3")
+        (mass,) = re.findall(rf"body\.mass = ({NUMBER})f;", text)
+        assert_is(true, float(mass), center, moments, numbers(text, "Quaternion")[0])
 
 
-def test_unreal_gets_the_mesh_that_its_importer_makes_of_the_file(body, properties):
-    # Centimetres and kg cm², y mirrored; the transform of the mass is where the diagonal stands.
-    text = engine_text("unreal", properties)
+def test_unreal_gets_centimetres_principal_moments_and_their_turn_with_y_negated(four, body, properties):
+    # The transform of the mass is where the diagonal stands. Products with y change their signs.
+    by_hand = MassProperties(4.0, np.array([20.0, -10.0, 30.0]), symmetric(12000, 15600, 6000, -800, 2400, -1200))
     mirrored = body.moments.mass_properties(mass=MASS, scale=(100.0, -100.0, 100.0))
-    moments, center = numbers(text, "FVector")
-    (mass,) = re.findall(rf"SetMass_AssumesLocked\(actor, ({NUMBER})f\)", text)
-    assert_is(mirrored, float(mass), center, moments, numbers(text, "FQuat")[0])
+    for text, true in ((engine_text("unreal", four), by_hand), (engine_text("unreal", properties), mirrored)):
+        moments, center = numbers(text, "FVector")
+        (mass,) = re.findall(rf"SetMass_AssumesLocked\(actor, ({NUMBER})f\)", text)
+        assert_is(true, float(mass), center, moments, numbers(text, "FQuat")[0])
+
+
+def test_godot_gets_the_diagonal_in_the_axes_of_the_mesh(four):
+    text = engine_text("godot", four)
+    center, diagonal = numbers(text, "Vector3")[:2]
+    assert center == pytest.approx([0.2, 0.1, 0.3]) and diagonal == pytest.approx([1.2, 1.56, 0.6])
+    assert re.search(r"^mass = 4$", text, re.MULTILINE) and f"off by {100 * 0.24 / 1.56:.2g} %" in text
 
 
 def test_godot_gets_the_diagonal_how_far_it_is_off_and_how_nothing_is_lost(properties):
@@ -71,16 +96,25 @@ def test_godot_gets_the_diagonal_how_far_it_is_off_and_how_nothing_is_lost(prope
     assert diagonal == pytest.approx(np.diag(properties.inertia), rel=1e-8)
     off = properties.inertia - np.diag(diagonal)
     assert np.max(np.abs(off)) / np.max(properties.inertia) == pytest.approx(0.2353, abs=1e-3)
-    assert "off by 24 %" in text and diagonal_error(properties.inertia) == pytest.approx(0.2353, abs=1e-3)
-    (turn,) = numbers(text, "Quaternion")  # of the body's children: from the mesh's axes to the principal ones
-    R = matrix_from_quaternion(turn)
+    assert "off by 24 %" in text
+    (axes,) = numbers(text, "Quaternion")
+    assert ").inverse()" in text  # so turned, the body's children have the principal axes along the body's
+    R = matrix_from_quaternion(axes).T
     assert principal_center == pytest.approx(R @ properties.center_of_mass, rel=1e-6, abs=1e-9)
     assert np.max(np.abs(R @ properties.inertia @ R.T - np.diag(moments))) <= 1e-7 * np.max(moments)
 
 
-def test_a_body_whose_products_are_zero_gets_no_line_about_them():
+@pytest.mark.parametrize(("engine", "comment"), [("godot", "#"), ("unreal", "//")])
+def test_what_cant_say_products_tells_how_far_it_is_off_where_there_are_any(properties, engine, comment):
     plain = MassProperties(1.0, np.zeros(3), np.diag([0.3, 0.5, 0.7]))
-    assert engine_text("godot", plain).count("#") == 1
+    assert engine_text(engine, plain).count(comment) == 1
+    rounded = MassProperties(1.0, np.zeros(3), plain.inertia + 5e-8 * 0.7 * (1.0 - np.eye(3)))
+    assert engine_text(engine, rounded).count(comment) == 1
+    slight = MassProperties(1.0, np.zeros(3), plain.inertia + 1.2e-6 * 0.7 * (1.0 - np.eye(3)))
+    assert "off by 0.00012 %" in engine_text(engine, slight)
+    assert "products of inertia" in engine_text(engine, properties).lower() and "off by 24 %" in engine_text(
+        engine, properties
+    )
 
 
 @pytest.mark.parametrize(
@@ -134,13 +168,15 @@ def test_gltf_is_a_nodes_extension(properties):
     assert_is(properties, *(motion[name] for name in ("mass", "centerOfMass", "inertiaDiagonal", "inertiaOrientation")))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FORMS)
 def test_the_command_prints_one_comment_and_the_lines(capsys, engine):
     assert main(["inspect", "l_bracket", "--mass", "2.5", "--for", engine]) == 0
     told = capsys.readouterr()
     first, *lines = told.out.splitlines()
     assert first.startswith(("// ", "# ")) and ("kg m²" in first or "kg cm²" in first)
-    assert lines and not any(line.startswith("//") for line in lines) and told.err == ""
+    says = [k for k, line in enumerate(lines) if not line.startswith(("//", "#"))]
+    assert says == list(range(max(says) + 1)) and told.err == ""
+    assert not re.search(r"\{\w+(:f)?\}|\bnan\b|\binf\b", told.out)
 
 
 def test_the_command_has_the_rotation_in_its_json_and_refuses_what_has_no_solid(capsys, tmp_path):

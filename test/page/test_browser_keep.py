@@ -11,6 +11,8 @@ import pytest
 from page_browser import Opened, page_address
 
 from rigid_proto_ros.base.bundled import PACKAGE_FOLDER
+from rigid_proto_ros.mass.engines import engine_text
+from rigid_proto_ros.mass.from_mesh import mesh_body
 
 pytestmark = pytest.mark.drawn
 BRACKET = PACKAGE_FOLDER / "bodies" / "l_bracket.obj"
@@ -76,6 +78,46 @@ def test_own_numbers_begin_as_those_in_force_and_are_refused_with_a_reason(opene
     opened.drawn()
     assert page.locator("#say").inner_text(), "no body has such moments"
     assert np.allclose(opened.js("[...page.motion.body().moments]"), moments)
+
+
+def test_the_bodys_numbers_are_copied_for_an_engine_and_follow_the_body(opened: Opened) -> None:
+    page = opened.page
+    opened.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.locator("[data-card=body]").click()
+    page.locator("input[type=file]").set_input_files(BRACKET)
+    page.wait_for_function("page.motion.body().name.includes('l_bracket')")
+    opened.js("page.motion.set({ mass: 2.5 })")
+    opened.drawn()
+    engines, lines = page.get_by_label("Copy for", exact=True), page.get_by_label("as an engine takes them")
+    assert not lines.is_visible()
+    page.get_by_role("button", name="copy", exact=True).click()
+    page.wait_for_function("document.getElementById('say').innerText === 'Copied.'")
+    properties = mesh_body(str(BRACKET)).moments.mass_properties(mass=2.5)
+    assert opened.js("navigator.clipboard.readText()") == engine_text("unity", properties) == lines.input_value()
+    engines.focus()  # by keys alone
+    page.keyboard.press("g")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    page.wait_for_function("async () => (await navigator.clipboard.readText()).startsWith('# Godot')")
+    assert opened.js("navigator.clipboard.readText()") == engine_text("godot", properties)
+    field = page.get_by_label("mass, kg").first
+    field.fill("5")
+    field.press("Enter")
+    opened.drawn()
+    heavier = mesh_body(str(BRACKET)).moments.mass_properties(mass=5.0)
+    assert lines.input_value() == engine_text("godot", heavier)
+    assert opened.covered() == []
+
+
+def test_without_a_clipboard_the_lines_are_there_to_be_copied_by_hand(opened: Opened) -> None:
+    opened.js("Object.defineProperty(navigator, 'clipboard', { value: undefined })")  # as where a page isn't trusted
+    page = opened.page
+    page.locator("[data-card=body]").click()
+    page.get_by_label("Copy for", exact=True).select_option("usd")
+    page.get_by_role("button", name="copy", exact=True).click()
+    page.wait_for_function("document.getElementById('say').innerText === 'Copy this:'")
+    chosen = "(({ value, selectionStart: from, selectionEnd: to }) => value.slice(from, to))"
+    assert opened.js(f"{chosen}(document.querySelector('section[data-card=body] textarea'))").startswith("# USD")
 
 
 def test_ballast_sticks_where_the_body_is_pressed_and_comes_off(opened: Opened) -> None:

@@ -14,6 +14,7 @@ import pytest
 from page_browser import NO_WEBGL, Opened, chromium
 from page_tools import kernels, packages, run_node
 
+from rigid_proto_ros.mass.engines import FORMS
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.page.bundle import SOURCE
 from rigid_proto_ros.scene.lessons import lessons
@@ -61,6 +62,7 @@ PLAIN = {
     "Iyz",
     "Izz",
     *INTEGRATORS,
+    *re.findall(r"\w+", " ".join(form.engine for form in FORMS.values())),
 }
 """Units, symbols and names that all languages share."""
 
