@@ -16,6 +16,7 @@ from ..mass.inspection import Inspection, as_json, inspect_mesh, verify_moments
 from ..mass.moments import MODELS
 from ..mass.properties import scale_vector
 from .inspect_report import print_inertial, print_report
+from .inspect_parts import is_link, mesh_of_texts, split_part, with_link
 from .inspect_robot import add_robot_arguments, compare, given, lump
 
 DENSITY = 1000.0
@@ -40,6 +41,10 @@ EXAMPLES = (
         "a part drawn in mm that weighs 1.2 kg, as a URDF <inertial>",
     ),
     ("rigid_proto inspect hammer --density 7850 --for unity", "mass, COM and tensor as lines to paste"),
+    (
+        "rigid_proto inspect body.stl=2700 cover.stl=mass:0.12 --scale 0.001",
+        "parts of different material as one body",
+    ),
     ("rigid_proto inspect hammer --verify", "the errors against exact rational arithmetic"),
     ("rigid_proto inspect --compare robot.urdf", "the errors of a robot's inertials"),
     (
@@ -58,7 +63,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Mass, centre of mass and inertia of a mesh under every model; a mesh that encloses no volume is refused."
     )
-    parser.add_argument("mesh", nargs="?", metavar="MESH", help="a path, package:// URI or bundled name")
+    parser.add_argument(
+        "mesh", nargs="*", metavar="MESH",
+        help="a path, package:// URI or bundled name; several, each MESH, MESH=density or MESH=mass:kg, or a YAML file "
+        "of parts, are one body; ROBOT.urdf#LINK among them is the link's own inertial",
+    )  # fmt: skip
     parser.add_argument("--density", type=float, metavar="D", help=f"kg/m³ (default {DENSITY:g})")
     parser.add_argument("--mass", type=float, metavar="M", help="kg, instead of a density")
     parser.add_argument(
@@ -94,6 +103,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Inspect, print, and return the exit status; raises InputError for what is refused."""
+    texts = args.mesh
+    args.mesh = texts[0] if texts else None
+    if len(texts) > 1 and (args.lump or args.compare):
+        option = "lump" if args.lump else "compare"
+        raise InputError("MESH", " ".join(texts), f"at most one with --{option}; several are the parts of one body")
     if args.lump is not None:
         return lump(args)
     if args.compare is not None:
@@ -108,13 +122,21 @@ def run(args: argparse.Namespace) -> int:
             raise InputError(name, value, "a finite number > 0")
     if args.mass and args.density:
         raise InputError("--density", args.density, "--mass or --density, not both")
-    scale = scale_vector(1.0 if args.scale is None else args.scale)
+    scale, mesh = scale_vector(1.0 if args.scale is None else args.scale), args.mesh
+    links = [text for text in texts if is_link(text)]
+    if links:
+        return with_link(args, links, [text for text in texts if text not in links])
+    if len(texts) > 1 or split_part(mesh)[1]:
+        mesh, scale = mesh_of_texts(texts, args.density or DENSITY, args.scale), scale_vector(1.0)
+    body = mesh_body(mesh, repair=args.repair, fallback=args.fallback or "", accept_open=args.accept_open or 0.0)
+    if body.parts and args.density and isinstance(mesh, str):
+        raise InputError("--density", args.density, "none: the file gives the densities of its parts")
     inspection = inspect_mesh(
-        mesh_body(args.mesh, repair=args.repair, fallback=args.fallback or "", accept_open=args.accept_open or 0.0),
+        body,
         model=args.model or "solid",
         scale=scale,
         mass=args.mass or 0.0,
-        density=args.density or DENSITY,
+        density=DENSITY if body.parts else args.density or DENSITY,
         ballast=args.ballast or (),
     )
     report = as_json(inspection)

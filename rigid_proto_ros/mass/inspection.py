@@ -9,6 +9,7 @@ import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import product
 from typing import Any
 
@@ -18,7 +19,8 @@ from numpy.typing import ArrayLike
 from ..base.errors import InputError
 from ..base.rotation import quaternion_from_matrix
 from ..base.vectors import Matrix3, Vector3
-from .exact_moments import exact_solid_moments, relative_errors
+from ..mesh.parts import DENSITY
+from .exact_moments import exact_solid_moments, exact_sum, relative_errors
 from .from_mesh import MeshBody
 from .moments import MODELS, extent
 from .properties import MassProperties, scale_vector
@@ -110,7 +112,7 @@ def _axes_turned(axes: Matrix3, mine: int | None, others: Matrix3, theirs: int |
 class Inspection:
     """The inspection of a mesh at one scale, mass and model. ``refusal`` is the error that prevents the chosen model,
     ``models`` the mass properties of all models that can be computed. lower and upper (3,): the scaled mesh's box, NaN
-    for a mesh that isn't usable."""
+    for a mesh that isn't usable. mass: the one given, without ballast, or 0."""
 
     body: MeshBody
     scale: Vector3
@@ -123,6 +125,7 @@ class Inspection:
     lower: Vector3
     upper: Vector3
     density: float | None
+    mass: float = 0.0
 
     @property
     def chosen(self) -> MassProperties:
@@ -175,11 +178,12 @@ def inspect_mesh(
         findings += [Finding("tensor", WARNING, text) for text in models[name].warnings]
     volume = None
     with contextlib.suppress(InputError):  # of a mesh that bounds no solid, and has no other shape to take
-        volume = moments.moments("solid").measure * float(np.prod(np.abs(s)))
+        volume = body.volume(s)
     shell = moments.moments("shell", s) if "shell" in models else None
     area = None if shell is None else shell.measure * float(s[0]) ** 2
-    implied = density if not mass > 0.0 else mass / volume if volume else None
-    return Inspection(body, s, model, models, findings, refusal, volume, area, lower, upper, implied)
+    own = mass or (moments.body_mass(scale=s) if body.mesh.parts and volume else 0.0)
+    implied = density if not own > 0.0 else own / volume if volume else None
+    return Inspection(body, s, model, models, findings, refusal, volume, area, lower, upper, implied, mass)
 
 
 def as_json(inspection: Inspection) -> dict[str, Any]:
@@ -205,17 +209,36 @@ def as_json(inspection: Inspection) -> dict[str, Any]:
         "principal_orientation_xyzw": quaternion_from_matrix(axes).tolist(),
         "bounding_box": {"min": inspection.lower.tolist(), "max": inspection.upper.tolist()},
         "models": {name: inspection.models[name].as_dict() if name in inspection.models else None for name in MODELS},
+        **({"parts": parts_of(inspection)} if body.parts else {}),
         "verdict": verdict,
     }
 
 
+def parts_of(inspection: Inspection) -> list[dict[str, Any]]:
+    """Of each part: name, mass, density and volume; where the whole is given a mass, in proportion to it."""
+    body, scale = inspection.body, inspection.scale
+    whole = sum(float(part.own_mass) for part in body.parts)
+    own = inspection.mass or body.moments.body_mass(scale=scale)
+    told = []
+    for part in body.parts:
+        mass, volume = float(part.own_mass) * own / whole, part.volume * float(np.prod(np.abs(scale)))
+        told.append({"name": part.name, "mass": mass, "density": mass / volume, "volume": volume})
+    return told
+
+
 def verify_moments(body: MeshBody, scale: Vector3) -> dict[str, float]:
     """Errors of the solid's volume, centroid and inertia against rational arithmetic on the same vertices."""
-    moments = body.moments
-    unit = moments.mass_properties("solid", scale=scale, density=1.0)  # raises InputError if there is no solid
-    vertices, triangles = moments.solid_surface()
-    exact = exact_solid_moments(vertices, triangles, scale.tolist())
-    lower, upper, _ = extent(vertices, triangles)
+    moments, parts = body.moments, body.parts
+    unit = moments.mass_properties("solid", scale=scale, density=DENSITY if parts else 1.0)  # or there is no solid
+    if parts:
+        each = [(part, exact_solid_moments(*part.surface(), scale.tolist())) for part in parts]
+        stretch = Fraction(abs(math.prod(map(Fraction, scale.tolist()))))
+        masses = [Fraction(p.mass) * stretch if p.mass else Fraction(p.density) * own.volume for p, own in each]
+        exact = exact_sum([own for _, own in each], masses)
+        lower, upper, _ = extent(body.vertices, body.moments.triangles)
+    else:
+        vertices, triangles = moments.solid_surface()
+        exact = exact_solid_moments(vertices, triangles, scale.tolist())
+        lower, upper, _ = extent(vertices, triangles)
     diagonal = float(np.linalg.norm((upper - lower) * scale))
-    volume = moments.moments("solid").measure * float(np.prod(np.abs(scale)))
-    return relative_errors(exact, volume, unit.center_of_mass, unit.inertia, diagonal)
+    return relative_errors(exact, body.volume(scale), unit.center_of_mass, unit.inertia, diagonal)

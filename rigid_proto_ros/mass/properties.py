@@ -68,7 +68,7 @@ class MeshMoments:
     the surface bounds no solid and what helps, "" if it bounds one; with it the solid model, and a density, are
     refused. ``stand_in`` returns vertices (k, 3) and triangles (l, 3) of another solid that is used instead, for a
     surface that bounds none or whose parts overlap. For a surface wound inward throughout the results are those of the
-    outward one.
+    outward one. summed: of a body of parts, the moments of their sum, which is its solid.
     """
 
     vertices: Points
@@ -77,6 +77,7 @@ class MeshMoments:
     no_solid: str = ""
     name: str = "mesh"
     stand_in: Callable[[], Surface] | None = None
+    summed: Callable[[], Moments] | None = None
     _moments: dict[tuple[Any, ...], Moments] = field(default_factory=dict)
 
     def solid_surface(self) -> Surface:
@@ -98,13 +99,17 @@ class MeshMoments:
         stretch = np.abs(scale_vector(scale)) if model in STRETCHED else np.ones(3)
         stretch = stretch / stretch[0]
         key = (model, *stretch.tolist())
+        if key not in self._moments and model == "solid" and self.summed is not None and not self.no_solid:
+            self._moments[key] = self.summed()
         if key not in self._moments:
             vertices, triangles = self.solid_surface() if model == "solid" else (self.vertices, self.triangles)
             self._moments[key] = mesh_moments(model, vertices, triangles, self.polygon_starts, stretch)
         return self._moments[key]
 
     def body_mass(self, *, scale: ArrayLike = (1.0, 1.0, 1.0), mass: float = 0.0, density: float = 1000.0) -> float:
-        """Mass [kg] without ballast: ``mass`` when > 0, else density × solid volume, the same for all models."""
+        """Mass [kg] without ballast: ``mass`` when > 0, else density × solid volume, the same for all models; of parts
+        the sum of their masses at a density of 1000, and in proportion at another.
+        """
         if not (0.0 <= mass < math.inf):
             raise InputError("mass", mass, "a finite number >= 0 (0: density decides) [kg]")
         if mass > 0.0:

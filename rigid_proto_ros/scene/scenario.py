@@ -20,6 +20,7 @@ from ..base.arithmetic import exact_quotient
 from ..base.compilation import copy_fields, copy_of, new_record
 from ..base.errors import CommandRefused, InputError, MeshError
 from ..base.vectors import Vector3
+from ..base.yaml_text import yaml_value
 from ..mass import INERTIA_MODELS
 from ..mass.from_mesh import mesh_body
 from ..mass.moments import STRETCHED
@@ -41,7 +42,6 @@ from ..simulation.record import MAX_BALLASTS, MESH, SCENE, SCENE_PARAMETERS, fie
 from ..simulation.setup import Setup, make_setup
 from ..simulation.thrusters import make_thruster
 from .scene_file import named_values, read_scene_text
-from .yaml_text import yaml_value
 
 _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 

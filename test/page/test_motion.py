@@ -18,13 +18,13 @@ from page_tools import TESTS, kernels, node, packages, run_node
 
 from rigid_proto_ros.base.bundled import example_names, example_path, scene_path
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.base.yaml_text import yaml_value
 from rigid_proto_ros.page.bundle import SOURCE
 from rigid_proto_ros.page.file import take_of
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scene_file import scene_values
 from rigid_proto_ros.scene.script import expand_script, parse_script, read_script
-from rigid_proto_ros.scene.yaml_text import yaml_value
 from rigid_proto_ros.simulation.commands import nanoseconds
 
 
