@@ -15,8 +15,8 @@ from ..mass.from_mesh import FALLBACKS, mesh_body
 from ..mass.inspection import Inspection, as_json, inspect_mesh, verify_moments
 from ..mass.moments import MODELS
 from ..mass.properties import scale_vector
-from .inspect_report import print_inertial, print_report
 from .inspect_parts import is_link, mesh_of_texts, split_part, with_link
+from .inspect_report import print_inertial, print_report
 from .inspect_robot import add_robot_arguments, compare, given, lump
 
 DENSITY = 1000.0

@@ -146,7 +146,8 @@ def _body_of_parts(mesh: Mesh, repair: bool, fallback: str, accept_open: float) 
         own = body.moments.polygon_starts
         starts.append((np.arange(len(body.triangles) + 1) if own is None else own)[:-1] + count)
         count += len(body.triangles)
-        solids.append(SolidPart(part.name, _surface_of(part, body), part.density, part.mass))
+        surface = _surface_of(part, body)
+        solids.append(SolidPart(part.name, surface, part.density, part.mass, part.wall_thickness, part.infill))
     vertices, triangles = assembly.surface()
     polygon_starts = None if mesh.polygon_starts is None else np.concatenate([*starts, [count]])
     if told.usable and not told.reason:

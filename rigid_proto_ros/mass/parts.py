@@ -12,12 +12,13 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.errors import MeshError
+from ..base.errors import InputError, MeshError
 from ..base.vectors import IntArray, Points, Triangles
 from ..mesh.intersection import nesting_of
 from ..mesh.parts import DENSITY
 from ..mesh.solids import MAX_UNITED, can_unite, shared_volume
 from .moments import Moments, extent, solid_moments
+from .properties import MeshMoments
 from .verdict import INFO, NO_OVERLAP, WARNING, Finding
 
 MAX_FACES = 2_000_000
@@ -27,18 +28,32 @@ MAX_FACES = 2_000_000
 @dataclass(frozen=True)
 class SolidPart:
     """surface: vertices (n, 3) in the body's coordinates, and outward triangles (m, 3), of its solid. mass [kg]; where
-    it is 0 the density [kg/m³] decides.
+    it is 0 the density [kg/m³] decides. wall_thickness [m]: of a printed part, and 0 of a solid one; infill: its own.
     """
 
     name: str
     surface: Callable[[], tuple[Points, Triangles]]
     density: float
     mass: float = 0.0
+    wall_thickness: float = 0.0
+    infill: float = 0.0
 
     @cached_property
     def solid(self) -> Moments:
         """Moments at unit density; raises MeshError where the surface encloses no volume."""
         return solid_moments(*self.surface())
+
+    @cached_property
+    def printed(self) -> tuple[Moments, float]:
+        """Moments at unit density, and their error relative to mass or tensor: of walls and infill, or of the solid.
+        Raises MeshError, also for walls that are too thick.
+        """
+        if self.wall_thickness == 0.0:
+            return self.solid, 0.0
+        try:
+            return MeshMoments(*self.surface()).printed(1.0, self.wall_thickness, self.infill)
+        except InputError as error:
+            raise MeshError(f"part {self.name}, {error.field}", error.received, error.accepted) from None
 
     @property
     def volume(self) -> float:
@@ -48,7 +63,7 @@ class SolidPart:
     @property
     def own_mass(self) -> Fraction:
         """[kg]"""
-        return Fraction(self.mass) if self.mass > 0.0 else Fraction(self.density) * Fraction(self.solid.measure)
+        return Fraction(self.mass) if self.mass > 0.0 else Fraction(self.density) * Fraction(self.printed[0].measure)
 
 
 SLOTS = tuple((i, j) for i in range(3) for j in range(i, 3))
@@ -59,15 +74,15 @@ def sum_of_parts(parts: Sequence[SolidPart]) -> Moments:
     """The parts as one solid whose density is 1 where it is DENSITY in truth: its measure is their mass in units of
     DENSITY, so that their own masses are what this density gives.
     """
-    masses = [part.own_mass for part in parts]
-    centers = [[sum(map(Fraction, at)) for at in zip(*_center_of(part.solid), strict=True)] for part in parts]
+    masses, moments = [part.own_mass for part in parts], [part.printed[0] for part in parts]
+    centers = [[sum(map(Fraction, at)) for at in zip(*_center_of(own), strict=True)] for own in moments]
     whole = sum(masses, Fraction(0))
     middle = [sum((m * c[k] for m, c in zip(masses, centers, strict=True)), Fraction(0)) / whole for k in range(3)]
     second = np.empty(6)
     for slot, (i, j) in enumerate(SLOTS):
         total = Fraction(0)
-        for part, mass, center in zip(parts, masses, centers, strict=True):
-            own = Fraction(float(part.solid.second[slot])) / Fraction(part.solid.measure)
+        for one, mass, center in zip(moments, masses, centers, strict=True):
+            own = Fraction(float(one.second[slot])) / Fraction(one.measure)
             total += mass * (own + (center[i] - middle[i]) * (center[j] - middle[j]))
         second[slot] = float(total / Fraction(DENSITY))
     reference = np.array([float(x) for x in middle])

@@ -59,9 +59,12 @@ class BodyMesh:
 
     def provide(self, model: str, scale: Vector3) -> np.record:
         """The numbers with the moments of a model at this scale (3,); raises MeshError."""
-        moments, numbers = self.moments.moments(model, scale), new_record(MESH)
+        numbers = new_record(MESH)
         copy_fields(self.numbers, numbers)  # setups keep the present ones
-        copy_fields(moments.record, numbers[model])
+        if model == "walled":
+            copy_fields(self.moments.walls(scale), numbers["walls"])
+        else:
+            copy_fields(self.moments.moments(model, scale).record, numbers[model])
         numbers["known"][INERTIA_MODELS.index(model)] = True
         if model in STRETCHED:
             numbers["stretch"] = np.abs(scale) / abs(scale[0])
