@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..base.errors import InputError, MeshError
+from ..base.errors import InputError
 from ..base.rotation import quaternion_from_matrix
 from ..mass.from_mesh import mesh_body
 from ..mass.inspection import inspect_mesh
@@ -19,7 +19,7 @@ from ..mass.properties import MassProperties
 from ..mass.tensor import check_tensor, principal_axes
 from ..mesh.locate import resolve_mesh
 from ..mesh.parts import Part, placing
-from ..mesh.reading import Mesh, load_mesh, mesh_of_parts
+from ..mesh.reading import Mesh, load_mesh, load_part, mesh_of_parts
 from .inspect_report import print_inertial, row_of, table, tensor_rows
 
 ROBOTS = (".urdf", ".sdf", ".xml", ".xacro", ".world")
@@ -47,9 +47,7 @@ def mesh_of_texts(texts: Sequence[str], density: float, scale: Sequence[float] |
             value = math.nan
         if kind != ("mass" if colon else "") or not 0.0 < value < math.inf:
             raise InputError(name, f"={material}", "=DENSITY in kg/m³ or =mass:KG, a finite number > 0")
-        mesh = load_mesh(name)
-        if mesh.parts:
-            raise MeshError(name, "a file of parts", "meshes, or one file of parts alone")
+        mesh = load_part(name, Path())
         own = mesh.name
         while own in [part.name for part in parts]:
             own += "'"
@@ -64,16 +62,19 @@ def is_link(text: str) -> bool:
     return bool(sign) and Path(file).suffix.lower() in ROBOTS and not Path(text).is_file()
 
 
-def with_link(args: argparse.Namespace, links: Sequence[str], texts: Sequence[str]) -> int:
+def with_link(args: argparse.Namespace, all_texts: Sequence[str]) -> int:
     """Print a link with what is fixed to it as one body, in the link's frame; returns the exit status."""
     from ..robots.link_shapes import combined
     from ..robots.reading import check_inertial, read_robot
 
+    links, texts = [text for text in all_texts if is_link(text)], [text for text in all_texts if not is_link(text)]
     if len(links) > 1 or not texts:
         raise InputError("MESH", " ".join([*links, *texts]), "one ROBOT#LINK, and the parts of its payload")
-    for name in ("verify", "ballast", "mass", "model"):
+    for name in ("verify", "ballast", "mass", "model", "wall_thickness", "infill"):
         if getattr(args, name):
-            raise InputError(f"--{name}", "has no meaning beside ROBOT#LINK, whose own inertial is taken as it is")
+            raise InputError(
+                f"--{name.replace('_', '-')}", "has no meaning beside ROBOT#LINK, whose own inertial is taken as it is"
+            )
     file, _, name = links[0].rpartition("#")
     found = {link.name: link for link in read_robot(Path(file)).links}
     if name not in found:

@@ -86,7 +86,8 @@ def walls_error(solid: np.record, walls: np.record, thickness: float, infill: fl
     measure, second = infill * volume + rest * t * area, infill * squares + rest * t * trace
     of_mass = rest * (t * t * abs(walls.edges) + t * area * twice) / measure
     of_tensor = rest * (t * t * abs(3.0 * volume + walls.edges_second) + t * trace * twice) / second
-    return of_mass if of_mass > of_tensor else of_tensor
+    error: float = of_mass if of_mass > of_tensor else of_tensor
+    return error
 
 
 @njit(error_model="numpy", allocates=False)
@@ -118,7 +119,7 @@ def mix_walls(
     offset, stretch = local_numbers(3), walls.stretch[1] * walls.stretch[2]
     of_walls = (1.0 - infill) * thickness
     inner, outer = infill * solid.measure * stretch, of_walls * walls.surface.measure
-    measure = inner + outer
+    measure: float = inner + outer
     for k in range(3):
         s = walls.stretch[k]
         reference[k] = s * solid.reference[k]

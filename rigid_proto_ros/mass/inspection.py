@@ -145,8 +145,12 @@ def inspect_mesh(
     mass: float = 0.0,
     density: float = 1000.0,
     ballast: Sequence[Sequence[float]] = (),
+    wall_thickness: float = 0.0,
+    infill: float = 0.0,
 ) -> Inspection:
-    """Mass properties of every model that can be computed for ``body``, and the findings on them."""
+    """Mass properties of every model that can be computed for ``body``, and the findings on them. Of a printed part
+    (walled) the others have its mass.
+    """
     s = scale_vector(scale)
     findings = list(body.verdict.findings)
     if body.mesh.unit != 1.0:
@@ -165,13 +169,27 @@ def inspect_mesh(
         units = f"it would be {side:.4g} mm if the file is in millimetres (--scale 0.001)"
         findings.append(Finding("unit_suspicion", WARNING, f"the body is {side:.4g} m across; {units} (scale)"))
     models, refusal = {}, None
+    if model == "walled":
+        try:
+            mass, error = _printed_mass(body, s, mass, density, wall_thickness, infill)
+            findings.append(Finding("walled", INFO, _said_of_walls(error)))
+        except InputError as refused:
+            refusal = refused
     # Every model checks mass, density, scale and ballast: a refusal of these comes first and is the same for all.
     for name in (model, *(other for other in MODELS if other != model)):
         try:
-            models[name] = moments.mass_properties(name, scale=s, mass=mass, density=density, ballast=ballast)
+            models[name] = moments.mass_properties(
+                name,
+                scale=s,
+                mass=mass,
+                density=density,
+                ballast=ballast,
+                wall_thickness=wall_thickness,
+                infill=infill,
+            )
         except InputError as error:
             if name == model:
-                refusal = error
+                refusal = refusal or error
             elif refusal is None and not (name == "solid" and not body.verdict.closed):
                 findings.append(Finding(f"model_{name}", WARNING, str(error)))
             continue
@@ -181,9 +199,28 @@ def inspect_mesh(
         volume = body.volume(s)
     shell = moments.moments("shell", s) if "shell" in models else None
     area = None if shell is None else shell.measure * float(s[0]) ** 2
-    own = mass or (moments.body_mass(scale=s) if body.mesh.parts and volume else 0.0)
+    own = mass
+    if body.parts and volume:
+        own = mass or moments.body_mass(scale=s)
+        findings += [
+            Finding("walled", INFO, f"part {part.name}: {_said_of_walls(part.printed[1])}")
+            for part in body.parts
+            if part.wall_thickness > 0.0
+        ]
     implied = density if not own > 0.0 else own / volume if volume else None
     return Inspection(body, s, model, models, findings, refusal, volume, area, lower, upper, implied, mass)
+
+
+def _printed_mass(
+    body: MeshBody, scale: Vector3, mass: float, density: float, wall_thickness: float, infill: float
+) -> tuple[float, float]:
+    """Mass [kg] of a printed part, and the error of its model; raises InputError."""
+    moments, error = body.moments.printed(scale, wall_thickness, infill)
+    return mass or density * moments.measure * abs(float(scale[0])) ** 3, error
+
+
+def _said_of_walls(error: float) -> str:
+    return f"mass and tensor are those of first order in the walls' thickness, whose error is {100.0 * error:.2g} %"
 
 
 def as_json(inspection: Inspection) -> dict[str, Any]:
@@ -191,8 +228,9 @@ def as_json(inspection: Inspection) -> dict[str, Any]:
     verdict = [vars(finding) for finding in inspection.findings]
     if inspection.refusal is not None:
         return {**dict.fromkeys(JSON_KEYS), "verdict": verdict}
-    body, chosen = inspection.body, inspection.chosen
+    body, chosen, models = inspection.body, inspection.chosen, inspection.models
     moments, axes = principal_axes(chosen.inertia)
+    names = dict.fromkeys((*MODELS, *models))
     return {
         "mesh": body.mesh.path,
         "vertices": len(body.mesh.vertices),
@@ -208,7 +246,7 @@ def as_json(inspection: Inspection) -> dict[str, Any]:
         "principal_axes": axes.tolist(),
         "principal_orientation_xyzw": quaternion_from_matrix(axes).tolist(),
         "bounding_box": {"min": inspection.lower.tolist(), "max": inspection.upper.tolist()},
-        "models": {name: inspection.models[name].as_dict() if name in inspection.models else None for name in MODELS},
+        "models": {name: models[name].as_dict() if name in models else None for name in names},
         **({"parts": parts_of(inspection)} if body.parts else {}),
         "verdict": verdict,
     }
@@ -232,7 +270,12 @@ def verify_moments(body: MeshBody, scale: Vector3) -> dict[str, float]:
     unit = moments.mass_properties("solid", scale=scale, density=DENSITY if parts else 1.0)  # or there is no solid
     if parts:
         each = [(part, exact_solid_moments(*part.surface(), scale.tolist())) for part in parts]
-        stretch = Fraction(abs(math.prod(map(Fraction, scale.tolist()))))
+        if any(part.wall_thickness > 0.0 for part in parts):
+            raise InputError(
+                "--verify", "walls", "solid parts: walls are of first order, and nothing exact is beside them"
+            )
+        sx, sy, sz = (abs(Fraction(x)) for x in scale.tolist())
+        stretch = sx * sy * sz
         masses = [Fraction(p.mass) * stretch if p.mass else Fraction(p.density) * own.volume for p, own in each]
         exact = exact_sum([own for _, own in each], masses)
         lower, upper, _ = extent(body.vertices, body.moments.triangles)

@@ -24,6 +24,7 @@ import numpy as np
 from ..base.errors import InputError, MeshError, one_of
 from ..base.vectors import FloatArray, IntArray
 from ..base.yaml_text import load_yaml
+from . import INFILL
 from .assembly import Assembly, node_matrix
 
 if TYPE_CHECKING:
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 YAML = ("yaml", "yml")
 DENSITY = 1000.0
 """kg/m³ of a part that gives neither density nor mass, as of a mesh alone."""
-INFILL = 0.2
-"""Of a part with walls that gives none."""
 SCALES = (1e-9, 1e9)
 MAX_PARTS = 1000
 """More are no body that somebody wrote by hand; each pair of them is looked at."""

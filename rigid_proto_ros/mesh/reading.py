@@ -119,7 +119,7 @@ def read_mesh(data: bytes, path: Path) -> Mesh:
     if not data.strip():
         raise MeshError(path.name, "the file is empty")
     if suffix in YAML:
-        parts = read_parts(data, path.name, functools.cache(lambda name: _load_part(name, path.parent)))
+        parts = read_parts(data, path.name, functools.cache(lambda name: load_part(name, path.parent)))
         return mesh_of_parts(path.stem, str(path), parts, hashlib.sha256(data).hexdigest())
     up = _UP_AXIS.search(data) if suffix == "dae" else None
     sha256, starts, unit = hashlib.sha256(data).hexdigest(), None, 1.0
@@ -143,11 +143,12 @@ def mesh_of_parts(name: str, path: str, parts: Sequence[Part], said: str) -> Mes
     return Mesh(name, path, vertices, triangles, starts, hash_of_parts(said, parts), parts=tuple(parts))
 
 
-def _load_part(name: str, folder: Path) -> Mesh:
-    mesh = load_mesh(name, search=Search(folder))
-    if mesh.parts:
-        raise MeshError("mesh", name, "a mesh; this file has parts itself")
-    return mesh
+def load_part(name: str, folder: Path) -> Mesh:
+    """The mesh of a part, by a name as ``load_mesh`` has it, or beside the file that names it; raises MeshError."""
+    path = resolve_mesh(name, Search(folder))
+    if path.suffix.lower().lstrip(".") in YAML:
+        raise MeshError("mesh", name, "a mesh; a file of parts has no others within")
+    return load_mesh(str(path))
 
 
 def load_mesh(name: str, *, search: Search = NOWHERE_ELSE) -> Mesh:

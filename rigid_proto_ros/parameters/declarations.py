@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError, did_you_mean
-from ..mass import INERTIA_MODELS, MODEL_COMS
+from ..mass import INERTIA_MODELS, INFILL, MODEL_COMS, WALL_THICKNESS
 from ..motion import INTEGRATOR_NAMES
 from ..motion.frames import check_contact_name
 
@@ -328,7 +328,7 @@ class Parameters:
         choices=MODEL_COMS,
     )
     wall_thickness: float = declare(
-        0.001,
+        WALL_THICKNESS,
         "Thickness of the walled model's walls, which have the full density.",
         "m",
         lower=0.0,
@@ -336,7 +336,7 @@ class Parameters:
         above=True,
     )
     infill: float = declare(
-        0.2, "Density within the walled model's walls, as a part of the full one.", lower=0.0, upper=1.0
+        INFILL, "Density within the walled model's walls, as a part of the full one.", lower=0.0, upper=1.0
     )
     explicit_inertia: ExplicitInertia = ExplicitInertia()
     gyroscopic: bool = declare(True, "Include the term ω × Iω; without it the motion isn't that of a rigid body.")

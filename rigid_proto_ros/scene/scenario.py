@@ -49,13 +49,14 @@ _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 @dataclass(eq=False)
 class BodyMesh:
     """A mesh with what is computed from it once: its moments, its surface wound outward, and its numbers (MESH), of
-    which there are those that a scene has needed so far.
+    which there are those that a scene has needed so far. volume: of a body of parts, the sum of theirs.
     """
 
     mesh: Mesh
     moments: MeshMoments
     surface: Surface
     numbers: np.record
+    volume: float | None = None
 
     def provide(self, model: str, scale: Vector3) -> np.record:
         """The numbers with the moments of a model at this scale (3,); raises MeshError."""
@@ -178,7 +179,8 @@ def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh
         raise MeshError(f"mesh {parameters.mesh}", body.verdict.reason)
     surface, numbers = Surface(body.vertices, body.triangles), new_record(MESH)
     numbers["has_surface"], numbers["extent"] = True, surface.extent
-    return BodyMesh(body.mesh, body.moments, surface, numbers)
+    volume = body.volume() if body.parts and not body.moments.no_solid else None
+    return BodyMesh(body.mesh, body.moments, surface, numbers, volume)
 
 
 def _made_of(parameters: Parameters) -> tuple[str, bool, str]:
