@@ -24,11 +24,11 @@ from peers import Contestant, Run
 from problems import Problem, Wrench
 from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.base.rotation import rotate
+from rigid_proto_ros.base.yaml_text import plain
 from rigid_proto_ros.motion.body import make_body
 from rigid_proto_ros.motion.frames import parse_frame
 from rigid_proto_ros.motion.integrators import INTEGRATORS
 from rigid_proto_ros.scene.scenario import make_scenario
-from rigid_proto_ros.scene.yaml_text import plain
 from rigid_proto_ros.simulation.commands import WrenchCommand
 from rigid_proto_ros.simulation.effects import BEGIN
 from rigid_proto_ros.simulation.flight import steps_of_segment

@@ -49,7 +49,7 @@ ALLOWED = {
     "numpy": ORDER,
     "numba": ("base.compilation", "base.simd", "base.arithmetic", "kernels"),  # where kernels are built
     "llvmlite": ("base.compilation", "base.simd", "base.arithmetic", "kernels"),  # comes with numba
-    "yaml": ("scene", "session", "sweep", "ros", "cli"),
+    "yaml": ("base.yaml_text", "scene", "session", "sweep", "ros", "cli"),
     "trimesh": ("mesh.assembly", "robots.link_shapes"),
     "collada": ("mesh.assembly",),
     "mujoco": ("robots.mjcf_compiler",),

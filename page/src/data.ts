@@ -10,6 +10,7 @@ export interface Words {
   readonly accepted: string;
   readonly scale: string;
   readonly mass: string;
+  readonly walls: string;
   readonly orientation: string;
   readonly rate: readonly string[];
   readonly magnitude: string;

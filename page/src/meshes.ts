@@ -34,7 +34,7 @@ export const excerpt = (text: string): string => text.slice(0, 40).split("\n")[0
 /** The mesh in a file's bytes, read by the ending of its name; its name ends in .obj, as which it is saved. */
 export function readMesh(file: string, bytes: Uint8Array, kernels: Kernels): MeshNumbers {
   const name = file.replace(/^.*[\\/]/, ""), ending = /\.[^.]*$/.exec(name)?.[0].toLowerCase() ?? "";
-  if (/^\.?ya?ml$/.test(ending)) throw new Refused(`${name}: scenes and scripts are read by rigid_proto workbench SCENE --script SCRIPT --html FILE, which writes a page that plays them`);
+  if (/^\.?ya?ml$/.test(ending)) throw new Refused(`${name}: scenes, scripts and bodies of parts name other files, which a page can't open: rigid_proto workbench FILE --html OUT (and --script SCRIPT) writes a page that has them`);
   if (!ENDINGS.includes(ending)) throw new Refused(`${name}: no file that this page reads; accepted: a mesh named ${ENDINGS.join(", ")}`);
   if (bytes.length > MOST_BYTES) throw new Refused(`${name}: ${(bytes.length / 1e6).toFixed(1)} MB; at most ${MOST_BYTES / 1e6} MB are read here, and more by rigid_proto workbench FILE --html`);
   if (bytes.every((byte) => byte <= 32)) throw new Refused(`${name}: the file is empty`);

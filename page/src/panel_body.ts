@@ -7,7 +7,7 @@ import type { Model, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
-const MODELS = ["solid", "shell", "points", "bounding_box", "explicit"] as const;
+const MODELS = ["solid", "shell", "points", "bounding_box", "walled", "explicit"] as const;
 /** Of the six numbers of a tensor, xx xy xz yy yz zz, those that are moments, and where each stands among the nine. */
 const NINE = [0, 1, 2, 4, 5, 8] as const, NAMES = ["xx", "xy", "xz", "yy", "yz", "zz"] as const;
 const BALLAST = "ballast.";
@@ -45,6 +45,9 @@ export function bodyCard(desk: Desk): Card {
   const tensor = NAMES.map((name, k) => one("explicit_inertia.tensor", `I${name}`, k, "kg m²"));
   const own = make("div", {}, make("div", { class: "field" }, w.fixed, make("span", {}, ownMass.node, " kg")), make("div", { class: "field" }, w.centre, make("span", { class: "trio" }, ...centre.map(({ node: field }) => field))),
     ...[0, 3].map((from) => make("div", { class: "field" }, ...[0, 1, 2].map((k) => make("label", {}, `I${NAMES[from + k]}`, tensor[from + k]!.node)))), make("p", { class: "note" }, w.ownNote));
+  const thickness = numberField(w.walls, (value) => motion.set({ wall_thickness: 0.001 * value }), "mm"), infill = numberField(w.infill, (value) => motion.set({ infill: 0.01 * value }), "%");
+  const walls = make("div", {}, make("div", { class: "field" }, w.walls, make("span", {}, thickness.node, " mm")), make("div", { class: "field" }, w.infill, make("span", {}, infill.node, " %")));
+  const denser = make("div", { class: "field" }, w.dense, make("span", {}, density.node, " kg/m³"));
   const table = make("table", { "data-mark": "moments", tabindex: -1 }), ballast = make("div");
   const lines = make("textarea", { class: "text", readonly: true, hidden: true, rows: 7, spellcheck: "false", "aria-label": w.lines });
   const written = (): string => (lines.value = engineText(desk.forms[engines.select.value]!, motion.body()));
@@ -74,6 +77,10 @@ export function bodyCard(desk: Desk): Card {
     density.show(Number.isFinite(info.volume) && info.volume > 0 ? solidMass(info.models, info.massKg) / info.volume : Number(values["density"]));
     models.show(String(values["inertia_model"]));
     own.hidden = values["inertia_model"] !== "explicit";
+    walls.hidden = values["inertia_model"] !== "walled";
+    denser.hidden = info.hasParts;
+    thickness.show(1000 * numbers("wall_thickness")[0]!);
+    infill.show(100 * numbers("infill")[0]!);
     ownMass.show(numbers("explicit_inertia.mass")[0]!);
     centre.forEach((field, k) => field.show(numbers("explicit_inertia.center_of_mass")[k]!));
     tensor.forEach((field, k) => field.show(numbers("explicit_inertia.tensor")[k]!));
@@ -94,7 +101,7 @@ export function bodyCard(desk: Desk): Card {
   const node = make("div", {},
     make("h3", {}, w.bundled), bodies, scenes.node,
     ...(motion.can.openFiles ? [make("h3", {}, w.own), make("div", { class: "row" }, button(w.choose, () => file.click()), file), units.node, make("p", { class: "note" }, w.formats)] : []), verdict, facts,
-    make("h3", {}, w.mass), make("div", { class: "field" }, w.fixed, make("span", {}, mass.node, " kg")), make("div", { class: "field" }, w.dense, make("span", {}, density.node, " kg/m³")), models.node, own,
+    make("h3", {}, w.mass), make("div", { class: "field" }, w.fixed, make("span", {}, mass.node, " kg")), denser, models.node, walls, own,
     make("h3", {}, w.table), table, make("div", { class: "row" }, engines.node, copy), lines,
     make("h3", {}, w.ballast), make("div", { class: "field", "data-mark": "ballast" }, make("span", {}, kilograms.node, " kg"), stick), ballast);
   return { node, changed, closed: () => { desk.pointer.claim = null; } };

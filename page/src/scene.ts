@@ -74,6 +74,8 @@ export class Refusals {
         return filled(words.scale, { 0: shown(values["scale"]) });
       case refusal.MASS:
         return filled(words.mass, { 0: a });
+      case refusal.WALLS:
+        return filled(words.walls, { 0: a, 1: b, 2: c });
       case refusal.ORIENTATION:
         return filled(words.orientation, { 0: shown(values["initial.orientation_xyzw"]) });
       case refusal.TENSOR:

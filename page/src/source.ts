@@ -65,7 +65,7 @@ export interface Parameter {
 
 /** A body by one of the ways to distribute its mass. Where it has none, `refusal` says why and the numbers are NaN. */
 export interface Model {
-  readonly model: "solid" | "shell" | "points" | "bounding_box" | "explicit";
+  readonly model: "solid" | "shell" | "points" | "bounding_box" | "walled" | "explicit";
   readonly massKg: number;
   /** [m, mesh axes after scaling] */
   readonly com: Vec3;
@@ -100,12 +100,14 @@ export interface BodyInfo {
   readonly turn: readonly number[];
   /** [m^3] of the solid as scaled; NaN where the surface bounds none */
   readonly volume: number;
+  /** of several materials: densities are those of its parts */
+  readonly hasParts: boolean;
   /** [m]: half the diagonal of the bounding box as scaled */
   readonly length: number;
   readonly findings: readonly Finding[];
   /** [mesh], by name */
   readonly contacts: Readonly<Record<string, Vec3>>;
-  /** by the same mass: the models of a mesh, and the numbers given */
+  /** by the same mass: the models of a mesh, a printed one only where it flies, and the numbers given */
   readonly models: readonly Model[];
 }
 

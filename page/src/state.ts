@@ -194,7 +194,8 @@ export class Observed {
       moments: triple(row, body.MOMENTS),
       axes: [...row.slice(body.AXES, body.AXES + 9)],
       turn: [...row.slice(body.QUATERNION, body.QUATERNION + 4)],
-      volume: surface?.closed === true ? this.#placed.record.solid.measure * Math.abs(scale[0] * scale[1] * scale[2]) : NaN,
+      volume: surface?.closed === true ? (surface.volume ?? this.#placed.record.solid.measure) * Math.abs(scale[0] * scale[1] * scale[2]) : NaN,
+      hasParts: surface?.volume !== undefined,
       length: row[body.LENGTH] ?? 1,
       findings: surface?.findings ?? [],
       contacts: Object.fromEntries(contacts.map(([name, point]) => [name.slice("contacts.".length), triple(point as readonly number[])])),
@@ -207,11 +208,13 @@ export class Observed {
   /** The body by each model, with the same mass. */
   models(flown: Flown): Model[] {
     const memory = this.#kernels.memory;
-    return this.#declared.models.map((model, number) => {
+    // Walls are measured by rays: of those that nobody asks for there are none.
+    return this.#declared.models.flatMap((model, number) => {
+      if (model === "walled" && flown.values["inertia_model"] !== model) return [];
       memory.u1(this.#scene.at, Scene.SIZE).set(memory.u1(flown.scene.at, Scene.SIZE));
       this.#scene.inertiaModel = number;
       this.#scene.inertiaModelCom = 0;
-      return this.#model(model as Model["model"], number, flown);
+      return [this.#model(model as Model["model"], number, flown)];
     });
   }
 

@@ -16,6 +16,8 @@ export interface MeshNumbers {
   readonly triangles: Int32Array;
   readonly starts: Int32Array | null;
   readonly solid?: Float64Array;
+  /** Of a body of parts: the sum of their volumes; its solid has their mass at a density of 1000 instead. */
+  readonly volume?: number;
 }
 
 /** A mesh that was judged. outward: triangles 3 m, wound outward; enclosing: those of its solid, over fewer vertices
@@ -209,7 +211,9 @@ export class Surfaces {
    * has any. */
   provide(record: Mesh, surface: Surface, model: number, scale: Float64Array): boolean {
     const memory = this.#kernels.memory, mark = memory.mark();
-    const found = (model !== 0 || surface.closed) && this.#fill(record, model === 0 ? { ...surface, triangles: surface.enclosing } : surface, model, memory, scale);
+    const found = this.#declared.models[model] === "walled"
+      ? this.#fillWalls(record, surface, model, memory, scale)
+      : (model !== 0 || surface.closed) && this.#fill(record, model === 0 ? { ...surface, triangles: surface.enclosing } : surface, model, memory, scale);
     memory.release(mark);
     if (found) surface.record.set(memory.u1(record.at, Mesh.SIZE));
     return found;
@@ -229,6 +233,24 @@ export class Surfaces {
     if (code !== moments.FOUND) return false;
     record.known[model] = 1;
     if (this.#declared.models[model] === "shell") record.stretch.set(memory.f8(stretch.at, 3));
+    return true;
+  }
+
+  /** What a printed part needs beside its solid, whose moments are filled, too. Parts have walls of their own. */
+  #fillWalls(record: Mesh, surface: Surface, model: number, memory: Memory, scale: Float64Array): boolean {
+    if (!surface.closed || surface.volume !== undefined) return false;
+    if (record.known[0] !== 1 && !this.#fill(record, { ...surface, triangles: surface.enclosing }, 0, memory)) return false;
+    const kernels = this.#kernels, n = surface.vertices.length / 3, m = surface.enclosing.length / 3;
+    const stretch = memory.numbers(3);
+    memory.f8(stretch.at, 3).set([0, 1, 2].map((k) => Math.abs(scale[k] ?? 1) / Math.abs(scale[0] ?? 1)));
+    const vertices = vertexMatrix(memory, surface.vertices), triangles = triangleMatrix(memory, surface.enclosing);
+    const room = memory.numbers(kernels.topologyRoom(n, m)), welded = memory.matrix(m, 3);
+    const corners = kernels.weldTriangles(vertices, triangles, room, welded) === 1 ? welded : triangles;
+    const { edges } = this.#connected(corners, n, room);
+    const starts = integers(memory, surface.enclosing === surface.triangles ? surface.starts ?? new Int32Array(0) : new Int32Array(0));
+    const code = kernels.wallsOf(vertices, corners, starts, edges, stretch, record.solid, memory.numbers(3 * (n + m)), record.walls);
+    if (code !== NUMBERS.moments.FOUND) return false;
+    record.known[model] = 1;
     return true;
   }
 

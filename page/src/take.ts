@@ -31,7 +31,7 @@ export interface Take {
 }
 
 /** A mesh in a take, its numbers in base64. */
-export interface WrittenMesh { readonly name: string; readonly vertices: string; readonly triangles: string; readonly starts?: string; readonly solid?: string }
+export interface WrittenMesh { readonly name: string; readonly vertices: string; readonly triangles: string; readonly starts?: string; readonly solid?: string; readonly volume?: number }
 
 interface Written {
   readonly form: number;
@@ -55,6 +55,7 @@ export function takeBytes(take: Take): Bytes {
       triangles: base64(bytesOf(mesh.triangles)),
       ...(mesh.starts === null ? {} : { starts: base64(bytesOf(mesh.starts)) }),
       ...(mesh.solid === undefined ? {} : { solid: base64(bytesOf(mesh.solid)) }),
+      ...(mesh.volume === undefined ? {} : { volume: mesh.volume }),
     },
   };
   return new TextEncoder().encode(JSON.stringify({ ...rest, ...numbers }));
@@ -80,14 +81,14 @@ export function takeOf(bytes: Uint8Array): Take {
 export function meshOf(mesh: WrittenMesh): MeshNumbers {
   const f8 = (text: string): Float64Array => new Float64Array(whole(fromBase64(String(text)), 8));
   const i4 = (text: string): Int32Array => new Int32Array(whole(fromBase64(String(text)), 4));
-  const { name, starts, solid } = mesh, vertices = f8(mesh.vertices), triangles = i4(mesh.triangles);
+  const { name, starts, solid, volume } = mesh, vertices = f8(mesh.vertices), triangles = i4(mesh.triangles);
   const polygons = starts === undefined ? null : i4(starts), moments: { solid?: Float64Array } = solid === undefined ? {} : { solid: f8(solid) };
   const rises = polygons?.every((start, k) => start > (polygons[k - 1] ?? -1)) ?? true;
   const fits = polygons === null || (polygons[0] === 0 && polygons.at(-1) === triangles.length / 3 && rises);
-  if (vertices.length % 3 !== 0 || triangles.length % 3 !== 0 || !fits || (moments.solid?.length ?? MOMENTS) !== MOMENTS) {
+  if (vertices.length % 3 !== 0 || triangles.length % 3 !== 0 || !fits || (moments.solid?.length ?? MOMENTS) !== MOMENTS || (volume !== undefined && !(volume > 0))) {
     throw new Refused("the take is damaged: its mesh isn't one");
   }
-  return { name: String(name).replace(/^.*[\\/]/, ""), vertices, triangles, starts: polygons, ...moments };
+  return { name: String(name).replace(/^.*[\\/]/, ""), vertices, triangles, starts: polygons, ...moments, ...(volume === undefined ? {} : { volume }) };
 }
 
 function whole(bytes: Bytes, size: number): ArrayBuffer {
@@ -120,7 +121,8 @@ export function takeFiles(take: Take, parameters: Parameters, name: string): Tak
     script: scriptText(take.script),
     durationS,
     command: `rigid_proto simulate ${name}.yaml --script ${name}_script.yaml --duration ${repr(durationS)} --json`,
-    mesh: take.mesh === null ? null : { name: take.mesh.name, bytes: new TextEncoder().encode(objText(take.mesh)) },
+    // A file of parts names others, which the page doesn't have.
+    mesh: take.mesh === null || take.mesh.volume !== undefined ? null : { name: take.mesh.name, bytes: new TextEncoder().encode(objText(take.mesh)) },
   };
 }
 

@@ -38,6 +38,7 @@ MODULES = (
     "mass.moments",
     "mass.repair",
     "mass.tensor",
+    "mass.walls",
     "motion.body",
     "motion.state",
     "motion.surface",

@@ -10,11 +10,13 @@ import sys
 from typing import Any
 
 from ..base.errors import InputError
+from ..mass import INERTIA_MODELS, INFILL, WALL_THICKNESS
 from ..mass.engines import FORMS
 from ..mass.from_mesh import FALLBACKS, mesh_body
 from ..mass.inspection import Inspection, as_json, inspect_mesh, verify_moments
-from ..mass.moments import MODELS
 from ..mass.properties import scale_vector
+from ..mesh.reading import Mesh
+from .inspect_parts import is_link, mesh_of_texts, split_part, with_link
 from .inspect_report import print_inertial, print_report
 from .inspect_robot import add_robot_arguments, compare, given, lump
 
@@ -40,6 +42,14 @@ EXAMPLES = (
         "a part drawn in mm that weighs 1.2 kg, as a URDF <inertial>",
     ),
     ("rigid_proto inspect hammer --density 7850 --for unity", "mass, COM and tensor as lines to paste"),
+    (
+        "rigid_proto inspect body.stl=2700 cover.stl=mass:0.12 --scale 0.001",
+        "parts of different material as one body",
+    ),
+    (
+        "rigid_proto inspect hammer --density 1240 --wall-thickness 0.0012 --infill 0.15",
+        "a printed part",
+    ),
     ("rigid_proto inspect hammer --verify", "the errors against exact rational arithmetic"),
     ("rigid_proto inspect --compare robot.urdf", "the errors of a robot's inertials"),
     (
@@ -58,13 +68,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Mass, centre of mass and inertia of a mesh under every model; a mesh that encloses no volume is refused."
     )
-    parser.add_argument("mesh", nargs="?", metavar="MESH", help="a path, package:// URI or bundled name")
+    parser.add_argument(
+        "mesh", nargs="*", metavar="MESH",
+        help="a path, package:// URI or bundled name; several, each MESH, MESH=density or MESH=mass:kg, or a YAML file "
+        "of parts, are one body; ROBOT.urdf#LINK among them is the link's own inertial",
+    )  # fmt: skip
     parser.add_argument("--density", type=float, metavar="D", help=f"kg/m³ (default {DENSITY:g})")
     parser.add_argument("--mass", type=float, metavar="M", help="kg, instead of a density")
     parser.add_argument(
         "--scale", nargs="+", type=float, metavar="S", help="one or three numbers, after MESH (0.001: mm to m)"
     )
-    parser.add_argument("--model", choices=MODELS, help="inertia model (default solid)")
+    parser.add_argument("--model", choices=INERTIA_MODELS[:-1], help="inertia model (default solid)")
+    parser.add_argument(
+        "--wall-thickness", type=float, metavar="T",
+        help="a printed part: walls of the full density, T in m (default 0.001), and --infill within",
+    )  # fmt: skip
+    parser.add_argument("--infill", type=float, metavar="F", help="density within the walls, 0 to 1 (default 0.2)")
     parser.add_argument(
         "--ballast", nargs=4, type=float, action="append", metavar=("M", "X", "Y", "Z"),
         help="a point mass in kg at mesh coordinates; may be repeated",
@@ -94,6 +113,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Inspect, print, and return the exit status; raises InputError for what is refused."""
+    texts = args.mesh
+    args.mesh = _one(args) if args.lump or args.compare else None
     if args.lump is not None:
         return lump(args)
     if args.compare is not None:
@@ -101,22 +122,9 @@ def run(args: argparse.Namespace) -> int:
     for name, needed in NEEDS.items():
         if given(args, name):
             raise InputError(f"--{name}", f"needs {needed}")
-    if not args.mesh:
-        raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
-    for name, value in (("mass", args.mass), ("density", args.density)):
-        if value is not None and not 0.0 < value < math.inf:
-            raise InputError(name, value, "a finite number > 0")
-    if args.mass and args.density:
-        raise InputError("--density", args.density, "--mass or --density, not both")
-    scale = scale_vector(1.0 if args.scale is None else args.scale)
-    inspection = inspect_mesh(
-        mesh_body(args.mesh, repair=args.repair, fallback=args.fallback or "", accept_open=args.accept_open or 0.0),
-        model=args.model or "solid",
-        scale=scale,
-        mass=args.mass or 0.0,
-        density=args.density or DENSITY,
-        ballast=args.ballast or (),
-    )
+    inspection = _inspection(args, texts)
+    if inspection is None:
+        return with_link(args, texts)
     report = as_json(inspection)
     try:
         if inspection.refusal is not None:
@@ -128,6 +136,47 @@ def run(args: argparse.Namespace) -> int:
     if not args.json:
         _print(inspection, report, args)
     return status
+
+
+def _one(args: argparse.Namespace) -> str | None:
+    """The one mesh that there may be beside a robot."""
+    if len(args.mesh) > 1:
+        option = "lump" if args.lump else "compare"
+        raise InputError("MESH", " ".join(args.mesh), f"at most one with --{option}; several are the parts of one body")
+    return args.mesh[0] if args.mesh else None
+
+
+def _inspection(args: argparse.Namespace, texts: list[str]) -> Inspection | None:
+    """The inspection of a mesh or of parts; None where a link of a robot is among them. Raises InputError."""
+    if not any(texts):
+        raise InputError("MESH", "missing: give a path, a package:// URI or a bundled name, or --compare ROBOT")
+    for name, value in (("mass", args.mass), ("density", args.density)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise InputError(name, value, "a finite number > 0")
+    if args.mass and args.density:
+        raise InputError("--density", args.density, "--mass or --density, not both")
+    if any(map(is_link, texts)):
+        return None
+    scale = scale_vector(1.0 if args.scale is None else args.scale)
+    mesh: Mesh | str = texts[0]
+    if len(texts) > 1 or split_part(texts[0])[1]:
+        mesh, scale = mesh_of_texts(texts, args.density or DENSITY, args.scale), scale_vector(1.0)
+    body = mesh_body(mesh, repair=args.repair, fallback=args.fallback or "", accept_open=args.accept_open or 0.0)
+    if body.parts and args.density and isinstance(mesh, str):
+        raise InputError("--density", args.density, "none: the file gives the densities of its parts")
+    has_walls = args.wall_thickness is not None or args.infill is not None
+    if has_walls and args.model not in (None, "walled"):
+        raise InputError("--model", args.model, "walled, with --wall-thickness and --infill")
+    return inspect_mesh(
+        body,
+        model=args.model or ("walled" if has_walls else "solid"),
+        scale=scale,
+        mass=args.mass or 0.0,
+        density=DENSITY if body.parts else args.density or DENSITY,
+        ballast=args.ballast or (),
+        wall_thickness=WALL_THICKNESS if args.wall_thickness is None else args.wall_thickness,
+        infill=INFILL if args.infill is None else args.infill,
+    )
 
 
 def _print(inspection: Inspection, report: dict[str, Any], args: argparse.Namespace) -> None:

@@ -61,6 +61,11 @@ def print_report(inspection: Inspection, report: dict[str, Any]) -> None:
     ]
     table(rows)
     print()
+    if "parts" in report:
+        head = ("part", "mass [kg]", "density [kg/m³]", "volume [m³]")
+        cells = [tuple(f"{part[key]:.6g}" for key in ("mass", "density", "volume")) for part in report["parts"]]
+        table([(part["name"], *row) for part, row in zip(report["parts"], cells, strict=True)], head)
+        print()
     _print_models(inspection)
     if "verification" in report:
         errors = (

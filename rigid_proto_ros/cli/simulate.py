@@ -159,7 +159,7 @@ def _moved(attitude: float | None, position: float, wall_time: float, **finer: f
 
 def _setting(text: str) -> tuple[str, object]:
     """``name=value`` with the value typed as on a ROS command line."""
-    from ..scene.yaml_text import scalar
+    from ..base.yaml_text import scalar
 
     name, equals, value = text.partition("=")
     if not equals or not name:

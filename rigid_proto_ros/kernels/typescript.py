@@ -135,7 +135,8 @@ _NUMBERS: dict[str, tuple[Any, str]] = {
     "flight": (flight, "REACHED NEVER"),
     "refusal": (
         refusals,
-        "NO_MOMENTS SCALE MASS TENSOR ORIENTATION INTEGRATOR RATE MAGNITUDE PULL UNRESOLVED OUT_OF_BOUNDS AT_FREE_END",
+        "NO_MOMENTS SCALE MASS TENSOR ORIENTATION INTEGRATOR RATE MAGNITUDE PULL UNRESOLVED OUT_OF_BOUNDS AT_FREE_END "
+        "WALLS",
     ),
     "load": (
         of_load,

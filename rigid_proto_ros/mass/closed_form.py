@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mass, COM and inertia in closed form from the ten moments of a mesh or from given numbers, ballast included;
+"""Mass, COM and inertia in closed form from the moments of a mesh or from given numbers, ballast included;
 compiled, for one body and for sweeps.
 """
 
@@ -13,6 +13,7 @@ from ..base.compilation import exported, local_matrix, local_numbers, njit
 from ..base.vectors import FloatArray, Matrix3, Vector3
 from .moments import MOMENTS
 from .tensor import MAX_MOMENT_RATIO, TRIANGLE_SLACK_COMPUTED, principal_axes_kernel
+from .walls import LIMIT, RAYS, WALLS
 
 
 @njit(error_model="numpy", allocates=False)
@@ -67,6 +68,90 @@ def _loaded(
     return total
 
 
+@njit(error_model="numpy", allocates=False)
+def walls_error(solid: np.record, walls: np.record, thickness: float, infill: float) -> float:
+    """The model's error, relative to mass or tensor, whichever is larger: the next term in the thickness, and what
+    opposite walls share; thickness in units of the mesh as stretched.
+    """
+    rest, stretch = 1.0 - infill, walls.stretch[1] * walls.stretch[2]
+    volume, t, squares = solid.measure * stretch, thickness, 0.0
+    area, twice, trace = walls.surface.measure, 0.0, 0.0
+    for k in range(3):
+        slot = 3 if k == 1 else 5 if k == 2 else 0
+        squares += solid.second[slot] * stretch * (walls.stretch[k] * walls.stretch[k])
+        trace += walls.surface.second[slot]
+    for k in range(RAYS):
+        if walls.depth[k] < 2.0 * t:
+            twice += (1.0 - walls.depth[k] / (2.0 * t)) / RAYS
+    measure, second = infill * volume + rest * t * area, infill * squares + rest * t * trace
+    of_mass = rest * (t * t * abs(walls.edges) + t * area * twice) / measure
+    of_tensor = rest * (t * t * abs(3.0 * volume + walls.edges_second) + t * trace * twice) / second
+    error: float = of_mass if of_mass > of_tensor else of_tensor
+    return error
+
+
+@njit(error_model="numpy", allocates=False)
+def thickest_walls(solid: np.record, walls: np.record, infill: float) -> float:
+    """The largest thickness whose error is within LIMIT, in units of the mesh as stretched."""
+    low, high = 0.0, solid.measure * walls.stretch[1] * walls.stretch[2] / walls.surface.measure
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if walls_error(solid, walls, middle, infill) <= LIMIT:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(error_model="numpy", allocates=False)
+def mix_walls(
+    solid: np.record,
+    walls: np.record,
+    thickness: float,
+    infill: float,
+    reference: Vector3,
+    center: Vector3,
+    second: FloatArray,
+) -> float:
+    """Fill reference (3,), centre (3,) relative to it, and second moments (6,) about that of walls of unit density and
+    what is within; returns their measure. All in units of the mesh as stretched, as is ``thickness``.
+    """
+    offset, stretch = local_numbers(3), walls.stretch[1] * walls.stretch[2]
+    of_walls = (1.0 - infill) * thickness
+    inner, outer = infill * solid.measure * stretch, of_walls * walls.surface.measure
+    measure: float = inner + outer
+    for k in range(3):
+        s = walls.stretch[k]
+        reference[k] = s * solid.reference[k]
+        own = s * (solid.center[k] + solid.center_low[k])
+        of_surface = walls.surface.center[k] + walls.surface.center_low[k]
+        offset[k] = (walls.surface.reference[k] - reference[k]) + (of_surface - own)
+        center[k] = own + outer / measure * offset[k]
+    slot = 0
+    for i in range(3):
+        for j in range(i, 3):
+            own = infill * solid.second[slot] * stretch * (walls.stretch[i] * walls.stretch[j])
+            apart = inner * (outer / measure) * (offset[i] * offset[j])
+            second[slot] = own + of_walls * walls.surface.second[slot] + apart
+            slot += 1
+    return measure
+
+
+@exported(MOMENTS, WALLS, "f8", "f8", "f8[:]", "f8[:]", "f8[:]", returns="f8 f8 f8")
+def printed_moments(
+    solid: np.record,
+    walls: np.record,
+    thickness: float,
+    infill: float,
+    reference: Vector3,
+    center: Vector3,
+    second: FloatArray,
+) -> tuple[float, float, float]:
+    """The measure, see ``mix_walls``, the error, and the largest thickness that is taken."""
+    measure = mix_walls(solid, walls, thickness, infill, reference, center, second)
+    return measure, walls_error(solid, walls, thickness, infill), thickest_walls(solid, walls, infill)
+
+
 @exported(
     "f8", MOMENTS, MOMENTS, "b1", "f8[:]", "f8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", returns="f8"
 )
@@ -90,18 +175,55 @@ def spread_mass(
     solid at no scale. scale (3,) of the mesh; left (3,): the part of it that ``unit`` doesn't include yet. points (k,
     4): ballast, masses [kg] and mesh coordinates.
     """
+    per_measure, center = mass / unit.measure, placed.center
+    second, low = unit.second, placed.center_low
+    return spread_over(
+        mass,
+        per_measure,
+        second,
+        placed.reference,
+        center,
+        low,
+        at_solid,
+        scale,
+        left,
+        points,
+        com,
+        inertia,
+        moments,
+        axes,
+    )
+
+
+@njit(error_model="numpy", allocates=False)
+def spread_over(
+    mass: float,
+    per_measure: float,
+    unit_second: FloatArray,
+    placed: Vector3,
+    center: Vector3,
+    center_low: Vector3,
+    at_solid: bool,
+    scale: Vector3,
+    left: Vector3,
+    points: FloatArray,
+    com: Vector3,
+    inertia: Matrix3,
+    moments: Vector3,
+    axes: Matrix3,
+) -> float:
+    """The same with the numbers of a record: second moments (6,), reference, centre and the rest of it (3,)."""
     place, base, reference, second = local_numbers(3), local_numbers(3), local_numbers(3), local_matrix(3, 3)
-    low = local_numbers(3)
-    slot, per_measure = 0, mass / unit.measure
+    low, slot = local_numbers(3), 0
     for i in range(3):
         stretch = scale[i] / left[i] if at_solid else 1.0
-        at = stretch * placed.reference[i]
+        at = stretch * placed[i]
         reference[i] = at * (left[i] / scale[i])
         base[i] = left[i] * at + 0.0  # no -0
-        place[i] = left[i] * (stretch * placed.center[i])
-        low[i] = stretch * placed.center_low[i]
+        place[i] = left[i] * (stretch * center[i])
+        low[i] = stretch * center_low[i]
         for j in range(i, 3):
-            second[i, j] = second[j, i] = unit.second[slot] * (left[i] * left[j]) * per_measure
+            second[i, j] = second[j, i] = unit_second[slot] * (left[i] * left[j]) * per_measure
             slot += 1
     total = _loaded(mass, place, second, scale, reference, points, com, inertia)
     for i in range(3):

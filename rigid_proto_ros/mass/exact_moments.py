@@ -8,7 +8,7 @@ floating-point computation, which never uses it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -76,6 +76,23 @@ def exact_solid_moments(
     inertia = tuple(tuple((whole_spread if i == j else 0) - spread[i][j] for j in range(3)) for i in range(3))
     centroid = tuple(stretch[k] * (center[k] + middle[k] * unit) for k in range(3))
     return ExactMoments(outward * volume, centroid, inertia)
+
+
+def exact_sum(solids: Sequence[ExactMoments], masses: Sequence[Fraction]) -> ExactMoments:
+    """Solids with these masses as one: the sum of their volumes, and the inertia with their masses."""
+    whole = sum(masses, Fraction(0))
+    places = [solid.centroid for solid in solids]
+    middle = [sum((m * c[k] for m, c in zip(masses, places, strict=True)), Fraction(0)) / whole for k in range(3)]
+    inertia = [[Fraction(0)] * 3 for _ in range(3)]
+    for solid, mass in zip(solids, masses, strict=True):
+        offset = [solid.centroid[k] - middle[k] for k in range(3)]
+        square = sum(x * x for x in offset)
+        for i in range(3):
+            for j in range(3):
+                moved = (square if i == j else 0) - offset[i] * offset[j]
+                inertia[i][j] += mass * (solid.inertia[i][j] / solid.volume + moved)
+    volume = sum((solid.volume for solid in solids), Fraction(0))
+    return ExactMoments(volume, tuple(middle), tuple(map(tuple, inertia)))
 
 
 def relative_errors(

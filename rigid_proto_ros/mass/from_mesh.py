@@ -14,23 +14,27 @@ import functools
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.cache import source_stamp, user_cache
 from ..base.compilation import INTERPRETED
 from ..base.errors import InputError
 from ..base.files import whole_file
 from ..base.vectors import Points, Triangles
+from ..mesh.assembly import Assembly
+from ..mesh.parts import Part
 from ..mesh.reading import Mesh, load_mesh
 from ..mesh.solids import box_surface, can_unite, convex_hull, united_surface
 from ..mesh.topology import mesh_topology, turned_triangles
-from .moments import extent, referenced_vertices
-from .properties import MeshMoments, Surface
+from .moments import extent, referenced_vertices, solid_moments
+from .parts import SolidPart, overlaps_of, sum_of_parts
+from .properties import MeshMoments, Surface, scale_vector
 from .repair import close_surface, repair_surface
-from .verdict import NESTED, WARNING, Finding, Verdict, check_surface
+from .verdict import INFO, NESTED, WARNING, Finding, Verdict, check_surface
 
 FALLBACKS = ("", "hull", "box")
 """Substitute for a surface that bounds no solid: none (refuse), its convex hull, or its bounding box."""
@@ -41,11 +45,12 @@ PASSING = "rigid_proto_upload_"
 @dataclass(frozen=True)
 class MeshBody:
     """A mesh, the verdict on it, and its moments; ``vertices`` and ``triangles`` are those used for the moments
-    (repaired ones if repair was requested and needed)."""
+    (repaired ones if repair was requested and needed). parts: the solids whose sum it is, of a body of parts."""
 
     mesh: Mesh
     verdict: Verdict
     moments: MeshMoments
+    parts: tuple[SolidPart, ...] = ()
 
     @property
     def vertices(self) -> Points:
@@ -57,6 +62,12 @@ class MeshBody:
         """Triangles (m, 3), reversed if the file winds them inward throughout."""
         triangles = self.moments.triangles
         return turned_triangles(triangles) if self.verdict.inward else triangles
+
+    def volume(self, scale: ArrayLike = (1.0, 1.0, 1.0)) -> float:
+        """Volume [m³] of the solid, of parts the sum of theirs; raises MeshError where there is none."""
+        solid = self.moments.moments("solid")
+        own = sum(part.volume for part in self.parts) if self.parts else solid.measure
+        return float(own * np.prod(np.abs(scale_vector(scale))))
 
 
 def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", accept_open: float = 0.0) -> MeshBody:
@@ -74,6 +85,8 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
         raise InputError("--accept-open", accept_open, "a number from 0 to 1: part of volume and tensor")
     if isinstance(mesh, str):
         mesh = load_mesh(mesh)
+    if mesh.parts:
+        return _body_of_parts(mesh, repair, fallback, accept_open)
     verdict = check_mesh(mesh)
     vertices, triangles, polygon_starts = mesh.vertices, mesh.triangles, mesh.polygon_starts
     nested = any(finding.code == NESTED for finding in verdict.findings)
@@ -108,6 +121,53 @@ def mesh_body(mesh: Mesh | str, *, repair: bool = False, fallback: str = "", acc
     no_solid = "" if verdict.closed else f"{repaired}{verdict.reason}; use {remedies}"
     moments = MeshMoments(vertices, triangles, polygon_starts, no_solid=no_solid, name=mesh.name, stand_in=stand_in)
     return MeshBody(mesh, verdict, moments)
+
+
+def _body_of_parts(mesh: Mesh, repair: bool, fallback: str, accept_open: float) -> MeshBody:
+    """The body that is the sum of a mesh's parts, each judged, repaired or replaced by itself."""
+    told, solids, assembly = Verdict(), [], Assembly(mesh.name)
+    starts, count = [], 0
+    for part in mesh.parts:
+        body = mesh_body(part.mesh, repair=repair, fallback=fallback, accept_open=accept_open)
+        one = body.verdict
+        if part.mesh.unit != 1.0:
+            unit = (
+                f"part {part.name}: its file's unit is {part.mesh.unit:g} m, from which it has been converted to metres"
+            )
+            told.findings.append(Finding("stated_unit", INFO, unit))
+        told.findings += [replace(each, message=f"part {part.name}: {each.message}") for each in one.findings]
+        told.usable, told.closed = told.usable and one.usable, told.closed and one.closed
+        told.watertight = told.watertight and one.watertight
+        told.winding_consistent = told.winding_consistent and one.winding_consistent
+        told.components += one.components
+        lacking = one.reason if not one.usable else body.moments.no_solid if body.moments.stand_in is None else ""
+        told.reason = told.reason or (f"part {part.name}: {lacking}" if lacking else "")
+        assembly.add(body.vertices, body.triangles, part.matrix, f"part {part.name}")
+        own = body.moments.polygon_starts
+        starts.append((np.arange(len(body.triangles) + 1) if own is None else own)[:-1] + count)
+        count += len(body.triangles)
+        surface = _surface_of(part, body)
+        solids.append(SolidPart(part.name, surface, part.density, part.mass, part.wall_thickness, part.infill))
+    vertices, triangles = assembly.surface()
+    polygon_starts = None if mesh.polygon_starts is None else np.concatenate([*starts, [count]])
+    if told.usable and not told.reason:
+        told.findings += overlaps_of(solids)
+    summed = functools.partial(sum_of_parts, solids)
+    moments = MeshMoments(vertices, triangles, polygon_starts, no_solid=told.reason, name=mesh.name, summed=summed)
+    return MeshBody(mesh, told, moments, tuple(solids))
+
+
+def _surface_of(part: Part, body: MeshBody) -> Callable[[], Surface]:
+    """The outward surface of a part's solid in the whole body's coordinates, once it is needed."""
+
+    @functools.cache
+    def surface() -> Surface:
+        placed = Assembly(body.mesh.name)
+        placed.add(*body.moments.solid_surface(), part.matrix, part.name)
+        vertices, triangles = placed.surface()
+        return vertices, turned_triangles(triangles) if solid_moments(vertices, triangles).measure < 0.0 else triangles
+
+    return surface
 
 
 def folder() -> Path | None:

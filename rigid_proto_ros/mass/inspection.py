@@ -9,6 +9,7 @@ import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import product
 from typing import Any
 
@@ -18,7 +19,8 @@ from numpy.typing import ArrayLike
 from ..base.errors import InputError
 from ..base.rotation import quaternion_from_matrix
 from ..base.vectors import Matrix3, Vector3
-from .exact_moments import exact_solid_moments, relative_errors
+from ..mesh.parts import DENSITY
+from .exact_moments import exact_solid_moments, exact_sum, relative_errors
 from .from_mesh import MeshBody
 from .moments import MODELS, extent
 from .properties import MassProperties, scale_vector
@@ -110,7 +112,7 @@ def _axes_turned(axes: Matrix3, mine: int | None, others: Matrix3, theirs: int |
 class Inspection:
     """The inspection of a mesh at one scale, mass and model. ``refusal`` is the error that prevents the chosen model,
     ``models`` the mass properties of all models that can be computed. lower and upper (3,): the scaled mesh's box, NaN
-    for a mesh that isn't usable."""
+    for a mesh that isn't usable. mass: the one given, without ballast, or 0."""
 
     body: MeshBody
     scale: Vector3
@@ -123,6 +125,7 @@ class Inspection:
     lower: Vector3
     upper: Vector3
     density: float | None
+    mass: float = 0.0
 
     @property
     def chosen(self) -> MassProperties:
@@ -142,8 +145,12 @@ def inspect_mesh(
     mass: float = 0.0,
     density: float = 1000.0,
     ballast: Sequence[Sequence[float]] = (),
+    wall_thickness: float = 0.0,
+    infill: float = 0.0,
 ) -> Inspection:
-    """Mass properties of every model that can be computed for ``body``, and the findings on them."""
+    """Mass properties of every model that can be computed for ``body``, and the findings on them. Of a printed part
+    (walled) the others have its mass.
+    """
     s = scale_vector(scale)
     findings = list(body.verdict.findings)
     if body.mesh.unit != 1.0:
@@ -162,24 +169,58 @@ def inspect_mesh(
         units = f"it would be {side:.4g} mm if the file is in millimetres (--scale 0.001)"
         findings.append(Finding("unit_suspicion", WARNING, f"the body is {side:.4g} m across; {units} (scale)"))
     models, refusal = {}, None
+    if model == "walled":
+        try:
+            mass, error = _printed_mass(body, s, mass, density, wall_thickness, infill)
+            findings.append(Finding("walled", INFO, _said_of_walls(error)))
+        except InputError as refused:
+            refusal = refused
     # Every model checks mass, density, scale and ballast: a refusal of these comes first and is the same for all.
     for name in (model, *(other for other in MODELS if other != model)):
         try:
-            models[name] = moments.mass_properties(name, scale=s, mass=mass, density=density, ballast=ballast)
+            models[name] = moments.mass_properties(
+                name,
+                scale=s,
+                mass=mass,
+                density=density,
+                ballast=ballast,
+                wall_thickness=wall_thickness,
+                infill=infill,
+            )
         except InputError as error:
             if name == model:
-                refusal = error
+                refusal = refusal or error
             elif refusal is None and not (name == "solid" and not body.verdict.closed):
                 findings.append(Finding(f"model_{name}", WARNING, str(error)))
             continue
         findings += [Finding("tensor", WARNING, text) for text in models[name].warnings]
     volume = None
     with contextlib.suppress(InputError):  # of a mesh that bounds no solid, and has no other shape to take
-        volume = moments.moments("solid").measure * float(np.prod(np.abs(s)))
+        volume = body.volume(s)
     shell = moments.moments("shell", s) if "shell" in models else None
     area = None if shell is None else shell.measure * float(s[0]) ** 2
-    implied = density if not mass > 0.0 else mass / volume if volume else None
-    return Inspection(body, s, model, models, findings, refusal, volume, area, lower, upper, implied)
+    own = mass
+    if body.parts and volume:
+        own = mass or moments.body_mass(scale=s)
+        findings += [
+            Finding("walled", INFO, f"part {part.name}: {_said_of_walls(part.printed[1])}")
+            for part in body.parts
+            if part.wall_thickness > 0.0
+        ]
+    implied = density if not own > 0.0 else own / volume if volume else None
+    return Inspection(body, s, model, models, findings, refusal, volume, area, lower, upper, implied, mass)
+
+
+def _printed_mass(
+    body: MeshBody, scale: Vector3, mass: float, density: float, wall_thickness: float, infill: float
+) -> tuple[float, float]:
+    """Mass [kg] of a printed part, and the error of its model; raises InputError."""
+    moments, error = body.moments.printed(scale, wall_thickness, infill)
+    return mass or density * moments.measure * abs(float(scale[0])) ** 3, error
+
+
+def _said_of_walls(error: float) -> str:
+    return f"mass and tensor are those of first order in the walls' thickness, whose error is {100.0 * error:.2g} %"
 
 
 def as_json(inspection: Inspection) -> dict[str, Any]:
@@ -187,8 +228,9 @@ def as_json(inspection: Inspection) -> dict[str, Any]:
     verdict = [vars(finding) for finding in inspection.findings]
     if inspection.refusal is not None:
         return {**dict.fromkeys(JSON_KEYS), "verdict": verdict}
-    body, chosen = inspection.body, inspection.chosen
+    body, chosen, models = inspection.body, inspection.chosen, inspection.models
     moments, axes = principal_axes(chosen.inertia)
+    names = dict.fromkeys((*MODELS, *models))
     return {
         "mesh": body.mesh.path,
         "vertices": len(body.mesh.vertices),
@@ -204,18 +246,42 @@ def as_json(inspection: Inspection) -> dict[str, Any]:
         "principal_axes": axes.tolist(),
         "principal_orientation_xyzw": quaternion_from_matrix(axes).tolist(),
         "bounding_box": {"min": inspection.lower.tolist(), "max": inspection.upper.tolist()},
-        "models": {name: inspection.models[name].as_dict() if name in inspection.models else None for name in MODELS},
+        "models": {name: models[name].as_dict() if name in models else None for name in names},
+        **({"parts": parts_of(inspection)} if body.parts else {}),
         "verdict": verdict,
     }
 
 
+def parts_of(inspection: Inspection) -> list[dict[str, Any]]:
+    """Of each part: name, mass, density and volume; where the whole is given a mass, in proportion to it."""
+    body, scale = inspection.body, inspection.scale
+    whole = sum(float(part.own_mass) for part in body.parts)
+    own = inspection.mass or body.moments.body_mass(scale=scale)
+    told = []
+    for part in body.parts:
+        mass, volume = float(part.own_mass) * own / whole, part.volume * float(np.prod(np.abs(scale)))
+        told.append({"name": part.name, "mass": mass, "density": mass / volume, "volume": volume})
+    return told
+
+
 def verify_moments(body: MeshBody, scale: Vector3) -> dict[str, float]:
     """Errors of the solid's volume, centroid and inertia against rational arithmetic on the same vertices."""
-    moments = body.moments
-    unit = moments.mass_properties("solid", scale=scale, density=1.0)  # raises InputError if there is no solid
-    vertices, triangles = moments.solid_surface()
-    exact = exact_solid_moments(vertices, triangles, scale.tolist())
-    lower, upper, _ = extent(vertices, triangles)
+    moments, parts = body.moments, body.parts
+    unit = moments.mass_properties("solid", scale=scale, density=DENSITY if parts else 1.0)  # or there is no solid
+    if parts:
+        each = [(part, exact_solid_moments(*part.surface(), scale.tolist())) for part in parts]
+        if any(part.wall_thickness > 0.0 for part in parts):
+            raise InputError(
+                "--verify", "walls", "solid parts: walls are of first order, and nothing exact is beside them"
+            )
+        sx, sy, sz = (abs(Fraction(x)) for x in scale.tolist())
+        stretch = sx * sy * sz
+        masses = [Fraction(p.mass) * stretch if p.mass else Fraction(p.density) * own.volume for p, own in each]
+        exact = exact_sum([own for _, own in each], masses)
+        lower, upper, _ = extent(body.vertices, body.moments.triangles)
+    else:
+        vertices, triangles = moments.solid_surface()
+        exact = exact_solid_moments(vertices, triangles, scale.tolist())
+        lower, upper, _ = extent(vertices, triangles)
     diagonal = float(np.linalg.norm((upper - lower) * scale))
-    volume = moments.moments("solid").measure * float(np.prod(np.abs(scale)))
-    return relative_errors(exact, volume, unit.center_of_mass, unit.inertia, diagonal)
+    return relative_errors(exact, body.volume(scale), unit.center_of_mass, unit.inertia, diagonal)

@@ -108,7 +108,7 @@ def _new_moments() -> tuple[FloatArray, np.record]:
 
 
 MODELS = ("solid", "shell", "points", "bounding_box")
-"""Those of INERTIA_MODELS that are moments of a mesh, by their numbers in kernels."""
+"""Those of INERTIA_MODELS that are moments of a mesh by themselves, by their numbers in kernels."""
 SOLID, SHELL, POINTS, BOX = range(4)
 STRETCHED = ("shell",)
 """Models whose measure stretches depending on direction, so that a non-uniform scale needs a new pass."""
@@ -553,10 +553,10 @@ def _put_back(found: np.record, stretch: Vector3, base: Vector3) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def _shell(
+def shell_moments(
     vertices: Points, triangles: Triangles, starts: IntArray, scale: Vector3, points: Points, found: np.record
 ) -> int:
-    """The shell's part of ``moments_of``; points (n, 3): workspace."""
+    """The shell's part of ``moments_of``, which ``walls`` needs, too; points (n, 3): workspace."""
     stretch, base, reference = local_numbers(3), local_numbers(3), local_numbers(3)
     lower, upper, sums = local_numbers(3), local_numbers(3), local_matrix(10, 2)
     is_stretched = False
@@ -660,7 +660,7 @@ def moments_of(
     if triangles.shape[0] == 0 or vertices.shape[0] == 0:
         return NO_FACES
     if model == SHELL:
-        return _shell(vertices, triangles, starts, scale, matrix_of(room, vertices.shape[0], 3), found)
+        return shell_moments(vertices, triangles, starts, scale, matrix_of(room, vertices.shape[0], 3), found)
     lower, upper = local_numbers(3), local_numbers(3)
     code = bounding_box(vertices, triangles, used, lower, upper)
     if code != FOUND:

@@ -514,14 +514,21 @@ class Nesting:
 
 def component_nesting(vertices: Points, topology: Topology, sums: Components) -> Nesting:
     """Nesting, intersections and self-intersections of closed components."""
-    component, count = topology.component, topology.components
+    return nesting_of(vertices, topology.corners, topology.component, sums.lower, sums.upper)
+
+
+def nesting_of(vertices: Points, corners: Triangles, component: IntArray, lower: Points, upper: Points) -> Nesting:
+    """The same of any closed surfaces: component (m,): number of the one that a triangle belongs to; lower and upper
+    (k, 3): corners of their boxes.
+    """
+    count = len(lower)
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
-    order, own, boxes = hierarchy(vertices, topology.corners)
+    order, own, boxes = hierarchy(vertices, corners)
     found = np.empty((count, count), dtype=bool)
     examined = len(component) <= MAX_SELF_CROSSING
     tree = order, own, boxes, np.empty(len(boxes), np.int64)
-    within, complete = crossings(vertices, topology.corners, component, *tree, examined, WORK_LIMIT, found)
-    near = np.all((sums.lower[:, None] <= sums.upper[None]) & (sums.lower[None] <= sums.upper[:, None]), axis=2)
+    within, complete = crossings(vertices, corners, component, *tree, examined, WORK_LIMIT, found)
+    near = np.all((lower[:, None] <= upper[None]) & (lower[None] <= upper[:, None]), axis=2)
     np.fill_diagonal(near, False)
     inside = np.zeros((count, count), dtype=bool)
     if near.any():
@@ -529,11 +536,11 @@ def component_nesting(vertices: Points, topology: Topology, sums: Components) ->
         samples = np.concatenate(
             [mine[:: -(-len(mine) // SAMPLES)] for mine, asked in zip(of_each, near.any(axis=1), strict=True) if asked]
         )
-        reach = NEAR * float(np.linalg.norm(sums.upper.max(axis=0) - sums.lower.min(axis=0)))
+        reach = NEAR * float(np.linalg.norm(upper.max(axis=0) - lower.min(axis=0)))
         outside, inner = np.empty_like(near), np.empty_like(near)
         room = np.empty(count, np.int64), np.empty((2, count), dtype=bool)
         rays = order, boxes, samples
-        decided = sides_of_components(vertices, topology.corners, component, *rays, near, reach, outside, inner, *room)
+        decided = sides_of_components(vertices, corners, component, *rays, near, reach, outside, inner, *room)
         on_both_sides = outside & inner
         found = found | on_both_sides | on_both_sides.T
         inside = inner & ~outside & ~found

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
@@ -19,6 +21,7 @@ from .gltf import add_gltf
 from .locate import NOWHERE_ELSE, Search, resolve_mesh
 from .obj import read_obj
 from .off import read_off
+from .parts import YAML, Part, hash_of_parts, joined_surface, read_parts
 from .ply import read_ply
 from .stl import read_stl
 from .threemf import add_threemf
@@ -43,7 +46,7 @@ class Mesh:
     when every face is a triangle. sha256 is the hex digest of the file's bytes, and of those of every other file that
     was read with it; path its absolute path. unit: the unit that the file states [m], by which the vertices have been
     multiplied; 1 if it states none. up_axis: which axis it says is up, "" if it says nothing; coordinates stay as they
-    are.
+    are. parts: those of a body of several, of whose surfaces this one consists, in their order.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Mesh:
     sha256: str
     unit: float = 1.0
     up_axis: str = ""
+    parts: tuple[Part, ...] = ()
 
 
 def fan_polygons(corners: IntArray, starts: IntArray) -> tuple[Triangles, IntArray | None]:
@@ -109,10 +113,14 @@ def _read_scene(data: bytes, suffix: str, path: Path) -> tuple[Points, Triangles
 def read_mesh(data: bytes, path: Path) -> Mesh:
     """The mesh in a file's bytes, read according to the file's extension; raises MeshError naming what is wrong."""
     suffix = path.suffix.lower().lstrip(".")
-    if suffix not in FORMATS and suffix not in other_formats():
-        raise MeshError("mesh", path.name, f"a file named .{', .'.join(FORMATS)}, or another format that trimesh reads")
+    if suffix not in (*FORMATS, *YAML) and suffix not in other_formats():
+        formats = f"a file named .{', .'.join(FORMATS)}, a .yaml file of parts"
+        raise MeshError("mesh", path.name, f"{formats}, or another format that trimesh reads")
     if not data.strip():
         raise MeshError(path.name, "the file is empty")
+    if suffix in YAML:
+        parts = read_parts(data, path.name, functools.cache(lambda name: load_part(name, path.parent)))
+        return mesh_of_parts(path.stem, str(path), parts, hashlib.sha256(data).hexdigest())
     up = _UP_AXIS.search(data) if suffix == "dae" else None
     sha256, starts, unit = hashlib.sha256(data).hexdigest(), None, 1.0
     if suffix in OWN_FORMATS:
@@ -127,6 +135,20 @@ def read_mesh(data: bytes, path: Path) -> Mesh:
         raise MeshError(path.name, many if len(triangles) else "the file has no faces")
     up_axis = "" if up is None else up[1].decode()
     return Mesh(path.stem, str(path), vertices, triangles, starts, sha256, unit, up_axis)
+
+
+def mesh_of_parts(name: str, path: str, parts: Sequence[Part], said: str) -> Mesh:
+    """The surface of a body of parts; said: how they are told, for its hash. Raises MeshError where it is too large."""
+    vertices, triangles, starts = joined_surface(name, parts)
+    return Mesh(name, path, vertices, triangles, starts, hash_of_parts(said, parts), parts=tuple(parts))
+
+
+def load_part(name: str, folder: Path) -> Mesh:
+    """The mesh of a part, by a name as ``load_mesh`` has it, or beside the file that names it; raises MeshError."""
+    path = resolve_mesh(name, Search(folder))
+    if path.suffix.lower().lstrip(".") in YAML:
+        raise MeshError("mesh", name, "a mesh; a file of parts has no others within")
+    return load_mesh(str(path))
 
 
 def load_mesh(name: str, *, search: Search = NOWHERE_ELSE) -> Mesh:

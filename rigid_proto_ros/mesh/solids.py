@@ -98,6 +98,25 @@ def _united(
     return list(parts.values())
 
 
+def shared_volume(one: tuple[Points, Triangles], other: tuple[Points, Triangles]) -> float:
+    """Volume that two solids, each given by vertices (n, 3) and outward triangles (m, 3), have in common; raises
+    MeshError where manifold3d takes one for no solid.
+    """
+    import manifold3d
+
+    origin = 0.5 * (one[0].min(axis=0) + one[0].max(axis=0))
+    solids = []
+    for vertices, triangles in (one, other):
+        topology = mesh_topology(vertices, triangles)
+        used, local = np.unique(topology.corners, return_inverse=True)
+        faces = local.reshape(-1, 3).astype(np.uint64)
+        solid = manifold3d.Manifold(manifold3d.Mesh64(vert_properties=vertices[used] - origin, tri_verts=faces))
+        if solid.status() != manifold3d.Error.NoError:
+            raise MeshError("mesh", NOT_UNITED)
+        solids.append(solid)
+    return float((solids[0] ^ solids[1]).volume())
+
+
 def hull_is_missing() -> str:
     """What to install for ``convex_hull``; empty where it is there."""
     try:

@@ -89,7 +89,8 @@ def take_of(values: dict[str, Any], script: Sequence[Command] = ()) -> dict[str,
         "endNs": max((command.stamp_ns for command in script), default=0),
     }
     if scenario.body_mesh is not None and values.get("mesh", "t_handle") not in body_names():
-        used["mesh"] = f"{scenario.body_mesh.mesh.name}.obj"
+        ending = "yaml" if scenario.body_mesh.mesh.parts else "obj"
+        used["mesh"] = f"{scenario.body_mesh.mesh.name}.{ending}"
         take["mesh"] = mesh_numbers(scenario.body_mesh, used["mesh"])
     return take
 
@@ -113,7 +114,9 @@ def _changed(parameters: Parameters) -> dict[str, Any]:
 
 
 def mesh_numbers(body: BodyMesh, name: str) -> dict[str, Any]:
-    """The numbers of a mesh. solid: its moments at unit density (mass/moments.py, MOMENTS), where Python has them."""
+    """The numbers of a mesh. solid: its moments at unit density (mass/moments.py, MOMENTS), where Python has them.
+    volume: of a body of parts, whose solid has their mass instead (mass/parts.py).
+    """
     moments = body.moments
     mesh: dict[str, Any] = {
         "name": name,
@@ -126,6 +129,8 @@ def mesh_numbers(body: BodyMesh, name: str) -> dict[str, Any]:
         mesh["solid"] = _base64(np.frombuffer(moments.moments("solid").record.tobytes()), "<f8")
     except InputError:
         pass  # its surface bounds none, as the page will find, too
+    if body.volume is not None:
+        mesh["volume"] = body.volume
     return mesh
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import CommandRefused, InputError, did_you_mean
-from ..mass import INERTIA_MODELS, MODEL_COMS
+from ..mass import INERTIA_MODELS, INFILL, MODEL_COMS, WALL_THICKNESS
 from ..motion import INTEGRATOR_NAMES
 from ..motion.frames import check_contact_name
 
@@ -309,7 +309,12 @@ class Parameters:
         upper=HUGE,
     )
     density: float = declare(
-        1000.0, "Density of the solid; setting it sets mass to 0.", "kg/m³", lower=0.0, upper=HUGE, above=True
+        1000.0,
+        "Density of the solid; setting it sets mass to 0. Of a body of parts 1000 leaves theirs as they are.",
+        "kg/m³",
+        lower=0.0,
+        upper=HUGE,
+        above=True,
     )
     inertia_model: str = declare(
         "solid",
@@ -321,6 +326,17 @@ class Parameters:
         "Which centre of mass is used, that of the inertia model or that of the solid; with the latter, only the "
         "tensors differ; the explicit model always keeps its own.",
         choices=MODEL_COMS,
+    )
+    wall_thickness: float = declare(
+        WALL_THICKNESS,
+        "Thickness of the walled model's walls, which have the full density.",
+        "m",
+        lower=0.0,
+        upper=1e9,
+        above=True,
+    )
+    infill: float = declare(
+        INFILL, "Density within the walled model's walls, as a part of the full one.", lower=0.0, upper=1.0
     )
     explicit_inertia: ExplicitInertia = ExplicitInertia()
     gyroscopic: bool = declare(True, "Include the term ω × Iω; without it the motion isn't that of a rigid body.")

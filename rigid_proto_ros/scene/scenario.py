@@ -20,6 +20,7 @@ from ..base.arithmetic import exact_quotient
 from ..base.compilation import copy_fields, copy_of, new_record
 from ..base.errors import CommandRefused, InputError, MeshError
 from ..base.vectors import Vector3
+from ..base.yaml_text import yaml_value
 from ..mass import INERTIA_MODELS
 from ..mass.from_mesh import mesh_body
 from ..mass.moments import STRETCHED
@@ -41,7 +42,6 @@ from ..simulation.record import MAX_BALLASTS, MESH, SCENE, SCENE_PARAMETERS, fie
 from ..simulation.setup import Setup, make_setup
 from ..simulation.thrusters import make_thruster
 from .scene_file import named_values, read_scene_text
-from .yaml_text import yaml_value
 
 _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 
@@ -49,19 +49,23 @@ _HASH = re.compile(r"^# mesh_sha256: ([0-9a-f]{64})$", re.MULTILINE)
 @dataclass(eq=False)
 class BodyMesh:
     """A mesh with what is computed from it once: its moments, its surface wound outward, and its numbers (MESH), of
-    which there are those that a scene has needed so far.
+    which there are those that a scene has needed so far. volume: of a body of parts, the sum of theirs.
     """
 
     mesh: Mesh
     moments: MeshMoments
     surface: Surface
     numbers: np.record
+    volume: float | None = None
 
     def provide(self, model: str, scale: Vector3) -> np.record:
         """The numbers with the moments of a model at this scale (3,); raises MeshError."""
-        moments, numbers = self.moments.moments(model, scale), new_record(MESH)
+        numbers = new_record(MESH)
         copy_fields(self.numbers, numbers)  # setups keep the present ones
-        copy_fields(moments.record, numbers[model])
+        if model == "walled":
+            copy_fields(self.moments.walls(scale), numbers["walls"])
+        else:
+            copy_fields(self.moments.moments(model, scale).record, numbers[model])
         numbers["known"][INERTIA_MODELS.index(model)] = True
         if model in STRETCHED:
             numbers["stretch"] = np.abs(scale) / abs(scale[0])
@@ -175,7 +179,8 @@ def load_body_mesh(parameters: Parameters, mesh: Mesh | None = None) -> BodyMesh
         raise MeshError(f"mesh {parameters.mesh}", body.verdict.reason)
     surface, numbers = Surface(body.vertices, body.triangles), new_record(MESH)
     numbers["has_surface"], numbers["extent"] = True, surface.extent
-    return BodyMesh(body.mesh, body.moments, surface, numbers)
+    volume = body.volume() if body.parts and not body.moments.no_solid else None
+    return BodyMesh(body.mesh, body.moments, surface, numbers, volume)
 
 
 def _made_of(parameters: Parameters) -> tuple[str, bool, str]:

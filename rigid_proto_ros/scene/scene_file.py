@@ -18,11 +18,12 @@ import yaml
 
 from ..base.bundled import body_names, scene_names, scene_path
 from ..base.errors import InputError, MeshError, did_you_mean, printable
+from ..base.yaml_text import compose_yaml, key_of, read_text, refused, typed
 from ..mesh.assembly import other_formats
 from ..mesh.locate import resolve_mesh
+from ..mesh.parts import YAML, tells_parts
 from ..mesh.reading import FORMATS
 from ..parameters.declarations import is_ros_parameter, parameter_named
-from .yaml_text import compose_yaml, key_of, read_text, refused, typed
 
 GONE = re.compile(
     r"(imu_noise\..*|pose_noise\..*|noise\.(gyroscope|accelerometer|position|orientation|(linear|angular)_velocity)"
@@ -49,11 +50,14 @@ def scene_file(name: str) -> Path:
 
 
 def is_mesh(name: str) -> bool:
-    """Whether a name that stands for a scene is a mesh's: of a file in a format that is read, by path or package://
-    URI, or of a bundled body that has no scene of its name.
+    """Whether a name that stands for a scene is a mesh's: of a file in a format that is read, or of parts, by path or
+    package:// URI, or of a bundled body that has no scene of its name.
     """
     suffix = Path(name).suffix.lower().lstrip(".")
-    if suffix in ("yaml", "yml") or not (name.startswith("package://") or Path(name).is_file()):
+    if suffix in YAML and Path(name).is_file():
+        with suppress(InputError):  # which the scene's reader tells
+            return tells_parts(read_text(Path(name), "a YAML file"))
+    if suffix in YAML or not (name.startswith("package://") or Path(name).is_file()):
         return name in body_names() and name not in scene_names()
     return suffix in FORMATS or suffix in other_formats()
 

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from ..base.errors import CommandRefused, InputError, did_you_mean
 from ..base.vectors import Vector
+from ..base.yaml_text import flow, load_items, load_json, load_yaml, plain, read_text
 from ..motion.frames import CONTACT_NAME, FIXED_POINTS, RESERVED_WORDS, SLOT_NAME, Frame
 from ..parameters.declarations import ZERO
 from ..simulation.commands import (
@@ -31,7 +32,6 @@ from ..simulation.commands import (
     WrenchCommand,
     nanoseconds,
 )
-from .yaml_text import flow, load_items, load_json, load_yaml, plain, read_text
 
 Stamp = dict[str, Any]
 """A command's stamp_ns and entry."""

@@ -29,10 +29,19 @@ from ..base.compilation import (
 from ..base.errors import InputError
 from ..base.vectors import BoolArray, FloatArray, Matrix3, Vector3
 from ..mass import MODEL_COMS
-from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
+from ..mass.closed_form import (
+    given_mass,
+    is_plainly_good,
+    mix_walls,
+    spread_mass,
+    spread_over,
+    thickest_walls,
+    walls_error,
+)
 from ..mass.moments import MOMENTS
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import NEARLY, POSSIBLE, judged_tensor
+from ..mass.walls import LIMIT, WALLS
 from ..motion.body import LENGTH, BodyRow, fill_body
 from ..motion.integrators import INTEGRATORS
 from ..motion.integrators.series_steps import degree_for
@@ -48,7 +57,7 @@ from .string_control import begins_clear, follows_rates, tie
 MAX_BALLASTS = 32
 
 SCENE_PARAMETERS = (
-    *("scale", "mass", "density", "inertia_model", "inertia_model_com"),
+    *("scale", "mass", "density", "inertia_model", "inertia_model_com", "wall_thickness", "infill"),
     *("explicit_inertia.mass", "explicit_inertia.center_of_mass", "explicit_inertia.tensor"),
     *("gyroscopic", "gravity", "linear_damping", "angular_damping"),
     *("initial.position", "initial.orientation_xyzw", "initial.linear_velocity", "initial.angular_velocity"),
@@ -78,7 +87,7 @@ SCENE = record_type(
     ]
 )
 
-SOLID, SHELL, POINTS, BOUNDING_BOX, EXPLICIT = range(5)
+SOLID, SHELL, POINTS, BOUNDING_BOX, WALLED, EXPLICIT = range(6)
 """Numbers of INERTIA_MODELS; all but the last one are a mesh's."""
 OF_SOLID = MODEL_COMS.index("solid")
 
@@ -90,6 +99,7 @@ MESH = record_type(
         ("shell", MOMENTS),
         ("points", MOMENTS),
         ("bounding_box", MOMENTS),
+        ("walls", WALLS),
         ("stretch", np.float64, 3),  # |scale|/|scale_x| for which those of the shell hold
         ("known", np.uint8, EXPLICIT),  # by the number of the model, whether its moments are there
     ]
@@ -210,7 +220,13 @@ def _are_known(scene: np.record, mesh: np.record, refusal: np.record) -> bool:
             fits = fits and abs(s[k]) / abs(s[0]) == mesh.stretch[k]
     if not fits:
         return refuse(refusal, rf.NO_MOMENTS, model, 0.0, 0.0, 0.0)
-    if mesh.known[SOLID] == 0 and (scene.mass == 0.0 or scene.inertia_model_com == OF_SOLID):
+    if model == WALLED:
+        for k in range(3):
+            fits = fits and abs(s[k]) / abs(s[0]) == mesh.walls.stretch[k]
+        if not fits:
+            return refuse(refusal, rf.NO_MOMENTS, model, 0.0, 0.0, 0.0)
+    needs_solid = model == WALLED or scene.mass == 0.0 or scene.inertia_model_com == OF_SOLID
+    if mesh.known[SOLID] == 0 and needs_solid:
         return refuse(refusal, rf.NO_MOMENTS, SOLID, 0.0, 0.0, 0.0)
     return True
 
@@ -231,6 +247,8 @@ def _spread(
     if not _are_known(scene, mesh, refusal):
         return 0.0
     s, mass, model = scene.scale, scene.mass, scene.inertia_model
+    if model == WALLED:
+        return _spread_walls(scene, mesh, com, inertia, moments, axes, refusal)
     if mass == 0.0:
         mass = scene.density * mesh.solid.measure * abs(s[0] * s[1] * s[2])
         if not 1e-300 < mass < math.inf:
@@ -244,6 +262,44 @@ def _spread(
     at_solid = scene.inertia_model_com == OF_SOLID
     placed, ballast = mesh.solid if at_solid else unit, scene.ballast[: scene.ballasts]
     return spread_mass(mass, unit, placed, at_solid, s, left, ballast, com, inertia, moments, axes)
+
+
+@njit(error_model="numpy", allocates=False)
+def _spread_walls(
+    scene: np.record,
+    mesh: np.record,
+    com: Vector3,
+    inertia: Matrix3,
+    moments: Vector3,
+    axes: Matrix3,
+    refusal: np.record,
+) -> float:
+    """The same of a printed part, whose mass without a given one is that of walls and infill."""
+    s, mass, unit = scene.scale, scene.mass, abs(scene.scale[0])
+    t, infill = scene.wall_thickness / unit, scene.infill
+    error = walls_error(mesh.solid, mesh.walls, t, infill)
+    if not error <= LIMIT:
+        largest = unit * thickest_walls(mesh.solid, mesh.walls, infill)
+        refuse(refusal, rf.WALLS, 0, scene.wall_thickness, largest, error)
+        return 0.0
+    reference, center, second = local_numbers(3), local_numbers(3), local_numbers(6)
+    low, left = local_numbers(3), local_numbers(3)
+    measure = mix_walls(mesh.solid, mesh.walls, t, infill, reference, center, second)
+    if mass == 0.0:
+        mass = scene.density * measure * (unit * unit * unit)
+        if not 1e-300 < mass < math.inf:
+            refuse(refusal, rf.MASS, 0, mass, 0.0, 0.0)
+            return 0.0
+    at_solid = scene.inertia_model_com == OF_SOLID
+    for k in range(3):
+        left[k], low[k] = math.copysign(unit, s[k]), 0.0
+        if at_solid:
+            reference[k], center[k] = mesh.solid.reference[k], mesh.solid.center[k]
+            low[k] = mesh.solid.center_low[k]
+    per_measure, ballast = mass / measure, scene.ballast[: scene.ballasts]
+    return spread_over(
+        mass, per_measure, second, reference, center, low, at_solid, s, left, ballast, com, inertia, moments, axes
+    )
 
 
 @exported(SCENE, MESH, "f8[:]", REFUSAL, returns="b1")

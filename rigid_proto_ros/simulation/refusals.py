@@ -8,6 +8,7 @@ import numpy as np
 from ..base.compilation import njit, record_type
 from ..base.errors import CommandRefused
 from ..base.vectors import Matrix3
+from ..mass.walls import rounded_down
 from ..motion.body import MAX_ACCELERATION
 from ..motion.integrators import INTEGRATORS, check_supported
 from ..motion.integrators.auto import FASTEST
@@ -38,7 +39,8 @@ REFUSAL = record_type(
     UNRESOLVED,  # detail: why a load's point wasn't found (motion/loads.py)
     OUT_OF_BOUNDS,  # detail: place of the number in SCENE (simulation/record.py); numbers: the number
     AT_FREE_END,  # of a string that pushes; numbers: the target
-) = range(13)
+    WALLS,  # too thick for the first order: numbers: thickness, the largest one taken [m], error
+) = range(14)
 
 RATES = (
     ("linear_damping", "N s/m"),
@@ -79,12 +81,8 @@ def refused_command(refusal: np.record) -> CommandRefused:
         except CommandRefused as error:
             return error
     if refusal.code == RATE:
-        from decimal import ROUND_DOWN, Context  # 3 ms, which no start needs
-
         parameter, unit = RATES[refusal.detail]
-        # Three digits, which rounded up would be refused themselves.
-        digits = Context(prec=3, rounding=ROUND_DOWN).create_decimal_from_float(b)
-        accepted = f"at most {float(digits):g} {unit}".rstrip()
+        accepted = f"at most {rounded_down(b):g} {unit}".rstrip()
         why = f"auto follows rates up to {FASTEST:g} /s, and this is one of {c:.3g} /s"
         return CommandRefused("integrator", parameter, a, f"{accepted} for this body: {why}")
     if refusal.code == MAGNITUDE:

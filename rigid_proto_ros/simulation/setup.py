@@ -17,6 +17,7 @@ from ..base.vectors import Points, Records, StateRow, Triangles, Vector, Vector3
 from ..mass import INERTIA_MODELS
 from ..mass.properties import scale_vector
 from ..mass.tensor import check_tensor
+from ..mass.walls import refused_walls
 from ..motion.body import LENGTH, Body
 from ..motion.integrators import INTEGRATORS, check_supported
 from ..motion.integrators.integrator import Integrator
@@ -144,6 +145,8 @@ def _refused_scene(scene: np.record, refusal: np.record, mesh_name: str) -> Inpu
             return error
     if code == rf.MASS:
         return InputError("mass", float(refusal.numbers[0]), "density * volume within 1e-300 .. 1e300 kg")
+    if code == rf.WALLS:
+        return refused_walls(*refusal.numbers.tolist())
     if code == rf.ORIENTATION:
         accepted = "four finite numbers x, y, z, w, not all zero"
         return InputError("initial.orientation_xyzw", scene.initial_orientation_xyzw.tolist(), accepted)

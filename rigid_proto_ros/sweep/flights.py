@@ -26,12 +26,12 @@ from pathlib import Path
 from typing import TypeVar
 
 from ..base.errors import CommandRefused, InputError
+from ..base.yaml_text import plain
 from ..motion.state import State
 from ..scene.scenario import Scenario, read_scene
 from ..scene.scenario_run import OfflineRun
 from ..scene.script import MAX_TIME_S, expand_entry
 from ..scene.sensitivity import sensitivity_of
-from ..scene.yaml_text import plain
 from ..simulation.commands import Command, nanoseconds
 from ..simulation.observer import Observer
 from ..simulation.quantities import DIFFERENCES

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from ..base.errors import InputError
 from ..base.files import output_file
 from ..base.vectors import BoolArray, FloatArray, IntArray, Records
+from ..base.yaml_text import plain
 from ..motion.loads import FORCE, TORQUE
 from ..parameters.declarations import HUGE, Value, parameter_named, with_mass_of_density
 from ..scene.scenario import Scenario, build_scenario
 from ..scene.scenario_run import OfflineRun
 from ..scene.script import MAX_TIME_S, expand_script, script_text
-from ..scene.yaml_text import plain
 from ..simulation import batch
 from ..simulation import flight as fl
 from ..simulation.commands import ClearWrench, Command, Pending, WrenchCommand, row_of

@@ -26,6 +26,7 @@ from ..base.errors import InputError, MeshError, did_you_mean
 from ..base.library import stamp
 from ..base.provenance import MOTION
 from ..base.vectors import IntArray
+from ..base.yaml_text import load_yaml, plain, read_text
 from ..mesh.reading import Mesh, load_mesh
 from ..parameters.declarations import (
     READ_ONLY,
@@ -40,7 +41,6 @@ from ..scene.scenario_run import OfflineRun
 from ..scene.scene_file import scene_file, scene_values
 from ..scene.script import expand_script
 from ..scene.sensitivity import finer_values
-from ..scene.yaml_text import load_yaml, plain, read_text
 from ..simulation.commands import Command, nanoseconds
 from .fields import mapping, number, whole
 from .measures import Measures, read_measures

@@ -163,7 +163,7 @@ def test_what_is_refused_says_what_would_be_accepted(capsys, arguments, words):
 
 @pytest.mark.parametrize(
     "arguments",
-    [("book", "--mass", "heavy"), ("book", "--scale", "two"), ("book", "hammer"), ("book", "--model", "cuboid"), ("book", "--json", "--urdf"), ("book", "--colour"), ("book", "--model", "explicit")],
+    [("book", "--mass", "heavy"), ("book", "--scale", "two"), ("book", "--model", "cuboid"), ("book", "--json", "--urdf"), ("book", "--colour"), ("book", "--model", "explicit")],
 )  # fmt: skip
 def test_wrong_usage_exits_2_with_one_line(capsys, arguments):
     with pytest.raises(SystemExit) as ended:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -18,13 +19,13 @@ from page_tools import TESTS, kernels, node, packages, run_node
 
 from rigid_proto_ros.base.bundled import example_names, example_path, scene_path
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.base.yaml_text import yaml_value
 from rigid_proto_ros.page.bundle import SOURCE
 from rigid_proto_ros.page.file import take_of
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.scene_file import scene_values
 from rigid_proto_ros.scene.script import expand_script, parse_script, read_script
-from rigid_proto_ros.scene.yaml_text import yaml_value
 from rigid_proto_ros.simulation.commands import nanoseconds
 
 
@@ -62,6 +63,9 @@ REFUSED: list[tuple[dict[str, Any], dict[str, Any] | None]] = [
     ({**SCENE, "string.attached": True}, {"set": {"string.stiffness": 1e20}}),
     ({**SCENE, "string.attached": True, "string.stiffness": 1e6}, {"set": {"string.damping_ratio": 1e6}}),
     (SCENE, {"set": {"initial.orientation_xyzw": [0.0, 0.0, 0.0, 0.0]}}),
+    (SCENE, {"set": {"inertia_model": "walled", "wall_thickness": 0.02}}),
+    (SCENE, {"set": {"inertia_model": "walled", "wall_thickness": 0.0}}),
+    (SCENE, {"set": {"inertia_model": "walled", "infill": 1.5}}),
     (SCENE, {"set": {"contacts.tip": [0.0, 0.0, 0.0]}}),
     ({**SCENE, "integrator": "lie_midpoint"}, {"set": {"gyroscopic": False}}),
     (SCENE, {"force": [1e20, 0.0, 0.0]}),
@@ -136,6 +140,9 @@ def test_a_mesh_of_one_s_own_flies_as_python_flies_it(page_file: Path, tmp_path:
         "quads.obj": (mf.obj(faces=mf.CUBE_QUADS), {"inertia_model": "shell", "scale": [1.0, 2.0, 0.5], "mass": 1.0}),
         "open.obj": (mf.obj(faces=mf.CUBE_QUADS[1:]), {"mesh_repair": True}),
         "two.obj": (mf.obj(*overlapping), {}),
+        "walls.obj": (mf.obj(faces=mf.CUBE_QUADS), {"inertia_model": "walled", "wall_thickness": 0.03}),
+        "stretched.obj": (mf.obj(), {"inertia_model": "walled", "wall_thickness": 0.01, "scale": [1.0, -2.0, 0.5]}),
+        "parts.yaml": (b"parts: {a: {mesh: cube.ply, mass: 5}, b: {mesh: two.obj, position: [2, 0, 0]}}", {}),
     }
     for name, (content, values) in files.items():
         mesh = tmp_path / name
@@ -150,7 +157,11 @@ def test_a_mesh_of_one_s_own_flies_as_python_flies_it(page_file: Path, tmp_path:
         saved = tmp_path / "saved"
         saved.mkdir(exist_ok=True)
         (saved / "scene.yaml").write_text(told["files"]["scene"])
-        (saved / told["files"]["mesh"]["name"]).write_text(told["files"]["mesh"]["text"])
+        if not name.endswith(".yaml"):
+            (saved / told["files"]["mesh"]["name"]).write_text(told["files"]["mesh"]["text"])
+        else:  # a page has no files of parts: they are those that it was made of
+            assert told["files"]["mesh"] is None
+            shutil.copytree(tmp_path, saved, dirs_exist_ok=True, ignore=shutil.ignore_patterns("saved"))
         run = OfflineRun(make_scenario(given))
         run.advance(nanoseconds(1.5))
         assert told["hash"] == run.simulation.state.sha256(), name

@@ -26,6 +26,7 @@ from rigid_proto_ros.simulation.record import (
     SCENE_PARAMETERS,
     SHELL,
     SOLID,
+    WALLED,
     field_of,
 )
 from rigid_proto_ros.simulation.refusals import AUTO, OUT_OF_BOUNDS, REFUSAL
@@ -108,7 +109,14 @@ def test_the_record_of_all_defaults_has_them(field: str) -> None:
 def test_numbers_of_choices_are_those_of_the_parameters() -> None:
     for field, choices in (("inertia_model", INERTIA_MODELS), ("integrator", tuple(INTEGRATORS))):
         assert DECLARED[field].choices == choices
-    models = {"solid": SOLID, "shell": SHELL, "points": POINTS, "bounding_box": BOUNDING_BOX, "explicit": EXPLICIT}
+    models = {
+        "solid": SOLID,
+        "shell": SHELL,
+        "points": POINTS,
+        "bounding_box": BOUNDING_BOX,
+        "walled": WALLED,
+        "explicit": EXPLICIT,
+    }
     assert {name: INERTIA_MODELS.index(name) for name in INERTIA_MODELS} == models
     assert list(INTEGRATORS)[AUTO] == "auto"
 

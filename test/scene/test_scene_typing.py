@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
+from rigid_proto_ros.base import yaml_text
 from rigid_proto_ros.base.bundled import scene_names, scene_path
 from rigid_proto_ros.base.errors import InputError
+from rigid_proto_ros.base.yaml_text import scalar
 from rigid_proto_ros.mesh.locate import resolve_mesh
 from rigid_proto_ros.ros.arguments import given_arguments
-from rigid_proto_ros.scene import yaml_text
 from rigid_proto_ros.scene.scenario import make_scenario, read_scene
 from rigid_proto_ros.scene.scene_file import read_scene_file, read_scene_text, scene_values
 from rigid_proto_ros.scene.script import parse_script
-from rigid_proto_ros.scene.yaml_text import scalar
 
 NUMBERS = "1 -1 +1 0 007 010 0x10 -0x1F 1. 1.0 .5 -.5 +2.5 1e3 1e-3 1.5E+2 1e400 1_000 0b1 0o7 09 1e e5 --1 1:30"
 TEXTS = "true True TRUE yes no y N on Off false tRUE ja .inf -.inf .nan .NaN inf nan abc 1abc 2020-01-01"

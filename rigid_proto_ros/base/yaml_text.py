@@ -17,8 +17,8 @@ from typing import Any, NoReturn
 import numpy as np
 import yaml
 
-from ..base.errors import InputError
-from ..base.files import read_bounded
+from .errors import InputError
+from .files import read_bounded
 
 MAX_BYTES = 16 << 20
 """Larger than any scene or script; a mesh given by mistake stops here instead of in the YAML reader."""
