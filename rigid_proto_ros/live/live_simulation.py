@@ -273,7 +273,9 @@ class LiveSimulation:
         return named
 
     def set_parameters(self, changes: Mapping[str, object]) -> None:
-        """Change all these parameters at once. Raises InputError and then changes none. Setting density sets mass to 0."""
+        """Change all these parameters at once. Raises InputError and then changes none. Setting density
+        sets mass to 0.
+        """
         self.give_up_failed_recording()
         # Loading a mesh takes too long for the physics thread: ``with_changes`` here fills the cache.
         loop = self.loop

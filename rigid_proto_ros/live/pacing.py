@@ -119,7 +119,9 @@ class Pace:
 
     @property
     def offset_ns(self) -> int:
-        """The followed clock minus simulated time at the anchor [ns]; 0 without a followed clock or before it starts."""
+        """The followed clock minus simulated time at the anchor [ns]; 0 without a followed clock or before
+        it starts.
+        """
         return self.anchored_ns - self._anchor_simulated_ns if self.followed and self.anchored_ns else 0
 
     def present_ns(self, reached_ns: int, next_publication_ns: int, idle: bool = False) -> int:

@@ -434,7 +434,9 @@ class SimulationLoop(ScenarioRun):
             self.endpoints.publish(self)
 
     def _publish_next(self) -> bool:
-        """Advance to the next publication and publish it; False if the tick's budget ends before or the motion failed."""
+        """Advance to the next publication and publish it; False if the tick's budget ends before or the
+        motion failed.
+        """
         if self.publications.next_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
             return False
