@@ -13,7 +13,7 @@ import rerun as rr
 
 from ..base.errors import InputError
 from ..base.ports import LOOPBACK
-from ..session.mailbox import Noted
+from ..session.mailbox import TimedEvent
 from . import viewers
 from .backend import Stream, last_line
 from .observer import RerunObserver
@@ -106,7 +106,7 @@ class LiveView(RerunObserver):
             # At the end of the process the library would wait, without limit, for every recording to be taken.
             rr.unregister_shutdown()
 
-    def _write(self, events: list[Noted]) -> None:
+    def _write(self, events: list[TimedEvent]) -> None:
         """Now and then what was said long ago again: the server drops the oldest, so viewers that come late lack it."""
         super()._write(events)
         self._rows_since_repeat += len(events)

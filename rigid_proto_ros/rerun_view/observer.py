@@ -31,7 +31,7 @@ from ..base.rotation import matrix_from_quaternion
 from ..base.vectors import StateRow
 from ..picture import style
 from ..picture.picture import Picture
-from ..session.mailbox import BATCH, Noted, WritingObserver
+from ..session.mailbox import BATCH, TimedEvent, WritingObserver
 from ..simulation.observer import (
     AccuracyFloor,
     Applied,
@@ -112,7 +112,7 @@ class RerunObserver(WritingObserver):
 
     # The thread
 
-    def _write_what_waits(self) -> None:
+    def _write_waiting(self) -> None:
         for events in self._mailbox.take():
             if self._stream is not None:
                 self._write(events)
@@ -130,7 +130,7 @@ class RerunObserver(WritingObserver):
         stream, self._stream = self._stream, None
         refused = isinstance(error, OSError)
         # Told first: what the library does with a file that it can't write may take for ever.
-        self._tell_end(str(error) if refused else f"{type(error).__name__}: {error}")
+        self._report_failure(str(error) if refused else f"{type(error).__name__}: {error}")
         if refused:
             rr.unregister_shutdown()
         if stream is None:
@@ -197,9 +197,9 @@ class RerunObserver(WritingObserver):
 
     # What happens in it
 
-    def _write(self, events: list[Noted]) -> None:
+    def _write(self, events: list[TimedEvent]) -> None:
         """Send what happened; nothing to a stream that is behind, which must be told later how things are then."""
-        states: list[Noted] = []
+        states: list[TimedEvent] = []
         stream = self._stream
         if stream is not None and events:
             stream.missed |= stream.behind
@@ -257,7 +257,7 @@ class RerunObserver(WritingObserver):
                 attitudes = None if frame == style.CENTRE else row[np.newaxis, 3:7]
                 self._backend.place(frame, row[np.newaxis, 0:3], attitudes)
 
-    def _write_states(self, states: list[Noted]) -> None:
+    def _write_states(self, states: list[TimedEvent]) -> None:
         """The picture of states, which all belong to the present body, and what happened."""
         self._commanded |= bool(self._lines)
         for entity, lines in self._lines.items():
@@ -311,12 +311,12 @@ class FileRecorder(RerunObserver):
         self._mailbox.moved()
         self._stream = None
 
-    def _write_what_waits(self) -> None:
+    def _write_waiting(self) -> None:
         """Every WRITE_S, when much waits, and at the end; in between only look whether the file can be written."""
         now_s, mailbox = time.monotonic(), self._mailbox
         if now_s >= self._write_at_s or mailbox.closed or mailbox.waiting >= BATCH:
             self._write_at_s = now_s + WRITE_S
-            super()._write_what_waits()
+            super()._write_waiting()
         elif isinstance(self._stream, FileStream):
             self._stream.check()
 
