@@ -122,16 +122,16 @@ def wait_for(condition: Callable[[], Any]) -> Any:
 def flush(observer: Observer) -> None:
     """Wait until everything so far was handed to the file and the viewers."""
     observer._write_at_s = 0.0
-    own, passes = observer._write_what_waits, []
+    own, passes = observer._write_waiting, []
 
     def counted() -> None:
         own()
         passes.append(1)
 
-    observer._write_what_waits = counted
+    observer._write_waiting = counted
     observer._mailbox.wake()
     wait_for(lambda: passes)
-    observer._write_what_waits = own
+    observer._write_waiting = own
 
 
 def record_batches(path: Path) -> Iterator[tuple[str, bool, Any]]:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// What stands behind the # of the page's address: a lesson, class mode and a language, by name; or a take (take.ts).
+// The fragment (#) of the page's address: a lesson, class mode and a language, by name; or a take (take.ts).
 
 export interface Address {
   readonly lesson: string;

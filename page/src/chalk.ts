@@ -4,17 +4,18 @@
 
 import type { Hit, Motion, Vec3 } from "./source.ts";
 
-/** Chalk lies this many of the body's lengths above the surface, where it is seen. */
+/** Height of chalk above the surface, in lengths of the body, so that the surface doesn't hide it. */
 const ABOVE = 0.004;
 const SAMPLES = 160;
 
-/** Where chalk lies [mesh] that was put on the body here. */
+/** The position [mesh] of chalk at a hit on the body. */
 export function chalked(motion: Motion, { body, normal }: Hit): Vec3 {
   const { rotation: R } = motion.snapshot().body, info = motion.body(), up = ABOVE * info.length;
   return body.map((c, k) => (c + info.com[k]! + up * (R[k]! * normal[0] + R[3 + k]! * normal[1] + R[6 + k]! * normal[2])) / info.scale[k]!) as unknown as Vec3;
 }
 
-/** Pairs of points [mesh]: a line through a point along a direction [both of the world], on both of the body's broad sides. */
+/** Line segments, as pairs of points [mesh], along a line through a point in a direction [both world], on both broad
+ * sides of the body. */
 export function lineOnBody(motion: Motion, point: Vec3, along: Vec3): readonly number[] {
   const { vertices, scale, length } = motion.body(), R = motion.snapshot().body.rotation;
   const sides = [0, 1, 2].map((k) => {

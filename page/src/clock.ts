@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Time: playing, slower, by steps, back to any moment and on from there; and the bar where one does so.
+// Time: play, slow motion, steps, seeking back and continuing from there; and its bar.
 
 import { button, icon, make, say } from "./panel_elements.ts";
 import type { Entry, Motion } from "./source.ts";
@@ -8,13 +8,15 @@ import { words } from "./words.ts";
 
 const RATES = [1, 0.5, 0.25, 0.1, 0.02] as const;
 const STEP_NS = 10_000_000, BACK_NS = 2_000_000_000;
-/** [ms] of the wall clock that a picture makes up for: after a pause that nobody saw the body goes on from where it was. */
+/** [ms of the wall clock] Longest time by which a frame advances the motion; a longer gap, such as of a hidden page, is
+ * skipped. */
 const MOST_MS = 100;
-/** [ns] Pictures show times that are multiples of this, less than anyone sees: a link holds the time of each thing done. */
+/** [ns] Frames are at multiples of this time, which is too short to be seen, so that a link has short times of
+ * commands. */
 const GRAIN_NS = 100_000;
-/** [ms] Between two readings of the time: each has the page put its bar together anew. */
+/** [ms] Shortest period of updating the bar, since an update makes the browser lay it out again. */
 const READ_MS = 90;
-/** [s] The bar spans this, or twice, four times as much. */
+/** [s] Span of the bar; it is doubled as often as necessary. */
 const SPAN_S = 10;
 
 const PLAY = "M7 4v16l13-8z", PAUSE = "M6 4h4.5v16H6zM13.5 4H18v16h-4.5z", STEP = "M5 4v16l11-8zM17 4h3v16h-3z";
@@ -22,7 +24,7 @@ const RESET = "M12 5V1.5L6.5 6.5 12 11.500V8a5.500 5.500 0 1 1-5.500 5.500H3.500
 
 export class Clock {
   paused = false;
-  /** Why time stands and can't go on, or "". */
+  /** Why time is paused and can't be resumed, or "". */
   held = "";
   rate: number = RATES[0];
   readonly node: HTMLElement;
@@ -53,7 +55,7 @@ export class Clock {
     this.scrub.addEventListener("pointerdown", () => { this.scrubbing = true; });
     for (const end of ["pointerup", "pointercancel", "blur"]) this.scrub.addEventListener(end, () => { this.scrubbing = false; });
     this.scrub.addEventListener("input", () => { this.wanted = (Number(this.scrub.value) / 1000) * this.span * 1e9; });
-    // By keys one second at a time, whatever the bar spans.
+    // Keys move by one second, independent of the bar's span.
     this.scrub.addEventListener("keydown", (event) => {
       const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -5, PageUp: 5 }[event.key];
       const end = this.motion.history().endNs, now = this.motion.snapshot().timeNs;
@@ -104,7 +106,7 @@ export class Clock {
     this.motion.advance(this.motion.snapshot().timeNs + STEP_NS);
   }
 
-  /** Fly on by what the wall clock has [ms] since the picture before. */
+  /** Advance the motion; milliseconds: wall time since the last frame. */
   advance(milliseconds: number): void {
     if (this.wanted !== null) {
       this.motion.goTo(Math.round(Math.max(0, Math.min(this.motion.history().endNs, this.wanted))));
@@ -118,7 +120,7 @@ export class Clock {
     this.owedNs = nowNs + passedNs - untilNs;
   }
 
-  /** What was done has changed: other marks; or a node's time goes otherwise. */
+  /** The history has changed, so marks must be updated; or a node's time was paused, resumed or changed its rate. */
   changed(): void {
     this.stale = true;
     const { node } = this.motion;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 //
-// What the page has of Python's declarations (rigid_proto_ros/page/data.py): parameters, words, bodies, scenes.
+// Python's declarations as embedded in the page (rigid_proto_ros/page/data.py): parameters, words, bodies, scenes.
 
 import type { LessonTexts } from "./lessons.ts";
 import type { Parameter, Value } from "./source.ts";
 
-/** Texts by what they are about, with places (numbers.ts, `filled`). */
+/** Texts with placeholders (numbers.ts, `filled`), by their subject. */
 export interface Words {
   readonly accepted: string;
   readonly scale: string;
@@ -43,7 +43,7 @@ export interface Declarations {
   /** field of the record SCENE, by the parameter's name */
   readonly fields: Readonly<Record<string, string>>;
   readonly models: readonly string[];
-  /** order: null of one that chooses its steps, or is exact */
+  /** order: null if the integrator is adaptive or exact */
   readonly integrators: readonly { readonly name: string; readonly supports: readonly number[]; readonly order: number | null }[];
   /** doubles of an integrator's workspace */
   readonly room: number;
@@ -53,11 +53,11 @@ export interface Declarations {
   readonly lessons: Readonly<Record<string, LessonTexts>>;
   readonly forms: Readonly<Record<string, Form>>;
   readonly start: string;
-  /** longest side of a mesh file [mesh units] above which its unit is taken for a millimetre */
+  /** longest side of a mesh file [mesh units] above which its unit is assumed to be a millimetre */
   readonly longest: number;
 }
 
-/** The declarations, and the bundled meshes as they are asked for. */
+/** The declarations, and the bundled meshes, which are decoded on request. */
 export class Data {
   readonly declared: Declarations;
   readonly #numbers: Uint8Array;
@@ -78,7 +78,7 @@ export class Data {
     return { vertices: Float64Array.from(whole, (x) => x / unit), triangles };
   }
 
-  /** Rows of three whole numbers, of the planes that data.py makes. */
+  /** Rows of three integers, decoded from the byte planes that data.py writes. */
   #rows(at: number, count: number): Int32Array {
     const all = 3 * count, rows = new Int32Array(all), bytes = this.#numbers;
     for (let column = 0; column < 3; column++) {

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: MIT
 //
-// What physics engines were measured to do with a free body (benchmarks/engines.py).
+// Measured motion of a free body in physics engines (benchmarks/engines.py).
 
 import table from "../../benchmarks/results/engines.csv";
 
-/** 60 s of a body that spins nearly about its middle axis; the exact motion flips 9 times. turnDeg: of L, at most. */
+/** 60 s of a body that spins nearly about its intermediate axis; the exact motion flips 9 times. turnDeg: largest
+ * change of L's direction. */
 export interface Measured {
   readonly engine: string;
   readonly version: string;
   readonly way: string;
   readonly stepS: number;
   readonly flips: number;
-  /** of the energy at the start; NaN of one that wasn't flown */
+  /** relative to the energy at the start; NaN if it wasn't measured */
   readonly energyChange: number;
   readonly turnDeg: number;
-  /** which of our own motions was flown beside it (ghosts.ts), or "" */
+  /** name of the ghost with the same motion (ghosts.ts), or "" */
   readonly ghost: string;
   readonly date: string;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// One flight in the memory of the kernels: it is begun, flown on, commanded, kept and put back. What is done here to a
-// flight is what rigid_proto_ros/simulation/simulation.py does, in the same order: the same bits follow.
+// One flight in the kernels' memory: start, advance, commands, saving and restoring its state. The operations and their
+// order are those of rigid_proto_ros/simulation/simulation.py, so the results are the same bit for bit.
 
 import type { Declarations } from "./data.ts";
 import { Event, Flight, LoadRow, NUMBERS, Scene } from "./kernels.ts";
@@ -12,10 +12,10 @@ import type { Command, Load } from "./script.ts";
 import type { Values } from "./source.ts";
 import type { Placed, Surfaces } from "./surface.ts";
 
-/** Loads that may act at once; more are a mistake of a script. */
+/** Largest number of loads that act at the same time; more are most likely a mistake in a script. */
 const ROWS = 1024;
 
-/** What a flight is at one time, to be put back. */
+/** The saved state of a flight. */
 export interface Kept {
   readonly values: Values;
   readonly scene: Uint8Array;
@@ -39,7 +39,7 @@ export class Flown {
   readonly #newScene: Scene;
   readonly #scratch: Flight;
   readonly #slots: string[] = [];
-  /** Parameters in force, all of them. */
+  /** All present parameters. */
   values: Values = {};
   /** Why the motion stopped, or "". */
   failure = "";
@@ -73,7 +73,7 @@ export class Flown {
     return this.#slots[number - NUMBERS.command.UNNAMED_SLOT - 1] ?? "";
   }
 
-  /** Begin at time 0 with all values, on the surface that is in place. Throws Refused, and then all is as it was. */
+  /** Start at time 0 with these parameters, on the present surface. Throws Refused and then changes nothing. */
   begin(values: Values): void {
     const memory = this.#kernels.memory;
     this.#check(values);
@@ -85,7 +85,7 @@ export class Flown {
     this.#operate(NUMBERS.operation.BEGIN);
   }
 
-  /** Whether there is a flight of these values; its scene is in newScene, and its start in scratch. Throws Refused. */
+  /** Check parameters: puts their scene into newScene and the flight's start into scratch. Throws Refused. */
   #check(values: Values): void {
     const memory = this.#kernels.memory, placed = this.#placed, { refusal } = NUMBERS;
     fillScene(this.#newScene, values, this.#declared);
@@ -99,7 +99,7 @@ export class Flown {
     }
   }
 
-  /** Fly on; stops in the last good state where the motion fails. */
+  /** Advance; stops in the last good state if the motion fails. */
   fly(untilNs: number): void {
     const { operation, flight } = NUMBERS;
     if (this.failure !== "" || untilNs <= this.timeNs) return;
@@ -112,17 +112,17 @@ export class Flown {
     this.#operate(operation.FINISH);
   }
 
-  /** End what ends now; whether anything did. */
+  /** End the loads and the string that end now; returns whether there were any. */
   endDue(): boolean {
     return this.#operate(NUMBERS.operation.END_DUE) !== 0;
   }
 
-  /** A new segment: after all that was done at one time. */
+  /** Start a new segment, after all commands of one time. */
   cut(): void {
     this.#operate(NUMBERS.operation.CUT);
   }
 
-  /** Do a command now. Throws Refused. */
+  /** Apply a command now. Throws Refused. */
   command(command: Exclude<Command, { set: unknown }>): void {
     const { kernels, placed } = { kernels: this.#kernels, placed: this.#placed };
     const number = this.flight.acting;
@@ -155,7 +155,7 @@ export class Flown {
     return known >= 0 ? known : this.#slots.push(name) - 1;
   }
 
-  /** Go on with other values, on the surface that is in place; sameMesh: it was before. Throws Refused. */
+  /** Continue with other parameters, on the present surface. sameMesh: the mesh hasn't changed. Throws Refused. */
   change(values: Values, sameMesh: boolean): void {
     const kernels = this.#kernels, memory = kernels.memory;
     this.#check(values);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 //
-// Ghosts by the name of the engines that do the same, as benchmarks/engines.py has measured.
+// Ghosts named after engines that have the same error, as measured by benchmarks/engines.py.
 
 import type { GhostChoice } from "./source.ts";
 
 export const NO_GHOST: GhostChoice = { inertia_model: "", integrator: "", step: 0, gyroscopic: true };
 
-/** beside: what the benchmark calls the ghost. MuJoCo's step is that of a picture, as the parameter step rounds it. */
+/** beside: name of the ghost in the benchmark. MuJoCo's step is 1/60 s, rounded as the parameter step is. */
 interface Named { readonly choice: GhostChoice; readonly beside: string }
 
 export const NAMED: Readonly<Record<"gyroscopic" | "mujoco", Named>> = {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 //
-// The languages of the page beside English, by their codes. How one is added: docs/translations.md.
+// Languages of the page besides English, by code. docs/translations.md says how to add one.
 
 import type { LessonTexts } from "./lessons.ts";
 import type { Words } from "./words.ts";
 
-/** The page's words, and the texts of those lessons that are translated; the others stay English. */
+/** The page's words, and the texts of translated lessons; other lessons are shown in English. */
 export interface Language {
   readonly words: Words;
   readonly lessons: Readonly<Record<string, LessonTexts>>;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 //
-// What a lesson is, what it takes note of, and how far it has come. Nothing here knows the page: Node plays lessons, too.
-// What each lesson's steps are about stands in lessons_steps.ts, its texts in the head of its scene.
+// A lesson: its definition, the record of what the user has done, and its progress. Independent of the DOM, so that
+// Node can play lessons, too. The steps of each lesson are in lessons_steps.ts, its texts in the head of its scene.
 
 import type { BodyInfo, Entry, GhostChoice, Motion, Snapshot, Values, Vec3 } from "./source.ts";
 import type { Words } from "./words.ts";
 
-/** A lesson's texts, as rigid_proto_ros/page/data.py writes them from the head of its scene. answer: number of a choice. */
+/** A lesson's texts, which rigid_proto_ros/page/data.py takes from the head of its scene. answer: index of the right
+ * choice. */
 export interface LessonTexts {
   readonly title: string;
   readonly question: string;
@@ -16,7 +17,7 @@ export interface LessonTexts {
   readonly reason: string;
 }
 
-/** An instant as it was seen. entries: how many of the trial's script had acted. */
+/** A recorded instant. entries: number of the trial's script entries that had acted. */
 export interface Seen {
   readonly now: Snapshot;
   readonly info: BodyInfo;
@@ -24,17 +25,17 @@ export interface Seen {
   readonly entries: number;
 }
 
-/** One flight from a start on. start: the values in force then. */
+/** One flight from its start. start: the parameters at the start. */
 export interface Trial {
   readonly start: Values;
   readonly script: readonly Entry[];
   readonly seen: readonly Seen[];
 }
 
-/** A line drawn in chalk while the string was at rest: through the knot along the string. [mesh], both. */
+/** A chalk line along the string, drawn while the body hung at rest: through the knot. point, along [mesh]. */
 export interface ChalkLine { readonly point: Vec3; readonly along: Vec3 }
 
-/** What one has chosen to see beside the motion. */
+/** The user's choices of what is shown beside the motion. */
 export interface Sight {
   readonly turned: readonly number[] | null;
   readonly principal: boolean;
@@ -46,8 +47,8 @@ export interface Sight {
   readonly cards: readonly string[];
 }
 
-/** What a step's condition is about. scene: the values with which the lesson began. trials: since then, the last one is
- * the present one. trial, from: when the step began, the number of a trial and of the first instant in it. */
+/** The input of a step's condition. scene: the parameters at the start of the lesson. trials: all since then; the last
+ * one is the present one. trial, from: indices of the trial and of the instant at which the step began. */
 export interface Account {
   readonly scene: Values;
   readonly trials: readonly Trial[];
@@ -57,9 +58,9 @@ export interface Account {
   readonly sight: Sight;
 }
 
-/** What a step's button does. poke: at a contact or "com", along [body axes]; fresh: from the start anew. start, set:
- * these values, start from the scene's start anew. ghost: another one, from the start anew. card: opens it and marks the
- * element. pull, press, tie: lead to the picture. */
+/** The action of a step's button. poke: at a contact or "com", along [body axes]; fresh: after a restart. start, set:
+ * set values; start also restarts the scene. ghost: restarts with another ghost. card: opens a card and marks an
+ * element. pull, press, tie: point to the picture. */
 export type Act = { readonly text: (words: Words["lesson"]) => string } & (
   | { readonly kind: "poke"; readonly at: string; readonly along: Vec3; readonly fresh?: boolean }
   | { readonly kind: "start" | "set"; readonly values: (scene: Values, info: BodyInfo) => Values }
@@ -70,15 +71,15 @@ export type Act = { readonly text: (words: Words["lesson"]) => string } & (
 );
 
 export interface Step {
-  /** Whether what the step is about has happened. */
+  /** Whether the step's condition is fulfilled. */
   readonly done: (account: Account) => boolean;
   readonly acts: readonly Act[];
 }
 
-/** What a lesson needs of the page. marks: contacts, or "com", whose places are marked in the picture. rate: of time.
- * trace: of a point from the answer on. plots: in class mode. hidesCentre: the centre of mass and the arrows that begin in
- * it aren't drawn until the question is answered, or until the last step is done, where they would answer it. */
-export interface Course {
+/** The plan of a lesson. marks: contacts, or "com", that are marked in the picture. rate: of time. trace: of a point,
+ * after the answer. plots: in class mode. hidesCentre: the centre of mass and arrows that start there would give the
+ * answer, so they aren't drawn until the question is answered, or until the last step is done. */
+export interface LessonPlan {
   readonly steps: readonly Step[];
   readonly marks?: readonly string[];
   readonly rate?: number;
@@ -87,24 +88,26 @@ export interface Course {
   readonly hidesCentre?: "question" | "end";
 }
 
-/** [ns] Instants that are kept lie this far apart, and there are this many of a trial; then every second one goes. */
+/** Shortest time between recorded instants [ns], and their largest number in a trial; beyond it every second one is
+ * dropped. */
 const APART_NS = 15_000_000, MOST = 4000;
-/** At rest: so slow [rad/s, and body lengths a second] for so long [ns]. A body that swings stands still at each turn. */
+/** A body is at rest if it is slower than this [rad/s, and body lengths per second] for this time [ns]; a swinging body
+ * is slow at each turning point. */
 const REST_SPEED = 0.03, REST_NS = 600_000_000;
-/** Trials that are kept: comparisons are with the one before. */
+/** Largest number of recorded trials; steps compare with earlier ones. */
 const MOST_TRIALS = 40;
 
 interface Open { start: Values; script: readonly Entry[]; seen: Seen[] }
 
-/** A lesson under way: what was answered, how many steps are done, and what was seen. */
+/** A running lesson: the answer, the number of completed steps, and the record. */
 export class Lesson {
   readonly name: string;
   readonly texts: LessonTexts;
-  readonly course: Course;
+  readonly plan: LessonPlan;
   readonly lines: ChalkLine[] = [];
-  /** The choice, once there is one. */
+  /** Index of the user's choice, or null. */
   answer: number | null = null;
-  /** How many steps are done, one after the other. */
+  /** Number of completed steps. */
   done = 0;
   readonly scene: Values;
   readonly #motion: Motion;
@@ -112,24 +115,24 @@ export class Lesson {
   #trial = 0;
   #from = 0;
 
-  constructor(name: string, texts: LessonTexts, course: Course, motion: Motion) {
+  constructor(name: string, texts: LessonTexts, plan: LessonPlan, motion: Motion) {
     this.name = name;
     this.texts = texts;
-    this.course = course;
+    this.plan = plan;
     this.#motion = motion;
     this.scene = motion.values();
     this.restarted();
   }
 
-  get finished(): boolean { return this.answer !== null && this.done === this.course.steps.length; }
+  get finished(): boolean { return this.answer !== null && this.done === this.plan.steps.length; }
 
-  /** Whether the centre of mass, and what shows it, is hidden. */
+  /** Whether the centre of mass and everything that shows it is hidden. */
   get hidesCentre(): boolean {
-    const { hidesCentre } = this.course;
+    const { hidesCentre } = this.plan;
     return hidesCentre === "end" ? !this.finished : hidesCentre === "question" && this.answer === null;
   }
 
-  /** The motion stands at a start. */
+  /** Record that the motion was restarted. */
   restarted(): void {
     this.#trials.push({ start: this.#motion.values(), script: [], seen: [] });
     if (this.#trials.length > MOST_TRIALS) {
@@ -139,7 +142,7 @@ export class Lesson {
     this.note();
   }
 
-  /** Answer the question: steps count from now on. Returns whether it is right. */
+  /** Answer the question and start the steps; returns whether the answer is right. */
   choose(choice: number): boolean {
     if (this.answer === null) {
       this.answer = choice;
@@ -153,9 +156,9 @@ export class Lesson {
     this.#from = Math.max(0, this.#trials[this.#trial]!.seen.length - 1);
   }
 
-  /** Whether a step is done now. */
+  /** Check whether the present step is fulfilled, and go to the next one if it is. */
   check(sight: Sight): boolean {
-    const step = this.course.steps[this.done];
+    const step = this.plan.steps[this.done];
     if (this.answer === null || !step) return false;
     const account: Account = { scene: this.scene, trials: this.#trials, trial: this.#trial, from: this.#from, lines: this.lines, sight };
     if (!step.done(account)) return false;
@@ -164,7 +167,7 @@ export class Lesson {
     return true;
   }
 
-  /** Whether the body has been at rest for a while, on its string. */
+  /** Whether the body has been at rest for REST_NS. */
   get isAtRest(): boolean {
     const { seen } = this.#trials[this.#trials.length - 1]!, now = seen[seen.length - 1]?.now.timeNs ?? 0;
     const late = seen.filter(({ now: { timeNs } }) => timeNs >= now - REST_NS);
@@ -174,10 +177,10 @@ export class Lesson {
     });
   }
 
-  /** Take note of this instant; more often than pictures is never needed. */
+  /** Record the present instant; call it once per frame. */
   note(): void {
     const motion = this.#motion, now = motion.snapshot(), { script, endNs } = motion.history(), trial = this.#trials[this.#trials.length - 1]!, { seen } = trial;
-    // What came after was dropped: it is another flight from there on.
+    // After a change in the past, later instants belong to a discarded flight.
     while (seen.length && seen[seen.length - 1]!.now.timeNs > endNs) seen.pop();
     if (this.#trial === this.#trials.length - 1) this.#from = Math.min(this.#from, Math.max(0, seen.length - 1));
     const last = seen[seen.length - 1], entries = now.timeNs >= endNs ? script.length : script.filter((entry) => (entry.t ?? 0) * 1e9 <= now.timeNs).length;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 //
-// The lessons' steps, by the name of the scene, as many as the head of the scene has sentences: what each is about, and the
-// buttons that do it or lead to where it is done. A condition is a function of what was seen and done (lessons_seen.ts):
-// a place, a value, or an outcome, and never the press of a button.
+// The steps of each lesson, by the scene's name, one per sentence in the head of the scene: a condition, and buttons
+// that fulfil it or point to where the user can. A condition is a function of the record (lessons_seen.ts): a place, a
+// value, or an outcome, never the press of a button.
 
 import { isSameGhost, NAMED } from "./ghosts.ts";
-import type { Account, Act, Course, Seen, Step } from "./lessons.ts";
+import type { Account, Act, LessonPlan, Seen, Step } from "./lessons.ts";
 import {
   alike, axis, between, earlier, flips, free, isAt, isVector, lasted, latest, minus, momentum, newPokes, ofGhost, omega, onlyPoke, pokes, precessed, present, since, size,
   speedGiven, spinGiven, startSpin, steady, strayed, tilted, turns, untouched,
@@ -25,18 +25,18 @@ const press: Act = { kind: "press", text: (w) => w.press };
 const ghost = (name: keyof typeof NAMED): Act => ({ kind: "ghost", choice: NAMED[name].choice, text: (w) => w.ghosts[name] });
 const spun = (factor: number): ((scene: Values) => Values) => (scene) => ({ "initial.angular_velocity": startSpin(scene).map((w) => w * factor) });
 
-// What steps are about
+// Conditions
 
 const watch = (done: Step["done"]): Step => ({ done, acts: [again] });
 const unturned = (trial: { readonly start: Values }, scene: Values): boolean => isVector(startSpin(trial.start), startSpin(scene));
 
-/** The whole present trial from its start on, none of it if somebody touched the body. */
+/** The present trial from its start if the body wasn't touched; otherwise nothing. */
 function whole(account: Account): readonly Seen[] {
   const { script, seen } = present(account);
   return seen[0]?.now.timeNs === 0 && script.every((entry) => "set" in entry) ? seen : [];
 }
 
-/** A throw about an axis of the mesh, at the lesson's speed. */
+/** The present trial if it is a throw about this axis of the mesh at the lesson's speed; otherwise nothing. */
 function thrown(account: Account, k: number): readonly Seen[] {
   const spin = startSpin(present(account).start), all = size(startSpin(account.scene));
   return Math.abs(spin[k]!) > 0.99 * size(spin) && alike(size(spin), all, 0.2) ? whole(account) : [];
@@ -47,8 +47,9 @@ const throwAbout = (k: 0 | 1 | 2, slow: number): Act => start((w) => w.throwAbou
   return { "initial.angular_velocity": [0, 1, 2].map((i) => (i === k ? all : slow)) };
 });
 
-/** A book or racket: unstable about one axis of the mesh, steady about the others, and about none without the term. */
-const throws = (unsteady: 0 | 1 | 2, others: readonly [0 | 1 | 2, 0 | 1 | 2], slow: number): Course => ({
+/** A book or racket: rotation is unstable about one axis of the mesh, stable about the others, and stable about all
+ * without ω × Iω. */
+const throws = (unsteady: 0 | 1 | 2, others: readonly [0 | 1 | 2, 0 | 1 | 2], slow: number): LessonPlan => ({
   plots: ["omega"],
   steps: [
     { done: (a) => flips(free(a), unsteady) > 0, acts: [again] },
@@ -60,7 +61,7 @@ const throws = (unsteady: 0 | 1 | 2, others: readonly [0 | 1 | 2, 0 | 1 | 2], sl
   ],
 });
 
-/** The whole trial beside this ghost. */
+/** The present trial if it has this ghost from its start; otherwise nothing. */
 const besideGhost = (a: Account, name: keyof typeof NAMED): readonly Seen[] => {
   const seen = whole(a);
   return unturned(present(a), a.scene) && hasTerm(seen) && isSameGhost(a.sight.ghost, NAMED[name].choice) && seen.every(({ now }) => now.ghost !== null) ? seen : [];
@@ -69,7 +70,7 @@ const besideGhost = (a: Account, name: keyof typeof NAMED): readonly Seen[] => {
 const hasTerm = (seen: readonly Seen[]): boolean => seen.every(({ values }) => values["gyroscopic"] !== false);
 const model = ({ values }: Seen): string => String(values["inertia_model"]);
 
-/** [kg] of ballast near a contact. */
+/** Mass of ballast near a contact [kg]. */
 function ballastAt(seen: Seen, place: string): number {
   const { info: { contacts, scale, length } } = seen, contact = contacts[place]!;
   return Object.entries(seen.values).reduce((mass, [name, value]) => {
@@ -81,7 +82,7 @@ function ballastAt(seen: Seen, place: string): number {
 
 const ballast = (seen: Seen): number => Object.entries(seen.values).reduce((mass, [name, value]) => mass + (name.startsWith("ballast.") && Array.isArray(value) ? (value as number[])[0]! : 0), 0);
 
-/** The same push as before, at this place, from rest, gives the same speed. */
+/** A step: the same push from rest as at ``before``, now at this place, gives the same speed. */
 const push = (place: string, along: Vec3, before: string | null): Step => ({
   done: (a) => {
     const poked = onlyPoke(a, place), other = before ? earlier(a, before) : null;
@@ -92,7 +93,7 @@ const push = (place: string, along: Vec3, before: string | null): Step => ({
   acts: [before ? afresh(place, along) : poke(place, along)],
 });
 
-export const COURSES: Readonly<Record<string, Course>> = {
+export const LESSON_PLANS: Readonly<Record<string, LessonPlan>> = {
   ballast_stops_flip: {
     marks: ["tip"], plots: ["omega"],
     steps: [
@@ -333,7 +334,7 @@ const isTilt = (poked: ReturnType<typeof onlyPoke>, least: number, most: number)
 const firstMass = (account: Account): number => Number(account.scene["density"]) * (account.trials[0]?.seen[0]?.info.volume ?? NaN);
 const isLevel = (seen: readonly Seen[]): boolean => seen.every((each) => Math.abs(90 - between(axis(each, 2), [0, 0, 1])) < 45);
 
-/** Whether the body is back at the height of its throw, untouched. */
+/** Whether the body has returned to the height of its throw without being touched. */
 function back(account: Account): boolean {
   const seen = whole(account), first = seen[0], last = seen[seen.length - 1];
   return first !== undefined && last !== undefined && seen.some(({ now }) => now.body.row[2]! > first.now.body.row[2]! + 0.5)
@@ -344,12 +345,12 @@ function principalAxis({ info: { axes }, now: { body: { rotation: R } } }: Seen,
   return [0, 1, 2].map((i) => R[3 * i]! * axes[k]! + R[3 * i + 1]! * axes[3 + k]! + R[3 * i + 2]! * axes[6 + k]!) as unknown as Vec3;
 }
 
-/** [degrees] by which axes (columns) are turned from those of the mesh. */
+/** Angle between these axes (columns) and those of the mesh [degrees]. */
 function strayedAxes(turned: readonly number[]): number {
   return (Math.acos(Math.max(-1, Math.min(1, 0.5 * (turned[0]! + turned[4]! + turned[8]! - 1)))) * 180) / Math.PI;
 }
 
-/** The largest product of a tensor in these axes (columns), in parts of the largest moment. */
+/** The largest product of inertia in these axes (columns), relative to the largest moment. */
 function product(axes: readonly number[], inertia: readonly number[] | undefined): number {
   if (!inertia) return Infinity;
   const column = (k: number): Vec3 => [axes[k]!, axes[3 + k]!, axes[6 + k]!];

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 //
-// The motion of a running node, over one WebSocket (rigid_proto_ros/page/live_page.py has the messages). What comes are
-// records of the node's own kernels, which are the page's: what is shown is made of them as of a flight in the page.
+// The motion of a running node, over one WebSocket (messages: rigid_proto_ros/page/live_page.py). The node sends
+// records of its kernels. The page has the same kernels, so it evaluates these records like those of its own
+// simulation.
 
 import { Data } from "./data.ts";
 import type { Declarations } from "./data.ts";
@@ -22,26 +23,26 @@ import { meshOf } from "./take.ts";
 import type { WrittenMesh } from "./take.ts";
 import { words } from "./words.ts";
 
-/** Pictures that are kept to look back at: two minutes at thirty a second, 10 MB. */
+/** Largest number of recorded pictures, for seeking back: two minutes at thirty per second, 10 MB. */
 const MOST_SEEN = 3600;
-/** Entries that are kept of what was done. */
+/** Largest number of recorded script entries. */
 const MOST_DONE = 2000;
-/** [ms] Between two tries to reach the node again. */
+/** [ms] Period of reconnection attempts. */
 const AGAIN_MS = 2000;
-/** [ns] Whoever goes nearly to the end of time looks at the present. */
+/** [ns] Seeking to less than this before the end shows the present. */
 const NEAR_NS = 60_000_000;
 /** Numbers before a picture's records, 4 bytes each. */
 const HEAD = 4;
-/** [rad/s] Of a body that is opened and has no spin of its own. */
+/** [rad/s] Initial angular velocity of an opened body whose scene has none. */
 const SPIN = [0.05, 0.1, 3];
-/** Where the page of a node is. */
+/** Path of a node's page. */
 const ADDRESS = /^\/live\/[\w-]{16,}$/;
 
-/** What the pictures of one number are of. */
+/** The scene of all pictures with this number. */
 interface Scenery { readonly number: number; readonly values: Values; readonly record: Uint8Array; readonly ghost: Uint8Array; readonly surface: Surface | null }
 interface Seen { readonly timeNs: number; readonly bytes: Uint8Array; readonly scenery: Scenery }
-/** What a node says, by its only key. */
-interface Told {
+/** A message of the node, with one of these keys. */
+interface NodeMessage {
   readonly hello?: { readonly name: string; readonly version: string; readonly owner: boolean };
   readonly mesh?: WrittenMesh | null;
   readonly scene?: { readonly number: number; readonly values: Values; readonly record: string; readonly ghost: string };
@@ -54,7 +55,7 @@ interface Told {
   readonly refusal?: string | null;
 }
 
-/** Whether this page is a node's. */
+/** Whether this page is served by a node. */
 export function isLive(): boolean {
   return /^https?:$/.test(location.protocol) && ADDRESS.test(location.pathname);
 }
@@ -117,7 +118,7 @@ export class Live implements Motion, NodeBehind {
 
   // The socket
 
-  /** Until the first picture has come. */
+  /** Connect; resolves when the first picture has arrived. */
   opened(): Promise<void> {
     document.addEventListener("visibilitychange", () => this.#send({ looking: !document.hidden }));
     return new Promise((first) => { this.#first = first; this.#connect(); });
@@ -127,7 +128,7 @@ export class Live implements Motion, NodeBehind {
     const socket = (this.#socket = new WebSocket(this.#address));
     socket.binaryType = "arraybuffer";
     socket.addEventListener("message", ({ data }: MessageEvent<ArrayBuffer | string>) => {
-      if (typeof data === "string") this.#told(JSON.parse(data) as Told);
+      if (typeof data === "string") this.#receive(JSON.parse(data) as NodeMessage);
       else this.#picture(new Uint8Array(data));
     });
     socket.addEventListener("open", () => {
@@ -150,39 +151,39 @@ export class Live implements Motion, NodeBehind {
     if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(message));
   }
 
-  #told(told: Told): void {
-    if (told.hello) {
-      this.name = told.hello.name;
-      this.hand = { ...this.hand, owner: told.hello.owner };
-      if (told.hello.version !== this.version) location.reload();
-    } else if (told.mesh !== undefined) this.#mesh = told.mesh === null ? null : meshOf(told.mesh);
-    else if (told.scene) this.#scene(told.scene);
-    else if (told.time) {
-      ({ paused: this.paused, rate: this.rate } = told.time);
-      this.#failure = told.time.failure;
+  #receive(message: NodeMessage): void {
+    if (message.hello) {
+      this.name = message.hello.name;
+      this.hand = { ...this.hand, owner: message.hello.owner };
+      if (message.hello.version !== this.version) location.reload();
+    } else if (message.mesh !== undefined) this.#mesh = message.mesh === null ? null : meshOf(message.mesh);
+    else if (message.scene) this.#scene(message.scene);
+    else if (message.time) {
+      ({ paused: this.paused, rate: this.rate } = message.time);
+      this.#failure = message.time.failure;
       this.#snapshot = this.#inMemory = null;
-    } else if (told.done) this.#done = [...this.#done, ...told.done].slice(-MOST_DONE);
-    else if (told.reset) {
+    } else if (message.done) this.#done = [...this.#done, ...message.done].slice(-MOST_DONE);
+    else if (message.reset) {
       this.began++;
       this.#done = [];
       this.#seen = [];
       this.#shownAt = this.#tying = null;
-    } else if (told.said !== undefined) this.#said(told.said);
-    else if (told.hand) {
-      this.hand = { ...told.hand, owner: this.hand.owner };
-      if (!told.hand.yours) this.#tying = null;
-    } else if (told.answer !== undefined) { this.#answered(told.answer, told.refusal ?? null); return; }
+    } else if (message.said !== undefined) this.#said(message.said);
+    else if (message.hand) {
+      this.hand = { ...message.hand, owner: this.hand.owner };
+      if (!message.hand.yours) this.#tying = null;
+    } else if (message.answer !== undefined) { this.#answered(message.answer, message.refusal ?? null); return; }
     this.#changed();
   }
 
-  #scene(scene: NonNullable<Told["scene"]>): void {
+  #scene(scene: NonNullable<NodeMessage["scene"]>): void {
     const values = { ...this.#parameters.defaults(), ...scene.values };
     let surface: Surface | null = null;
     try {
       surface = this.#surfaceOf(String(values["mesh"] ?? ""));
     } catch (error) {
       if (!(error instanceof Refused)) throw error;
-      this.#said(error.message); // it is drawn without a surface
+      this.#said(error.message); // the body is drawn without a surface
     }
     this.#coming = { number: scene.number, values, record: fromBase64(scene.record), ghost: fromBase64(scene.ghost), surface };
   }
@@ -201,7 +202,7 @@ export class Live implements Motion, NodeBehind {
     const [number] = new Uint32Array(bytes.buffer, 0, HEAD), last = this.#seen.at(-1);
     const coming = this.#coming, isNew = coming !== null && number === coming.number;
     const scenery = isNew ? coming : last?.scenery;
-    if (!scenery || number !== scenery.number) return; // of a scene that isn't told yet, or no longer
+    if (!scenery || number !== scenery.number) return; // of a scene that hasn't arrived yet, or of an earlier one
     const timeNs = Number(new DataView(bytes.buffer).getBigInt64(4 * HEAD, true));
     if (last && timeNs <= last.timeNs) this.#seen = this.#seen.filter((one) => one.timeNs < timeNs);
     this.#seen.push({ timeNs, bytes, scenery });
@@ -214,7 +215,7 @@ export class Live implements Motion, NodeBehind {
     this.#first = null;
   }
 
-  // What is there
+  // State
 
   parameters(): readonly Parameter[] { return this.#parameters.all; }
 
@@ -230,14 +231,14 @@ export class Live implements Motion, NodeBehind {
     return (this.#info ??= this.#observed.info(this.#body));
   }
 
-  /** What is shown: now, or what is looked back at. */
+  /** The picture shown: the present one, or an earlier one after seeking. */
   get #at(): Seen {
     const at = this.#shownAt ?? this.#seen.at(-1) ?? this.#inMemory;
     if (!at) throw new Error(words.live.lost);
     return at;
   }
 
-  /** Have the state that is shown in the kernels' memory. */
+  /** Copy the state shown into the kernels' memory. */
   #put(): Seen {
     const at = this.#at;
     if (at === this.#inMemory) return at;
@@ -270,7 +271,7 @@ export class Live implements Motion, NodeBehind {
     const now = this.#snapshot, tying = this.#tying;
     if (!tying || this.#shownAt) return now;
     if (now.body.string) { this.#tying = null; return now; }
-    // The hand's string is there as soon as it is tied, and not only when the node has said so.
+    // Show the hand's string as soon as it is tied, without waiting for the node's confirmation.
     const knot = this.#observed.worldPoint(this.#body, tying.attach);
     const string: StringNow = { attach: tying.attach, knot, end: tying.target, target: tying.target, force: [0, 0, 0], tension: 0, restLength: 0, releaseNs: Infinity };
     return { ...now, body: { ...now.body, string } };
@@ -283,9 +284,9 @@ export class Live implements Motion, NodeBehind {
 
   history(): History { return { script: this.#done, endNs: this.#seen.at(-1)?.timeNs ?? 0 }; }
 
-  // What is done
+  // Commands
 
-  /** Send a command; why not, or null. */
+  /** Send a command; returns a refusal, or null. */
   #command(command: object): string | null {
     if (!this.isReached) return words.live.lost;
     if (this.hand.taken && !this.hand.yours && this.hand.locked && !this.hand.owner) return words.live.locked;
@@ -303,7 +304,7 @@ export class Live implements Motion, NodeBehind {
     if (refusal === null) return;
     if (this.#tying && number >= this.#tying.number) this.#tying = null;
     this.#said(refusal);
-    this.#changed(); // a control goes back to what is in force
+    this.#changed(); // controls show the present values again
   }
 
   submit(entry: Entry): string | null {
@@ -320,7 +321,7 @@ export class Live implements Motion, NodeBehind {
     const { string } = plain;
     if (string === "release") this.#tying = this.#targetNext = null;
     else if (string.attach === undefined && this.#targetSent >= 0) {
-      this.#targetNext = plain; // a hand is where it is now
+      this.#targetNext = plain; // only the latest target matters
       if (this.#tying && string.target) this.#tying = { ...this.#tying, target: string.target };
       return null;
     }
@@ -363,9 +364,9 @@ export class Live implements Motion, NodeBehind {
     return filled(this.#declared.words.accepted, { 0: field, 1: shown(name), 2: known.join(", ") });
   }
 
-  // Time, which is the node's
+  // Time, which the node advances
 
-  advance(): void { /* the node does */ }
+  advance(): void { /* done by the node */ }
 
   goTo(timeNs: number): void {
     const end = this.#seen.at(-1);
@@ -379,19 +380,19 @@ export class Live implements Motion, NodeBehind {
     this.#changed();
   }
 
-  reset(): void { this.#tell(this.#command({ time: "reset" })); }
+  reset(): void { this.#report(this.#command({ time: "reset" })); }
 
-  setPaused(paused: boolean): void { this.#tell(this.#command({ time: paused ? "pause" : "resume" })); }
+  setPaused(paused: boolean): void { this.#report(this.#command({ time: paused ? "pause" : "resume" })); }
 
-  setRate(rate: number): void { this.#tell(this.#command({ entry: { set: { real_time_factor: rate } } })); }
+  setRate(rate: number): void { this.#report(this.#command({ entry: { set: { real_time_factor: rate } } })); }
 
-  step(): void { this.#tell(this.#command({ time: "step" })); }
+  step(): void { this.#report(this.#command({ time: "step" })); }
 
   wish(wish: Wish): void { this.#send({ hand: wish }); }
 
-  #tell(refusal: string | null): void { if (refusal !== null) this.#said(refusal); }
+  #report(refusal: string | null): void { if (refusal !== null) this.#said(refusal); }
 
-  // A take of it is recorded by the node
+  // Takes aren't available: the node records
 
   take(): TakeFiles { throw new Refused(words.live.recorded); }
 
@@ -414,7 +415,7 @@ export class Live implements Motion, NodeBehind {
   #changed(): void { for (const changed of this.#watchers) changed(); }
 }
 
-/** The motion of the node whose page this is. */
+/** The motion of the node that serves this page. */
 export async function openLive(kernels: Uint8Array<ArrayBuffer>, data: Uint8Array<ArrayBuffer>): Promise<Live> {
   const live = new Live(await Kernels.load(kernels), new Data(data), `${location.origin.replace(/^http/, "ws")}${location.pathname}`);
   await live.opened();

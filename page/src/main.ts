@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// The page: a motion, its picture, hands and panel, and the loop that joins them.
+// The page: a motion, its picture, pointer and panel, and the loop that connects them.
 
 import { addressOf } from "./address.ts";
 import { Clock } from "./clock.ts";
@@ -8,7 +8,7 @@ import { Data } from "./data.ts";
 import { inside } from "./file.ts";
 import { LANGUAGES } from "./languages.ts";
 import type { LessonTexts } from "./lessons.ts";
-import { COURSES } from "./lessons_steps.ts";
+import { LESSON_PLANS } from "./lessons_steps.ts";
 import { isLive, openLive } from "./live.ts";
 import { Panel, type Desk, type Look } from "./panel.ts";
 import { icon, make, say } from "./panel_elements.ts";
@@ -24,31 +24,31 @@ import { openMotion } from "./simulation.ts";
 import type { Motion, Snapshot, Vec3 } from "./source.ts";
 import { language, words } from "./words.ts";
 
-/** [ns simulated], [s of the wall clock]: an impulse acts at an instant; its arrow stays so long that it can be seen. */
+/** [ns simulated], [s of the wall clock] How long the arrow of an impulse, which acts at an instant, is shown. */
 const BLOW_NS = 150_000_000, BLOW_S = 0.5;
-/** [rad/s] of a body that comes at rest. */
+/** [rad/s] Angular velocity given to an opened body without one. */
 const SPIN = 5;
-/** [s] of a point's path that is drawn. */
+/** [s] Length of a point's trace. */
 const TRACE_S = 8;
-/** [ms] in which what moves of itself, the eye and arrows, comes to rest. */
+/** [ms] How long frames are drawn after the last change, so that animations of camera and arrows can finish. */
 const AWAKE_MS = 2500;
-/** [s] in which the hand shows what can be grabbed. */
+/** [s] How long the hand's hint is shown. */
 const HINT_S = 9;
 const HAND = "M9 11V4.500a1.500 1.500 0 0 1 3 0V10h.6V8.800a1.400 1.400 0 0 1 2.800 0V11h.6V9.700a1.400 1.400 0 0 1 2.800 0V12h.4v-.9a1.300 1.300 0 0 1 2.600 0V16c0 4-2.600 6.500-6.300 6.500-3.200 0-4.700-1.400-6.300-3.800L5.300 14a1.500 1.500 0 0 1 2.400-1.800L9 13.600z";
 
 interface Impulse extends Blow { readonly timeNs: number }
 
-/** What those who measure and test look at. */
+/** The page's internals, for tests and measurements. */
 export interface Probe {
   readonly motion: Motion;
   readonly picture: Picture;
   readonly clock: Clock;
   readonly pointer: Pointer;
   readonly lessons: LessonPanel;
-  /** [ms] when the script began, the motion was there, what draws was there, and the first and the first moving picture
-   * were drawn. */
+  /** [ms] Times at which the script started, the motion and the renderer were ready, and the first frame and the first
+   * frame after simulated time 0 were drawn. */
   readonly times: { readonly script: number; readonly motion: number; drawing: number; first: number; moving: number };
-  /** [ms] at which pictures were drawn, and that a drag took until it was. */
+  /** [ms] Times of the frames, and latencies from a drag's event to its frame. */
   readonly pictures: number[];
   readonly drags: number[];
 }
@@ -68,7 +68,7 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, for
   const startOver = (): void => { pointer.forget(); picture.restart(motion.snapshot()); lessons.restarted(); };
   const restart = (): void => {
     motion.reset();
-    if (motion.node) return; // it says when it has begun anew
+    if (motion.node) return; // the node reports its restart
     startOver();
     if (!clock.held) clock.setPaused(false);
   };
@@ -89,7 +89,7 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, for
     const notice = motion.notice();
     if (notice) say(notice, 10);
   };
-  // A body that comes at rest shows nothing: it spins about its middle axis, nearly, and so turns over.
+  // A body opened at rest gets a spin nearly about its intermediate axis, so that it flips.
   const lively = (refusal: string | null): string | null => {
     const spin = motion.values()["initial.angular_velocity"] as readonly number[] | undefined;
     if (refusal || motion.node || !spin || spin.some((w) => w !== 0)) return refusal;
@@ -98,8 +98,8 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, for
     motion.reset();
     return refused;
   };
-  // A lesson is a take of one's own: beside a node there is none.
-  const named = Object.entries(motion.node ? {} : texts).filter(([name]) => name in COURSES).map(([name, { title }]) => ({ name, title }));
+  // Lessons need the page's own simulation, so there are none beside a node.
+  const named = Object.entries(motion.node ? {} : texts).filter(([name]) => name in LESSON_PLANS).map(([name, { title }]) => ({ name, title }));
   const desk: Desk = { motion, picture, pointer, clock, look, restart, lessons: named, forms, track: () => track, later: (name, act) => { waiting.set(name, act); }, told, open, lively };
   const panel = new Panel(desk, () => { moved = true; }), lessons = new LessonPanel(desk, panel, texts);
   const drop = make("div", { id: "drop", hidden: true }, words.body.drop);
@@ -128,9 +128,9 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, for
     panel.changed();
     handPane?.changed();
   };
-  // A node begins anew by whose hand ever.
+  // Any client may restart the node.
   let began = motion.node?.began ?? 0, flown = motion.body().vertices;
-  const beganAnew = (): void => {
+  const nodeRestarted = (): void => {
     began = motion.node?.began ?? 0;
     track.seen.length = 0;
     startOver();
@@ -181,7 +181,7 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, for
     if (file) panel.takeFile(file);
   });
 
-  // A hand shows once what can be grabbed.
+  // A hint that the body can be grabbed, shown once.
   let hintS = HINT_S;
   pointer.touched = () => { hintS = 0; };
   const showHint = (now: Snapshot, seconds: number): void => {
@@ -194,7 +194,7 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, for
   };
 
   const probe: Probe = { motion, picture, clock, pointer, lessons, times: { script: scriptMs, motion: motionMs, drawing: drawingMs, first: 0, moving: 0 }, pictures: [], drags: [] };
-  // While time stands and nobody does anything, nothing is drawn anew.
+  // Without changes and input, no frames are drawn.
   let last = 0, failure = "", awakeMs = Infinity, drawnNs = -1;
   const wake = (): void => { awakeMs = performance.now() + AWAKE_MS; };
   for (const kind of ["pointerdown", "pointermove", "pointerup", "wheel", "keydown", "keyup", "input", "change", "click", "focusin"])
@@ -209,7 +209,7 @@ function begin(motion: Motion, texts: Readonly<Record<string, LessonTexts>>, for
     pointer.act();
     clock.advance(passed);
     if (changed) refresh();
-    if (motion.node && (motion.node.began !== began || motion.body().vertices !== flown)) beganAnew();
+    if (motion.node && (motion.node.began !== began || motion.body().vertices !== flown)) nodeRestarted();
     if (moved) fit();
     const now = motion.snapshot();
     drawnNs = now.timeNs;
@@ -252,10 +252,10 @@ async function start(): Promise<void> {
     const [kernels, data, take] = await Promise.all([inside("kernels"), inside("data"), inside("take")]);
     if (!kernels || !data) throw new Error(words.picture.incomplete);
     const motion = isLive() ? await openLive(kernels, data) : await openMotion(kernels, data, take);
-    // A file that was written for a lesson opens in it.
+    // A file written for a lesson opens with it.
     const address = location.hash || (take ? "" : document.querySelector<HTMLMetaElement>("meta[name=begin]")?.content ?? ""), asked = addressOf(address);
     const refusal = asked.take ? await motion.openLink(asked.take) : null;
-    // Who was sent nothing sees what a box in place of the truth does.
+    // Without a take, the first screen compares the body with the ghost of its bounding box's tensor.
     if (!take && !asked.take && !motion.node) motion.setGhost({ inertia_model: "bounding_box" });
     const { lessons, forms } = new Data(data).declared;
     const probe = begin(motion, { ...lessons, ...LANGUAGES[language]?.lessons }, forms, address, app, scriptMs);

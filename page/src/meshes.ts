@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Mesh files read as numbers, exactly as rigid_proto_ros/mesh reads them: vertices in the file's order, polygons fanned
-// from their first corner. Refused is thrown for what is no such file, with one line that says where.
+// Reading of mesh files, exactly as in rigid_proto_ros/mesh: vertices in the file's order, polygons fanned from their
+// first corner. Throws Refused for an invalid file, with a line that names the place.
 
 import { gltfSurface } from "./meshes_gltf.ts";
 import { plySurface } from "./meshes_ply.ts";
@@ -12,26 +12,27 @@ import type { MeshNumbers } from "./surface.ts";
 export const MOST_BYTES = 50_000_000;
 export const ENDINGS = [".obj", ".stl", ".ply", ".glb"];
 
-/** Vertices (3 n), polygons' corners (c,) and how many each has (p,); triangles alone where there are no counts. */
+/** Vertices (3 n), corners of all polygons (c,), and number of corners of each (p,); without counts
+ * all are triangles. */
 export interface Read { readonly vertices: Float64Array; readonly corners: Int32Array; readonly counts: Int32Array | null }
 
 const NUMBER = /^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?$/;
 const EDGES = /^[ \t\v\f]+|[ \t\v\f]+$/g;
 const NAMED = /^[+-]?(?:nan|inf(?:inity)?)$/i;
 
-/** The number that a word is, or null. Those that aren't finite are refused where the surface is judged. */
+/** The number that a word represents, or null. Numbers that aren't finite are refused when the surface is checked. */
 export function numberOf(word: string): number | null {
   if (NUMBER.test(word)) return Number(word);
   return NAMED.test(word) ? NaN : null;
 }
 
-/** Every byte as a character; those beyond ASCII as some other. */
+/** Each byte as one character; bytes beyond ASCII as arbitrary ones. */
 export const latin = (bytes: Uint8Array): string => new TextDecoder("latin1").decode(bytes);
 
-/** A piece of a file for a message. */
+/** An excerpt of a file for an error message. */
 export const excerpt = (text: string): string => text.slice(0, 40).split("\n")[0]?.trim().replace(/[^\x20-\x7e]/g, "?") ?? "";
 
-/** The mesh in a file's bytes, read by the ending of its name; its name ends in .obj, as which it is saved. */
+/** The mesh in a file's bytes; the suffix determines the format. The mesh's name ends in .obj, the format of saving. */
 export function readMesh(file: string, bytes: Uint8Array, kernels: Kernels): MeshNumbers {
   const name = file.replace(/^.*[\\/]/, ""), ending = /\.[^.]*$/.exec(name)?.[0].toLowerCase() ?? "";
   if (/^\.?ya?ml$/.test(ending)) throw new Refused(`${name}: scenes, scripts and bodies of parts name other files, which a page can't open: rigid_proto workbench FILE --html OUT (and --script SCRIPT) writes a page that has them`);
@@ -74,7 +75,7 @@ function fanned(corners: Int32Array, counts: Int32Array | null): { triangles: In
 
 // Wavefront .obj
 
-/** A list of numbers that grows. */
+/** A growing array of numbers. */
 class Grown<A extends Float64Array | Int32Array> {
   #numbers: A;
   length = 0;
@@ -130,7 +131,8 @@ function objSurface(bytes: Uint8Array, name: string): Read {
   return { vertices: vertices.all(), corners: corners.all(), counts: counts.all() };
 }
 
-/** Lines without comments, a line that ends in a backslash joined with the next one; `lines`: of how many it is made. */
+/** Lines without comments; a line that ends with a backslash is joined with the next one. lines: number of joined
+ * lines. */
 function* logicalLines(text: string): Generator<{ text: string; lines: number }> {
   const end = text.includes("\r") ? /\r\n|\r|\n/g : /\n/g;
   let begun = "", lines = 0, at = 0;
@@ -156,7 +158,7 @@ function* logicalLines(text: string): Generator<{ text: string; lines: number }>
 
 const FACET_BYTES = 50;
 const SPARE = 2;
-/** Blanks and what isn't one are ASCII's, as in Python's patterns of bytes. */
+/** A pattern in which \s and \S are ASCII only, as in Python's patterns of bytes. */
 const ascii = (pattern: string, flags = ""): RegExp => new RegExp(pattern.replaceAll("\\s", "[ \\t\\n\\r\\f\\v]").replaceAll("\\S", "[^ \\t\\n\\r\\f\\v]"), flags);
 const CORNER = String.raw`\s+vertex\s+(\S+)\s+(\S+)\s+(\S+)`;
 const FACET = ascii(String.raw`\bfacet\s+normal(?:\s+\S+){3}\s+outer\s+loop${CORNER}${CORNER}${CORNER}\s+endloop\s+endfacet(?!\S)`, "g");
@@ -180,7 +182,7 @@ function stlSurface(bytes: Uint8Array, name: string): Read {
   return merged(points);
 }
 
-/** Binary files, too, may begin with the word solid. */
+/** Whether a file is ASCII; binary files, too, may start with the word solid. */
 function isAscii(bytes: Uint8Array, view: DataView): boolean {
   if (bytes.length >= 84 && bytes.length === 84 + FACET_BYTES * view.getUint32(80, true)) return false;
   const words = latin(bytes.subarray(0, 10_000)).match(WORDS) ?? [];
@@ -188,7 +190,7 @@ function isAscii(bytes: Uint8Array, view: DataView): boolean {
   return head.startsWith("solid") && (head.includes("facet") || head.includes("endsolid")) && !head.includes("\0");
 }
 
-/** Corner points (9 a facet); only the names of solids may stand beside whole facets. */
+/** Corner points (9 numbers per facet); a file may have only facets and names of solids. */
 function asciiPoints(text: string, name: string): Float64Array {
   const points = new Grown((n) => new Float64Array(n)), rest: string[] = [];
   let end = 0;
@@ -212,7 +214,7 @@ function asciiPoints(text: string, name: string): Float64Array {
   return points.all();
 }
 
-/** Corners that are equal to the bit become one vertex, numbered by first appearance. */
+/** Merge bit-equal corners into one vertex; vertices are numbered in order of first appearance. */
 export function merged(points: Float64Array): Read {
   const count = points.length / 3, words = new Uint32Array(points.buffer, points.byteOffset, 2 * points.length);
   let size = 16;

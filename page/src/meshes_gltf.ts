@@ -10,7 +10,7 @@ import { fromBase64 } from "./packing.ts";
 
 const TRIANGLES = 4;
 const QUANTIZED = "KHR_mesh_quantization";
-/** Names of extensions that change no triangle begin so. */
+/** Prefixes of extensions that don't affect triangles. */
 const LOOKS = ["KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_"];
 const WIDTHS = { SCALAR: 1, VEC3: 3 } as const;
 const SIZES: Readonly<Record<number, number>> = { 5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4 };
@@ -63,7 +63,7 @@ class Document {
     return content.subarray(start, start + length);
   }
 
-  /** Rows of an accessor of this kind, by its name in the specification, one after the other. */
+  /** The values of an accessor; kind: its type in the specification. */
   numbers(number: unknown, kind: keyof typeof WIDTHS): Float64Array {
     const accessor = this.item("accessors", number);
     for (const [key, told] of [["sparse", "is sparse"], ["normalized", "is of normalized integers"]] as const) {
@@ -160,7 +160,7 @@ function addNode(document: Document, number: unknown, above: Matrix, seen: Set<u
   for (const child of (node["children"] as readonly unknown[] | undefined) ?? []) addNode(document, child, matrix, seen, parts, kernels);
 }
 
-/** A primitive's own numbers; null for points and lines. */
+/** The triangles of a primitive; null for points and lines. */
 function triangles(document: Document, primitive: Fields): Part | null {
   const mode = Number(primitive["mode"] ?? TRIANGLES), { name } = document;
   if (mode < TRIANGLES) return null;
@@ -174,7 +174,7 @@ function triangles(document: Document, primitive: Fields): Part | null {
   return { vertices, triangles: corners };
 }
 
-/** A part in the scene's axes, wound the other way if its matrix mirrors. */
+/** A part in the scene's axes; its winding is reversed if the matrix is a reflection. */
 function placed(part: Part, matrix: Matrix, kernels: Kernels): Part {
   const memory = kernels.memory, mark = memory.mark(), count = part.vertices.length;
   const from = memory.matrix(count / 3, 3), to = memory.matrix(count / 3, 3);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Stanford .ply, ASCII and binary, with the same number of corners in all faces: every element is then a table.
+// Stanford .ply, ASCII and binary. All faces must have the same number of corners, so that each element is a table.
 
 import { excerpt, latin, numberOf } from "./meshes.ts";
 import type { Read } from "./meshes.ts";
@@ -12,14 +12,14 @@ const KINDS: Readonly<Record<string, string>> = {
 };
 const INDICES = ["vertex_indices", "vertex_index"];
 const REMEDY = "faces that all have the same number of corners; save the mesh as .obj or .stl";
-/** What separates words in Python. */
+/** Separators of words, as in Python. */
 const BLANKS = /[ \t\n\r\v\f\x1c-\x1f]+/;
 const SPARE = 2;
 const MOST_HEADER = 1_000_000;
 
 interface Property { readonly name: string; readonly kind: string; readonly length: string }
 interface Element { readonly name: string; readonly count: number; readonly properties: Property[] }
-/** Numbers one after the other, from a body of either form. */
+/** A sequence of numbers from an ASCII or binary body. */
 interface Numbers { next(kind: string): number; readonly left: number }
 
 export function plySurface(bytes: Uint8Array, name: string): Read {
@@ -66,7 +66,7 @@ function header(bytes: Uint8Array, name: string): { layout: string; elements: El
   return { layout, elements, body };
 }
 
-/** Points (3 n) of a table with x, y, z; the vertex numbers of its list, and how many there are in each row. */
+/** Points (3 n) of a table with x, y, z; the vertex numbers of its list; and their number in each row. */
 function rows(element: Element, numbers: Numbers, name: string): { points: Float64Array<ArrayBuffer>; list: Int32Array<ArrayBuffer> | null; size: number } {
   const { count, properties } = element, lengths = new Map<number, number>();
   if (count > numbers.left) throw new Refused(`${name}: it can't hold the ${count} rows of ${excerpt(element.name)} that it announces; the file may be truncated`);

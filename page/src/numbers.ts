@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 //
-// Numbers and values as Python and YAML write them, so that texts here and there are the same.
+// Numbers and values formatted as in Python and YAML, so that messages and files are the same.
 
 import type { Value } from "./source.ts";
 
-/** repr of a double: the shortest decimals that give it back. */
+/** Python's repr of a double: the shortest decimal number that converts back to it. */
 export function repr(x: number): string {
   if (Number.isNaN(x)) return "nan";
   if (!Number.isFinite(x)) return x > 0 ? "inf" : "-inf";
@@ -15,7 +15,7 @@ export function repr(x: number): string {
   return text.includes(".") ? text : `${text}.0`;
 }
 
-/** `{x:.Ng}` of Python. */
+/** Python's `{x:.Ng}`. */
 export function general(x: number, digits: number): string {
   if (!Number.isFinite(x)) return repr(x);
   const [mantissa = "0", exponent = "0"] = rounded(x, digits).split("e");
@@ -28,7 +28,7 @@ export function general(x: number, digits: number): string {
   return sign + (whole.length > power + 1 ? `${whole.slice(0, power + 1)}.${whole.slice(power + 1)}` : whole);
 }
 
-/** toExponential, with halves to the even digit. */
+/** toExponential, with ties rounded to even. */
 function rounded(x: number, digits: number): string {
   const [mantissa = "", exponent = "0"] = x.toExponential(80).split("e");
   const cut = mantissa.indexOf(".") + digits, kept = mantissa.slice(0, cut).replace(/\.$/, "");
@@ -42,7 +42,7 @@ function pythonExponent(text: string): string {
   return `${mantissa}e${exponent.startsWith("-") ? "-" : "+"}${power}`;
 }
 
-/** Three digits, rounded down: rounded up, a largest value would be refused itself. */
+/** Three digits, rounded down, because a limit that is rounded up would be refused itself. */
 function roundedDown(x: number): string {
   const power = Math.floor(Math.log10(Math.abs(x)));
   const exact = x.toExponential(20);
@@ -50,7 +50,8 @@ function roundedDown(x: number): string {
   return general(kept, 6);
 }
 
-/** A text with its places filled, such as {0:.3g}: see page/words.py. Names stand for texts as they are. */
+/** A text with its placeholders filled, such as {0:.3g} (see page/words.py); placeholders without a
+ * format take texts. */
 export function filled(text: string, values: Readonly<Record<string, string | number>>): string {
   return text.replace(/\{(\w+)(?::([^}]*))?\}/g, (place, name: string, how: string | undefined) => {
     const value = values[name];
@@ -63,17 +64,17 @@ export function filled(text: string, values: Readonly<Record<string, string | nu
   });
 }
 
-/** The nearest whole number, halves to the even one. */
+/** The nearest integer, with ties rounded to even. */
 export function nearest(x: number): number {
   const low = Math.floor(x), rest = x - low;
   if (rest === 0.5) return low % 2 === 0 ? low : low + 1;
   return rest < 0.5 ? low : low + 1;
 }
 
-/** Nanoseconds of seconds. */
+/** Convert seconds to nanoseconds. */
 export const nanoseconds = (seconds: number): number => nearest(seconds * 1e9);
 
-/** A value as Python's messages show it. */
+/** A value as in Python's messages. */
 export function shown(value: unknown): string {
   if (typeof value === "number") return repr(value);
   if (typeof value === "boolean") return value ? "True" : "False";
@@ -82,7 +83,7 @@ export function shown(value: unknown): string {
   return value === null || value === undefined ? "None" : String(value);
 }
 
-/** A parameter's value in a YAML file: a double keeps its point, so that it is read back as one. */
+/** A parameter's value in a YAML file; a double has a decimal point, so that it is read back as a double. */
 export function yamlValue(value: Value): string {
   if (typeof value === "number") return yamlNumber(value);
   if (typeof value === "object") return `[${value.map(yamlNumber).join(", ")}]`;
@@ -96,7 +97,7 @@ function yamlNumber(x: number): string {
 
 const WORD = /^(?!(?:null|yes|true|false|off)$)[a-z_]{3,}$/;
 
-/** Plain data as YAML on one line. Whole numbers that count, such as a vertex, are given as texts of digits by `Whole`. */
+/** Plain data as YAML on one line; integers, such as a vertex number, are given as `Whole`. */
 export function flow(value: unknown): string {
   if (value instanceof Whole) return String(value.number);
   if (typeof value === "number") return yamlNumber(value);
@@ -106,7 +107,7 @@ export function flow(value: unknown): string {
   return JSON.stringify(value);
 }
 
-/** A number that is written without a point. */
+/** An integer, written without a decimal point. */
 export class Whole {
   readonly number: number;
 
@@ -117,8 +118,7 @@ export class Whole {
 
 const LONGEST = 4000;
 
-/** What was given isn't accepted; the message is the one line that people read: without what a file may have in it that
- * isn't to be seen, and no longer than anybody reads. */
+/** Refused input. The message is one line for the user, of limited length and without invisible characters. */
 export class Refused extends Error {
   constructor(message: string) {
     super(message.slice(0, LONGEST).replace(/[\p{C}\p{Zl}\p{Zp}]/gu, "?"));

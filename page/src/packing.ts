@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Bytes as text, and compressed: what links and the page's file are made of.
+// Base64 and compression, for links and the page's file.
 
 import { Refused } from "./numbers.ts";
 
@@ -15,7 +15,7 @@ export function base64(bytes: Uint8Array): string {
   return btoa(text);
 }
 
-/** Throws Refused for what is no base64. */
+/** Decode base64; throws Refused if the text isn't base64. */
 export function fromBase64(text: string): Bytes {
   try {
     return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
@@ -24,13 +24,13 @@ export function fromBase64(text: string): Bytes {
   }
 }
 
-/** base64 for addresses. */
+/** Base64 for URLs. */
 export const base64url = (bytes: Uint8Array): string => base64(bytes).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
 export const fromBase64url = (text: string): Bytes => fromBase64(text.replaceAll("-", "+").replaceAll("_", "/"));
 
 export const compressed = (bytes: Bytes, format: Format): Promise<Bytes> => through(bytes, new CompressionStream(format), Infinity);
 
-/** Throws Refused for damaged bytes, and for what gets larger than `most`. */
+/** Decompress; throws Refused for damaged data, and if the result is larger than `most`. */
 export async function expanded(bytes: Bytes, format: Format, most: number): Promise<Bytes> {
   try {
     return await through(bytes, new DecompressionStream(format), most);

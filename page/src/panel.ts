@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// The first screen: the switch, what the hand can change, readings; and the cards that open beside the picture.
+// The first screen: the tensor switch, body controls and readings; and the cards that open beside the picture.
 
 import type { Clock } from "./clock.ts";
 import type { Form } from "./data.ts";
@@ -19,7 +19,7 @@ import type { Bundled, Motion, Snapshot, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
-/** What one has chosen to see beside the body. */
+/** The user's choices of what is shown beside the body. */
 export interface Look {
   apart: boolean;
   boundingBox: boolean;
@@ -29,15 +29,15 @@ export interface Look {
   cones: boolean;
   principal: boolean;
   turned: readonly number[] | null;
-  /** A point [mesh], or the centre of mass, whose path is drawn. */
+  /** The point [mesh], or the centre of mass, whose trace is drawn. */
   trace: Vec3 | "com" | null;
-  /** Pairs of points [mesh], of chalk; another array with each stroke. */
+  /** Chalk lines as pairs of points [mesh]; a new array after each stroke. */
   chalk: readonly number[];
   protractor: readonly [string, string] | null;
   kept: Track | null;
 }
 
-/** What cards work with. */
+/** The objects and functions that cards use. */
 export interface Desk {
   readonly motion: Motion;
   readonly picture: Picture;
@@ -48,15 +48,15 @@ export interface Desk {
   /** What engines take, by the names of `inspect --for`. */
   readonly forms: Readonly<Record<string, Form>>;
   track(): Track;
-  /** Do this before the next picture; what was asked for under the same name before then isn't done. */
+  /** Call act before the next frame; a later call with the same name replaces it. */
   later(name: string, act: () => void): void;
-  /** Say a refusal; whether there was none. */
+  /** Show a refusal, if there is one; returns whether there was none. */
   told(refusal: string | null): boolean;
-  /** A body that was just opened, unless it was refused, gets a spin where it has none. */
+  /** After a body was opened, give it a spin if it has none; returns a refusal, or null. */
   lively(refusal: string | null): string | null;
-  /** Begin anew with the parameters in force, and fly. */
+  /** Restart with the present parameters, and play. */
   restart(): void;
-  /** Another take: a function that opens one, said if it is refused. */
+  /** Open another take by a function; shows its refusal, if any. */
   open(how: () => string | null | Promise<string | null>): Promise<void>;
 }
 
@@ -64,27 +64,27 @@ export interface Card {
   readonly node: HTMLElement;
   /** Body, parameters, ghost or history have changed. */
   changed(): void;
-  /** An instant; some ten times a second. */
+  /** Update readings; called about ten times a second. */
   show?(now: Snapshot): void;
-  /** An instant, each picture. */
+  /** Update drawings; called once per frame. */
   draw?(now: Snapshot): void;
   closed?(): void;
 }
 
-/** Mass and impulse from a tenth to ten times, sizes from 0.4 to 2.5 times what they were as the body came. */
+/** Ranges of sliders, as factors of a body's first values: mass 1/10 to 10, impulse 1/30 to 30, sizes 1/2.5 to 2.5. */
 const WIDE = 10, WIDEST = 30, SIZED = 2.5;
-/** [1/s] A poke as the body comes gives it this many times its size a second. */
+/** [1/s] The initial poke gives a body this many times its size per second. */
 const LIVELY = 0.9;
-/** [s] in which the energy bars find another scale. */
+/** [s] Time constant of the energy bars' scale. */
 const RESCALED_S = 8;
-/** [ms] Between two readings: each has the page put its cards together anew. */
+/** [ms] Shortest period of updating readings, since an update makes the browser lay the cards out again. */
 const READ_MS = 80;
 const LOCK = "M7 10V7a5 5 0 0 1 10 0v3h1.500v11h-13V10zM9.500 10h5V7a2.500 2.500 0 0 0-5 0z";
 
 type Name = keyof typeof words.cards;
 
 export class Panel {
-  /** [N s] of a poke. */
+  /** Impulse of a poke [N s]. */
   impulse = 1;
   readonly node: HTMLElement;
   readonly free = make("div", { id: "free" });
@@ -181,7 +181,7 @@ export class Panel {
     });
   }
 
-  /** The card that stays at the top of those that open, or none. */
+  /** Set the card that stays above the others, or none. */
   hold(node: HTMLElement | null): void {
     for (const name of [...this.open]) this.close(name);
     this.held?.remove();
@@ -192,7 +192,7 @@ export class Panel {
 
   opened(): readonly string[] { return [...this.open]; }
 
-  /** Open a card, and mark and focus what a lesson leads to in it. */
+  /** Open a card, and mark and focus the element that a lesson's step is about. */
   lead(name: Name, mark: string): void {
     if (!this.open.has(name)) this.toggle(name);
     const found = this.side.querySelector<HTMLElement>(`section[data-card=${name}] [data-mark="${mark}"]`);
@@ -213,7 +213,7 @@ export class Panel {
     this.resized();
   }
 
-  /** A card opens beside the picture, or closes; plots stay beside another one where there is room. */
+  /** Open or close a card; plots stay open beside another card if there is space. */
   toggle(name: Name): void {
     const was = this.open.has(name), room = matchMedia("(min-height: 35em) and (min-width: 44em)").matches;
     for (const other of [...this.open]) if (other === name || !room || (other === "plots") === (name === "plots")) this.close(other);
@@ -239,7 +239,7 @@ export class Panel {
     this.chips[name].setAttribute("aria-expanded", "false");
   }
 
-  /** Another body or another flight: sliders begin in their middle. */
+  /** After another body or flight was opened: centre the sliders' ranges on its values. */
   begin(): void {
     const info = this.desk.motion.body(), impulse = LIVELY * info.massKg * 2 * info.length;
     this.first = { mass: info.massKg, scale: info.scale, impulse: Number(impulse.toPrecision(1)) || 1 };
@@ -284,12 +284,12 @@ export class Panel {
     for (const card of this.cards.values()) card.show?.(now);
   }
 
-  /** Files dropped on the page are bodies. */
+  /** Open a dropped file as a body. */
   takeFile(file: File): void {
     if (file.size > 50 * 1024 * 1024) { say(words.body.tooLarge); return; }
     void this.desk.open(async () => this.desk.lively(this.desk.motion.openMesh(file.name, new Uint8Array(await file.arrayBuffer()))));
   }
 }
 
-/** Of a slider: three figures, so that what is shown is what is set. */
+/** A slider's value, rounded to three digits so that the value set is the value shown. */
 function rounded(value: number): number { return Number(value.toPrecision(3)); }

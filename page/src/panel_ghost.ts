@@ -8,14 +8,14 @@ import type { GhostChoice } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
-/** [s]; 0: that of the body. 1/60 s as the parameter step rounds it. */
+/** [s] Choices of the ghost's step; 0: the body's; 1/60 s is rounded as the parameter step is. */
 const STEPS = [0, 0.016666667, 0.01, 0.001] as const;
-/** [s] Rows of the table with a step above it are shown. */
+/** [s] The table shows measurements with steps above this. */
 const FINE = 0.01;
-/** Changes of energy below this are told as none. */
+/** Relative changes of energy below this are shown as none. */
 const KEPT = 1e-5;
 
-/** What differs of the body that flies beside. */
+/** The card of the ghost: how it differs from the body. */
 export function ghostCard(desk: Desk): Card {
   const { motion, look } = desk, w = words.ghost;
   const names = motion.parameters().find(({ name }) => name === "integrator")?.choices ?? [];

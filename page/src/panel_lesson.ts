@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 //
-// A lesson beside the picture: its question first, then its steps with their buttons; and over the picture for a class.
+// The panel of a lesson: its question, then its steps with their buttons; in class mode, as an overlay over the
+// picture.
 
 import { addressOf, hashOf } from "./address.ts";
 import { lineOnBody } from "./chalk.ts";
 import { Lesson, type Act, type LessonTexts, type Sight } from "./lessons.ts";
-import { COURSES } from "./lessons_steps.ts";
+import { LESSON_PLANS } from "./lessons_steps.ts";
 import type { Desk, Panel } from "./panel.ts";
 import { button, icon, make, say } from "./panel_elements.ts";
 import type { Mark } from "./picture.ts";
@@ -13,19 +14,19 @@ import { Plots } from "./plots.ts";
 import type { Snapshot, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 
-/** [ms] Between two looks at whether a step is done: conditions go through all that was seen. */
+/** [ms] Period of checking a step's condition, which may evaluate the whole record. */
 const LOOK_MS = 100;
 const DOWN = "M7 10l5 5 5-5z", TICK = "M9 16.200 4.800 12l-1.400 1.400L9 19 21 7l-1.400-1.400z", SCREEN = "M3 4h18v13H3zM5 6v9h14V6zM8 19h8v2H8z";
 
 export class LessonPanel {
   readonly node = make("section", { id: "lesson", class: "card", "aria-labelledby": "question" });
-  /** Beside the body, for a class. */
+  /** Plots beside the body in class mode. */
   readonly plots = make("div", { id: "class-plots", class: "card", hidden: true });
   lesson: Lesson | null = null;
   private readonly desk: Desk;
   private readonly panel: Panel;
   private readonly texts: Readonly<Record<string, LessonTexts>>;
-  /** What was just done, for those who don't see it. */
+  /** The step just completed, for screen readers. */
   private readonly told = make("div", { id: "told", class: "out", role: "status", "aria-live": "polite" });
   private drawn: Plots | null = null;
   private lookedMs = 0;
@@ -45,25 +46,25 @@ export class LessonPanel {
     });
   }
 
-  /** Begin what the address names, or leave the lesson. Returns why not, or null. */
+  /** Start the lesson that the address names, or leave the present one. Returns a refusal, or null. */
   async begin(name: string, isClass: boolean): Promise<string | null> {
-    const texts = this.texts[name], course = COURSES[name], { desk } = this, { motion, clock, look } = desk, hadFocus = document.activeElement !== document.body;
+    const texts = this.texts[name], plan = LESSON_PLANS[name], { desk } = this, { motion, clock, look } = desk, hadFocus = document.activeElement !== document.body;
     if (name === "") { this.leave(); return null; }
-    if (!texts || !course) return words.lesson.unknown(name);
+    if (!texts || !plan) return words.lesson.unknown(name);
     this.leave();
     let refusal: string | null = null;
     this.isOpening = true;
     await desk.open(() => (refusal = motion.openScene(name)));
     this.isOpening = false;
     if (refusal) return refusal;
-    this.lesson = new Lesson(name, texts, course, motion);
-    clock.setRate(course.rate ?? 1);
+    this.lesson = new Lesson(name, texts, plan, motion);
+    clock.setRate(plan.rate ?? 1);
     clock.setPaused(true);
     clock.held = words.lesson.first;
     look.trace = null;
     look.principal = look.poinsot = look.cones = false;
     desk.pointer.pulls = motion.values()["string.attached"] !== true;
-    this.drawn = new Plots(desk.track(), course.plots);
+    this.drawn = new Plots(desk.track(), plan.plots);
     this.plots.replaceChildren(this.drawn.node);
     this.panel.hold(this.node);
     this.setClass(isClass);
@@ -84,30 +85,30 @@ export class LessonPanel {
     document.title = words.title;
   }
 
-  /** Another take was opened: a lesson is about the scene that it began with. */
+  /** Another take was opened: end the lesson, which needs its own scene. */
   opened(): void {
     if (this.isOpening || !this.lesson) return;
     this.leave();
     history.replaceState(null, "", hashOf({ language: addressOf(location.hash).language }));
   }
 
-  /** The motion begins anew. */
+  /** The motion was restarted. */
   restarted(): void { this.lesson?.restarted(); }
 
   get hidesCentre(): boolean { return this.lesson?.hidesCentre ?? false; }
 
-  /** Places that the steps name. */
+  /** Marks of the places that the steps name. */
   marks(now: Snapshot): readonly Mark[] {
     const { lesson } = this, { contacts } = this.desk.motion.body(), { com, scale } = now.body;
     if (!lesson) return [];
-    const names = lesson.finished && lesson.course.hidesCentre === "end" ? ["com"] : lesson.course.marks ?? [];
+    const names = lesson.finished && lesson.plan.hidesCentre === "end" ? ["com"] : lesson.plan.marks ?? [];
     return names.flatMap((name): Mark[] => {
       const point = name === "com" ? (com.map((c, k) => c / scale[k]!) as unknown as Vec3) : contacts[name];
       return point ? [{ point, text: words.lesson.places[name] ?? name, isCentre: name === "com" }] : [];
     });
   }
 
-  /** An instant, each picture. */
+  /** Record the present instant and check the step; called once per frame. */
   look(now: Snapshot): void {
     const { lesson } = this, ms = performance.now();
     lesson?.note();
@@ -116,7 +117,7 @@ export class LessonPanel {
     if (this.isClass) this.drawn?.draw(now.timeNs);
     if (!lesson.check(this.sight())) return;
     this.write();
-    this.told.textContent = `${words.lesson.done(lesson.done, lesson.course.steps.length)} ${lesson.finished ? words.lesson.finished : lesson.texts.steps[lesson.done] ?? ""}`;
+    this.told.textContent = `${words.lesson.done(lesson.done, lesson.plan.steps.length)} ${lesson.finished ? words.lesson.finished : lesson.texts.steps[lesson.done] ?? ""}`;
   }
 
   private sight(): Sight {
@@ -132,26 +133,26 @@ export class LessonPanel {
     if (desk.motion.history().script.length || desk.motion.snapshot().timeNs) desk.restart();
     const isRight = lesson.choose(choice), { answer, choices, reason } = lesson.texts;
     desk.clock.held = "";
-    if (lesson.course.trace) desk.look.trace = lesson.course.trace;
+    if (lesson.plan.trace) desk.look.trace = lesson.plan.trace;
     desk.clock.setPaused(false);
     this.write();
     this.told.textContent = `${isRight ? words.lesson.right : words.lesson.wrong(words.lesson.letters[answer]!, choices[answer]!)} ${reason}`;
     this.node.querySelector<HTMLElement>(".verdict")?.focus({ preventScroll: true });
   }
 
-  /** The whole card anew; what had the focus keeps it. */
+  /** Rebuild the whole card; the focus is kept. */
   private write(): void {
     const { lesson } = this, w = words.lesson;
     if (!lesson) return;
-    const { texts, course } = lesson, focused = document.activeElement instanceof HTMLElement && this.node.contains(document.activeElement) ? document.activeElement.dataset["key"] : undefined;
+    const { texts, plan } = lesson, focused = document.activeElement instanceof HTMLElement && this.node.contains(document.activeElement) ? document.activeElement.dataset["key"] : undefined;
     const picker = make("select", { "aria-label": w.name, "data-key": "picker", change: () => { location.hash = hashOf({ language: addressOf(location.hash).language, lesson: picker.value, isClass: this.isClass && picker.value !== "" }); } },
-      make("option", { value: "" }, `– ${w.none} –`), ...Object.entries(this.texts).filter(([name]) => name in COURSES).map(([name, { title }]) => make("option", { value: name, selected: name === lesson.name }, title)));
-    // A list of the browser's own cuts a long title: what is chosen stands over it, in as many lines as it takes.
+      make("option", { value: "" }, `– ${w.none} –`), ...Object.entries(this.texts).filter(([name]) => name in LESSON_PLANS).map(([name, { title }]) => make("option", { value: name, selected: name === lesson.name }, title)));
+    // Browsers truncate long titles in a select, so the chosen title is shown over it, in as many lines as needed.
     const head = make("div", { class: "head" }, make("div", { class: "picker" }, picker, make("span", { "aria-hidden": "true" }, texts.title, icon(DOWN))),
       button(icon(SCREEN), () => this.toggleClass(), { class: "close", "aria-pressed": String(this.isClass), "aria-label": w.class, title: w.classTitle, "data-key": "class" }),
       button("×", () => { location.hash = hashOf({ language: addressOf(location.hash).language }); }, { class: "close", "aria-label": w.leave, title: w.leave, "data-key": "leave" }));
     const question = make("h2", { id: "question", class: lesson.answer === null ? "" : "out", tabindex: -1, "data-key": "question" }, texts.question);
-    this.node.replaceChildren(head, question, ...(lesson.answer === null ? [this.choices(texts)] : this.steps(lesson, course.steps.length)));
+    this.node.replaceChildren(head, question, ...(lesson.answer === null ? [this.choices(texts)] : this.steps(lesson, plan.steps.length)));
     this.node.classList.toggle("asks", lesson.answer === null);
     if (lesson.done > 0) this.node.querySelector(".now, .end")?.scrollIntoView({ block: "nearest" }); else this.node.scrollTop = 0;
     const again = focused === undefined ? null : this.node.querySelector<HTMLElement>(`[data-key="${focused}"]`) ?? this.node.querySelector<HTMLElement>('[data-key="act0"]') ?? this.heading();
@@ -163,22 +164,22 @@ export class LessonPanel {
       make("button", { type: "button", class: "choice", "data-key": `choice${k}`, click: () => this.answer(k) }, make("b", {}, words.lesson.letters[k]!), make("span", {}, choice))));
   }
 
-  private steps({ answer, texts, course, done, finished }: Lesson, count: number): HTMLElement[] {
+  private steps({ answer, texts, plan, done, finished }: Lesson, count: number): HTMLElement[] {
     const w = words.lesson, isRight = answer === texts.answer;
     const said = make("b", {}, isRight ? w.right : w.wrong(w.letters[texts.answer]!, texts.choices[texts.answer]!)), attributes = { class: `verdict ${isRight ? "good" : "bad"}`, "data-key": "verdict" };
-    // The reason is read once; then steps have its room.
+    // The reason is shown until the first step is done; then the steps take its space.
     const verdict = done === 0 || finished ? make("div", { ...attributes, tabindex: -1 }, said, make("p", { class: "reason" }, texts.reason))
       : make("details", attributes, make("summary", {}, said, " ", make("span", { class: "why" }, w.why)), make("p", { class: "reason" }, texts.reason));
     const list = make("ol", { class: "steps", "aria-label": w.steps }, ...Array.from({ length: count }, (_, k) => {
       const state = k < done ? "done" : k === done ? "now" : "";
       return make("li", { class: state, ...(state === "now" ? { "aria-current": "step" } : {}) },
         make("span", { class: "mark" }, k < done ? icon(TICK) : String(k + 1), k < done && make("span", { class: "out" }, w.ticked)), make("span", {}, texts.steps[k] ?? ""),
-        k === done && make("div", { class: "row" }, ...(course.steps[k]?.acts ?? []).map((act, n) => button(act.text(w), () => this.act(act), { "data-key": `act${n}` }))));
+        k === done && make("div", { class: "row" }, ...(plan.steps[k]?.acts ?? []).map((act, n) => button(act.text(w), () => this.act(act), { "data-key": `act${n}` }))));
     }));
     return [verdict, list, ...(finished ? [make("p", { class: "good end" }, w.finished, " ", button(w.anew, () => { void this.begin(this.lesson!.name, this.isClass); }, { "data-key": "act0" }))] : [])];
   }
 
-  /** What a step's button does, or leads to. */
+  /** Perform the action of a step's button. */
   private act(act: Act): void {
     const { desk, lesson } = this, { motion, look, pointer } = desk, w = words.lesson;
     if (!lesson) return;
@@ -203,7 +204,7 @@ export class LessonPanel {
     if (act.kind === "poke" || act.kind === "set") desk.clock.setPaused(false);
   }
 
-  /** The string's line on the body, where it hangs at rest. */
+  /** Draw the string's line on the body if it hangs at rest. */
   private chalk(): void {
     const { desk, lesson } = this, { body } = desk.motion.snapshot(), { string } = body;
     if (!string) { say(words.lesson.untied); return; }
@@ -213,12 +214,12 @@ export class LessonPanel {
     lesson.lines.push({ point: string.attach, along: [0, 1, 2].map((k) => (R[k]! * along[0] + R[3 + k]! * along[1] + R[6 + k]! * along[2]) / scale[k]!) as unknown as Vec3 });
   }
 
-  // For a class
+  // Class mode
 
   private toggleClass(): void {
     this.setClass(!this.isClass);
     history.replaceState(null, "", hashOf({ ...addressOf(location.hash), lesson: this.lesson?.name ?? "", isClass: this.isClass, take: "" }));
-    // A browser may refuse: the page is for a class all the same.
+    // A browser may refuse full screen; class mode works without it.
     if (this.isClass) void document.documentElement.requestFullscreen?.().catch(() => undefined);
     else if (document.fullscreenElement) void document.exitFullscreen().catch(() => undefined);
     this.write();

@@ -5,7 +5,7 @@ import type { Card, Desk } from "./panel.ts";
 import { make } from "./panel_elements.ts";
 import { words } from "./words.ts";
 
-/** All lessons, as addresses. */
+/** The card with links to all lessons. */
 export function lessonsCard(desk: Desk): Card {
   const { language } = addressOf(location.hash);
   const list = make("ul", { class: "lessons" }, ...desk.lessons.map(({ name, title }) => make("li", {}, make("a", { href: hashOf({ lesson: name, language }) }, title))));

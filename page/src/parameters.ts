@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 //
-// Values of parameters, checked by the declarations that Python has them by.
+// Conversion and checks of parameter values, by Python's declarations.
 
 import type { Declarations } from "./data.ts";
 import { filled, Refused, shown } from "./numbers.ts";
 import type { Parameter, Value, Values } from "./source.ts";
 
-/** Numbers are within doubles' squares in every parameter without bounds of its own. */
+/** Names of ballast and contacts. */
 const NAME = /^[a-z][a-z0-9_]*$/;
 const PATTERNS = ["ballast.", "contacts."];
 
@@ -49,7 +49,8 @@ export class Parameters {
     return typed;
   }
 
-  /** Changes of parameters that fly: checked, a density with mass 0, which would win. Throws Refused. */
+  /** Checked changes of parameters in flight; setting density sets mass to 0, since mass overrides it.
+   * Throws Refused. */
   changes(changes: unknown): Record<string, Value> {
     if (typeof changes !== "object" || changes === null || Array.isArray(changes) || Object.keys(changes).length === 0) {
       throw new Refused(filled(this.#accepted, { 0: "set", 1: shown(changes), 2: "{parameter: value, ...}" }));
@@ -59,7 +60,7 @@ export class Parameters {
     return "density" in found && !("mass" in found) ? { ...found, mass: 0 } : found;
   }
 
-  /** Values that differ from the defaults, and the mesh. */
+  /** The mesh, and values that differ from their defaults. */
   changed(values: Values): Record<string, Value> {
     const defaults = this.defaults();
     return Object.fromEntries(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// What is seen of a motion: body, ghost, arrows, string, and what one asks for beside them.
+// The picture of a motion: body, ghost, arrows, string, and optional parts.
 
 import {
   BoxGeometry, BufferAttribute, BufferGeometry, CanvasTexture, Color, DirectionalLight, DoubleSide, EdgesGeometry, FrontSide, Group, HemisphereLight, Line, LineBasicMaterial,
@@ -24,33 +24,34 @@ export const COLOURS = {
   axes: [0xd1432f, 0x1f9d55, 0x2f63ad], trace: 0xc2347f, inertia: 0xc79a12, angle: 0x1d2433, chalk: 0xffffff,
 } as const;
 
-/** Body sizes (diagonals of its box): lengths of the first L, omega and other arrows, and of none more. */
+/** Lengths of the first L, omega and load arrows, and the largest length of any arrow, in body sizes (diagonals of its
+ * box). */
 const FIRST_MOMENTUM = 0.58, FIRST_OMEGA = 0.47, FIRST_LOAD = 0.36, LONGEST = 0.63;
 const FRAMED = 0.69;
-/** Shaft radii in body sizes. */
+/** Radii of shafts, in body sizes. */
 const STRONG = 0.0135, PLAIN = 0.009, CORD = 0.0075;
 const LIGHT = new Vector3(-0.35, -0.5, 1);
 const MOST_TRACE = 4000;
-/** Size of labels, unless the reader has chosen a larger one; half the width of a letter, and half the height of a line. */
+/** Font size of labels at the browser's default; half the width of a letter, and half the height of a line. */
 const LETTER_PX = 17, HALF_PX = 5.8, LINE_PX = 12;
-/** Of the weight: a string that pulls less is as good as slack. */
+/** Tension relative to the weight below which a string is shown as slack. */
 const SLACK = 1e-3;
-/** What lies behind everything; lighter round the middle where that costs nothing. */
+/** Colours of the background: plain, or a gradient on fast renderers. */
 const SKY = 0xf1f4f9, LIGHT_SKY = "#ffffff", DARK_SKY = "#dfe5f0";
 
-/** How a body lies, or lay. */
+/** Pose of a body, now or earlier. */
 export interface Pose { readonly row: readonly number[]; readonly scale: Vec3; readonly com: Vec3 }
 
-/** A blow whose arrow still stands: impulse [N s] at a point [mesh]. */
+/** A recent impulse whose arrow is shown: impulse [N s] at a point [mesh]. */
 export interface Blow { readonly point: Vec3; readonly impulse: Vec3; readonly axes: "body" | "world" }
 
-/** A place of the body that is marked by its name. */
+/** A named mark on the body. */
 export interface Mark { readonly point: Vec3; readonly text: string; readonly isCentre: boolean }
 
-/** What is drawn beside body and loads. */
+/** The parts drawn besides body and loads. */
 export interface Shown {
   readonly marks: readonly Mark[];
-  /** Whether nothing may show where the centre of mass is. */
+  /** Whether parts that show the centre of mass are hidden. */
   readonly hidesCentre: boolean;
   readonly apart: boolean;
   readonly model: string;
@@ -63,29 +64,29 @@ export interface Shown {
   readonly principal: boolean;
   readonly poinsot: boolean;
   readonly cones: boolean;
-  /** Omegas up to now while L was the same [rad/s, world]. */
+  /** Omegas up to now since the last change of L [rad/s, world]. */
   readonly herpolhode: readonly Vec3[];
-  /** Axes turned by hand, as columns, in body axes. */
+  /** Axes turned by the user, as columns, in body axes. */
   readonly turned: readonly number[] | null;
-  /** Places of the trace [m, world] from the oldest on. */
+  /** Points of the trace [m, world], the oldest first. */
   readonly trace: readonly number[] | null;
   readonly tracePoint: Vec3 | null;
-  /** Pairs of points [mesh] between which chalk was drawn. */
+  /** Chalk lines as pairs of points [mesh]. */
   readonly chalk: readonly number[];
-  /** The two directions [world] between which an angle is measured. */
+  /** The two directions [world] of the protractor. */
   readonly protractor: readonly [Vec3, Vec3] | null;
   readonly kept: Pose | null;
-  /** Where the keyboard aims [px]. */
+  /** Position of the keyboard's aim [px]. */
   readonly aim: readonly [number, number] | null;
 }
 
 interface Copy { readonly frame: Group; readonly mesh: Mesh; readonly edges: LineSegments }
 
-/** A text that stands at a place of the picture. */
+/** A text at a position in the picture. */
 class Label {
   readonly node = document.createElement("span");
   private text = "";
-  /** [px], while it is shown. */
+  /** Position [px] while it is shown. */
   place: readonly [number, number] | null = null;
   constructor(into: HTMLElement, colour: string) {
     this.node.className = "label";
@@ -104,7 +105,7 @@ class Label {
 
 export class Picture {
   readonly eye = new Eye();
-  /** Null where there is no WebGL: then flat draws. */
+  /** Null without WebGL; then ``flat`` draws. */
   readonly renderer: Renderer | null;
   private readonly flat: FlatPicture | null;
   private readonly scene = new Scene();
@@ -141,15 +142,15 @@ export class Picture {
   private free: Free = { left: 0, top: 0, width: 1, height: 1 };
   private offset = new Vector3();
   private size = 1;
-  /** Of labels, times the usual size. */
+  /** Size of labels relative to LETTER_PX. */
   private letter = 1;
   private reach = 0.5;
-  /** Where labels of this picture stand [px], with half their widths. */
+  /** Positions of the labels of this frame [px], with half their widths. */
   private readonly said: { readonly x: number; readonly y: number; readonly half: number }[] = [];
 
   constructor(stage: HTMLElement, labelRoom: HTMLElement) {
     let renderer: Renderer | null = null;
-    try { renderer = new Renderer(stage); } catch { /* said by the page, and drawn flat */ }
+    try { renderer = new Renderer(stage); } catch { /* reported by the page, and drawn flat */ }
     this.renderer = renderer;
     this.flat = renderer ? null : new FlatPicture(stage);
     this.labelRoom = labelRoom;
@@ -208,14 +209,14 @@ export class Picture {
     const frame = new Group();
     mesh.add(edges);
     frame.add(mesh);
-    // A body's transparent copies stand behind arrows that are seen through it.
+    // Transparent copies of the body are drawn after the arrows that are visible through them.
     mesh.renderOrder = clear ? 3 : 0;
     edges.renderOrder = clear ? 4 : 2;
     this.scene.add(frame);
     return { frame, mesh, edges };
   }
 
-  /** Another body, or the same one changed. */
+  /** Set the body, or its changes. */
   setBody(info: BodyInfo): void {
     if (info.vertices !== this.info?.vertices) {
       const before = this.surface, surface = shadedSurface(info.vertices, info.triangles);
@@ -225,7 +226,7 @@ export class Picture {
       before?.geometry.dispose();
       before?.edges.dispose();
       this.scales.forget();
-      // An open surface is seen from inside as well.
+      // The inside of an open surface is visible, too.
       (this.body.mesh.material as MeshLambertMaterial).side = Number.isFinite(info.volume) ? FrontSide : DoubleSide;
     }
     this.info = info;
@@ -239,7 +240,8 @@ export class Picture {
     this.reach = reach;
   }
 
-  /** The background: one colour where each pixel costs, since a see-through canvas is put together once more by the page. */
+  /** Set the background; on slow renderers one colour, because the browser composites a transparent
+   * canvas once more. */
   private sky(): void {
     const plain = !this.renderer?.shown.smooth;
     if (plain) { this.scene.background = new Color(SKY); return; }
@@ -265,16 +267,16 @@ export class Picture {
     this.flat?.resize(width, height);
   }
 
-  /** Arrows find their lengths anew, and the eye its place. */
+  /** Reset the scales of arrows, and the camera's position. */
   restart(now: Snapshot): void {
     this.scales.forget();
     this.eye.jump([now.body.row[0]!, now.body.row[1]!, now.body.row[2]!]);
   }
 
-  /** Where the ghost stands beside the body rather than in it. */
+  /** Draw the ghost beside the body instead of in place. */
   setApart(apart: boolean): void { this.offset = apart ? new Vector3(...this.eye.right()).setZ(0).normalize().multiplyScalar(1) : new Vector3(); }
 
-  /** Draw this instant, `seconds` after the picture before; the eye stays while it is held. */
+  /** Draw an instant, `seconds` after the previous frame; the camera doesn't move while the body is held. */
   draw(now: Snapshot, shown: Shown, seconds: number, held: boolean): void {
     const { body, ghost } = now, { size, eye } = this;
     const at = new Vector3(body.row[0], body.row[1], body.row[2]), aside = this.offset.clone().multiplyScalar(2.1 * this.reach);
@@ -306,7 +308,7 @@ export class Picture {
     else this.flat?.draw(eye, this.scene);
   }
 
-  /** A label at an arrow's tip, beyond it. */
+  /** Put a label beyond an arrow's tip. */
   private tag(label: Label, text: string, tip: Vector3, from: Vector3, beyond = 17): void {
     const end = this.eye.project(tip, new Vector3()), start = this.eye.project(from, new Vector3());
     const dx = end.x - start.x, dy = end.y - start.y, length = Math.hypot(dx, dy);
@@ -314,8 +316,8 @@ export class Picture {
     this.put(label, text, end.x + ux * (beyond + Math.abs(ux) * HALF_PX * text.length) * this.letter, end.y + uy * beyond * this.letter);
   }
 
-  /** A label as near to a place on the screen [px] as lies in what nothing covers; above another one that stands there,
-   * or beside it. */
+  /** Put a label as close to a screen position [px] as possible within the uncovered part of the window; above or
+   * beside a label that is there already. */
   private put(label: Label, text: string, x: number, y: number): void {
     const { left, top, width, height } = this.free, half = HALF_PX * this.letter * text.length, line = LINE_PX * this.letter;
     let atX = Math.max(left + half, Math.min(left + width - half, x)), atY = Math.max(top + line, Math.min(top + height - line, y));
@@ -338,7 +340,7 @@ export class Picture {
     ] as const;
     for (const [arrow, label, kind, vector, first, usual, thick] of parts) {
       const value = vector.length(), scaled = this.scales.length(kind, value, first * size, LONGEST * size, usual);
-      // Then omega ends where the ellipsoid touches the plane.
+      // In Poinsot's construction, omega ends where the ellipsoid touches the plane.
       const length = shown.hidesCentre ? 0 : made && arrow === this.omega ? made.unit * value : scaled;
       if (!length) { arrow.hide(); label.hide(); continue; }
       arrow.show(at, vector.multiplyScalar(length / value), thick * STRONG * size);
@@ -373,7 +375,7 @@ export class Picture {
       }
       const value = load.vector.length(), length = this.scales.length(load.kind, value, FIRST_LOAD * size, LONGEST * size, value);
       const vector = load.vector.multiplyScalar(length / (value || 1));
-      // A force that pushes has its tip at the point, as a finger would stand.
+      // The tip of a pushing force is at the point, like a finger.
       const from = load.pushes ? load.from.clone().sub(vector) : load.from, tip = from.clone().add(vector);
       this.loads[k]!.show(from, vector, PLAIN * size);
       const text = `${short(value)} ${load.unit}`;
@@ -382,7 +384,7 @@ export class Picture {
     }
   }
 
-  /** Where a point of the mesh is in the world now. */
+  /** Present world position of a point of the mesh. */
   onBody(point: Vec3): Vector3 {
     const { mesh } = this.body, middle = this.surface!.middle;
     mesh.updateWorldMatrix(true, false);
@@ -399,7 +401,7 @@ export class Picture {
     if (!label) return;
     const isSlack = Math.abs(string.tension) < SLACK * flying!.massKg * Math.hypot(...gravity), text = `${isSlack ? "0" : short(string.tension)} N`, seen = this.eye.project(hand, new Vector3());
     if (this.inFree(seen.x, seen.y)) { this.tag(label, text, hand, knot, 24); return; }
-    // A nail that isn't seen: beside the string, near the body.
+    // The string's end is out of view: put the label beside the string, near the body.
     const at = this.eye.project(knot, new Vector3()), away = Math.hypot(seen.x - at.x, seen.y - at.y) || 1, up = 70 * this.letter;
     this.put(label, text, at.x + (up * (seen.x - at.x)) / away + (16 + HALF_PX * text.length) * this.letter, at.y + (up * (seen.y - at.y)) / away);
   }
@@ -410,7 +412,7 @@ export class Picture {
     this.boundingBox.visible = shown.boundingBox;
     this.boundingBox.position.set(...([0, 1, 2].map((k) => 0.5 * (low[k]! + high[k]!) * body.scale[k]! - body.com[k]!) as [number, number, number]));
     this.boundingBox.scale.set(...([0, 1, 2].map((k) => Math.max(1e-9, Math.abs((high[k]! - low[k]!) * body.scale[k]!))) as [number, number, number]));
-    // The box and the ellipsoid of evenly spread mass that have this mass and these moments.
+    // The uniform box and the uniform ellipsoid of this mass and these moments.
     const [a, b, c] = info.moments, spread = [b + c - a, a + c - b, a + b - c].map((s) => Math.sqrt(Math.max(0, s) / info.massKg));
     const axes = info.axes;
     const turn = new Matrix4().set(axes[0]!, axes[1]!, axes[2]!, 0, axes[3]!, axes[4]!, axes[5]!, 0, axes[6]!, axes[7]!, axes[8]!, 0, 0, 0, 0, 1);
@@ -467,7 +469,7 @@ export class Picture {
     this.tag(this.labels.angle, `${((angle * 180) / Math.PI).toFixed(1)}°`, point, at, 16);
   }
 
-  /** The middle of the mesh's box [mesh]. */
+  /** Centre of the mesh's bounding box [mesh]. */
   private boxMiddle(): Vec3 {
     const { low, high } = this.surface!;
     return [0, 1, 2].map((k) => 0.5 * (low[k]! + high[k]!)) as unknown as Vec3;
@@ -480,20 +482,20 @@ export class Picture {
       const [dot, name] = (this.markLabels[k] ??= [new Label(this.labelRoom, "#1d2433"), new Label(this.labelRoom, "#1d2433")]), point = this.onBody(mark.point), seen = this.eye.project(point, new Vector3());
       dot.node.classList.add("dot");
       dot.show(mark.isCentre ? "⊕" : "●", seen.x, seen.y);
-      if (mark.isCentre) name.hide(); // its sign stands on the body, a name would cover it
+      if (mark.isCentre) name.hide(); // its symbol is on the body, which a name would cover
       else if (this.isNearTip(seen)) this.put(name, mark.text, seen.x + (16 + HALF_PX * mark.text.length) * this.letter, seen.y);
       else this.tag(name, mark.text, point, at, 20);
     }
   }
 
-  /** Whether an arrow of the motion ends near a place on the screen [px]. */
+  /** Whether the arrow of omega or L ends near a screen position [px]. */
   private isNearTip({ x, y }: Vector3): boolean {
     return [this.labels.omega, this.labels.momentum].some(({ place }) => place !== null && Math.hypot(place[0] - x, place[1] - y) < 52 * this.letter);
   }
 
   private drawFloor(at: Vector3): void {
     const { floor, shadow, eye } = this, cell = niceCell(0.3 * this.size), below = 1.06 * this.reach;
-    // Floors lie one below the other: one that falls passes them.
+    // There is a floor at each multiple of a height, and a falling body passes them.
     const storey = 2.6 * below, height = Math.floor((eye.target.z + 0.35 * storey) / storey) * storey - below;
     const left = (eye.target.z - height) / storey;
     const seen = Math.max(0, Math.min(1, (left - 0.05) / 0.2, (1.1 - left) / 0.2));
@@ -508,7 +510,7 @@ export class Picture {
     (shadow.material as MeshBasicMaterial).opacity = 0.13 * seen;
   }
 
-  /** What is drawn, with its labels; of the whole window, or of what nothing covers. */
+  /** The frame with its labels, of the whole window or of its uncovered part. */
   still(background: string, isFree = false): HTMLCanvasElement {
     const canvas = document.createElement("canvas"), ratio = 2, { width, height } = this.eye, { free } = this;
     const from = isFree ? { x: free.left - 10, y: free.top - 10, width: free.width + 20, height: free.height + 20 } : { x: 0, y: 0, width, height };
@@ -534,13 +536,13 @@ export class Picture {
     return canvas;
   }
 
-  /** What is drawn, as it would be saved. */
+  /** The frame as an image file. */
   async saved(background: string): Promise<Blob> {
     const canvas = this.still(background);
     return new Promise((done, failed) => canvas.toBlob((blob) => (blob ? done(blob) : failed(new Error("no picture"))), "image/png"));
   }
 
-  /** Whether a place on the screen [px] lies in what nothing covers. */
+  /** Whether a screen position [px] is in the uncovered part of the window. */
   inFree(x: number, y: number): boolean {
     const { left, top, width, height } = this.free;
     return x >= left && y >= top && x <= left + width && y <= top + height;
@@ -559,12 +561,12 @@ function place(copy: Copy, pose: Pose | null, surface: Surface | null, aside: Ve
   copy.mesh.scale.set(scale[0], scale[1], scale[2]);
 }
 
-/** A vector in body axes, in world axes. */
+/** Convert a vector from body to world axes. */
 function turned(R: readonly number[], [x, y, z]: Vec3): Vector3 {
   return new Vector3(R[0]! * x + R[1]! * y + R[2]! * z, R[3]! * x + R[4]! * y + R[5]! * z, R[6]! * x + R[7]! * y + R[8]! * z);
 }
 
-/** A body has the colour of its tensor: true, box, or another. */
+/** Colour a body by its tensor: true, box, or another. */
 function paint(copy: Copy, model: string): void {
   const colour = colourOf(model);
   (copy.mesh.material as MeshLambertMaterial).color.setHex(colour);
@@ -575,13 +577,13 @@ export function colourOf(model: string): number {
   return model === "solid" ? COLOURS.body.true : model === "bounding_box" ? COLOURS.body.box : COLOURS.body.other;
 }
 
-/** 1, 2 or 5 times a power of ten, about as large as asked. */
+/** 1, 2 or 5 times a power of ten, about as large as ``length``. */
 function niceCell(length: number): number {
   const power = 10 ** Math.floor(Math.log10(length || 1)), part = length / power;
   return power * (part < 1.5 ? 1 : part < 3.5 ? 2 : part < 7.5 ? 5 : 10);
 }
 
-/** A grid in the xy plane with cells of 1 that fades towards its rim. */
+/** A grid in the xy plane with cells of size 1, which fades towards its rim. */
 function grid(): LineSegments {
   const half = 9, places: number[] = [], colours: number[] = [], ink = new Color(0xaab4ca);
   const vertex = (x: number, y: number): void => {

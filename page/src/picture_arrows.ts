@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Arrows, strings and their lengths.
+// Arrows, their scales, and strings.
 
 import { BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, GreaterDepth, Group, Mesh, MeshBasicMaterial, MeshLambertMaterial, SphereGeometry, Vector3 } from "three";
 
@@ -9,7 +9,7 @@ const SHAFT = new CylinderGeometry(1, 1, 1, 18, 1).translate(0, 0.5, 0);
 const HEAD = new ConeGeometry(1, 1, 24).translate(0, 0.5, 0);
 const BALL = new SphereGeometry(1, 20, 14);
 
-/** An arrow; what of it is behind something shows through. */
+/** An arrow; its hidden parts shine through. */
 export class Arrow {
   readonly node = new Group();
   private readonly shafts: Mesh[] = [];
@@ -29,7 +29,7 @@ export class Arrow {
     this.node.visible = false;
   }
 
-  /** From `from` along `vector` [m], its shaft of this radius [m]. */
+  /** Show the arrow from `from` along `vector` [m], with this radius of the shaft [m]. */
   show(from: Vector3, vector: Vector3, radius: number): void {
     const length = vector.length();
     this.node.visible = length > 0;
@@ -47,12 +47,12 @@ export class Arrow {
   hide(): void { this.node.visible = false; }
 }
 
-/** Values per metre of each kind of arrow, proportional to the value. The first value of a kind sets its scale; one that
- * would reach out of the picture sets it anew. */
+/** Scale of each kind of arrow, as value per metre. The first value of a kind sets it; a value whose arrow would leave
+ * the picture sets it again. */
 export class Scales {
   private readonly perMetre = new Map<string, number>();
 
-  /** Length [m] of an arrow for a value >= 0; usual: a value of this kind where the first one is next to nothing. */
+  /** Length [m] of an arrow for a value >= 0. usual: sets the scale if the first value is negligible. */
   length(kind: string, value: number, first: number, longest: number, usual: number): number {
     if (!(value > 0) || !Number.isFinite(value)) return 0;
     let known = this.perMetre.get(kind) ?? (value > 1e-6 * usual ? value : usual) / first;
@@ -67,7 +67,7 @@ export class Scales {
 
 const RINGS = 17, SIDES = 8;
 
-/** A string from the hand to the knot, on top of everything, with a ball at each end. */
+/** The string from the hand to the knot, drawn on top, with a ball at each end. */
 export class Cord {
   readonly node = new Group();
   private readonly tube: Mesh;
@@ -91,7 +91,7 @@ export class Cord {
     this.node.visible = false;
   }
 
-  /** restLength [m]: a slack string hangs along `down`. */
+  /** Show the string; with length restLength [m] it sags along `down` while it is slack. */
   show(hand: Vector3, knot: Vector3, restLength: number, down: Vector3, radius: number): void {
     this.node.visible = true;
     const span = hand.distanceTo(knot), curve = sag(span, restLength);
@@ -120,7 +120,7 @@ export class Cord {
   hide(): void { this.node.visible = false; }
 }
 
-/** How deep a parabola of this length hangs whose ends are `span` apart; 0 of one that is taut. */
+/** Sag of a parabola of this length whose ends are `span` apart; 0 if it is taut. */
 function sag(span: number, length: number): number {
   if (!(length > span)) return 0;
   let low = 0, high = 0.6 * length;

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: MIT
 //
-// Where one looks from: round a point that follows the body, framed into the part of the window that nothing covers.
-// z is up.
+// The camera: it orbits a target that follows the body, and frames it in the uncovered part of the window. z is up.
 
 import { PerspectiveCamera, Vector3 } from "three";
 import type { Vec3 } from "./source.ts";
 
-/** Distance of the eye in radii of what is framed: long enough that near and far parts have about the same scale. */
+/** Distance of the camera in framed radii, so large that perspective is weak. */
 const FAR_RADII = 4.2;
-/** [s] in which the eye makes up most of what the body is ahead. */
+/** [s] Time constant with which the target follows the body. */
 const FOLLOWS_S = 0.35;
-/** Radii by which the body may be away from the middle. */
+/** Largest distance of the body from the target, in framed radii. */
 const STRAY = 0.3;
 const HIGHEST = 1.5;
 const FIRST = { azimuth: -0.84, elevation: 0.4 };
@@ -27,7 +26,7 @@ export class Eye {
   private elevation = FIRST.elevation;
   private zoom = 1;
   private radius = 1;
-  /** What moves smoothly: the radius that is framed. */
+  /** The framed radius, smoothed. */
   private shownRadius = 0;
 
   constructor() { this.camera.up.set(0, 0, 1); }
@@ -38,7 +37,7 @@ export class Eye {
     this.free = free;
   }
 
-  /** A sphere of this radius [m] about the target is to be seen. */
+  /** Set the radius [m] of the sphere about the target that is framed. */
   frame(radius: number): void {
     this.radius = radius;
     if (!this.shownRadius) this.shownRadius = radius;
@@ -69,7 +68,7 @@ export class Eye {
     if (away > most) this.target.lerp(to, 1 - most / away);
   }
 
-  /** Put the camera where it belongs, `seconds` after the picture before. */
+  /** Update the camera, `seconds` after the previous frame. */
   place(seconds: number): void {
     this.shownRadius += (this.radius - this.shownRadius) * (1 - Math.exp(-seconds / 0.2));
     const { camera, free, width, height } = this, half = Math.max(20, 0.5 * Math.min(free.width, free.height));
@@ -86,31 +85,31 @@ export class Eye {
     camera.updateMatrixWorld();
   }
 
-  /** Where a point of the world is on the screen [px], and whether it is before the eye. */
+  /** Screen position [px] of a world point; z is its depth in normalized device coordinates. */
   project(point: Vector3, into: Vector3): Vector3 {
     into.copy(point).project(this.camera);
     return into.set((0.5 + 0.5 * into.x) * this.width, (0.5 - 0.5 * into.y) * this.height, into.z);
   }
 
-  /** The ray through a place on the screen [px]; the direction is a unit vector. */
+  /** The ray through a screen position [px]; its direction is a unit vector. */
   ray(x: number, y: number): { origin: Vec3; direction: Vec3 } {
     const at = new Vector3((2 * x) / this.width - 1, 1 - (2 * y) / this.height, 0.5).unproject(this.camera).sub(this.camera.position).normalize();
     return { origin: this.camera.position.toArray(), direction: at.toArray() };
   }
 
-  /** How deep a point lies before the eye [m]. */
+  /** Depth of a point along the camera's axis [m]. */
   depth(point: Vec3): number {
     return new Vector3(...point).sub(this.camera.position).dot(this.camera.getWorldDirection(new Vector3()));
   }
 
-  /** The point at this depth [m] that is seen at a place on the screen [px]. */
+  /** The world point at a screen position [px] and depth [m]. */
   at(x: number, y: number, depth: number): Vec3 {
     const { origin, direction } = this.ray(x, y), way = new Vector3(...direction);
     const along = depth / way.dot(this.camera.getWorldDirection(new Vector3()));
     return way.multiplyScalar(along).add(new Vector3(...origin)).toArray();
   }
 
-  /** Unit vector to the right on the screen. */
+  /** Unit vector towards the right of the screen [world]. */
   right(): Vec3 { return new Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0).toArray(); }
 
   /** Metres per pixel at the target. */

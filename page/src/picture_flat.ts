@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 //
-// The same picture without WebGL, on a 2D canvas: the far triangles first, the near ones over them.
+// The picture without WebGL, on a 2D canvas, by the painter's algorithm.
 
 import { BackSide, GreaterDepth, LineBasicMaterial, LineSegments, Material, Mesh, MeshBasicMaterial, MeshLambertMaterial, FrontSide, Line, Points, Vector3, type BufferGeometry, type Object3D, type Scene } from "three";
 import type { Eye } from "./picture_camera.ts";
 
 const SUN = new Vector3(-0.35, -0.5, 1).normalize();
-/** Triangles beyond which only every n-th of a mesh is drawn: a picture has to be ready before the next. */
+/** Largest number of triangles drawn; of a larger mesh only every n-th is drawn, to keep up with the frame rate. */
 const MOST = 12_000;
 
 interface Piece { readonly depth: number; readonly at: readonly number[]; readonly colour: string; readonly filled: boolean; readonly top: boolean }
@@ -42,7 +42,7 @@ export class FlatPicture {
       paper.moveTo(at[0]!, at[1]!);
       for (let k = 2; k < at.length; k += 2) paper.lineTo(at[k]!, at[k + 1]!);
       if (filled) { paper.fillStyle = colour; paper.fill(); }
-      // Neighbours leave no seam between them where each has its outline.
+      // The outline covers seams between neighbouring triangles.
       paper.strokeStyle = colour;
       paper.stroke();
     }
@@ -90,7 +90,7 @@ export class FlatPicture {
   }
 }
 
-/** Of linear light, as browsers write it. */
+/** The CSS colour of linear RGB. */
 function css(r: number, g: number, b: number, alpha: number): string {
   const byte = (x: number): number => Math.round(255 * Math.min(1, Math.max(0, x)) ** (1 / 2.2));
   return `rgba(${byte(r)},${byte(g)},${byte(b)},${alpha})`;

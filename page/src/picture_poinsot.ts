@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Poinsot's construction round the body: ellipsoid, plane, the curves on both, and the two cones.
+// Poinsot's construction about the body: ellipsoid, plane, polhode, herpolhode, and the two cones.
 
 import {
   BufferAttribute, BufferGeometry, CircleGeometry, DoubleSide, Group, Line, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, Points,
@@ -11,11 +11,11 @@ import type { Vec3 } from "./source.ts";
 
 const ELLIPSOID = 0x2f63ad, POLHODE = 0xb5890a, HERPOLHODE = 0xd1602a, PLANE = 0x7a45d1;
 const MOST = 3000;
-/** Of the body's size: the plane's radius, and the distance between its lines. */
+/** Radius of the plane, and spacing of its lines, in body sizes. */
 const RADIUS = 0.75, CELL = 0.15;
 const OUT = new Vector3(0, 0, 1);
 
-/** A curve that is seen at any distance, and the cone from the centre through it. */
+/** A curve that is visible at any distance, and the cone from the centre through it. */
 class Curve {
   readonly line: Line;
   readonly dots: Points;
@@ -49,7 +49,7 @@ class Curve {
 interface Wanted { readonly poinsot: boolean; readonly cones: boolean }
 
 export class PoinsotPicture {
-  /** In body axes, and in world axes; both stand at the centre of mass. */
+  /** Groups in body axes and in world axes, both with their origin at the centre of mass. */
   readonly onBody = new Group();
   readonly inSpace = new Group();
   private readonly ellipsoid = new Mesh(new SphereGeometry(1, 40, 26), new MeshLambertMaterial({ color: ELLIPSOID, transparent: true, opacity: 0.28, depthWrite: false }));
@@ -71,7 +71,8 @@ export class PoinsotPicture {
 
   hide(): void { this.onBody.visible = this.inSpace.visible = false; }
 
-  /** axes: 9 numbers row by row, principal axes as columns, in body axes; size [m]; at: the centre of mass [m, world]. */
+  /** Show the construction. axes: 9 numbers row by row, principal axes as columns, in body axes; size: the body's [m];
+   * at: the centre of mass [m, world]. */
   show(made: Construction, axes: readonly number[], herpolhode: readonly Vec3[], at: Vector3, size: number, { poinsot, cones }: Wanted): void {
     this.onBody.visible = this.inSpace.visible = true;
     this.ellipsoid.visible = this.plane.visible = poinsot;
@@ -87,7 +88,7 @@ export class PoinsotPicture {
   }
 }
 
-/** Lines of the plane, within its rim. */
+/** The grid of the plane, within its rim. */
 function rulings(): LineSegments {
   const places: number[] = [];
   for (let s = -RADIUS + CELL; s < RADIUS - 1e-9; s += CELL) {

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
 //
-// What WebGL draws with, and how much of it: less until enough pictures a second are drawn, more where there is room.
+// The WebGL renderer and its level of detail, which adapts to the frame rate.
 
 import { WebGLRenderer, type Camera, type Scene } from "three";
 
 export interface Level {
   readonly smooth: boolean;
-  /** Pixels drawn per pixel of the page, at most. */
+  /** Largest number of drawn pixels per CSS pixel. */
   readonly ratio: number;
   readonly shadow: boolean;
 }
 
-/** Fewer pixels than the page has would look coarse and save nothing: in software most of a picture goes into putting canvas
- * and cards together. */
+/** Levels of detail, from the highest. A ratio below 1 would look coarse and save nothing: in software rendering, most
+ * of a frame's time is spent on compositing the canvas with the cards. */
 const LEVELS: readonly Level[] = [
   { smooth: true, ratio: 2, shadow: true },
   { smooth: false, ratio: 2, shadow: true },
@@ -20,10 +20,10 @@ const LEVELS: readonly Level[] = [
   { smooth: false, ratio: 1, shadow: true },
   { smooth: false, ratio: 1, shadow: false },
 ];
-/** [ms] A picture that takes longer on the mean of a window is drawn with less; one that takes less, with more. */
+/** [ms] Mean frame time of a window above which the level is lowered, and below which it is raised. */
 const SLOW_MS = 1000 / 27, QUICK_MS = 1000 / 52;
 const WINDOW_MS = 1200, RAISED_AFTER_MS = 5000;
-/** [ms] A gap this long is a page that nobody saw, not a slow picture. */
+/** [ms] A longer gap is due to a hidden page, not to a slow frame. */
 const UNSEEN_MS = 400;
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
@@ -36,11 +36,11 @@ export class Renderer {
   private pictures = 0;
   private quickSince = 0;
   private last = 0;
-  /** The best level that didn't hold. */
+  /** Largest index of a level that was too slow. */
   private failed = -1;
   private readonly stage: HTMLElement;
 
-  /** Throws where there is no WebGL. */
+  /** Throws without WebGL. */
   constructor(stage: HTMLElement) {
     this.stage = stage;
     this.gl = this.made(false);
@@ -63,7 +63,7 @@ export class Renderer {
 
   draw(scene: Scene, camera: Camera): void { this.gl.render(scene, camera); }
 
-  /** Count a picture drawn at this time [ms]; says whether the level has changed. */
+  /** Count a frame drawn at this time [ms]; returns whether the level has changed. */
   judge(now: number): boolean {
     const gap = now - this.last;
     this.last = now;
@@ -88,7 +88,7 @@ export class Renderer {
 
   private ratio(level: Level): number { return Math.min(level.ratio, Math.max(1, devicePixelRatio || 1)); }
 
-  /** The next level that draws otherwise on this screen; the same where there is none. */
+  /** The next level that makes a difference on this screen; the same level if there is none. */
   private next(from: number, step: 1 | -1): number {
     const before = LEVELS[from];
     for (let k = from + step; k >= 0 && k < LEVELS.length; k += step) {

@@ -1,28 +1,29 @@
 // SPDX-License-Identifier: MIT
 //
-// A mesh as it is drawn: in single precision about its own middle, smooth where it is smooth, with the lines of its edges.
+// A mesh for drawing: in single precision relative to its middle, with smooth normals except at creases, and lines
+// there.
 
 import { BufferAttribute, BufferGeometry } from "three";
 
-/** Faces that meet at less than this are drawn as one smooth surface. */
+/** Cosine of the crease angle: faces that meet at a smaller angle are shaded smoothly. */
 const CREASE_COS = Math.cos((35 * Math.PI) / 180);
-/** Triangles up to which lines are drawn at the edges: beyond it they hide the body and take long to find. */
+/** Largest number of triangles with lines at creases; with more, lines would hide the body and take long to find. */
 const MOST_EDGED = 60_000;
 
 export interface Surface {
   readonly geometry: BufferGeometry;
   readonly edges: BufferGeometry;
-  /** [mesh]: single precision has no digits for a mesh far from its origin */
+  /** [mesh] origin of the geometry, since single precision loses the digits of a mesh far from its own origin */
   readonly middle: readonly [number, number, number];
-  /** [mesh] corners of its box */
+  /** [mesh] corners of the bounding box */
   readonly low: readonly [number, number, number];
   readonly high: readonly [number, number, number];
 }
 
-/** vertices: 3 n numbers [mesh]. triangles: 3 m vertex numbers, wound outward. */
+/** The surface to draw. vertices: 3 n numbers [mesh]. triangles: 3 m vertex numbers, wound outward. */
 export function shadedSurface(vertices: Float64Array, triangles: Uint32Array): Surface {
   const low = [Infinity, Infinity, Infinity] as [number, number, number], high = [-Infinity, -Infinity, -Infinity] as [number, number, number];
-  // A stray vertex that no triangle uses is no part of the body.
+  // Vertices that no triangle uses are not part of the body.
   for (const v of triangles) for (let k = 0; k < 3; k++) {
     const x = vertices[3 * v + k]!;
     if (x < low[k]!) low[k] = x;
@@ -60,7 +61,7 @@ export function shadedSurface(vertices: Float64Array, triangles: Uint32Array): S
   return { geometry, edges: creases(vertices, triangles, normals, middle), middle, low, high };
 }
 
-/** Lines where faces meet at a crease, or where a face ends. */
+/** Lines at creases and at open edges. */
 function creases(vertices: Float64Array, triangles: Uint32Array, normals: Float64Array, middle: readonly number[]): BufferGeometry {
   const lines: number[] = [], seen = new Map<number, number>(), count = vertices.length / 3;
   const add = (a: number, b: number): void => {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// What was seen so far: the track of a take, and its curves beside the picture.
+// The record of a take for plots and traces, and the plots.
 
 import { make } from "./panel_elements.ts";
 import type { Pose } from "./picture.ts";
@@ -8,27 +8,27 @@ import type { BodyInfo, Snapshot, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
-/** [ns] between instants that are kept, and how many: then every second one is forgotten. */
+/** Shortest time between recorded instants [ns], and their largest number; beyond it every second one is dropped. */
 const APART_NS = 3_000_000, MOST = 12_000;
-/** [s] shown in a plot. */
+/** [s] Time span of a plot. */
 const WINDOW_S = 10;
 
 interface Seen { readonly now: Snapshot; readonly info: BodyInfo; readonly gravity: Vec3 }
 
 export interface Energies { readonly spin: number; readonly move: number; readonly height: number; readonly string: number }
 
-/** [J]; height: against gravity, from the world's origin. */
+/** Energies [J]. height: gravitational energy relative to the world's origin. */
 export function energies({ row, massKg, kinetic, potential }: Snapshot["body"], gravity: Vec3): Energies {
   const [vx, vy, vz] = [row[7]!, row[8]!, row[9]!], move = 0.5 * massKg * (vx * vx + vy * vy + vz * vz);
   const height = -massKg * (gravity[0] * row[0]! + gravity[1] * row[1]! + gravity[2] * row[2]!);
   return { spin: Math.max(0, kinetic - move), move, height, string: Math.max(0, potential - height) };
 }
 
-/** The instants of a take that were seen, in the order of their times. */
+/** The recorded instants of a take, in order of time. */
 export class Track {
   readonly seen: Seen[] = [];
 
-  /** The take is flown up to endNs: what was seen beyond was another one. */
+  /** Remove instants after endNs, the end of the take; they belong to a discarded flight. */
   cut(endNs: number): void {
     while (this.seen.length && this.seen[this.seen.length - 1]!.now.timeNs > endNs) this.seen.pop();
   }
@@ -36,7 +36,7 @@ export class Track {
   add(now: Snapshot, info: BodyInfo, gravity: Vec3): void {
     const last = this.seen[this.seen.length - 1];
     if (last && now.timeNs - last.now.timeNs < APART_NS) {
-      // Something done while time stands shows at once.
+      // A command while paused shows at once.
       if (now.timeNs === last.now.timeNs) this.seen[this.seen.length - 1] = { now, info, gravity };
       return;
     }
@@ -44,7 +44,7 @@ export class Track {
     if (this.seen.length > MOST) this.seen.splice(0, this.seen.length, ...this.seen.filter((_, k) => k % 2 === 0));
   }
 
-  /** Of the instant before a time, its number; -1 where there is none. */
+  /** Index of the last instant at or before a time; -1 if there is none. */
   before(timeNs: number): number {
     let low = -1, high = this.seen.length;
     while (high - low > 1) {
@@ -54,7 +54,7 @@ export class Track {
     return low;
   }
 
-  /** How the body lay at a time: between two instants that were seen. */
+  /** The body's pose at a time, interpolated between recorded instants. */
   pose(timeNs: number): Pose | null {
     const k = this.before(timeNs), one = this.seen[k]?.now, two = this.seen[k + 1]?.now;
     if (!one) return null;
@@ -67,7 +67,7 @@ export class Track {
     return { row, scale: one.body.scale, com: one.body.com };
   }
 
-  /** Places [m, world] of a point [mesh] up to a time, over this long [s]. */
+  /** Positions [m, world] of a point [mesh] during the last `seconds` up to a time. */
   trace(point: Vec3, untilNs: number, seconds: number): number[] {
     const places: number[] = [];
     for (let k = this.before(untilNs - seconds * 1e9) + 1; k <= this.before(untilNs); k++) {
@@ -79,7 +79,7 @@ export class Track {
   }
 }
 
-/** key: its name in the plot's title. */
+/** A curve. key: its entry in the plot's legend. */
 interface Curve { readonly key: HTMLElement; readonly colour: string; value(seen: Seen): number }
 interface Plot { readonly kind: string; readonly title: string; readonly unit: string; readonly curves: readonly Curve[]; readonly canvas: HTMLCanvasElement }
 
@@ -87,10 +87,10 @@ const principal = ({ now, info }: Seen, k: number): number =>
   info.axes[k]! * now.body.row[10]! + info.axes[3 + k]! * now.body.row[11]! + info.axes[6 + k]! * now.body.row[12]!;
 const AXES = ["#c93a27", "#16803f", "#2f63ad"] as const;
 
-/** Of the largest value: a smaller one of the other sign is nothing at the end of an axis. */
+/** Values of the other sign that are smaller than this, relative to the largest value, don't extend the axis. */
 const SEEN = 1e-3;
 
-/** Curves over the last seconds of the take, and where now is. */
+/** Plots of the last seconds of the take, with a line at the present time. */
 export class Plots {
   readonly node: HTMLElement;
   private readonly plots: readonly Plot[];
@@ -135,12 +135,12 @@ export class Plots {
           const at = value(seen[k]!);
           if (Number.isFinite(at)) places.push([((seen[k]!.now.timeNs - from) / (to - from)) * width, at]);
         }
-        key.hidden = !places.length; // of a ghost that isn't there
+        key.hidden = !places.length; // no ghost
         return { colour, places };
       });
       let low = 0, high = 0;
       for (const { places } of lines) for (const [, value] of places) { low = Math.min(low, value); high = Math.max(high, value); }
-      // What rounding leaves is no value to read.
+      // Rounding errors must not extend the axis.
       if (-low < SEEN * high) low = 0;
       if (high < -SEEN * low) high = 0;
       const room = 0.08 * (high - low || 1);

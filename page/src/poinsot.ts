@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT
 //
-// Poinsot's construction: the ellipsoid of a torque-free body's omegas of one energy rolls, without slipping, on the plane
-// L . omega = 2 T. The touching point's path on the ellipsoid is the polhode, that on the plane the herpolhode. Rays from
-// the centre through them make two cones, of the body and of space; the first rolls on the second.
+// Poinsot's construction: the inertia ellipsoid of a torque-free body, omega . I omega = 2 T, rolls without slipping on
+// the plane L . omega = 2 T. The path of the contact point on the ellipsoid is the polhode, its path on the plane the
+// herpolhode. Rays from the centre through them form the body cone and the space cone; the first rolls on the second.
 
 import type { BodyInfo, Flying, Snapshot, Vec3 } from "./source.ts";
 
-/** Relative change of L beyond which another herpolhode begins. */
+/** Relative change of L beyond which a new herpolhode starts. */
 const SAME = 2e-3;
-/** Instants of a herpolhode. */
+/** Largest number of points of a herpolhode. */
 const MOST = 3000;
-/** Of the body's size: the ellipsoid's mean semi-axis, and its longest one at most. */
+/** Mean semi-axis of the ellipsoid, and largest length of its longest one, in body sizes. */
 const MEAN = 0.45, LONGEST = 0.62;
 
 export interface Construction {
-  /** [m] that stand for 1 rad/s */
+  /** length that represents 1 rad/s [m] */
   readonly unit: number;
   /** semi-axes [m] about the principal axes */
   readonly semi: Vec3;
-  /** of L, world axes, and [m] along it from the centre to the plane */
+  /** unit vector of L, world axes; and distance of the plane from the centre [m] */
   readonly upright: Vec3;
   readonly depth: number;
   /** the closed curve through omega [rad/s, principal axes] */
@@ -27,7 +27,7 @@ export interface Construction {
 
 const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
-/** Of a body at one instant, drawn beside a body of this size [m]; null where it doesn't spin. */
+/** The construction for a body at one instant, scaled to its size [m]; null if the body doesn't spin. */
 export function construction({ row, omega, momentum }: Flying, { moments, axes }: BodyInfo, size: number): Construction | null {
   const twice = dot(omega, momentum), l = Math.hypot(...momentum), [I1, I2] = moments;
   if (!(twice > 0 && l > 0 && I1 > 0)) return null;
@@ -40,8 +40,8 @@ export function construction({ row, omega, momentum }: Flying, { moments, axes }
   };
 }
 
-/** The closed curve through omega on which T and |L| are the same, in principal axes with ascending moments: round the axis
- * of the largest moment, or of the smallest. One point where omega stays where it is. */
+/** The closed curve through omega on which T and |L| are constant, in principal axes with ascending moments, about the
+ * axis of the largest or of the smallest moment. A single point if omega is constant. */
 export function polhode([I1, I2, I3]: Vec3, w: Vec3): Vec3[] {
   const I = [I1, I2, I3], squares = w.map((x) => x * x);
   const [pole, first, second] = I3 * (I3 - I2) * squares[2]! >= I1 * (I2 - I1) * squares[0]! ? [2, 0, 1] : [0, 1, 2];
@@ -58,8 +58,7 @@ export function polhode([I1, I2, I3]: Vec3, w: Vec3): Vec3[] {
   });
 }
 
-/** Omegas [rad/s, world axes] up to now, from the last time on at which something changed L: the herpolhode. seen: instants
- * in the order of their times. */
+/** The herpolhode: omegas [rad/s, world axes] up to now since the last change of L. seen: instants in order of time. */
 export function herpolhode(seen: readonly { readonly now: Snapshot }[], now: Snapshot): Vec3[] {
   const { momentum, omega } = now.body, l = Math.hypot(...momentum), found: Vec3[] = [omega];
   let k = seen.length - 1;

@@ -1,30 +1,31 @@
 // SPDX-License-Identifier: MIT
 //
-// Hands: a pointer that pulls the body on a string from where it grabbed it, or pokes it; and pointers that turn the view.
-// The keyboard has one too.
+// Pointers: one pulls the body on a string from the grabbed point, or pokes it; others turn the view. The keyboard can
+// do the same.
 
 import type { Picture } from "./picture.ts";
 import { say } from "./panel_elements.ts";
 import type { Hit, Motion, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 
-/** [px] A pointer that moves less was pressed on one place. */
+/** [px] A pointer that moves less is a click, not a drag. */
 const STILL_PX = { mouse: 4, pen: 6, touch: 9 } as const;
-/** [ms] A second finger that comes sooner makes of the drag a pinch, and the drag is taken back; later it only ends it. */
+/** [ms] A second finger within this time turns a drag into a pinch, and the drag is undone; a later one only ends the
+ * drag. */
 const PINCH_MS = 350;
-/** [ns, simulated] A string is released by itself when its hand has said nothing for a while. */
+/** [ns, simulated] Period of repeating the hand's target, since the string is released after a timeout. */
 const HELD_NS = 400_000_000;
-/** [rad/s] Light and heavy bodies follow the hand alike. */
+/** [rad/s] Frequency of the hand's string, with which light and heavy bodies follow alike. */
 const FREQUENCY = 8;
 const AIM_PX = 12;
-/** [px] */
+/** [px] Resolution of targets. */
 const PART_PX = 0.25;
 
 interface Hand {
   readonly id: number;
   readonly hit: Hit;
   readonly inward: Vec3;
-  /** [m] of the grabbed point before the eye: the hand moves in that plane, which faces the camera. */
+  /** Depth of the grabbed point [m]; the hand moves in the plane of this depth, parallel to the screen. */
   readonly depth: number;
   x: number;
   y: number;
@@ -32,7 +33,7 @@ interface Hand {
   readonly still: number;
   readonly begunMs: number;
   tied: boolean;
-  /** Simulated time at which it was tied, and last told where it is. */
+  /** Simulated times at which the string was tied, and at which its target was sent last. */
   tiedNs: number;
   saidNs: number;
   moved: boolean;
@@ -40,19 +41,19 @@ interface Hand {
 }
 
 export class Pointer {
-  /** Who takes the next place on the body that is pressed, instead of a poke. */
+  /** Receives the next click on the body, instead of a poke. */
   claim: ((hit: Hit) => void) | null = null;
-  /** Who is told of each place of the body that is drawn over, instead of a drag; begins: of a stroke. */
+  /** Receives the points of a stroke on the body, instead of a drag; begins: the first point of a stroke. */
   chalk: ((hit: Hit, begins: boolean) => void) | null = null;
-  /** Whether a drag ties the string; otherwise the scene's own one holds the body. */
+  /** Whether a drag ties the string; false if the scene's own string holds the body. */
   pulls = true;
   private drawing: number | null = null;
-  /** Where the keyboard aims [px]. */
+  /** Position of the keyboard's aim [px]. */
   aim: [number, number] | null = null;
-  /** Called when a person has touched the picture. */
+  /** Called when the user has touched the picture. */
   touched: () => void = () => undefined;
   private hand: Hand | null = null;
-  /** [ms] of the event that was not drawn yet, for those who measure. */
+  /** [ms] Time of the first event that was not drawn yet, for measurements of latency. */
   waitingMs = 0;
   private readonly turning = new Map<number, [number, number]>();
   private readonly stage: HTMLElement;
@@ -77,17 +78,17 @@ export class Pointer {
     stage.addEventListener("blur", () => { this.aim = null; stage.classList.remove("by-pointer"); });
   }
 
-  /** Whether a string is held: then the eye stays where it is. */
+  /** Whether a string is held; then the camera doesn't move. */
   get holding(): boolean { return this.hand?.tied ?? false; }
 
-  /** The motion began anew, or went back: nothing is held. */
+  /** Release the hand after the motion was restarted or went back. */
   forget(): void {
     this.hand = null;
     this.grabbedByKey = false;
     this.stage.classList.remove("pulling");
   }
 
-  /** Do what hands have done since the picture before. */
+  /** Send the hand's commands since the previous frame. */
   act(): void {
     const { hand } = this;
     if (!hand) return;
@@ -106,7 +107,7 @@ export class Pointer {
     }
   }
 
-  /** Where the hand is, to a part of a pixel that nobody sees: a link holds every place of a drag. */
+  /** The hand's position, rounded to an invisible part of a pixel, so that a link has short numbers. */
   private target(hand: Hand): Vec3 {
     const { eye } = this.picture, digits = Math.max(0, Math.min(12, Math.ceil(-Math.log10(eye.perPixel * PART_PX))));
     return eye.at(hand.x, hand.y, hand.depth).map((x) => Number(x.toFixed(digits))) as unknown as Vec3;
@@ -124,7 +125,7 @@ export class Pointer {
 
   private down(event: PointerEvent): void {
     if (event.button > 0 && event.pointerType === "mouse") { this.turnFrom(event); return; }
-    // The focus that a pointer gives isn't shown: browsers take it for one of the keyboard's, since a script gives it.
+    // Hide the focus ring of pointer focus: browsers treat focus set by a script as keyboard focus.
     this.stage.classList.add("by-pointer");
     this.stage.focus({ preventScroll: true });
     this.aim = null;
@@ -177,7 +178,7 @@ export class Pointer {
   private tie(hand: Hand): void {
     if (!this.pulls) { this.forget(); say(words.lesson.tied); return; }
     const values = this.motion.values();
-    // A stiffness that the scene doesn't choose is chosen for the hand: 50 N/m throws a nut and doesn't move a satellite.
+    // Replace the default stiffness by a frequency: 50 N/m throws a nut and doesn't move a satellite.
     if (values["string.frequency"] === 0 && values["string.stiffness"] === 50) this.told(this.motion.set({ "string.frequency": FREQUENCY }));
     const now = this.motion.snapshot();
     if (!this.told(this.motion.submit({ string: { attach: hand.hit.mesh, target: this.target(hand) } }))) { this.forget(); return; }
@@ -187,7 +188,7 @@ export class Pointer {
     this.stage.classList.add("pulling");
   }
 
-  /** A drag that turned out to be a pinch. */
+  /** Undo a drag that turned out to be a pinch. */
   private takeBack(hand: Hand): void {
     if (hand.tied) {
       if (performance.now() - hand.begunMs < PINCH_MS && hand.tiedNs > 0 && this.motion.can.goOn) {
@@ -233,13 +234,13 @@ export class Pointer {
     this.told(this.motion.submit({ at: { point: hit.mesh }, impulse: [J * x, J * y, J * z], axes: "body" }));
   }
 
-  /** Into the body where it was hit, in body axes: it turns on while it is pressed. */
+  /** The inward normal at a hit, in body axes, since the body keeps turning while the pointer is pressed. */
   private inward({ normal: [x, y, z] }: Hit): Vec3 {
     const R = this.motion.snapshot().body.rotation;
     return [0, 1, 2].map((k) => -(R[k]! * x + R[3 + k]! * y + R[6 + k]! * z)) as unknown as Vec3;
   }
 
-  // The keyboard's hand
+  // Keyboard
 
   private key(event: KeyboardEvent): void {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -262,7 +263,7 @@ export class Pointer {
 
   private aimed(): [number, number] {
     if (!this.aim) {
-      // Not at the centre of mass where a string holds the body: to find it may be the task.
+      // Aim at the knot, not at the centre of mass, if a string holds the body: finding the centre may be the task.
       const { row, string } = this.motion.snapshot().body, from = string?.knot ?? [row[0]!, row[1]!, row[2]!], at = this.picture.eye.target.clone().set(...from), seen = this.picture.eye.project(at, at);
       this.aim = [seen.x, seen.y];
     }

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 //
-// On paper: a lesson's title, what is seen, its question and its steps with room for answers; without a lesson the picture.
+// Printing: a lesson's title, the picture, its question and its steps with space for answers; without a lesson, the
+// picture.
 
 import type { Lesson } from "./lessons.ts";
 import { make } from "./panel_elements.ts";
 import type { Picture } from "./picture.ts";
 import { words } from "./words.ts";
 
-/** Puts a sheet into the page while it is printed. */
+/** Adds a sheet to the page while it is printed. */
 export function printsSheet(app: HTMLElement, picture: Picture, lesson: () => Lesson | null): void {
   let sheet: HTMLElement | null = null;
   const remove = (): void => { sheet?.remove(); sheet = null; };

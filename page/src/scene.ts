@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// From parameters to the record of a scene, and from a refusal of kernels to words.
+// Conversion of parameters to the record of a scene, and of the kernels' refusals to words.
 
 import type { Declarations } from "./data.ts";
 import { NUMBERS, Refusal, Scene } from "./kernels.ts";
@@ -10,10 +10,10 @@ import type { Value, Values } from "./source.ts";
 
 const BALLAST = "ballast.";
 
-/** kernels.ts's name of a record's field. */
+/** The name of a record's field in kernels.ts. */
 const camel = (field: string): string => field.replace(/_+(.)/g, (_, letter: string) => letter.toUpperCase());
 
-/** Fill a scene's record from all its values, by name. Throws Refused for more ballast than it holds. */
+/** Fill a scene's record from all its parameters. Throws Refused for more ballast than it has space for. */
 export function fillScene(scene: Scene, values: Values, declared: Declarations): void {
   scene.memory.u1(scene.at, Scene.SIZE).fill(0);
   const fields = scene as unknown as Record<string, number | Float64Array>;
@@ -34,13 +34,13 @@ export function fillScene(scene: Scene, values: Values, declared: Declarations):
   scene.ballast.set(heavy.flat());
 }
 
-/** One number for all axes, or one for each. */
+/** Numbers for each axis, from one for all or one for each. */
 function spread(value: Value, length: number): readonly number[] {
   const numbers = Array.isArray(value) ? (value as readonly number[]) : [Number(value)];
   return numbers.length === 1 ? new Array<number>(length).fill(numbers[0] ?? 0) : numbers;
 }
 
-/** A choice is its place among the choices, and true is 1. */
+/** A value as a number: a choice is its index, and true is 1. */
 function numberOf(name: string, value: Value, declared: Declarations): number {
   if (typeof value === "string") return declared.parameters.find((one) => one.name === name)?.choices.indexOf(value) ?? 0;
   return Number(value);
@@ -62,7 +62,7 @@ export class Refusals {
     return this.record.code;
   }
 
-  /** The line that says why. values: of the scene that was refused; frame: of the load; vertices: how many there are. */
+  /** The refusal as a line of text. values: of the refused scene; frame: of the load; vertices: number of vertices. */
   words(values: Values, frame = "", vertices = 0): string {
     const { words, models } = this.#declared, { refusal } = NUMBERS;
     const { code, detail } = this.record;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 //
-// Entries of poke scripts: read as commands for kernels, and written as the files that Python reads.
+// Entries of poke scripts: converted to commands for the kernels, and written as files that Python reads.
 
 import type { Declarations } from "./data.ts";
 import { NUMBERS } from "./kernels.ts";
 import { filled, flow, nanoseconds, Refused, repr, shown, Whole } from "./numbers.ts";
 import type { At, Entry, Values, Vec3, Wrench } from "./source.ts";
 
-/** A command as a flight's table has it (LOAD_ROW): duration [ns], −1 for the default; slot: its name, "" for the unnamed
- * one of held wrenches, null for none; load: LOAD numbers. frame: what it is told by where it is refused. */
+/** A command as in a flight's table (LOAD_ROW): duration [ns], −1 for the default; slot: its name, "" for the unnamed
+ * slot of held wrenches, null for none; load: LOAD numbers. frame: its frame_id, for refusals. */
 export interface Load {
   readonly kind: number;
   readonly durationNs: number;
@@ -16,7 +16,7 @@ export interface Load {
   readonly load: readonly number[];
   readonly frame: string;
 }
-/** A load, or a change of parameters, still unchecked. */
+/** A load, or a change of parameters that isn't checked yet. */
 export type Command = Load | { readonly set: unknown };
 
 const MOST = 1e100;
@@ -29,7 +29,7 @@ const POKE_KEYS = ["t", ...KEYS, "impulse", "angular_impulse"];
 
 type Fields = Readonly<Record<string, unknown>>;
 
-/** Reads entries for a body with these contacts [mesh]. */
+/** Converts script entries to commands. */
 export class Script {
   readonly #declared: Declarations;
 
@@ -37,7 +37,7 @@ export class Script {
     this.#declared = declared;
   }
 
-  /** The commands of an entry. Throws Refused. */
+  /** The commands of an entry. contacts: parameters with the contacts [mesh]. Throws Refused. */
   commands(entry: Entry, contacts: Values): Command[] {
     const fields = this.#fields(entry, "entry", null);
     const kinds = ["wrench", "string", "set", "state", "service"].filter((key) => key in fields);
@@ -174,7 +174,7 @@ export class Script {
   }
 }
 
-/** A load's frame as Python writes it (motion/frames.py). */
+/** A load's frame_id, as in motion/frames.py. */
 function frameText(axes: string, at: unknown, durationS: number | null, impulse: boolean, slot: unknown): string {
   const options = impulse ? ";impulse" : `${durationS === null ? "" : `;duration=${repr(durationS)}`}${slot === undefined ? "" : `;slot=${String(slot)}`}`;
   return `${axes}@${pointText(at as At)}${options}`;
@@ -188,7 +188,7 @@ function pointText(at: At): string {
   return `ray/${triple(at.ray.origin)}/${triple(at.ray.direction)}`;
 }
 
-/** A poke script as a file, of entries with their times. */
+/** The text of a poke script; entries have their times. */
 export function scriptText(entries: readonly Entry[]): string {
   return entries.length === 0 ? "[]\n" : entries.map((entry) => `- ${flow(written(entry))}\n`).join("");
 }
@@ -203,7 +203,7 @@ function written(entry: Entry): Fields {
   return fields;
 }
 
-/** A vertex has a number without a point. */
+/** A point of a load for YAML, in which a vertex number is an integer. */
 function place(at: unknown): unknown {
   return typeof at === "object" && at !== null && "vertex" in at ? { vertex: new Whole(Number(at.vertex)) } : at;
 }

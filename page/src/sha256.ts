@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// SHA-256 (FIPS 180-4). Browsers have their own only on pages that they call secure, which one on a class's server isn't.
+// SHA-256 (FIPS 180-4). Browsers offer their own only in secure contexts, which a page served over plain HTTP isn't.
 
 const fraction = (x: number): number => (x - Math.floor(x)) * 4294967296 | 0;
 const PRIMES = Array.from({ length: 400 }, (_, k) => k + 2).filter((n, _, all) => !all.some((p) => p < n && n % p === 0)).slice(0, 64);
@@ -9,7 +9,7 @@ const ROUNDS = PRIMES.map((p) => fraction(Math.cbrt(p)));
 
 const turned = (x: number, n: number): number => (x >>> n) | (x << (32 - n));
 
-/** The digest of bytes, hexadecimal. */
+/** The hexadecimal digest of bytes. */
 export function sha256(bytes: Uint8Array): string {
   const blocks = Math.ceil((bytes.length + 9) / 64);
   const padded = new Uint8Array(64 * blocks), view = new DataView(padded.buffer);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// The motion that is simulated in the page: one take, which may be gone back in, with its body and its ghost.
+// The motion simulated in the page: one take with its body and its ghost, in which one can seek.
 
 import { Data } from "./data.ts";
 import type { Declarations } from "./data.ts";
@@ -25,16 +25,16 @@ import { FORM, linkText, madeBy, takeBytes, takeFiles, takeOf, takeOfLink } from
 import type { Take } from "./take.ts";
 import { words } from "./words.ts";
 
-/** States of a take are kept every so often, to go back to: each is 30 kB. Of too many every other one is forgotten. */
+/** Period and largest number of saved states for seeking, 30 kB each; beyond it every second one is dropped. */
 const KEEP_NS = 1_000_000_000;
 const MOST_KEPT = 128;
-/** How many times as accurate a second flight is (scene/sensitivity.py). */
+/** Factor of accuracy of the second flight (scene/sensitivity.py). */
 const FINER = 10;
 
 interface Done { readonly tNs: number; readonly entry: Entry }
 
-/** The take at one time. next: how many entries have acted; actedNs: when the last ones did; before: the state row then,
- * before them. */
+/** The state of a take. next: number of entries that have acted; actedNs: time of the last ones; before: the state row
+ * at that time, before they acted. */
 interface Moment {
   readonly timeNs: number;
   readonly next: number;
@@ -84,7 +84,7 @@ export class Simulation implements Motion {
   #before: readonly number[] = [];
   #kept: Moment[] = [];
   #info: BodyInfo | null = null;
-  /** While an open mesh flies, which bounds no solid: the values that make it a shell, and what they were before. */
+  /** For an open mesh, which bounds no solid: the parameters that make it a shell, and their values before. */
   #asShell: { readonly shell: Values; readonly before: Values } | null = null;
   #notice = "";
 
@@ -108,7 +108,7 @@ export class Simulation implements Motion {
     this.#start(this.#sceneValues(declared.start), NO_GHOST, null, []);
   }
 
-  // What is opened
+  // Opening
 
   openScene(name: string): string | null {
     if (!Object.hasOwn(this.#declared.scenes, name)) return this.#unknown("scene", name, Object.keys(this.#declared.scenes));
@@ -121,7 +121,7 @@ export class Simulation implements Motion {
 
   openBody(name: string): string | null {
     if (!Object.hasOwn(this.#declared.bodies, name)) return this.#unknown("mesh", name, Object.keys(this.#declared.bodies));
-    // Density, contacts and start of the body's own scene, in the world that is there.
+    // Density, contacts and initial state of the body's own scene; other parameters keep their values.
     const own = Object.entries(this.#sceneValues(name)).filter(([key]) => /^(?:density|mass|scale|contacts\.|initial\.)/.test(key));
     const values = { ...this.#withoutPoints(), ...Object.fromEntries(own), mesh: name };
     return this.#tried(() => {
@@ -151,7 +151,7 @@ export class Simulation implements Motion {
     return this.#refusal(async () => this.openTake(await takeOfLink(text)));
   }
 
-  /** Begin with a take of a link or file. Throws Refused. */
+  /** Start with a take of a link or file. Throws Refused. */
   openTake(take: Take): void {
     const values: Record<string, Value> = this.#parameters.defaults();
     for (const [name, value] of Object.entries(take.values)) values[name] = this.#parameters.converted(name, value);
@@ -175,7 +175,7 @@ export class Simulation implements Motion {
     return { ...this.#parameters.defaults(), ...this.#declared.scenes[name]?.values };
   }
 
-  /** The values in force but for points in the coordinates of one mesh, and for what an open mesh alone needed. */
+  /** The present parameters, without points in mesh coordinates, and without those that only an open mesh needs. */
   #withoutPoints(): Values {
     const { shell, before } = this.#asShell ?? { shell: {}, before: {} }, now = this.#body.values;
     const isShell = Object.entries(shell).every(([name, value]) => now[name] === value);
@@ -201,7 +201,7 @@ export class Simulation implements Motion {
     return surface;
   }
 
-  /** Begin a take. Throws Refused, and then all is as it was. */
+  /** Start a take. Throws Refused and then changes nothing. */
   #start(values: Values, choice: GhostChoice, own: MeshNumbers | null, done: Done[]): void {
     const isFirst = this.#before.length === 0, whole = isFirst ? null : this.#whole();
     try {
@@ -220,7 +220,7 @@ export class Simulation implements Motion {
     this.#changed();
   }
 
-  /** To time 0 of the take. Throws Refused. */
+  /** Go to time 0 of the take. Throws Refused. */
   #rewind(): void {
     this.#placed.place(this.#surfaceOf(this.#initial));
     this.#body.begin(this.#initial);
@@ -244,7 +244,7 @@ export class Simulation implements Motion {
     };
   }
 
-  // What is there
+  // State
 
   parameters(): readonly Parameter[] {
     return this.#parameters.all;
@@ -293,7 +293,7 @@ export class Simulation implements Motion {
     if (this.#hasGhost) this.#ghost.fly(this.#body.timeNs);
   }
 
-  /** Do what is due by now. */
+  /** Apply the entries that are due. */
   #actDue(): void {
     for (let one = this.#done[this.#next]; one !== undefined && one.tNs <= this.#body.timeNs; one = this.#done[this.#next]) {
       try {
@@ -301,13 +301,13 @@ export class Simulation implements Motion {
         this.#next++;
       } catch (error) {
         if (!(error instanceof Refused)) throw error;
-        this.#done.splice(this.#next, 1); // of a take that another version made
+        this.#done.splice(this.#next, 1); // in a take of another version
         this.#notice = `without an entry that is refused: ${error.message}`;
       }
     }
   }
 
-  /** Do an entry now. Throws Refused, and then nothing has changed. */
+  /** Apply an entry now. Throws Refused and then changes nothing. */
   #act(entry: Entry): void {
     const body = this.#body, before = this.#moment();
     try {
@@ -332,7 +332,7 @@ export class Simulation implements Motion {
     }
   }
 
-  /** What the ghost doesn't support it goes without. */
+  /** Apply a command to the ghost, too, unless the ghost's integrator doesn't support it. */
   #alsoGhost(act: () => void): void {
     if (!this.#hasGhost) return;
     try {
@@ -374,7 +374,8 @@ export class Simulation implements Motion {
     return this.submit({ set: values });
   }
 
-  /** Values of the ghost aren't done at a time: it flies from the start. */
+  /** Set parameters, some of which are the ghost's; those aren't entries of the script, since the ghost starts again at
+   * time 0. */
   #setWithGhost(values: Values): void {
     const { "ghost.inertia_model": model, "ghost.integrator": integrator, ...others } = this.#parameters.changes(values);
     const refused = this.setGhost({
@@ -415,7 +416,7 @@ export class Simulation implements Motion {
     if (this.#body.values !== values) this.#changed();
   }
 
-  /** Fly to a time of the take, and do there what was done by then: `next` entries at most. */
+  /** Advance to a time of the take and apply its entries there, but not more than `next` in total. */
   #flyAgain(timeNs: number, next: number): void {
     const { endNs } = { endNs: this.#endNs };
     this.advance(timeNs);
@@ -428,7 +429,7 @@ export class Simulation implements Motion {
     this.#changed();
   }
 
-  /** What came after now. */
+  /** Drop everything after now. */
   #drop(): void {
     const nowNs = this.#body.timeNs;
     this.#done.length = this.#next;
@@ -463,7 +464,7 @@ export class Simulation implements Motion {
     if (refused !== null) this.#notice = refused;
   }
 
-  // States of the take
+  // Saved states
 
   #moment(): Moment {
     return {
@@ -511,7 +512,7 @@ export class Simulation implements Motion {
     return Promise.resolve(this.stateHash());
   }
 
-  /** The hash of the state now, before what was done at this very time. */
+  /** The hash of the present state, before entries of the same time. */
   stateHash(): string {
     const body = this.#body, row = this.#actedNs === body.timeNs ? this.#before : [...body.flight.row];
     const view = new DataView(new ArrayBuffer(8 + 8 * row.length));
@@ -547,14 +548,14 @@ export class Simulation implements Motion {
     return () => this.#watchers.delete(changed);
   }
 
-  hear(): void { /* what is refused is refused at once */ }
+  hear(): void { /* refusals are returned at once */ }
 
   #changed(): void {
     this.#info = null;
     for (const changed of this.#watchers) changed();
   }
 
-  /** null, or why it was refused. */
+  /** Call act; returns its refusal, or null. */
   #tried(act: () => void): string | null {
     try {
       act();

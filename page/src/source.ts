@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
 //
-// What moves, behind one small interface. The view knows nothing but this file; `Motion` is made by `openMotion`
-// (simulation in the page), or by what looks at a running node.
+// The interface of a motion, on which alone the view depends. `openMotion` makes a `Motion` that is simulated in the
+// page, `openLive` one of a running node.
 //
 // Units: SI, times in whole nanoseconds of simulated time (`...Ns`, exact up to 2^53). Frames: *world*; *body* (origin
-// in the centre of mass, axes of the mesh); *mesh* (the numbers of the mesh's file, before scale). A point p of the mesh
-// is at p * scale - com [m] in body axes, and at position + R (p * scale - com) in the world. Quaternions are x, y, z, w
-// and turn body axes into world axes. Nothing that is returned may be modified; it stays as it is when time goes on.
+// in the centre of mass, axes of the mesh); *mesh* (the numbers of the mesh's file, before scale). A point p of the
+// mesh is at p * scale - com [m] in body axes, and at position + R (p * scale - com) in the world. Quaternions are x,
+// y, z, w and rotate body axes to world axes. Returned objects must not be modified; they don't change when time
+// advances.
 
 export type Vec3 = readonly [number, number, number];
 
-/** A value of a parameter, as scene files have it. */
+/** A value of a parameter, as in scene files. */
 export type Value = number | boolean | string | readonly number[];
 export type Values = Readonly<Record<string, Value>>;
 
@@ -34,8 +35,8 @@ export interface Wrench {
   readonly slot?: string;
 }
 
-/** Something done, as an entry of a poke script has it (scene/script.py). t [s]: when; the motion itself says now where
- * it is left out. impulse [N s], angular_impulse [N m s]; string: target [m, world], attach [mesh] or a contact. */
+/** A command, as an entry of a poke script (scene/script.py). t: time [s], by default now. impulse [N s],
+ * angular_impulse [N m s]; string: target [m, world], attach [mesh] or a contact. */
 export type Entry = { readonly t?: number } & (
   | Wrench
   | { readonly at?: At; readonly impulse?: Vec3; readonly angular_impulse?: Vec3; readonly axes?: "world" | "body" }
@@ -46,8 +47,8 @@ export type Entry = { readonly t?: number } & (
   | { readonly service: "clear_wrench" }
 );
 
-/** A parameter's declaration (parameters/declarations.py). `accepted`: what it takes, in words. Above lower, if `above`;
- * from lower otherwise. lengths: how many numbers it may have. changes: "live" or "at the next reset". */
+/** A parameter's declaration (parameters/declarations.py). accepted: accepted values, in words. above: whether lower
+ * itself is excluded. lengths: accepted numbers of elements. changes: "live" or "at the next reset". */
 export interface Parameter {
   readonly name: string;
   readonly type: "double" | "doubles" | "integer" | "bool" | "string";
@@ -63,7 +64,7 @@ export interface Parameter {
   readonly accepted: string;
 }
 
-/** A body by one of the ways to distribute its mass. Where it has none, `refusal` says why and the numbers are NaN. */
+/** The body by an inertia model. If the model isn't possible, `refusal` says why and the numbers are NaN. */
 export interface Model {
   readonly model: "solid" | "shell" | "points" | "bounding_box" | "walled" | "explicit";
   readonly massKg: number;
@@ -76,10 +77,10 @@ export interface Model {
   readonly refusal: string;
 }
 
-/** A remark about a mesh, with its remedy. */
+/** A finding about a mesh, with its remedy. */
 export interface Finding { readonly code: string; readonly severity: "info" | "warning" | "error"; readonly message: string }
 
-/** The body as it is now. It is another object after each change of it. */
+/** The present body; a new object after each change. */
 export interface BodyInfo {
   readonly name: string;
   /** 3 n numbers [mesh]; the same array as long as the mesh is the same */
@@ -96,9 +97,9 @@ export interface BodyInfo {
   readonly moments: Vec3;
   /** 9 numbers row by row: principal axes as columns, in body axes, in the order of the moments */
   readonly axes: readonly number[];
-  /** x y z w: turns principal axes into body axes */
+  /** xyzw quaternion that rotates principal axes into body axes */
   readonly turn: readonly number[];
-  /** [m^3] of the solid as scaled; NaN where the surface bounds none */
+  /** [m^3] of the scaled solid; NaN if the surface bounds none */
   readonly volume: number;
   /** of several materials: densities are those of its parts */
   readonly hasParts: boolean;
@@ -107,12 +108,12 @@ export interface BodyInfo {
   readonly findings: readonly Finding[];
   /** [mesh], by name */
   readonly contacts: Readonly<Record<string, Vec3>>;
-  /** by the same mass: the models of a mesh, a printed one only where it flies, and the numbers given */
+  /** all inertia models with the same mass; `walled` only where it is in force, `explicit` with the numbers given */
   readonly models: readonly Model[];
 }
 
-/** A load that acts now. point [m, world]; force [N], torque [N m], both in world axes. endNs: Infinity if nothing ends
- * it. */
+/** A load that acts now. point [m, world]; force [N], torque [N m], both in world axes. endNs:
+ * Infinity without an end. */
 export interface Acting {
   readonly kind: "wrench" | "poke";
   readonly slot: string;
@@ -123,7 +124,7 @@ export interface Acting {
 }
 
 /** The string while it is tied. knot, end (of the hand) and target [m, world], attach [mesh], force on the body
- * [N, world], tension [N], rest length [m]; releaseNs: Infinity if it isn't released by itself. */
+ * [N, world], tension [N], rest length [m]; releaseNs: Infinity without a timeout. */
 export interface StringNow {
   readonly attach: Vec3;
   readonly knot: Vec3;
@@ -148,7 +149,7 @@ export interface Flying {
   /** [J]; potential: of gravity and string */
   readonly kinetic: number;
   readonly potential: number;
-  /** what the hand has done through the string, and what the string's damper took, since the start [J] */
+  /** work of the hand through the string, and energy dissipated by the string's damper, since the start [J] */
   readonly handWork: number;
   readonly stringHeat: number;
   readonly massKg: number;
@@ -157,23 +158,24 @@ export interface Flying {
   readonly com: Vec3;
   readonly string: StringNow | null;
   readonly loads: readonly Acting[];
-  /** why its motion has stopped, or "" */
+  /** why its motion has failed, or "" */
   readonly failure: string;
 }
 
-/** attitude [rad], position [m]; finer: the parameter, accuracy or step, that the second flight had, and its value. */
+/** Differences of attitude [rad] and position [m] to a second flight; finer: its accuracy or step, as
+ * name and value. */
 export interface Sensitivity { readonly attitude: number; readonly position: number; readonly finer: readonly [string, number] }
 
 export interface Snapshot {
   readonly timeNs: number;
   readonly body: Flying;
   readonly ghost: Flying | null;
-  /** [rad] between the attitudes of body and ghost; NaN without one */
+  /** angle between the attitudes of body and ghost [rad]; NaN without a ghost */
   readonly angleToGhost: number;
 }
 
-/** Where a ray first meets the body. mesh: [mesh]; body: [m, body axes]; world: [m]; distance: [m] from the ray's origin;
- * normal: outward, unit, world axes. */
+/** Where a ray first meets the body. mesh: [mesh]; body: [m, body axes]; world: [m]; distance: [m] from the ray's
+ * origin; normal: outward, unit, world axes. */
 export interface Hit {
   readonly mesh: Vec3;
   readonly body: Vec3;
@@ -182,8 +184,8 @@ export interface Hit {
   readonly normal: Vec3;
 }
 
-/** How the ghost differs from the body: "", 0 and true mean as the body. Any of it makes a ghost. step: [s] of an
- * integrator with fixed steps. */
+/** How the ghost differs from the body; "", 0 and true mean the same as the body. With any difference there is a ghost.
+ * step: of an integrator with fixed steps [s]. */
 export interface GhostChoice {
   readonly inertia_model: string;
   readonly integrator: string;
@@ -191,8 +193,8 @@ export interface GhostChoice {
   readonly gyroscopic: boolean;
 }
 
-/** What was done from one start to now. `script`: entries in the order of their times, each with its t. endNs: how far it
- * was flown. */
+/** The history of a take. script: entries in order of time, each with its t. endNs: time up to which
+ * it was simulated. */
 export interface History {
   readonly script: readonly Entry[];
   readonly endNs: number;
@@ -208,14 +210,15 @@ export interface TakeFiles {
   readonly mesh: { readonly name: string; readonly bytes: Uint8Array } | null;
 }
 
-/** What can be opened by name. */
+/** A scene or body that can be opened by name. */
 export interface Bundled { readonly name: string; readonly title: string }
 
-/** What a motion can do, beside flying and being touched: open files of one's own; give its take as link, page or script;
- * go on from a moment that is looked back at. */
+/** Optional abilities of a motion: open the user's files; export its take as link, page or script; continue from an
+ * earlier time. */
 export interface Can { readonly openFiles: boolean; readonly keep: boolean; readonly goOn: boolean }
 
-/** Who drives, of those who look at one node. asked: whether this page has; asking: how many do; owner: of the terminal. */
+/** Who has the hand (control) of a node. asked: this page has asked for it; asking: number of pages that have; owner:
+ * this page has the owner's address. */
 export interface HandState {
   readonly yours: boolean;
   readonly taken: boolean;
@@ -227,8 +230,8 @@ export interface HandState {
 }
 export type Wish = "ask" | "give" | "take" | "lock" | "unlock";
 
-/** A running node, whose time isn't the page's. rate: simulated seconds a second, 0 for as fast as it goes; began: how often
- * it has begun anew. */
+/** A running node, which has its own time. rate: simulated seconds per second, 0 for as fast as possible; began: number
+ * of its restarts. */
 export interface NodeBehind {
   readonly name: string;
   readonly isReached: boolean;
@@ -238,79 +241,80 @@ export interface NodeBehind {
   readonly hand: HandState;
   setPaused(paused: boolean): void;
   setRate(rate: number): void;
-  /** By one publication. */
+  /** Advance by one publication. */
   step(): void;
   wish(wish: Wish): void;
 }
 
-/** Functions that may refuse return one line of text that says why, or null; then nothing has changed. */
+/** Functions that may refuse return the refusal as a line of text, after which nothing has changed, or null. */
 export interface Motion {
   /** Version of the package that made this page. */
   readonly version: string;
   readonly bodies: readonly Bundled[];
   readonly scenes: readonly Bundled[];
   readonly can: Can;
-  /** null where the motion is simulated in the page. */
+  /** null if the motion is simulated in the page. */
   readonly node: NodeBehind | null;
   /** Declarations of all parameters that a page can set, `ballast.<name>` and ghost's among them. */
   parameters(): readonly Parameter[];
-  /** The values in force now, by name; after a step back those of that time. */
+  /** The present values by name; after going back, those of that time. */
   values(): Values;
   ghost(): GhostChoice;
   body(): BodyInfo;
 
-  /** Begin a take of a bundled scene. */
+  /** Start a take of a bundled scene. */
   openScene(name: string): string | null;
-  /** Begin a take with a bundled body, and otherwise with the parameters in force. */
+  /** Start a take with a bundled body, and otherwise with the present parameters. */
   openBody(name: string): string | null;
-  /** Begin a take with a mesh file (.obj, .stl, .ply, .glb), and otherwise with the parameters in force. scale: of all
+  /** Start a take with a mesh file (.obj, .stl, .ply, .glb), and otherwise with the present parameters. scale: of all
    * three axes [m per mesh unit]. */
   openMesh(name: string, bytes: Uint8Array, scale?: number): string | null;
-  /** A take of link() or of a saved file. A take of another version is opened, and `notice()` says which made it. */
+  /** Open a take of link() or of a saved file; for a take of another version, `notice()` names the version. */
   openLink(text: string): Promise<string | null>;
-  /** What there is to say about what was opened last, or "". */
+  /** A notice about what was opened last, or "". */
   notice(): string;
 
-  /** Now. */
+  /** The present state. */
   snapshot(): Snapshot;
-  /** Fly on to this time; what was done then acts again on the way until endNs. No-op for times past. */
+  /** Advance to this time; entries of the take up to endNs act again. No-op for past times. */
   advance(untilNs: number): void;
-  /** Do something now, at once. Drops what came after now. */
+  /** Apply a command now; drops everything after now. */
   submit(entry: Entry): string | null;
   /** The same as submit({set: values}). */
   set(values: Values): string | null;
-  /** Another ghost, from the start of the take on. */
+  /** Set another ghost, from the start of the take. */
   setGhost(choice: Partial<GhostChoice>): string | null;
-  /** Where a ray [m, world] first meets the body as it is now. */
+  /** Where a ray [m, world] first meets the present body. */
   firstHit(origin: Vec3, direction: Vec3): Hit | null;
 
   history(): History;
-  /** To any time of the take up to endNs, to the bit as it was. */
+  /** Go to any time of the take up to endNs, with bit-identical states. */
   goTo(timeNs: number): void;
-  /** Go on from here: what came after now is dropped. */
+  /** Continue from here: everything after now is dropped. */
   goOn(): void;
-  /** To time 0 with the parameters now in force; a new take. */
+  /** Start a new take at time 0, with the present parameters. */
   reset(): void;
 
-  /** How far now is from where a second flight of the take is, ten times as accurate. Throws Refused. */
+  /** Difference of the present state to that of a second flight of the take, ten times as accurate. Throws Refused. */
   sensitivity(): Sensitivity;
 
   take(): TakeFiles;
-  /** SHA-256 as `rigid_proto simulate --json` prints it as state_hash, hexadecimal. */
+  /** The state_hash of `rigid_proto simulate --json`, a hexadecimal SHA-256. */
   hash(): Promise<string>;
-  /** Scene and take as text for behind the # of an address; "" where the mesh is one's own. */
+  /** Scene and take as text for an address's fragment (#); "" for a mesh that isn't bundled. */
   link(): Promise<string>;
-  /** The page's file with scene, take and mesh, to be saved as .html. */
+  /** The page's file with scene, take and mesh, for saving as .html. */
   file(): Promise<Blob>;
 
-  /** Call this whenever body, parameters, ghost or history (but not time alone) have changed; returns what ends that. */
+  /** Call changed() after each change of body, parameters, ghost or history, but not of time; returns a function that
+   * ends this. */
   watch(changed: () => void): () => void;
-  /** Who is told what is to be said later, such as why a node has refused something. */
+  /** Set the receiver of later messages, such as a node's refusals. */
   hear(said: (line: string) => void): void;
 }
 
-/** The motion that is simulated in the page (`openMotion` in simulation.ts), of `inside("kernels")`, `inside("data")` and
- * `inside("take")` (file.ts). It begins with the scene or take that the file was made for. */
+/** Makes the motion that is simulated in the page (`openMotion` in simulation.ts), from `inside("kernels")`,
+ * `inside("data")` and `inside("take")` (file.ts). It starts with the scene or take in the file. */
 export type OpenMotion = (
   kernels: Uint8Array<ArrayBuffer>, data: Uint8Array<ArrayBuffer>, take?: Uint8Array<ArrayBuffer> | null,
 ) => Promise<Motion>;

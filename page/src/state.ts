@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// What there is to see of a flight at one time, and of its body: numbers of kernels, put into the world's axes.
+// The observable state of a flight and of its body: the kernels' numbers, converted to world axes.
 
 import type { Declarations } from "./data.ts";
 import { Flight, NUMBERS, Problem, Scene } from "./kernels.ts";
@@ -12,7 +12,7 @@ import type { Placed, Surface, Surfaces } from "./surface.ts";
 
 export const triple = (numbers: ArrayLike<number>, at = 0): Vec3 => [numbers[at] ?? 0, numbers[at + 1] ?? 0, numbers[at + 2] ?? 0];
 
-/** R v of a matrix row by row, and its transpose's. */
+/** R v, for a matrix R row by row; and Rᵀ v. */
 export function times(R: ArrayLike<number>, v: Vec3): Vec3 {
   const r = (k: number): number => R[k] ?? 0;
   return [r(0) * v[0] + r(1) * v[1] + r(2) * v[2], r(3) * v[0] + r(4) * v[1] + r(5) * v[2], r(6) * v[0] + r(7) * v[1] + r(8) * v[2]];
@@ -63,7 +63,7 @@ export class Observed {
     this.#three = [memory.numbers(3), memory.numbers(3), memory.numbers(3)];
   }
 
-  /** Rotation matrix of an attitude, row by row. */
+  /** Rotation matrix of a quaternion, row by row. */
   rotation(q: ArrayLike<number>): number[] {
     const memory = this.#kernels.memory;
     memory.f8(this.#quaternion.at, 4).set(Array.from(q));
@@ -136,7 +136,7 @@ export class Observed {
     };
   }
 
-  /** The string's force on the body [N, world]: by what it changes the acceleration. */
+  /** The string's force on the body [N, world], from the acceleration that it causes. */
   #pull(flown: Flown): Vec3 {
     const kernels = this.#kernels, memory = kernels.memory, copy = this.#copy;
     memory.u1(copy.at, Flight.SIZE).set(memory.u1(flown.flight.at, Flight.SIZE));
@@ -147,7 +147,7 @@ export class Observed {
     return [mass * (x - a), mass * (y - b), mass * (z - c)];
   }
 
-  /** Where a point [mesh] is [m, world]. */
+  /** World position [m] of a point [mesh]. */
   worldPoint(flown: Flown, point: Vec3): Vec3 {
     const row = flown.flight.row, own = flown.flight.body, { body } = NUMBERS;
     return toWorld({ rotation: this.rotation([...row.subarray(3, 7)]), position: triple(row), com: triple(own, body.COM), scale: triple(own, body.BODY_SCALE) }, point);
@@ -176,7 +176,7 @@ export class Observed {
     };
   }
 
-  /** The body of a flight, on the surface that is in place. */
+  /** The body of a flight, with the present surface. */
   info(flown: Flown): BodyInfo {
     const { body } = NUMBERS, row = flown.flight.body, surface = this.#placed.surface;
     const values = flown.values, scale = triple(row, body.BODY_SCALE);
@@ -205,7 +205,7 @@ export class Observed {
     };
   }
 
-  /** The body by each model, with the same mass. */
+  /** The body by each inertia model, with the same mass. */
   models(flown: Flown): Model[] {
     const memory = this.#kernels.memory;
     // Walls are measured by rays: of those that nobody asks for there are none.
@@ -241,14 +241,14 @@ export class Observed {
 const NONE = { vertices: new Float64Array(0), triangles: new Uint32Array(0) };
 const outward = new WeakMap<Surface, Uint32Array>();
 
-/** The same array for the same surface. */
+/** The triangles of a surface; always the same array for the same surface. */
 function trianglesOf(surface: Surface): Uint32Array {
   const known = outward.get(surface) ?? Uint32Array.from(surface.outward);
   outward.set(surface, known);
   return known;
 }
 
-/** Where a body is: rotation row by row, position [m, world], centre of mass [m] and scale. */
+/** Pose and scale of a body: rotation row by row, position [m, world], centre of mass [m] and scale. */
 interface BodyPlace { readonly rotation: readonly number[]; readonly position: Vec3; readonly com: Vec3; readonly scale: Vec3 }
 
 function toWorld(place: BodyPlace, point: Vec3): Vec3 {
@@ -259,7 +259,7 @@ function toMesh(place: BodyPlace, point: Vec3): Vec3 {
   return each(plus(transposedTimes(place.rotation, minus(point, place.position)), place.com), place.scale, (x, s) => x / s);
 }
 
-/** Infinity for what ends at no time. */
+/** A time of an end; Infinity for none. */
 function endOf(timeNs: number): number {
   return timeNs >= NUMBERS.flight.NEVER / 4 ? Infinity : timeNs;
 }

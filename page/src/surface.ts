@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// The surface of a body: what kernels judge of it, its moments, and its place in their memory.
+// The surface of a body: its checks by the kernels, its moments, and its copy in the kernels' memory.
 
 import type { Declarations } from "./data.ts";
 import { Mesh, NUMBERS } from "./kernels.ts";
@@ -8,8 +8,8 @@ import type { Kernels, Matrix, Memory, Moments, Vector } from "./kernels.ts";
 import { filled, Refused } from "./numbers.ts";
 import type { Finding } from "./source.ts";
 
-/** A mesh as in its file [mesh]. vertices: 3 n; triangles: 3 m; starts: first triangle of each polygon, and their number
- * (p + 1), or null where all are triangles. solid: moments that Python has computed, as the record MOMENTS. */
+/** A mesh as in its file [mesh]. vertices: 3 n; triangles: 3 m; starts: first triangle of each polygon, and the number
+ * of triangles (p + 1), or null if all are triangles. solid: moments computed by Python, as the record MOMENTS. */
 export interface MeshNumbers {
   readonly name: string;
   readonly vertices: Float64Array;
@@ -20,8 +20,8 @@ export interface MeshNumbers {
   readonly volume?: number;
 }
 
-/** A mesh that was judged. outward: triangles 3 m, wound outward; enclosing: those of its solid, over fewer vertices
- * where corners at open edges count as one; record: MESH, as far as it is known. */
+/** A checked mesh. outward: triangles 3 m, wound outward; enclosing: triangles of its solid, with fewer vertices if
+ * corners at open edges are joined; record: MESH, with the moments known so far. */
 export interface Surface extends MeshNumbers {
   readonly outward: Int32Array;
   readonly enclosing: Int32Array;
@@ -31,10 +31,10 @@ export interface Surface extends MeshNumbers {
   readonly record: Uint8Array;
 }
 
-/** The largest numbers of a mesh whose moments are finite (mass/verdict.py, SIZE_RANGE). */
+/** Range of a mesh's size in which its moments are finite (mass/verdict.py, SIZE_RANGE). */
 const SIZES = [1e-60, 1e60] as const;
 
-/** Part of the box's diagonal up to which corners at open edges count as one (mesh/topology.py, JOINED). */
+/** Largest distance of joined corners at open edges, relative to the box's diagonal (mesh/topology.py, JOINED). */
 const JOINED = 1e-6;
 
 /** Write vertices (n, 3) into memory. */
@@ -44,7 +44,7 @@ function vertexMatrix(memory: Memory, vertices: Float64Array): Matrix {
   return matrix;
 }
 
-/** Write vertex numbers, from 0 on, as integers of 64 bits. */
+/** Write vertex numbers, from 0, as 64-bit integers. */
 function integers(memory: Memory, numbers: Int32Array): Vector {
   const vector = memory.numbers(numbers.length);
   const halves = memory.i4(vector.at, 2 * numbers.length);
@@ -68,13 +68,14 @@ function turned(triangles: Int32Array): Int32Array {
   return found;
 }
 
-/** A bound, to two digits and not below itself. */
+/** A bound, rounded up to two digits. */
 function roundedUp(value: number): number {
   const step = value > 0 ? 10 ** (Math.floor(Math.log10(value)) - 1) : 1e-12;
   return Number((step * Math.ceil(value / step + 1e-9)).toPrecision(2));
 }
 
-/** Edges (e, 6) of triangles, components (m) and their count, and edges of an odd number of triangles and wound alike. */
+/** Edges (e, 6) of triangles, components (m) and their count, and numbers of edges with an odd number of triangles, and
+ * of edges whose triangles are wound inconsistently. */
 interface Connected {
   readonly corners: Matrix;
   readonly edges: Matrix;
@@ -84,7 +85,7 @@ interface Connected {
   readonly flipped: number;
 }
 
-/** Judges surfaces and computes their moments, in memory that it gives back. */
+/** Checks surfaces and computes their moments, in memory that it releases. */
 export class Surfaces {
   readonly #kernels: Kernels;
   readonly #declared: Declarations;
@@ -94,7 +95,7 @@ export class Surfaces {
     this.#declared = declared;
   }
 
-  /** Judge a mesh. Throws Refused for one that isn't a surface at all. */
+  /** Check a mesh. Throws Refused if it isn't a surface at all. */
   judged(mesh: MeshNumbers): Surface {
     const kernels = this.#kernels, memory = kernels.memory, mark = memory.mark();
     try {
@@ -108,7 +109,7 @@ export class Surfaces {
     const kernels = this.#kernels, words = this.#declared.words.surface;
     const record = new Mesh(memory);
     record.hasSurface = true;
-    const extent = this.#extent(mesh, memory); // before the record is looked at: memory may grow
+    const extent = this.#extent(mesh, memory); // before the record is accessed, since memory may grow
     record.extent.set(extent);
     const vertices = vertexMatrix(memory, mesh.vertices), triangles = triangleMatrix(memory, mesh.triangles);
     const n = vertices.n, m = triangles.n;
@@ -157,7 +158,7 @@ export class Surfaces {
     return { corners, edges, component, count, odd, flipped };
   }
 
-  /** The same with corners at open edges joined where they differ by rounding alone; null where that closes nothing. */
+  /** The same with corners at open edges joined if they differ only by rounding; null if that closes nothing. */
   #joined(vertices: Matrix, corners: Matrix, separate: Connected, room: Vector): { connected: Connected; found: number; farthest: number } | null {
     if (separate.odd === 0) return null;
     const joined = this.#kernels.memory.matrix(corners.n, 3);
@@ -167,7 +168,7 @@ export class Surfaces {
     return connected.odd < separate.odd ? { connected, found, farthest } : null;
   }
 
-  /** Faces that occur twice with one winding, where the surface is closed without the copies, too. */
+  /** Number of duplicate faces with the same winding, if the surface is also closed without them. */
   #surplus(corners: Matrix, vertexCount: number, room: Vector): number {
     const kernels = this.#kernels, memory = kernels.memory;
     const flags = { at: memory.reserve(corners.n), n: corners.n };
@@ -185,7 +186,7 @@ export class Surfaces {
     return odd === 0 && flipped === 0 ? copies : 0;
   }
 
-  /** Sides of the bounding box [mesh]. Throws Refused where there are no faces, or no numbers. */
+  /** Sides of the bounding box [mesh]. Throws Refused without faces, or for numbers that aren't finite. */
   #extent(mesh: MeshNumbers, memory: Memory): [number, number, number] {
     const { words } = this.#declared, mark = memory.mark();
     const used = { at: memory.reserve(mesh.vertices.length / 3), n: mesh.vertices.length / 3 };
@@ -264,7 +265,7 @@ function momentsOf(record: Mesh, model: number): Moments {
   return [record.solid, record.shell, record.points, record.boundingBox][model] ?? record.solid;
 }
 
-/** The surface that flies, in memory from a mark on: each takes the place of the one before. */
+/** The present surface in the kernels' memory, at a mark; each surface replaces the previous one. */
 export class Placed {
   readonly #memory: Memory;
   #mark = 0;
@@ -278,7 +279,7 @@ export class Placed {
     this.record = new Mesh(memory);
   }
 
-  /** All else that stays must be in memory before the first one. */
+  /** Set the surface. All other permanent data must be in memory before the first call. */
   place(surface: Surface | null): void {
     const memory = this.#memory;
     if (this.#mark === 0) this.#mark = memory.mark();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// A take as text: in a link, in the page's file, and as files for the command line.
+// Serialization of a take: in a link, in the page's file, and as files for the command line.
 
 import type { Declarations } from "./data.ts";
 import { Refused, repr, yamlValue } from "./numbers.ts";
@@ -11,15 +11,15 @@ import { scriptText } from "./script.ts";
 import type { Entry, GhostChoice, TakeFiles, Value, Values } from "./source.ts";
 import type { MeshNumbers } from "./surface.ts";
 
-/** Of a take as text; rigid_proto_ros/page/file.py has the same. */
+/** Version of the format of takes; rigid_proto_ros/page/file.py has the same. */
 export const FORM = 1;
 const MOST_TEXT = 2_000_000;
 const MOST_BYTES = 50_000_000;
 const MOST_ENTRIES = 200_000;
-/** Numbers of a record MOMENTS. */
+/** Number of doubles in a record MOMENTS. */
 const MOMENTS = 16;
 
-/** What was done from one start. values: that differ from the defaults; script: entries with their times [s]. */
+/** A take. values: parameters that differ from the defaults; script: entries with their times [s]. */
 export interface Take {
   readonly form: number;
   readonly version: string;
@@ -30,7 +30,7 @@ export interface Take {
   readonly mesh: MeshNumbers | null;
 }
 
-/** A mesh in a take, its numbers in base64. */
+/** A mesh in a take, with its numbers in base64. */
 export interface WrittenMesh { readonly name: string; readonly vertices: string; readonly triangles: string; readonly starts?: string; readonly solid?: string; readonly volume?: number }
 
 interface Written {
@@ -45,7 +45,7 @@ interface Written {
 
 const bytesOf = (numbers: Float64Array | Int32Array): Uint8Array => new Uint8Array(numbers.buffer, numbers.byteOffset, numbers.byteLength);
 
-/** A take as bytes of JSON. */
+/** A take as JSON. */
 export function takeBytes(take: Take): Bytes {
   const { mesh, ...rest } = take;
   const numbers = mesh === null ? {} : {
@@ -61,7 +61,7 @@ export function takeBytes(take: Take): Bytes {
   return new TextEncoder().encode(JSON.stringify({ ...rest, ...numbers }));
 }
 
-/** Reads what takeBytes has written. Throws Refused for anything else. Values and entries are still to be checked. */
+/** Parse the result of takeBytes. Throws Refused for anything else. The caller must check values and entries. */
 export function takeOf(bytes: Uint8Array): Take {
   let written: Written;
   try {
@@ -77,7 +77,7 @@ export function takeOf(bytes: Uint8Array): Take {
   return { form, version: String(version), values, ghost: own, script, endNs, mesh: mesh === undefined ? null : meshOf(mesh) };
 }
 
-/** Throws Refused for what isn't one. */
+/** Decode a mesh; throws Refused for an invalid one. */
 export function meshOf(mesh: WrittenMesh): MeshNumbers {
   const f8 = (text: string): Float64Array => new Float64Array(whole(fromBase64(String(text)), 8));
   const i4 = (text: string): Int32Array => new Int32Array(whole(fromBase64(String(text)), 4));
@@ -109,7 +109,7 @@ export async function takeOfLink(text: string): Promise<Take> {
   return takeOf(await expanded(fromBase64url(packed), "deflate-raw", MOST_BYTES));
 }
 
-/** The files of a take, with which `simulate` repeats it. name: of its scene, without an ending. */
+/** The files of a take, with which `simulate` reproduces it. name: of its scene, without a suffix. */
 export function takeFiles(take: Take, parameters: Parameters, name: string): TakeFiles {
   const durationS = take.endNs / 1e9;
   const { inertia_model, integrator, step } = take.ghost;
@@ -128,7 +128,7 @@ export function takeFiles(take: Take, parameters: Parameters, name: string): Tak
 
 const typed = (name: string, value: Value, parameters: Parameters): Value => parameters.converted(name, value);
 
-/** A mesh as an .obj file, in which every number keeps all its digits. */
+/** A mesh as an .obj file, with all digits of its numbers. */
 export function objText(mesh: MeshNumbers): string {
   const lines: string[] = [], { vertices, triangles, starts } = mesh;
   for (let k = 0; k < vertices.length; k += 3) lines.push(`v ${Array.from(vertices.subarray(k, k + 3), repr).join(" ")}\n`);
@@ -142,7 +142,7 @@ export function objText(mesh: MeshNumbers): string {
   return lines.join("");
 }
 
-/** What to say about who made a take, or "". */
+/** A notice if another version has made the take, or "". */
 export function madeBy(take: Take, declared: Declarations): string {
   if (take.version === declared.version) return "";
   return `made with version ${take.version} of this page, which is ${declared.version}: the motion may differ from what was shared`;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Everything that the page says, once. Another language is another catalogue of this shape (languages.ts).
+// All texts of the page. Another language is another catalogue of this type (languages.ts).
 
 import { addressOf } from "./address.ts";
 import { LANGUAGES } from "./languages.ts";
@@ -120,7 +120,7 @@ export const english = {
 
 export type Words = typeof english;
 
-/** The code of the language that the address names, or the first of the reader's that is there. */
+/** The code of the language that the address names, or of the first of the reader's languages that exists. */
 function spoken(): string {
   if (typeof location === "undefined") return "en";
   const asked = addressOf(location.hash).language, wanted = asked ? [asked] : navigator.languages;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 //
-// Numbers as people read and type them.
+// Formatting and parsing of numbers for the user.
 
-/** Three figures, without an exponent where people wouldn't write one, with a true minus sign. */
+/** A number with three significant digits, an exponent only for very large or small numbers, and a typographic minus
+ * sign. */
 export function short(value: number, figures = 3): string {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
@@ -16,11 +17,11 @@ function raised(power: string): string {
   return [...power].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)])).join("");
 }
 
-/** A number as people type it, with comma or point; NaN where it is none. */
+/** Parse a typed number, with comma or point; NaN if it isn't a number. */
 export function read(text: string): number {
   const plain = text.trim().replace(/−/g, "-").replace(/\s/g, "").replace(/·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)$/, (_, power: string) =>
     `e${[...power].map((c) => (c === "⁻" ? "-" : "⁰¹²³⁴⁵⁶⁷⁸⁹".indexOf(c))).join("")}`);
-  // A comma with a point after it groups thousands; alone it is the point.
+  // A comma before a point is a thousands separator; otherwise it is the decimal separator.
   const pointed = /,\d{3}(,\d{3})*\./.test(plain) ? plain.replace(/,/g, "") : plain.replace(",", ".");
   return /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(pointed) ? Number(pointed) : NaN;
 }

@@ -6,7 +6,7 @@
 import type { Data } from "../src/data.ts";
 import { NAMED, NO_GHOST } from "../src/ghosts.ts";
 import { Lesson, type Act, type Sight } from "../src/lessons.ts";
-import { COURSES } from "../src/lessons_steps.ts";
+import { LESSON_PLANS } from "../src/lessons_steps.ts";
 import type { GhostChoice, Motion, Vec3, Values } from "../src/source.ts";
 
 const S = 1e9;
@@ -30,9 +30,9 @@ export class Player {
 
   static at(name: string, motion: Motion, data: Data): Player {
     motion.openScene(name);
-    const course = COURSES[name];
-    if (!course) throw new Error(`${name} has no steps`);
-    const player = new Player(new Lesson(name, data.declared.lessons[name]!, course, motion), motion);
+    const plan = LESSON_PLANS[name];
+    if (!plan) throw new Error(`${name} has no steps`);
+    const player = new Player(new Lesson(name, data.declared.lessons[name]!, plan, motion), motion);
     player.look();
     return player;
   }
@@ -108,7 +108,7 @@ export class Player {
 
   /** The buttons of the step one after the other, but those that lead to a card or the picture, then time. */
   buttons(seconds = 12): void {
-    for (const act of COURSES[this.lesson.name]!.steps[this.done]!.acts) if (act.kind !== "card" && act.kind !== "pull" && act.kind !== "press" && act.kind !== "again") this.press(act);
+    for (const act of LESSON_PLANS[this.lesson.name]!.steps[this.done]!.acts) if (act.kind !== "card" && act.kind !== "pull" && act.kind !== "press" && act.kind !== "again") this.press(act);
     this.fly(seconds, true);
   }
 }

@@ -7,7 +7,7 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { addressOf, hashOf } from "../src/address.ts";
 import { Data } from "../src/data.ts";
-import { COURSES } from "../src/lessons_steps.ts";
+import { LESSON_PLANS } from "../src/lessons_steps.ts";
 import { english } from "../src/words.ts";
 import { CLOSE, marked, OPEN } from "./marked.ts";
 
@@ -24,7 +24,7 @@ test("every word is marked, whatever it is made of, and the shape stays", () => 
 
 test("what lessons mark and say has words in the catalogue", () => {
   assert.deepEqual(Object.keys(data.declared.bodies).filter((name) => !(name in english.bodies)), []);
-  for (const [name, { marks, steps }] of Object.entries(COURSES)) {
+  for (const [name, { marks, steps }] of Object.entries(LESSON_PLANS)) {
     for (const mark of marks ?? []) assert.ok(mark in english.lesson.places, `${name}: ${mark}`);
     for (const { acts } of steps) for (const act of acts) assert.ok(act.text(english.lesson).length > 2, name);
   }

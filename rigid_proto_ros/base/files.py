@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files read up to the size that their purpose can need, and files written that get their name once they are whole."""
+"""Reading of files up to a size limit, and atomic writing of files."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .errors import InputError, did_you_mean
 try:
     import fcntl
 except ImportError:
-    fcntl = None  # type: ignore[assignment]  # on Windows, where several may write to one file
+    fcntl = None  # type: ignore[assignment]  # on Windows, where writers don't exclude each other
 
 CHUNK = 1 << 20
-"""Bytes read at a time from what doesn't say its size, such as a pipe."""
+"""Bytes read at a time from a file of unknown size, such as a pipe."""
 
 
 def read_bounded(path: Path, max_bytes: int, field: str, kind: str, *, ordinary: bool = False) -> bytes:
-    """The bytes of the file at ``path``; ``kind`` says in the refusal what it should be ("a URDF, SDF or MJCF file").
-    ordinary: no pipe and no device, which may never end, as suits a path that another file gives.
+    """The content of the file at ``path``. kind: what it should be, for error messages ("a URDF, SDF or MJCF file").
+    ordinary: refuse pipes and devices, which may never end; for paths that come from another file.
 
-    Raises InputError naming ``field`` when the file can't be read or holds more than ``max_bytes``.
+    Raises InputError naming ``field`` if the file can't be read or has more than ``max_bytes``.
     """
     try:
         if ordinary and path.exists() and not path.is_file():
@@ -51,8 +51,8 @@ def read_bounded(path: Path, max_bytes: int, field: str, kind: str, *, ordinary:
 
 
 def output_file(option: str, file: str | Path) -> Path:
-    """The path of a file that is to be written. Its own folder is made, but none above: a path with several unknown
-    ones is likelier a slip. Raises InputError, which names ``option``.
+    """The path of a file to be written. Creates its folder, but no folders above, since a path with several unknown
+    folders is probably a mistake. Raises InputError naming ``option``.
     """
     path = Path(file)
     try:
@@ -67,10 +67,10 @@ def output_file(option: str, file: str | Path) -> Path:
 
 
 def file_for_one_writer(option: str, file: str | Path) -> BinaryIO:
-    """An empty file to write to, which is refused to everybody who opens it by this function until it is closed, in
-    this process and in others. Raises InputError, which names ``option``, and OSError.
+    """Open an empty file for writing, and lock it: until it is closed, this function refuses it, in this process and in
+    others. Raises InputError naming ``option``, and OSError.
     """
-    # Not emptied as it is opened: it may be somebody's.
+    # Truncated only when locked, because another writer may have it.
     number = os.open(output_file(option, file), os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
     stream = os.fdopen(number, "wb")
     try:
@@ -87,13 +87,13 @@ def file_for_one_writer(option: str, file: str | Path) -> BinaryIO:
 
 
 def is_same_file(one: str | Path, other: str | Path) -> bool:
-    """Whether both paths lead to one file that is there."""
+    """Whether both paths lead to the same existing file."""
     return Path(one).exists() and Path(other).exists() and Path(one).samefile(other)
 
 
 def check_writable(option: str, file: str | Path) -> None:
-    """Check before long work that ``file`` can be written, and leave what stands there as it is. Raises InputError,
-    which names ``option``.
+    """Check, before long work, that ``file`` can be written; an existing file is unchanged. Raises InputError naming
+    ``option``.
     """
     path = output_file(option, file).resolve()
     try:
@@ -107,16 +107,16 @@ def check_writable(option: str, file: str | Path) -> None:
 
 
 def check_whole_file(option: str, file: str | Path) -> None:
-    """The same for what ``whole_file`` is to write, which takes the place of what stands there."""
+    """Check, before long work, that ``whole_file`` can write ``file``. Raises InputError naming ``option``."""
     with _beside(option, file):
         pass
 
 
 @contextmanager
 def whole_file(option: str, file: str | Path) -> Iterator[Path]:
-    """A path beside ``file``, with its ending, to write to: renamed to ``file``, or to what that links to, when the
-    block ends, and removed when it fails or is interrupted, so that no half of a file is left. Raises InputError, which
-    names ``option``, for a place that can't be written to.
+    """Context of writing a file atomically: yields a temporary path in the same folder, with the same suffix. It is
+    renamed to ``file``, or to the target of that link, when the block ends, and removed if the block fails or is
+    interrupted. Raises InputError naming ``option`` if the file can't be written.
     """
     with _beside(option, file) as (beside, path):
         yield beside
@@ -125,11 +125,13 @@ def whole_file(option: str, file: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def _beside(option: str, file: str | Path) -> Iterator[tuple[Path, Path]]:
-    """A new file beside ``file``, removed when the block ends if it is still there, and whose place it is to take."""
+    """Context of a temporary file beside ``file``, removed at the end if it still exists; yields it and the resolved
+    path.
+    """
     path = output_file(option, file).resolve()
     if path.exists() and not path.is_file():
         raise InputError(option, str(file), "the name of a file; this is a device or a pipe")
-    # A name that nobody can guess, and refused where something has it: a link that was planted there isn't followed.
+    # An unpredictable name, and exclusive creation, so that a planted link isn't followed.
     beside = path.with_name(f".{path.stem}.{secrets.token_hex(8)}{Path(file).suffix}")
     try:
         beside.open("xb").close()
@@ -137,5 +139,5 @@ def _beside(option: str, file: str | Path) -> Iterator[tuple[Path, Path]]:
     except OSError as error:
         raise InputError(option, str(file), f"a file that can be written ({error.strerror or error})") from None
     finally:
-        with suppress(OSError):  # it took its place, or was never made
+        with suppress(OSError):  # renamed, or never created
             beside.unlink()

@@ -29,18 +29,17 @@ from ..simulation.observer import (
 from ..simulation.setup import Setup
 
 Source = Callable[[Observer], OfflineRun | Resimulation]
-"""Makes the flight anew, with an observer that has it fly its ghost too."""
+"""Creates the simulation again at its start, with this observer, and with its ghost."""
 
 FRAMES_MAX = 4_000_000
 
 AGREES = 1e-4
-"""In m and of a quaternion's parts: how near a flight made anew must come to a recorded state to be taken for it."""
+"""Largest difference of a resimulated pose from the recorded one [m, and of quaternion components]."""
 
 
 class FlightRecord(Observer):
-    """One run. changes: what isn't a state, in the order in which it was told. states, ghosts: rows (13,) of the body
-    and of its ghost by time [ns], ascending. end_ns: when the flight ended [ns], if that is known to be later than the
-    last state.
+    """One run. changes: all events but states, in order. states, ghosts: rows (13,) of the body and of its ghost by
+    time [ns], ascending. end_ns: end of the flight [ns], if known to be later than the last state.
     """
 
     takes = frozenset(
@@ -57,7 +56,7 @@ class FlightRecord(Observer):
         self.end_ns = 0
 
     def on(self, event: Event) -> None:
-        """Keep it; of two states at one time, as a bag may hold them, the first."""
+        """Keep the event; of two states of the same time, which a bag may have, the first."""
         match event:
             case Published(time_ns, row):
                 self.states.setdefault(time_ns, np.array(row, dtype=float))
@@ -68,7 +67,7 @@ class FlightRecord(Observer):
 
     @property
     def times_ns(self) -> IntArray:
-        """Times (n,) [ns] of the states; raises InputError where there are none."""
+        """Times (n,) [ns] of the states; raises InputError if there are none."""
         if not self.states:
             raise InputError("session", "it has no states to export")
         return np.array(list(self.states), dtype=np.int64)
@@ -79,15 +78,15 @@ class FlightRecord(Observer):
         return np.array(list(self.states.values())).reshape(-1, 13)
 
     def setups(self, kind: type[BodyChanged | GhostChanged]) -> list[Setup]:
-        """Of the body, or the ghost, at the start and after each change."""
+        """Setups of the body, or of the ghost, at the start and after each change."""
         return [event.setup for event in self.changes if isinstance(event, kind) and event.setup is not None]
 
 
 def frames(record: FlightRecord, source: Source | None, fps: float) -> tuple[FlightRecord, str]:
-    """The flight at ``fps`` pictures a second and at impulses, and what to say of it.
+    """The flight at ``fps`` frames per second and at impulses, and a line to print.
 
-    source: None for a flight that can't be made anew; then its recorded states are the frames, as they are where it
-    isn't the recorded one, as may be on another kind of processor.
+    The frames are simulated again. The recorded states are the frames instead if source is None, or if the resimulation
+    differs from them, as it may on another kind of processor.
     """
     if source is None:
         return record, "the session can't be simulated again: the recorded states are used as frames"
@@ -99,9 +98,9 @@ def frames(record: FlightRecord, source: Source | None, fps: float) -> tuple[Fli
     for event in record.changes:
         if isinstance(event, LoadBegan) and event.load.kind == "impulse" and start_ns <= event.time_ns <= end_ns:
             times.add(event.time_ns)
-    made, heard = FlightRecord(), FlightRecord()
+    made, observed = FlightRecord(), FlightRecord()
     made.changes = record.changes
-    run = source(heard)
+    run = source(observed)
     for time_ns in sorted(times):
         try:
             run.advance(time_ns)
@@ -115,12 +114,12 @@ def frames(record: FlightRecord, source: Source | None, fps: float) -> tuple[Fli
         made.states[time_ns] = row.copy()
         if run.ghost is not None:
             run.ghost.advance(time_ns)
-    made.ghosts = {time_ns: row for time_ns, row in heard.ghosts.items() if time_ns in made.states}
+    made.ghosts = {time_ns: row for time_ns, row in observed.ghosts.items() if time_ns in made.states}
     return made, f"{len(made.states)} frames, {fps:g} a second"
 
 
 def source_of_scene(scenario: Scenario, script: list[Command]) -> Source:
-    """The flight of a scene and its script."""
+    """The source of a scene with a script."""
     return lambda observer: OfflineRun(scenario, script, observer)
 
 
@@ -129,9 +128,9 @@ def source_of_session(session: RecordedSession, given: Scenario | None = None) -
     if given is not None or session.missing:
         return None
 
-    def again(observer: Observer) -> Resimulation:
+    def resimulate(observer: Observer) -> Resimulation:
         flight = resimulation(session, observer)
         flight.begin_ghost()
         return flight
 
-    return again
+    return resimulate

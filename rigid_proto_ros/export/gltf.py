@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A flight as a glTF 2.0 binary file (.glb): nodes with the meshes, and one animation.
 
-The root node turns our z up into glTF's y up. A body's node has the centre of mass as its origin; below it hangs a node
-for each mesh, moved so that the mesh lies about that centre as it does in the simulation.
+The root node rotates our z up to glTF's y up. The origin of a body's node is the centre of mass; each mesh has a child
+node, translated so that the mesh lies about the centre of mass as in the simulation.
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ MAGIC = b"glTF"
 PHYSICS = "KHR_physics_rigid_bodies"
 
 LISTS = ("bufferViews", "accessors", "images", "samplers", "textures", "materials", "meshes", "nodes")
-"""Of a document, whose items name each other by number."""
+"""Lists of a document; items refer to each other by their index in these."""
 
 Y_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
-"""Attitude xyzw of the root: a quarter turn about x takes z up to y up."""
+"""Attitude xyzw of the root: a quarter turn about x, from z up to y up."""
 
 
 class Document:
-    """A file in the making: its lists of items, its animation and the bytes that they refer to. start_ns: the simulated
-    time [ns] at its second 0.
+    """A file being built: its lists of items, its animation and their binary data. start_ns: the simulated time [ns] at
+    its second 0.
     """
 
     def __init__(self, start_ns: int) -> None:
@@ -62,13 +62,13 @@ class Document:
         self._inputs: dict[bytes, int] = {}
 
     def add(self, kind: str, **item: Any) -> int:
-        """The number of a new item in one of the lists; what is None is left out."""
+        """Add an item to a list, without properties that are None; returns its index."""
         self.lists[kind].append({name: value for name, value in item.items() if value is not None})
         return len(self.lists[kind]) - 1
 
     def seconds(self, times_ns: IntArray) -> NDArray[np.float32]:
-        """Times (n,) [s], in single precision and strictly ascending: of two that it doesn't tell apart the first,
-        which is before a change, goes to the number before.
+        """Times (n,) [s] in single precision, strictly ascending: of two times that round to the same number, the first
+        one, which is before a change, becomes the next smaller number.
         """
         seconds = (np.maximum(times_ns - self.start_ns, 0) * 1e-9).astype(np.float32)
         for k in np.flatnonzero(seconds[:-1] >= seconds[1:])[::-1]:
@@ -76,7 +76,7 @@ class Document:
         return seconds
 
     def accessor(self, values: NDArray[Any], target: int | None = None, bounds: bool = False) -> int:
-        """The number of an accessor of these values (n,) or (n, c), as float32 or uint32."""
+        """Add an accessor of values (n,) or (n, c), as float32 or uint32; returns its index."""
         whole = values.dtype.kind in "iu"
         values = np.ascontiguousarray(values, dtype=np.uint32 if whole else np.float32)
         flat = values.reshape(len(values), -1)
@@ -93,14 +93,14 @@ class Document:
         )
 
     def node(self, name: str, parent: int | None, **properties: Any) -> int:
-        """The number of a new node."""
+        """Add a node; returns its index."""
         number = self.add("nodes", name=name, **properties)
         if parent is not None:
             self.lists["nodes"][parent].setdefault("children", []).append(number)
         return number
 
     def material(self, name: str, colour: Colour, alpha: float = 1.0) -> int:
-        """The number of a new material; colour: sRGB of 0 to 255."""
+        """Add a material; returns its index. colour: sRGB of 0 to 255."""
         shade = np.array(colour) / 255.0
         linear = np.where(shade <= 0.04045, shade / 12.92, ((shade + 0.055) / 1.055) ** 2.4)
         surface = {"baseColorFactor": [*linear.tolist(), alpha], "metallicFactor": 0.0, "roughnessFactor": 0.6}
@@ -108,7 +108,7 @@ class Document:
         return self.add("materials", name=name, pbrMetallicRoughness=surface, alphaMode=blend, doubleSided=True)
 
     def mesh(self, name: str, attributes: dict[str, int], indices: int | None, mode: int, material: int) -> int:
-        """The number of a new mesh of one primitive."""
+        """Add a mesh of one primitive; returns its index."""
         primitive: dict[str, Any] = {"attributes": attributes, "mode": mode, "material": material}
         if indices is not None:
             primitive["indices"] = indices
@@ -117,7 +117,7 @@ class Document:
     def animate(
         self, node: int, path: str, seconds: NDArray[np.float32], values: FloatArray, interpolation: str = "LINEAR"
     ) -> None:
-        """Play values (n, c) at seconds (n,) at a node's ``translation``, ``rotation`` or ``scale``."""
+        """Animate a node's ``translation``, ``rotation`` or ``scale`` by values (n, c) at seconds (n,)."""
         key = seconds.tobytes()
         if key not in self._inputs:
             self._inputs[key] = self.accessor(seconds, bounds=True)
@@ -127,8 +127,8 @@ class Document:
         )
 
     def animate_steps(self, node: int, seconds: NDArray[np.float32], **values: Points) -> None:
-        """Give a node what holds from frame to frame, (n, 3) of a path; no animation where that never changes."""
-        # Half-way to the frame, for a player's own rounding of the time.
+        """Animate a node by values (n, 3) that are constant from frame to frame; set them once if they never change."""
+        # Steps are half-way between frames, so that a player's rounding of time doesn't matter.
         begins = np.append(seconds[:1], 0.5 * (seconds[1:] + seconds[:-1]))
         for path, own in values.items():
             self.lists["nodes"][node][path] = own[0].tolist()
@@ -137,7 +137,7 @@ class Document:
                 self.animate(node, path, begins[changes], own[changes], "STEP")
 
     def binary(self) -> bytes:
-        """The file's bytes."""
+        """The content of the file."""
         from .. import __version__
 
         animation = {"name": "flight", "channels": self._channels, "samplers": self._samplers}
@@ -159,7 +159,7 @@ class Document:
 
 
 def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
-    """Write the body, and ghost and string where there are any."""
+    """Write the body, and ghost and string if there are any."""
     document = Document(int(record.times_ns[0]))
     root = document.node("flight", None, rotation=Y_UP, extras={"first_time_s": record.times_ns[0] * 1e-9})
     for name, part in BODIES.items():
@@ -195,7 +195,7 @@ def write_gltf(file: str, record: FlightRecord, tracks: Tracks) -> None:
 
 
 def _draw_surface(document: Document, node: int, name: str, surface: DrawnMesh, look: style.Style) -> None:
-    """Give a node this mesh."""
+    """Add a mesh to a node."""
     attributes = {
         "POSITION": document.accessor(surface.vertices, VERTICES, bounds=True),
         "NORMAL": document.accessor(surface.normals, VERTICES),
@@ -230,8 +230,8 @@ def _rigid_motion(setup: Setup) -> dict[str, Any]:
 
 
 def _draw_string(document: Document, root: int, string: dict[int, Points | None]) -> None:
-    """A straight line from the free end: a unit one along x, turned and stretched to the knot; of no size while no
-    string is tied.
+    """Add the string as a straight line from its free end: a unit line along x, rotated and scaled to the knot; its
+    scale is 0 while no string is tied.
     """
     ends = np.array([own if own is not None else np.zeros((2, 3)) for own in string.values()])
     if not ends.any():
@@ -239,7 +239,7 @@ def _draw_string(document: Document, root: int, string: dict[int, Points | None]
     spans = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(spans, axis=1)
     directions = spans / np.where(lengths > 0.0, lengths, 1.0)[:, np.newaxis]
-    # The shortest turn from x; opposite to x half a turn about z, and none of what has no direction.
+    # The shortest rotation from x; half a turn about z for −x, and none without a direction.
     turns = np.column_stack([np.zeros(len(spans)), -directions[:, 2], directions[:, 1], 1.0 + directions[:, 0]])
     turns[np.linalg.norm(turns, axis=1) < 1e-9] = [0.0, 0.0, 1.0, 0.0]
     points = document.accessor(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), VERTICES, bounds=True)
@@ -251,16 +251,15 @@ def _draw_string(document: Document, root: int, string: dict[int, Points | None]
     document.animate(node, "scale", seconds, np.repeat(lengths[:, np.newaxis], 3, axis=1))
 
 
-# The .glb that a body was read from, hung into the document as it is, with its materials and pictures
+# The .glb file of the body, added to the document unchanged, with its materials and images
 #
-# Its parts refer to each other by their places in lists, which are moved on by what the lists hold already (glTF 2.0,
-# section 3). Skins, cameras and animations of its own are left out: a rigid body has none.
+# Its items refer to each other by their index in lists (glTF 2.0, section 3), so indices are shifted by the present
+# length of each list. Its skins, cameras and animations are left out, since a rigid body has none.
 
 
 def model_of(record: FlightRecord) -> tuple[dict[str, Any], bytes, Vector3] | None:
-    """Document and data of the .glb that the body is drawn as, and the middle (3,) of its vertices' box; None where it
-    came from another kind of file, where that has changed or gone, has data elsewhere or no scene, and where it isn't
-    the only one.
+    """Document and data of the body's .glb file, and the middle (3,) of its vertices' box. None if the mesh isn't from
+    a .glb file, if that file has changed or gone, refers to external data or has no scene, or if the mesh changes.
     """
     drawn = [event for event in record.changes if isinstance(event, (Started, MeshChanged))]
     if len(drawn) != 1 or not isinstance(began := drawn[0], Started):
@@ -282,7 +281,7 @@ def model_of(record: FlightRecord) -> tuple[dict[str, Any], bytes, Vector3] | No
 
 
 EXTENSION_LISTS = ("KHR_lights_punctual", "KHR_materials_variants")
-"""Extensions whose items, which nodes and meshes name by number, stand at the document's top."""
+"""Extensions with items at the top level of the document, to which nodes and meshes refer by index."""
 
 REFERENCES = {
     "bufferView": "bufferViews",
@@ -292,11 +291,11 @@ REFERENCES = {
     "sampler": "samplers",
     "source": "images",
 }
-"""Properties that name an item of a list by its number."""
+"""Properties that refer to an item by its index, and their lists."""
 
 
 def add_model(document: Document, model: dict[str, Any], binary: bytes) -> list[int]:
-    """Add what a .glb's scene shows to a document; returns the numbers of the scene's nodes there."""
+    """Add the default scene of a .glb to a document; returns the new indices of the scene's root nodes."""
     document.data += bytes(-len(document.data) % 4)
     begin = len(document.data)
     document.data += binary
@@ -321,7 +320,7 @@ def add_model(document: Document, model: dict[str, Any], binary: bytes) -> list[
 
 
 def _renumber(item: dict[str, Any], start: dict[str, int]) -> None:
-    """Let an item name what stands so many places farther on in each list."""
+    """Shift the indices in an item by ``start``, by list."""
     for name, value in item.items():
         if name == "extras":
             continue

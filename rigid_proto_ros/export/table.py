@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""States as a table, .csv or .parquet: columns named as a sweep's, and every number as it was simulated, to the bit."""
+"""States as a table, .csv or .parquet, with the column names of a sweep and all digits of every number."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ STATE_COLUMNS = dict(list(QUANTITIES.items())[:13])
 UNITS = {"time": "s", **STATE_COLUMNS}
 
 KEY = b"rigid_proto_ros"
-"""Of a Parquet file's metadata: a JSON object."""
+"""Key of our metadata in a Parquet file, a JSON object."""
 
 
 def state_columns(record: FlightRecord) -> dict[str, FloatArray]:
@@ -28,7 +28,7 @@ def state_columns(record: FlightRecord) -> dict[str, FloatArray]:
 
 
 def write_csv(file: str, columns: dict[str, FloatArray]) -> None:
-    """Write a .csv: a line of names, then a line a state; numbers are read back as they were, to the last bit."""
+    """Write a .csv: a line of names, then a line per state; the numbers' text converts back to the same bits."""
     with whole_file("--csv", file) as path, open(path, "w", encoding="utf-8") as stream:
         stream.write(",".join(columns) + "\n")
         for row in zip(*(column.tolist() for column in columns.values()), strict=True):

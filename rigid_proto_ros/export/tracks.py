@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The picture as tracks: what a file for other tools holds of body, ghost and string at each frame."""
+"""Tracks of body, ghost and string, frame by frame, for files of other tools."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..picture.style import Colour
 from .flight_record import FlightRecord
 
 BODIES = {"body": style.BODY, "ghost": style.GHOST}
-"""Parts of the picture that move, by their names in a file."""
+"""Moving parts of the picture, by their names in a file."""
 MESHES = {style.BODY: style.BODY_MESH, style.GHOST: style.GHOST_MESH}
 
 WANTED = frozenset({style.GHOST, style.GHOST_MESH, style.STRING})
@@ -25,8 +25,8 @@ WANTED = frozenset({style.GHOST, style.GHOST_MESH, style.STRING})
 
 @dataclass(frozen=True)
 class Track:
-    """A body at times_ns (n,): its positions (n, 3) [m] and unit quaternions (n, 4); its mesh, None without one, and
-    that mesh's places [m] and scales (n, 3) in its frame, scales of 0 where it isn't shown.
+    """A body at times_ns (n,): positions (n, 3) [m] and unit quaternions (n, 4). surface: its mesh, or None;
+    mesh_places [m], mesh_scales (n, 3): the mesh in the body's frame, scale 0 where it isn't shown.
     """
 
     times_ns: IntArray
@@ -38,8 +38,8 @@ class Track:
 
 
 class Tracks(Backend):
-    """Keeps what is drawn. size: the least of the body's sizes [m]. string: per time its free end and its knot (2, 3),
-    or None.
+    """Collects what is drawn. size: the smallest of the body's sizes [m]. string: by time, its free end and knot (2,
+    3), or None.
     """
 
     def __init__(self) -> None:
@@ -51,16 +51,16 @@ class Tracks(Backend):
         self._times = np.zeros(0, np.int64)
 
     def begin(self, times_ns: IntArray) -> None:
-        """What follows is of these times (n,) [ns]."""
+        """Set the times (n,) [ns] of the following calls."""
         self._times = times_ns
 
     def resize(self, size: float) -> None:
-        """Keep the least."""
+        """Keep the smallest size."""
         self.size = min(size, self.size or size)
 
     def mesh(self, name: str, surface: DrawnMesh | None) -> None:
-        """Keep the mesh, and when a ghost that ended isn't shown; raises InputError for another mesh, or none of the
-        body, in flight.
+        """Keep the mesh, and the time from which an ended ghost is hidden. Raises InputError if the mesh changes, or
+        the body's is removed, in flight.
         """
         if name == style.GHOST_MESH and style.GHOST in self._drawn:
             _, positions, attitudes, _, scales = self._drawn[style.GHOST][-1]
@@ -103,7 +103,7 @@ class Tracks(Backend):
                 self.string[time_ns] = next(rest)[[0, -1]] if count else None
 
     def track(self, part: str) -> Track | None:
-        """What a file holds of a part in BODIES; None where it isn't drawn."""
+        """The track of a part in BODIES; None if it isn't drawn."""
         if part not in self._drawn:
             return None
         times_ns, *rest = map(np.concatenate, zip(*self._drawn[part], strict=True))
@@ -112,9 +112,7 @@ class Tracks(Backend):
 
 
 def tracks_of(record: FlightRecord) -> Tracks:
-    """The flight's picture: body, ghost and string. At the time of a change the state is the one before it, and so is
-    what is drawn.
-    """
+    """The tracks of a flight. A state at the time of a change is the one before the change, and is drawn so."""
     tracks = Tracks()
     picture = Picture(tracks, WANTED.__contains__, rate=1_000_000_000)
     times_ns, rows = record.times_ns, record.rows

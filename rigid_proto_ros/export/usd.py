@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A flight as USD (.usda, .usdc): time samples, and the body's mass properties as UsdPhysics has them.
+"""A flight as USD (.usda, .usdc): time samples, and the body's mass properties by UsdPhysics.
 
-The stage has z up and metres, as ROS has. A body's prim has the centre of mass as its origin, so that the axes of its
-tensor are the prim's own.
+The stage has z up and metres, like ROS. The origin of a body's prim is the centre of mass, and the tensor is in the
+prim's axes.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from pxr import Usd, UsdGeom
 
 STRING_WIDTH = 0.012
-"""Of the body's size."""
+"""Relative to the body's size."""
 
 
 def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> list[str]:
-    """Write the body, and ghost and string where there are any, at ``fps`` time codes a second. Returns what to say of
-    it, a line each.
+    """Write the body, and ghost and string if there are any, at ``fps`` time codes per second. Returns
+    lines to print.
     """
     check_library("--usd")
     from pxr import Usd, UsdGeom, UsdPhysics
@@ -46,7 +46,7 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
     start_ns = int(record.times_ns[0])
 
     def codes(times_ns: IntArray) -> list[float]:
-        # A frame's time is rounded to the ns: just behind its whole code, what is held would be seen a frame late.
+        # Times are rounded to the ns: a held value just after a whole time code would be seen a frame late.
         exact = np.maximum(times_ns - start_ns, 0) * 1e-9 * fps
         found: list[float] = np.where(np.abs(exact - np.rint(exact)) <= 0.6e-9 * fps, np.rint(exact), exact).tolist()
         return found
@@ -68,7 +68,7 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
     changed = _add_physics(stage, record)
     _draw_string(stage, tracks.string, codes(np.array(list(tracks.string), np.int64)), STRING_WIDTH * tracks.size)
     with whole_file("--usd", file) as path:
-        # The library takes an empty file for a damaged one.
+        # The library treats an empty file as a damaged one.
         path.unlink()
         if not stage.GetRootLayer().Export(str(path)):
             raise InputError("--usd", file, "a file that can be written")
@@ -106,7 +106,7 @@ def _place_mesh(prim: UsdGeom.Mesh, codes: list[float], track: Track) -> None:
 
 
 def _fill(prim: UsdGeom.Mesh, surface: DrawnMesh, look: style.Style) -> None:
-    """The prim's surface, about the middle of its box."""
+    """Set the prim's surface."""
     from pxr import Gf, UsdGeom, Vt
 
     points, triangles, normals = surface
@@ -123,7 +123,7 @@ def _fill(prim: UsdGeom.Mesh, surface: DrawnMesh, look: style.Style) -> None:
 
 
 def _add_physics(stage: Usd.Stage, record: FlightRecord) -> bool:
-    """The rigid body as it is at the start, with its velocities, and gravity: what a physics engine begins with.
+    """Add the rigid body at the start, with its velocities, and gravity: the initial conditions for a physics engine.
     Returns whether mass or tensor change in flight.
     """
     from pxr import Gf, UsdPhysics
@@ -151,7 +151,7 @@ def _add_physics(stage: Usd.Stage, record: FlightRecord) -> bool:
 
 
 def _draw_string(stage: Usd.Stage, string: dict[int, Points | None], codes: list[float], width: float) -> None:
-    """A straight curve from the free end to the knot, seen while a string is tied."""
+    """Add a straight curve from the free end to the knot, visible while a string is tied."""
     from pxr import Gf, UsdGeom, Vt
 
     if not any(own is not None for own in string.values()):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""A simulation in real time, in a thread of its own; without ROS."""
+"""A simulation in real time on its own thread; without ROS."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands as they arrive, from topics or from a page: counted, given their time, and submitted to the simulation."""
+"""Reception of commands from topics or from a page: counts them, resolves their stamps, submits them."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from .simulation_loop import SimulationLoop
 
 TOPICS = ("wrench", "thrusters", "poke", "string", "inertia", "schedule")
-"""What received messages are counted by."""
+"""Topics whose received messages are counted."""
 
 Submission = tuple[Command, int, Listed | None, Scenario]
-"""What ``ScenarioRun.take`` takes."""
+"""Arguments of ``ScenarioRun.take``."""
 
 DAY_NS = 24 * 3600 * 1_000_000_000
 
 
 class CommandReceiver:
-    """All on the physics thread.
+    """Receives commands on the physics thread.
 
-    received counts every command by topic, refused ones included, ``late`` and ``wall_stamp`` stamps that mean now;
-    refusals are the simulation's.
+    received: number of commands by topic, including refused ones. late, wall_stamp: commands whose stamp is past, or of
+    the system clock, and which therefore act now. The simulation counts refusals.
     """
 
     def __init__(self, loop: SimulationLoop) -> None:
@@ -41,16 +41,15 @@ class CommandReceiver:
 
     @property
     def step_requested(self) -> bool:
-        """Whether a step is to follow before another command is taken."""
+        """Whether a step must follow before another command is taken."""
         return self._loop.step_requested
 
     def receive(self, topic: str, command: Callable[[], Command]) -> None:
-        """Count a command and submit it, to act at its stamp read as that of a message; raises CommandRefused, counted,
-        for what can be checked now.
+        """Count a command and submit it to act at its message stamp. Raises CommandRefused, counted, if a check that is
+        possible now fails.
 
-        The loop catches up first, so that now is the tick's own time; while time stands, a command of now acts at once.
-        topic: one of TOPICS. command() gives it, or
-        raises CommandRefused.
+        The loop catches up first, so that now is the tick's present; while paused, a command for now acts at once.
+        topic: one of TOPICS. command(): returns the command, or raises CommandRefused.
         """
         loop = self._loop
         loop.catch_up()
@@ -71,10 +70,11 @@ class CommandReceiver:
                 loop.request_step()
 
     def receive_schedule(self, text: Callable[[], str]) -> None:
-        """Take an entry of a script, or a list of entries whole or not at all, as YAML; raises CommandRefused, counted
-        by entries. A mesh that it needs is loaded here and now. text() gives it, or raises CommandRefused.
+        """Take one script entry or a list of entries, as YAML; a list is accepted or refused as a whole. Raises
+        CommandRefused, counted once per entry. Loads the meshes that entries name. text(): returns the YAML, or raises
+        CommandRefused.
 
-        A list may be headed by a reset, which is taken with it; one that says ``more`` keeps time at 0 for the next.
+        A list may start with a reset; with ``more``, time is then held at 0 until the next list.
         """
         loop = self._loop
         loop.catch_up()
@@ -103,8 +103,8 @@ class CommandReceiver:
                 loop.hold_on(more)
 
     def _planned(self, listed: Schedule) -> tuple[list[Submission], dict[str, set[int]]]:
-        """The commands in order of time, those of one time in the order of the list, checked; and the entries to be
-        counted by each counter, once though they stand for several commands. Raises InputError.
+        """The checked commands, ordered by time and then by position in the list; and the set of entries per counter,
+        since one entry may expand to several commands. Raises InputError.
         """
         taken: list[Submission] = []
         counted: dict[str, set[int]] = {}
@@ -119,11 +119,11 @@ class CommandReceiver:
         return taken, counted
 
     def _effective(self, stamp_ns: int, now_ns: int, offset_ns: int = 0) -> tuple[int, str]:
-        """Simulated time [ns] at which a command with this stamp acts, and the counter it goes to, if any.
+        """Simulated time [ns] at which a command with this stamp acts, and the counter to increment, if any.
 
-        Zero or past means now (past: ``late``); one up to the horizon ahead acts at exactly that time; one within a day
-        of the system clock comes from a tool that stamps by it: it means now (``wall_stamp``). Raises CommandRefused
-        (``stamp``). offset_ns: how far stamps are ahead of simulated time.
+        A zero or past stamp means now (past: ``late``). A stamp up to the horizon ahead acts at exactly that time. A
+        stamp within a day of the system clock comes from a tool that uses that clock and means now (``wall_stamp``).
+        Raises CommandRefused (``stamp``) for others. offset_ns: stamp minus simulated time.
         """
         time_ns = stamp_ns - offset_ns
         if stamp_ns == 0:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""One body in real time with all that surrounds it: thread, commands, parameters, observers and recording.
+"""One body in real time: the physics thread, commands, parameters, observers and recording.
 
-The thread owns the simulation: it wakes at absolute deadlines and lets the loop do what is due. Everybody else hands
-work over with ``call``; nothing else touches the simulation. The node adds topics, services and ROS parameters to this;
-the interactive page uses it as it is.
+The physics thread owns the simulation. It wakes at absolute deadlines and runs the loop. Other threads access the
+simulation only by functions that they pass to ``call``. The node adds topics, services and ROS parameters; the
+interactive page uses this class directly.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ from .pacing import Stamps, ask_for_short_slices
 from .simulation_loop import Endpoints, SimulationLoop
 
 BUSY_S = 10.0
-"""How long a request waits to be begun [s]."""
+"""Timeout of a request that has not started [s]."""
 
 LOOK_S = 0.002
-"""Between looks whether a step is made [s]."""
+"""Polling period of a step's completion [s]."""
 
 SHORT_NS = 3_000_000
-"""Shorter waits [ns] are a plain sleep, which costs half of a wait that an arrival ends."""
+"""Waits shorter than this [ns] are a plain sleep, which costs half as much as a wait that arrivals interrupt."""
 
 SPACING_NS = 1_000_000
-"""In running time what arrives is taken at most this often [ns of wall time]."""
+"""Shortest period [ns of wall time] of taking arrivals while time runs."""
 
 
 class LiveSimulation:
-    """A simulation on a thread of its own. Methods may be called from any thread, except where they say otherwise.
+    """A simulation on its own thread. Methods may be called from any thread unless they say otherwise.
 
-    name: the body's, and a recording's. endpoints: what it publishes to and takes commands from beside these methods.
-    stamps: with a clock, simulated time follows that one instead of the wall's. Raises InputError for contacts that no
-    command could name.
+    name: name of the body and of its recording. endpoints: publishers and sources of commands besides these methods.
+    stamps: with a clock, simulated time follows it instead of the wall clock. Raises InputError for contacts that no
+    command can name.
     """
 
     def __init__(
@@ -69,13 +69,13 @@ class LiveSimulation:
         self._recorders: list[WritingObserver] = []
         self.loop = SimulationLoop(scenario, Observers(*observers), self.endpoints, self.stamps)
         self._requests: list[tuple[Callable[[], Any], Future[Any]]] = []
-        # Held while a request is taken, and while the thread begins or is to end.
-        self._handing_over = threading.Lock()
+        # Held while a request is queued and while the thread starts or stops.
+        self._requests_lock = threading.Lock()
         self._stopping = False
         self._thread: threading.Thread | None = None
 
     def _check_contacts(self, scenario: Scenario) -> None:
-        """Raises InputError for a contact that no command could name, since its name is that of a frame."""
+        """Raises InputError for a contact that no command can name because a frame has the same name."""
         for name in sorted(scenario.parameters.contacts.keys() & {self.frames[0], *body_names(self.frames[1])}):
             accepted = (
                 "a name that is neither that of the world's frame nor that of the body's (the node's name by default)"
@@ -85,29 +85,30 @@ class LiveSimulation:
     # The physics thread
 
     def announce(self) -> None:
-        """Begin the recording that the scenario asks for, and tell the observers what is going to fly; once, before
-        ``start``, when nothing else can be refused any more. Raises InputError when the recording can't be written.
+        """Start the scenario's recording and send the observers the scene and the body. Call once, before ``start``,
+        after everything else has been checked. Raises InputError if the recording can't be written.
         """
 
         def announce() -> None:
             self._recorders = self._open_recorders(self.scenario)
-            self._say_recording([], self._recorders)
+            self._log_recordings([], self._recorders)
             self._watch()
             self._introduce(self.loop.observer)
 
         self.call(announce)
 
     def start(self, on_crash: Callable[[], None] = lambda: None) -> None:
-        """Simulated time begins. on_crash() is called should the thread end by a fault of the program."""
-        # What start-up has made stays: the garbage collector going through it again would hold up the motion (30 ms).
+        """Start simulated time. on_crash() is called if the thread ends by an unexpected exception."""
+        # Objects made at start-up persist; without this, a garbage collection scans them and delays the motion by 30
+        # ms.
         gc.freeze()
-        with self._handing_over:
+        with self._requests_lock:
             self._thread = threading.Thread(target=self._run, args=(on_crash,), name="physics", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:
-        """End the motion, then the observers: what they hold goes out. Requests that still wait are refused."""
-        with self._handing_over:
+        """Stop the motion, then close the observers, which write out what they buffer. Pending requests are refused."""
+        with self._requests_lock:
             self._stopping = True
         self.endpoints.wake()
         if self._thread is not None:
@@ -116,14 +117,14 @@ class LiveSimulation:
             future.cancel()
         self.loop.simulation.notify_floor(at_end=True)
         self.loop.observer.close()
-        self._say_recording(self._recorders, [])
+        self._log_recordings(self._recorders, [])
 
     def post(self, function: Callable[[], Any]) -> Future[Any]:
-        """Let the physics thread run a function between two ticks, in the order of posting, without waiting for it; at
-        once, before the thread is started. Raises InputError when the simulation has ended.
+        """Queue a function for the physics thread, which runs it between two ticks, in the order of posting. Before the
+        thread is started, run it at once. Raises InputError if the simulation has ended.
         """
         future: Future[Any] = Future()
-        with self._handing_over:
+        with self._requests_lock:
             if self._stopping:
                 raise InputError("request", "the simulation has ended")
             if self._thread is None:
@@ -134,8 +135,8 @@ class LiveSimulation:
         return future
 
     def call(self, function: Callable[[], Any]) -> Any:
-        """Post a function, and return what it returns, or raise what it raises. Raises InputError where the thread is
-        too busy to begin it within BUSY_S; then it is never run.
+        """Post a function and wait: returns its result or raises its exception. Raises InputError if the thread is too
+        busy to start it within BUSY_S; then it never runs.
         """
         future = self.post(function)
         try:
@@ -146,7 +147,7 @@ class LiveSimulation:
             if future.cancel():
                 text = f"the simulation was too busy to start this request within {BUSY_S:g} s"
                 raise InputError("request", text) from None
-        # It has begun, so it will end.
+        # It has started, so it will end.
         return future.result()
 
     def _run(self, on_crash: Callable[[], None]) -> None:
@@ -186,7 +187,7 @@ class LiveSimulation:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario in force."""
+        """The present scenario."""
         return self.loop.scenario
 
     @property
@@ -202,7 +203,7 @@ class LiveSimulation:
     # Commands
 
     def submit(self, command: Command) -> None:
-        """Take a command of a service, which acts now and is counted by no topic."""
+        """Apply a command of a service now; no topic counts it."""
 
         def submit() -> None:
             self.loop.settle()
@@ -211,37 +212,37 @@ class LiveSimulation:
         self.call(submit)
 
     def schedule(self, text: str) -> None:
-        """Take an entry of a script, or a list of entries, as YAML, ``t`` in simulated seconds; a list is taken or
-        refused whole. Raises CommandRefused, counted.
+        """Take one script entry or a list of entries, as YAML, ``t`` in simulated seconds; a list is accepted or
+        refused as a whole. Raises CommandRefused, counted.
         """
         self.call(self.scheduling(text))
 
     def scheduling(self, text: str) -> Callable[[], None]:
-        """What ``schedule`` has the physics thread do."""
+        """The function that ``schedule`` runs on the physics thread."""
         return lambda: self.loop.commands.receive_schedule(lambda: text)
 
     # Time
 
     def pause(self, paused: bool) -> None:
-        """Stop simulated time, or let it run, once what was sent meanwhile is taken."""
+        """Pause or resume simulated time, after the commands sent before are taken."""
         self.call(lambda: self.loop.pause(paused))
 
     def reset(self) -> None:
-        """Time 0 and the initial state; paused or running stays."""
+        """Return to time 0 and the initial state; keeps paused or running."""
 
         def reset() -> None:
-            self.loop.settle()  # what was sent before goes with what it did
+            self.loop.settle()  # commands sent before act before the reset, so it discards them
             self.loop.reset()
 
         self.call(reset)
 
     def begin(self, scenario: Scenario) -> None:
-        """Another scene, from its time 0; paused or running stays. Raises InputError, and then the present one begins
-        anew.
+        """Start another scene at its time 0; keeps paused or running. Raises InputError, after which the present scene
+        starts again.
         """
 
         def begin() -> None:
-            # What acts now is no reason to refuse a scene that begins without it.
+            # A load or string that acts now must not be a reason to refuse the new scene.
             self.loop.reset()
             self.loop.replace(scenario)
             self.loop.reset()
@@ -250,8 +251,8 @@ class LiveSimulation:
         self.call(begin)
 
     def step(self, periods: int = 1) -> int:
-        """While paused, advance over so many publications; returns the simulated time reached [ns]. Raises InputError
-        while time runs, or when it takes too long.
+        """While paused, advance over ``periods`` publications; returns the simulated time reached [ns]. Raises
+        InputError while time runs, or if it takes too long.
         """
         steps = self.loop.steps(periods)
         while not self.call(lambda: next(steps, True)):
@@ -262,7 +263,7 @@ class LiveSimulation:
 
     @property
     def parameters_now(self) -> dict[str, Any]:
-        """The parameters in force by name, behind everything sent before."""
+        """The present parameters by name, after all commands sent before."""
 
         def now() -> dict[str, Any]:
             self.loop.settle()
@@ -272,11 +273,11 @@ class LiveSimulation:
         return named
 
     def set_parameters(self, changes: Mapping[str, object]) -> None:
-        """Change parameters all at once, or none: raises InputError, and then all stays as it was. Setting density sets
-        mass to 0.
+        """Change all these parameters at once. Raises InputError and then changes none. Setting density
+        sets mass to 0.
         """
         self.give_up_failed_recording()
-        # Loading a mesh takes time that the physics thread hasn't got: this fills the cache before it.
+        # Loading a mesh takes too long for the physics thread: ``with_changes`` here fills the cache.
         loop = self.loop
         changes = with_mass_of_density(changes)
         present = loop.scenario
@@ -292,14 +293,14 @@ class LiveSimulation:
 
         def change() -> list[WritingObserver]:
             scenario = loop.planned(changes, planned)
-            # A recording begins in the scene before the change that begins it, and has that as its first event.
+            # A recording starts with the scene before the change that starts it; that change is its first event.
             finished = self._switch_recording(recorders) if "record" in changes else []
             loop.change(changes, scenario)
             return finished
 
         recorders: list[WritingObserver] = []
         if "record" in changes:
-            # Opened last: a refused change must leave the file of that name as it is.
+            # Opened after all checks: a refused change must not truncate an existing file.
             self.call(partial(loop.planned, changes, planned))
             recorders = self._open_recorders(planned)
         try:
@@ -330,7 +331,7 @@ class LiveSimulation:
         self.call(add)
 
     def remove_observer(self, observer: Observer) -> None:
-        """Tell this observer nothing more."""
+        """Stop notifying this observer."""
 
         def remove() -> None:
             self._observers = tuple(other for other in self._observers if other is not observer)
@@ -341,8 +342,8 @@ class LiveSimulation:
     # The recording, which can be changed in flight
 
     def _open_recorders(self, scenario: Scenario) -> list[WritingObserver]:
-        """The recorders that ``record`` asks for, of which those that record already go on; raises InputError when a
-        file can't be written.
+        """The recorders that ``record`` names; recorders already running are kept. Raises InputError if a file can't be
+        written.
         """
         if not scenario.parameters.record:
             return []
@@ -353,7 +354,7 @@ class LiveSimulation:
         new = ",".join(name for name in names if name not in (recorder.place for recorder in going_on))
         return going_on + make_recorders(new, self.name, scenario.parameters, self._recording_failed)
 
-    def _say_recording(self, before: list[WritingObserver], now: list[WritingObserver]) -> None:
+    def _log_recordings(self, before: list[WritingObserver], now: list[WritingObserver]) -> None:
         for recorder in before:
             if recorder not in now:
                 self.endpoints.say(f"the recording to {recorder.place} ends")
@@ -362,11 +363,11 @@ class LiveSimulation:
                 self.endpoints.say(f"a recording to {recorder.place} begins")
 
     def _switch_recording(self, recorders: list[WritingObserver]) -> list[WritingObserver]:
-        """On the physics thread: switch recorders; new ones are told what flies. Returns those that have finished; the
-        caller closes them outside the physics thread.
+        """Switch recorders, on the physics thread; new ones receive the scene and the body. Returns the finished ones;
+        the caller closes them outside the physics thread.
         """
         before, self._recorders = self._recorders, recorders
-        self._say_recording(before, recorders)
+        self._log_recordings(before, recorders)
         self.loop.simulation.notify_floor(at_end=True)
         finished = [recorder for recorder in before if recorder not in recorders]
         errors = [recorder.error for recorder in finished if recorder.error]
@@ -379,7 +380,7 @@ class LiveSimulation:
 
     @property
     def recording_trouble(self) -> str:
-        """Why the last recording has stopped, or that the present one takes nothing; empty when all is well."""
+        """Why the last recording has failed, or that the present one is stalled; empty if neither."""
         return self._recording_error or next(filter(None, (recorder.stalled for recorder in self._recorders)), "")
 
     def _recording_failed(self, message: str) -> None:
@@ -387,18 +388,18 @@ class LiveSimulation:
         self.endpoints.parameters_changed()
 
     def give_up_failed_recording(self) -> None:
-        """Where a recording has stopped by itself: close it, and ``record`` names only those that go on."""
+        """Close recordings that have failed, and remove them from ``record``."""
         recorders = self._recorders
         if not any(recorder.error for recorder in recorders):
             return
 
         def give_up() -> list[WritingObserver]:
-            if self._recorders is not recorders:  # others have taken their place
+            if self._recorders is not recorders:  # replaced meanwhile
                 return []
             going_on = [recorder for recorder in recorders if not recorder.error]
             finished = self._switch_recording(going_on)
             left = ",".join(recorder.place for recorder in going_on)
-            self.loop.setup_of(Change({"record": left}))  # no event, since the motion stays
+            self.loop.setup_of(Change({"record": left}))  # no event, since the motion is unchanged
             return finished
 
         _close(self.call(give_up))
@@ -407,7 +408,7 @@ class LiveSimulation:
 def _fulfil(future: Future[Any], function: Callable[[], Any]) -> None:
     try:
         future.set_result(function())
-    except BaseException as error:  # the caller's to handle
+    except BaseException as error:  # handled by the caller
         future.set_exception(error)
 
 

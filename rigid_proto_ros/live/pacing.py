@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""How far a simulation is advanced, and when: by the clock that simulated time follows, and by the time that a tick may
-take.
+"""Pacing: maps a clock to simulated time, and bounds the work of one tick.
 
-Simulated time follows its clock from an anchor, never by adding up periods, so that a late wake-up isn't carried on.
+Simulated time is the clock's time since an anchor, never a sum of periods, so a late wake-up causes no drift.
 """
 
 from __future__ import annotations
@@ -19,48 +18,51 @@ from dataclasses import dataclass
 from ..simulation.simulation import Simulation
 
 WORK_NS = 8_000_000
-"""[ns of wall time] A tick advances no longer than this before it lets commands and requests in."""
+"""Longest time [ns of wall time] that a tick spends on the motion; commands and requests are served in between."""
 
 FIRST_STEPS, FIRST_NS = 1000, 1_000_000
-"""The first slice has room for so many fixed steps, at 0.1 to 10 µs each, and isn't longer than this [ns]: integrators
-that choose their own steps take up to some thousands in it.
+"""Largest first slice: this many fixed steps, which take 0.1 to 10 µs each, and this much simulated time [ns], in which
+an adaptive integrator takes up to a few thousand steps.
 """
 
 GROWTH = 4
+"""Factor by which a cheap slice grows."""
 
 TICK_NS = 10_000_000
-"""A loop with nothing else to do wakes this often [ns of wall time], and takes its commands."""
+"""Longest period [ns of wall time] between two ticks with listeners; each tick takes commands."""
 
 LAST_STAMP_NS = (2**31 - 1) * 1_000_000_000
-"""A message's stamp counts seconds in 32 bits."""
+"""Largest simulated time [ns]: a stamp counts seconds in a signed 32-bit integer."""
 
 LONGEST_NS = 1e18
-"""Thirty years [ns of wall time], for which nobody waits: a small enough factor asks for infinity."""
+"""Longest wait [ns of wall time], 30 years; caps the infinite wait of a tiny real-time factor."""
 
 JUMP_NS, JUMP_SPACINGS = 1_000_000_000, 10
-"""A followed clock that goes ahead by more than this [ns], and by more than so many of its usual steps, has jumped."""
+"""A followed clock has jumped if it advances by more than JUMP_NS [ns] and more than JUMP_SPACINGS of its usual steps
+between two readings.
+"""
 
 MAX_LAG_NS = 250_000_000
-"""A thread further behind than this [ns of wall time] gives the time up instead of racing after it."""
+"""Largest lag behind real time [ns of wall time]; time lost beyond it is given up, not caught up."""
 
 
 @dataclass
 class Stamps:
-    """What messages are stamped by. clock() gives nanoseconds of a clock that simulated time follows instead of the
-    wall's; offset_ns: how far stamps are ahead of simulated time, 0 without such a clock.
+    """Conversion of simulated time to message stamps. clock(): time [ns] of the clock that simulated time follows
+    instead of the wall clock. offset_ns: stamp minus simulated time [ns], 0 without such a clock.
     """
 
     clock: Callable[[], int] | None = None
     offset_ns: int = 0
 
     def of(self, time_ns: int) -> tuple[int, int]:
-        """Seconds and nanoseconds that stamp a simulated time."""
+        """Seconds and nanoseconds of the stamp of a simulated time."""
         return divmod(time_ns + self.offset_ns, 1_000_000_000)
 
 
 class WorkBudget:
-    """The time that one tick may spend on the motion, which is advanced in slices: they grow while they are cheap and
-    shrink when they turn out expensive. The motion doesn't depend on them, so they may follow the wall clock.
+    """Limits the wall time that one tick spends on the motion. The motion is advanced in slices, which grow while they
+    are cheap and shrink when they are expensive. Slices don't change the motion, so they may depend on the wall clock.
     """
 
     def __init__(self) -> None:
@@ -69,14 +71,14 @@ class WorkBudget:
         self._end_ns = 0
 
     def begin_tick(self) -> None:
-        """The time for this tick's work begins."""
+        """Start the time budget of this tick."""
         self._end_ns = time.monotonic_ns() + WORK_NS
 
     def advance(self, simulation: Simulation, until_ns: int) -> bool:
-        """Advance towards ``until_ns``, as far as the tick's time allows; whether it came there or failed."""
+        """Advance towards ``until_ns`` within the time budget. Returns whether the simulation reached it or failed."""
         while simulation.time_ns < until_ns and not simulation.failure:
             if self._events != simulation.events.count:
-                # Whatever happened may have changed what a second costs.
+                # An event may have changed the cost of a simulated second.
                 self._events = simulation.events.count
                 self._slice_ns = min(FIRST_STEPS * int(simulation.flight.step_ns), FIRST_NS)
             rest_ns = until_ns - simulation.time_ns
@@ -94,10 +96,9 @@ class WorkBudget:
 
 
 class Pace:
-    """The simulated time that a clock asks for: the wall clock times ``factor``, or ``followed()``, a clock in
-    nanoseconds that isn't the wall's. factor 0: as fast as it goes. anchored_ns: what the clock showed at the anchor.
-    overruns: publications more than a period late. real_time_lost_s: time given up rather than caught up. jumps: how
-    often the followed clock has jumped.
+    """Simulated time as a function of a clock: the wall clock times ``factor``, or the followed clock ``followed()``
+    [ns]. factor 0: as fast as possible. anchored_ns: the clock's reading at the anchor. overruns: publications more
+    than a period late. real_time_lost_s: real time given up. jumps: number of jumps of the followed clock.
     """
 
     def __init__(self, factor: float, followed: Callable[[], int] | None = None) -> None:
@@ -111,19 +112,21 @@ class Pace:
         self.anchor(0)
 
     def anchor(self, simulated_ns: int) -> None:
-        """From now on simulated time goes on from ``simulated_ns``."""
+        """Set the anchor: simulated time is ``simulated_ns`` at the clock's present reading."""
         self.anchored_ns = self.followed() if self.followed else time.monotonic_ns()
         self._last_reading_ns = self.anchored_ns
         self._anchor_simulated_ns = simulated_ns
 
     @property
     def offset_ns(self) -> int:
-        """How far the followed clock was ahead of simulated time at the anchor; 0 while there is none."""
+        """The followed clock minus simulated time at the anchor [ns]; 0 without a followed clock or before
+        it starts.
+        """
         return self.anchored_ns - self._anchor_simulated_ns if self.followed and self.anchored_ns else 0
 
     def present_ns(self, reached_ns: int, next_publication_ns: int, idle: bool = False) -> int:
-        """Simulated time asked for now; time lost beyond MAX_LAG_NS is given up and counted, unless nobody waits for
-        it (``idle``). Call ``jump`` before.
+        """Simulated time that corresponds to now. A lag beyond MAX_LAG_NS is given up and counted, unless the loop has
+        no listeners (``idle``). Call ``jump`` first.
         """
         if self.followed:
             return self._followed_present_ns(reached_ns)
@@ -142,13 +145,13 @@ class Pace:
 
     def _followed_present_ns(self, reached_ns: int) -> int:
         if self.anchored_ns == 0:
-            # It hasn't begun before: its steps count from here.
+            # The followed clock had not started yet: count from its present reading.
             self.anchor(reached_ns)
         return max(reached_ns, self._anchor_simulated_ns + self._last_reading_ns - self.anchored_ns)
 
     def jump(self) -> int:
-        """Read the followed clock; by how much it has jumped since the last reading [ns], below 0 for back, or 0.
-        ``present_before_ns`` is the simulated time that it asked for until then.
+        """Read the followed clock. Returns its jump since the last reading [ns], negative for backwards, or 0 for none.
+        Sets ``present_before_ns``, the simulated time that corresponds to the previous reading.
         """
         if not self.followed or not self.anchored_ns:
             return 0
@@ -164,7 +167,7 @@ class Pace:
         return 0
 
     def wall_ns(self, simulated_ns: int) -> int:
-        """When the wall clock gets to a simulated time, or in LONGEST_NS where it is later."""
+        """Wall time [ns] at which simulated time reaches ``simulated_ns``, at most LONGEST_NS after the anchor."""
         rest_ns = (simulated_ns - self._anchor_simulated_ns) / self.factor
         return self.anchored_ns + int(min(rest_ns, LONGEST_NS)) + 1
 
@@ -172,18 +175,18 @@ class Pace:
 # Time slices
 
 SCHED_SETATTR = {"x86_64": 314, "aarch64": 274}
-"""Number of this system call, which Python has no function for."""
+"""Number of the system call sched_setattr by machine; Python has no function for it."""
 
 SLICE_NS = 100_000
-"""The shortest that Linux gives."""
+"""Shortest time slice [ns] that Linux grants."""
 
 
 def ask_for_short_slices() -> None:
-    """Ask Linux for short time slices of the processor for the calling thread; elsewhere do nothing.
+    """Request short scheduler time slices for the calling thread; does nothing on systems other than Linux.
 
-    A thread that wakes up on a processor where another one runs waits for the end of that one's slice, 3 ms, unless its
-    own would end before (man 2 sched_setattr; Linux 6.12 and later, earlier ones do nothing). A policy or a priority
-    that somebody has set stays.
+    A thread that wakes up on a busy processor waits until the running thread's slice ends, 3 ms, unless its own slice
+    would end earlier (man 2 sched_setattr; has an effect since Linux 6.12). A scheduling policy or nice value set by
+    the user is kept.
     """
     call = SCHED_SETATTR.get(platform.machine())
     if call is None or sys.platform != "linux" or os.sched_getscheduler(0) != os.SCHED_OTHER:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A process that ends never hangs."""
+"""Watchdogs of shutdown, so that a process that ends never hangs."""
 
 from __future__ import annotations
 
@@ -11,21 +11,19 @@ from typing import NoReturn
 from ..base.interrupts import leave
 
 CLOSING_S = 40.0
-"""Longer than every wait for the physics thread and for recordings, added up."""
+"""Timeout of closing our own objects [s], longer than the sum of all waits for the physics thread and recordings."""
 
 TEARDOWN_S = 3.0
-"""What the middleware gets to say goodbye in; 0.1 s is usual. Nothing of ours waits for it any more."""
+"""Timeout of the middleware's shutdown [s], which usually takes 0.1 s; by then everything of ours is closed."""
 
 
 def begin_closing() -> None:
-    """Leave with status 1 and every thread's stack on stderr, should closing what is ours take longer
-    than CLOSING_S.
-    """
+    """Exit with status 1 and every thread's stack on stderr if closing our own objects takes longer than CLOSING_S."""
     faulthandler.dump_traceback_later(CLOSING_S, exit=True)
 
 
 def begin_teardown(status: int) -> None:
-    """All that is ours is closed: leave with ``status`` after TEARDOWN_S, whatever the middleware still does then."""
+    """Once everything of ours is closed: exit with ``status`` after TEARDOWN_S even if the middleware hangs."""
     faulthandler.dump_traceback_later(TEARDOWN_S + 2.0, exit=True)
     watch = threading.Timer(TEARDOWN_S, _leave_stuck, (status,))
     watch.daemon = True

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""One body in real time: when it is advanced, publishes and takes commands. All runs on the physics thread
-(live_simulation.py); where states go and commands come from is up to its endpoints.
+"""The real-time loop of one body: advances it, publishes states and takes commands at the right times. Everything here
+runs on the physics thread (live_simulation.py); endpoints connect the loop to topics or other transports.
 """
 
 from __future__ import annotations
@@ -20,47 +20,48 @@ from .command_receiver import CommandReceiver
 from .pacing import LAST_STAMP_NS, TICK_NS, Pace, Stamps, WorkBudget
 
 ACTIVE_DRAIN_NS = 500_000
-"""Between publications at most this often, while commands come in [ns of wall time]."""
+"""Shortest period [ns of wall time] of taking commands between publications, while commands arrive."""
 
 LEAD = 0.2
-"""Part of a publication's period before it at which commands are taken once more while they come in."""
+"""While commands arrive, they are taken once more this fraction of a period before each publication."""
 
 PAUSED_NS = 100_000_000
-"""States go out at 10 Hz while paused [ns of wall time]."""
+"""Period of publication while paused [ns of wall time]."""
 
 IDLE_NS = 500_000_000
-"""A loop whose states nobody takes wakes this often [ns of wall time], so that what a command means by now is near."""
+"""Longest period [ns of wall time] between two ticks without listeners; it bounds the time that a new command has to
+catch up.
+"""
 
 FOLLOW_NS = 1_000_000
-"""A followed clock is read this often [ns of wall time]."""
+"""Period at which a followed clock is read [ns of wall time]."""
 
 RAREST_NS = 100_000_000
-"""Where publications are further apart than this [ns of wall time], the motion is advanced between them, too."""
+"""If the publication period is longer than this [ns of wall time], the motion is also advanced in between."""
 
 STEP_PATIENCE_S = 10.0
-"""How long a request to step waits for the end of it."""
-
+"""Timeout of a request to step [s]."""
 
 HOLD_NS = 1_000_000_000
-"""Time stays at 0 for the next list of a script for so long [ns of wall time]."""
+"""Timeout [ns of wall time] for the next list of a script while time is held at 0."""
 
 
 class Endpoints:
-    """What surrounds a loop; by itself it does nothing. All but the last three are called on the physics thread."""
+    """Callbacks of a loop; the defaults do nothing. All but the last three are called on the physics thread."""
 
     def __init__(self) -> None:
         self._woken = threading.Event()
 
     def publish(self, run: ScenarioRun) -> None:
-        """Publish the present state, which is due."""
+        """Publish the present state."""
 
     def has_subscribers(self) -> bool:
-        """Whether anybody gets states; without, none is built for them."""
+        """Whether states have subscribers; without any, none are published."""
         return False
 
     def take_commands(self, _commands: CommandReceiver, _wall_ns: int, _at_once: bool) -> bool:
-        """Give ``_commands`` what has arrived, on quiet topics too if ``_at_once``; whether commands come in these
-        seconds.
+        """Pass the messages that have arrived to ``_commands``; with ``_at_once``, poll quiet topics, too. Returns
+        whether commands have arrived recently.
         """
         return False
 
@@ -68,11 +69,11 @@ class Endpoints:
         """Answer requests for steps."""
 
     def parameters_changed(self) -> None:
-        """Parameters have changed, by whatever, or a recording has stopped by itself."""
+        """Parameters have changed for any reason, or a recording has failed."""
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until a command, a request for a step or a subscriber comes, ``wake`` is called, or the time is over;
-        whether one may have come.
+        """Wait until a command, a request for a step or a subscriber arrives, ``wake`` is called, or the timeout ends.
+        Returns whether something may have arrived.
         """
         self._woken.wait(timeout_s)
         self._woken.clear()
@@ -83,7 +84,7 @@ class Endpoints:
         self._woken.set()
 
     def say(self, message: str) -> None:
-        """Tell the user, who may want to know."""
+        """Inform the user."""
 
     def warn(self, message: str) -> None:
         """Warn the user."""
@@ -91,10 +92,12 @@ class Endpoints:
 
 
 class SimulationLoop(ScenarioRun):
-    """observer: gets every publication, in bundles where nobody subscribes to the endpoints; without subscribers and an
-    observer that takes states none is made, and the body crosses the time between two moments at which commands are
-    taken at once. stamps: those of a clock that is followed from the start, a reset and the end of a pause on.
-    step_requested: whether a step is to follow the command taken last, before the next one is taken.
+    """A scenario run in real time.
+
+    observer: receives every publication, in batches if the endpoints have no subscribers. Without subscribers and
+    without an observer of states no publications are made, and the body is advanced in one go from one taking of
+    commands to the next. stamps: of the followed clock, if any; anchored at the start, at a reset and at the end of a
+    pause. step_requested: a step must follow the last command before the next command is taken.
     """
 
     def __init__(
@@ -131,10 +134,10 @@ class SimulationLoop(ScenarioRun):
         """Stop when simulated time reaches ``time_ns``, and call on_end()."""
         self._end_ns, self._on_end = time_ns, on_end
 
-    # For functions that other threads hand over
+    # Called by requests of other threads
 
     def check_change(self, scenario: Scenario) -> None:
-        """Raises InputError where this scenario can't follow the present one."""
+        """Raises InputError if this scenario can't replace the present one."""
         if self.pace.followed and scenario.parameters.publish_clock:
             raise InputError(
                 "publish_clock", True, "false, while simulated time follows the /clock of another node (use_sim_time)"
@@ -142,7 +145,7 @@ class SimulationLoop(ScenarioRun):
         super().check_change(scenario)
 
     def replace(self, scenario: Scenario) -> Setup:
-        """Put another scenario in force; its real time factor takes effect at once, too."""
+        """Replace the scenario; its real-time factor takes effect at once, too."""
         setup = super().replace(scenario)
         self.endpoints.parameters_changed()
         if scenario.parameters.real_time_factor != self.pace.factor:
@@ -158,28 +161,30 @@ class SimulationLoop(ScenarioRun):
         listed: Listed | None = None,
         at_hand: Scenario | None = None,
     ) -> int:
-        """See ScenarioRun; while time stands, a command of now has acted when this returns."""
+        """See ScenarioRun; while paused, a command for now acts before this returns."""
         when_ns = super().take(command, at_ns, listed, at_hand)
         if self.paused:
             self.act()
         return when_ns
 
     def act(self) -> None:
-        """Let the commands that are due now act."""
+        """Apply the commands that are due now."""
         if self.simulation.act():
-            # What is published of this time was published before they acted.
+            # The publication of this time was made before they acted.
             self.publications.pass_over(self.simulation.time_ns)
             if self.ghost is not None:
                 self.ghost.act(self.simulation.time_ns)
 
     def settle(self) -> None:
-        """While time stands, let act what is due now and what was sent before."""
+        """While paused, take and apply the commands that were sent before now."""
         if self.paused:
             self.take_commands()
             self.act()
 
     def planned(self, changes: Mapping[str, object], at_hand: Scenario) -> Scenario:
-        """The scenario that these parameters would make now. Raises InputError, counted; at_hand: see ``take``."""
+        """The scenario that results if these parameters change now. Raises InputError; counts a CommandRefused.
+        at_hand: see ``take``.
+        """
         self.settle()
         self.act()
         try:
@@ -191,23 +196,23 @@ class SimulationLoop(ScenarioRun):
         return scenario
 
     def change(self, changes: Mapping[str, object], scenario: Scenario) -> None:
-        """Change parameters now, to what ``planned`` gave."""
+        """Change parameters now; scenario: the result of ``planned``."""
         if self.simulation.failure:
-            self.replace(scenario)  # for the run after the reset: nothing acts any more in this one
+            self.replace(scenario)  # for the run after the reset: a failed simulation takes no commands
         else:
             self.take(Change(dict(changes)), at_hand=scenario)
             self.act()
 
     def watch(self, observer: Observer) -> None:
-        """Tell another observer from now on."""
+        """Replace the observer."""
         self.observer = observer
         self.simulation.watch(observer)
         if self.ghost is not None:
             self.ghost.watch(observer)
 
     def pause(self, paused: bool) -> None:
-        """Stop or resume simulated time; what was sent while it stood is taken before it goes on. Raises InputError
-        where the motion has failed.
+        """Pause or resume simulated time. Commands sent while paused are taken before time resumes. Raises InputError
+        on resuming a failed motion.
         """
         if paused != self.paused:
             if not paused:
@@ -226,8 +231,8 @@ class SimulationLoop(ScenarioRun):
         self.endpoints.take_commands(self.commands, time.monotonic_ns(), True)
 
     def catch_up(self) -> None:
-        """Advance to this tick's present, or as far towards it as the tick's time allows: what a command means by now.
-        Without commands nobody needs it. While time stands, what is due acts.
+        """Advance towards this tick's present, within the tick's budget, so that a command for now acts at this time.
+        Not needed without commands. While paused, apply the commands that are due.
         """
         if self.paused:
             self.act()
@@ -236,10 +241,10 @@ class SimulationLoop(ScenarioRun):
             self._check_failure()
 
     def step(self, periods: int = 1) -> bool:
-        """While paused, take all commands that have arrived and begin to advance over so many publications; whether
-        they are made already, else ``stepping`` says.
+        """While paused, take all commands that have arrived and start to advance over ``periods`` publications. Returns
+        whether the step is complete; otherwise ``stepping`` is true until it is.
         """
-        # This very step follows what is taken now, also where each command would have one of its own.
+        # In lockstep, commands taken here share this step instead of each requesting its own.
         self._in_step = True
         self.take_commands()
         self._in_step = False
@@ -247,7 +252,7 @@ class SimulationLoop(ScenarioRun):
 
     def _begin_step(self, periods: int) -> bool:
         self.simulation.log("step", {"periods": periods} if periods > 1 else {})
-        # Who has subscribed since the last publication waits for these.
+        # Clients that subscribed since the last publication expect these.
         self._check_listeners()
         self.publications.find_after(self.simulation.time_ns)
         self._steps_left = periods
@@ -257,16 +262,16 @@ class SimulationLoop(ScenarioRun):
         return not self.stepping
 
     def steps(self, periods: int = 1) -> Iterator[None]:
-        """While paused, advance over so many publications; yields while the thread's ticks make them.
+        """While paused, advance over ``periods`` publications; yields until the thread's ticks have made them.
 
-        Raises InputError while time runs, where the motion has failed, where the step is given up since time is resumed
-        or reset, and when it takes longer than STEP_PATIENCE_S; the step goes on by itself then.
+        Raises InputError while time runs, if the motion has failed, if the step is aborted because time is resumed or
+        reset, and if it takes longer than STEP_PATIENCE_S; in the last case the step continues.
         """
         if not self.paused:
             raise InputError("step", "the simulation is running; pause it first")
         end = time.monotonic() + STEP_PATIENCE_S
         begun = 0
-        # One after another: a step that somebody else has begun is made first.
+        # A step that another client has started is completed first.
         while self.stepping or not begun:
             if time.monotonic() > end:
                 reached_s = self.simulation.time_ns / 1e9
@@ -282,7 +287,7 @@ class SimulationLoop(ScenarioRun):
             raise InputError("step", "given up, since simulated time was resumed or reset meanwhile")
 
     def _give_up_steps(self) -> None:
-        """Of the step under way, and of those requested, no more publications are made."""
+        """Abort the step in progress and any requested step."""
         if self.stepping:
             self._given_up = self._steps_begun
         self._steps_left, self.step_requested = 0, False
@@ -292,17 +297,17 @@ class SimulationLoop(ScenarioRun):
             raise InputError(asked, f"stopped in the last good state until a reset: {self.simulation.failure}")
 
     def request_step(self) -> None:
-        """A wrench or thruster command has come: paused and in lockstep it is followed by a step."""
+        """Request a step after a wrench or thruster command, if paused and in lockstep."""
         if self.paused and self.scenario.parameters.lockstep and not self._in_step:
             self.step_requested = True
 
     @property
     def stepping(self) -> bool:
-        """Whether publications of a step are still to be made."""
+        """Whether a step is in progress."""
         return self._steps_left > 0
 
     def reset(self) -> None:
-        """Time 0 and the initial state; paused or running stays."""
+        """Return to time 0 and the initial state; keeps paused or running."""
         self.resets += 1
         self._held_until_ns = 0
         self.simulation.reset(self.scenario.setup)
@@ -312,36 +317,36 @@ class SimulationLoop(ScenarioRun):
         self._give_up_steps()
         self._present_ns = 0
         self._anchor()
-        # Stamped anew: the message that is latched is from before.
+        # Replaces the latched message, whose stamp is from before the reset.
         self.simulation.announce()
         self.endpoints.say("reset: simulated time is 0")
 
     def hold(self) -> None:
-        """Keep running time at 0, where a reset has just put it, until ``hold_on`` says otherwise."""
+        """If running, hold time at 0 after a reset, until ``hold_on`` releases it or HOLD_NS passes."""
         if not self.paused:
             self._held_until_ns = time.monotonic_ns() + HOLD_NS
 
     def hold_on(self, more: bool) -> None:
-        """A list has come: time that is held is held for the next one, or goes on."""
+        """After a list has arrived: keep holding time for the next list (``more``), or release it."""
         if self._held_until_ns:
             self.hold()
             if not more:
-                self._let_go()
+                self._release_hold()
 
-    def _let_go(self) -> None:
+    def _release_hold(self) -> None:
         self._held_until_ns = 0
         self._anchor()
 
-    # In the thread's loop
+    # Called by the thread's loop
 
     def start(self) -> None:
-        """Simulated time begins now."""
+        """Start simulated time."""
         if Published in self.observer.takes:
             self.begin_ghost()
         self._anchor()
 
     def tick(self, arrived: bool = True) -> None:
-        """Do what is due, for no longer than pacing.WORK_NS. arrived: commands or requests may have come."""
+        """Do what is due, within pacing.WORK_NS. arrived: commands or requests may have arrived."""
         self._budget.begin_tick()
         if self.paused or self._held_until_ns:
             self._tick_standing(arrived)
@@ -349,7 +354,7 @@ class SimulationLoop(ScenarioRun):
             self._tick_running(arrived)
 
     def prepare_request(self) -> None:
-        """Bring simulated time up to now for a request, unless a publication comes first."""
+        """Advance simulated time to now for a request, unless a publication is due before."""
         self._budget.begin_tick()
         if not (self.paused or self._held_until_ns):
             self._present_ns = min(self._simulated_present_ns(), LAST_STAMP_NS)
@@ -359,14 +364,14 @@ class SimulationLoop(ScenarioRun):
     def _tick_running(self, arrived: bool) -> None:
         """Advance to the present: publish what is due, then take the commands that have arrived."""
         wall_ns = time.monotonic_ns()
-        # Before somebody who has come is noticed: what has passed isn't published for them.
+        # Before new subscribers are detected: past states aren't published for them.
         present_ns = self._simulated_present_ns()
         check = wall_ns >= self._next_listener_check_ns or (arrived and not self._has_subscribers)
         if check:
             self._next_listener_check_ns = wall_ns + TICK_NS
             self._check_listeners()
         if check or arrived:
-            self.endpoints.serve_steps(self)  # refuses them
+            self.endpoints.serve_steps(self)  # answers with an error while running
         if present_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
             return
@@ -375,7 +380,7 @@ class SimulationLoop(ScenarioRun):
         due_ns = self.publications.next_ns
         while due_ns <= present_ns:
             if not self._publish_next():
-                # Stopped for good, or out of time: then now is as far as it came, and the rest is for the next tick.
+                # Failed, or out of budget: the present is the time reached; the next tick continues from there.
                 present_ns = self.simulation.time_ns
                 break
             due_ns = self.publications.next_ns
@@ -384,7 +389,7 @@ class SimulationLoop(ScenarioRun):
         self._last_drain_ns = wall_ns
         self._present_ns = present_ns
         self._commands_come = self.endpoints.take_commands(self.commands, wall_ns, arrived)
-        # Else what acts in between, and reports of it, would wait for the next publication.
+        # Otherwise commands between publications, and their events, would wait for the next publication.
         rarely = self.publications.rate * self.pace.factor * RAREST_NS < 1e9
         if ends or rarely or not self._has_listeners or self.pace.followed or not self._caught_up:
             self.catch_up()
@@ -404,7 +409,7 @@ class SimulationLoop(ScenarioRun):
 
     def _tick_standing(self, arrived: bool) -> None:
         if 0 < self._held_until_ns <= time.monotonic_ns():
-            self._let_go()
+            self._release_hold()
             self.endpoints.warn(
                 f"a script said that more of it follows, and nothing came for {HOLD_NS / 1e9:g} s: it runs without"
             )
@@ -412,7 +417,7 @@ class SimulationLoop(ScenarioRun):
         if self.stepping:
             self._step_on()
         if self.pace.followed and not self.pace.anchored_ns:
-            # A /clock that had not begun when the pause did.
+            # /clock had not started when the pause began.
             self._anchor()
         now_ns = time.monotonic_ns()
         self._last_drain_ns = now_ns
@@ -429,8 +434,8 @@ class SimulationLoop(ScenarioRun):
             self.endpoints.publish(self)
 
     def _publish_next(self) -> bool:
-        """Advance to the next publication and make it; False when the tick's time is over before, or the
-        motion stopped.
+        """Advance to the next publication and publish it; False if the tick's budget ends before or the
+        motion failed.
         """
         if self.publications.next_ns > LAST_STAMP_NS:
             self._stop_at_the_last_stamp()
@@ -461,13 +466,13 @@ class SimulationLoop(ScenarioRun):
     # Time
 
     def _anchor(self, stamps_stay: bool = False) -> None:
-        """Simulated time goes on from where it is."""
+        """Anchor the present simulated time at the clock's present reading."""
         self.pace.anchor(self.simulation.time_ns)
-        self._begin_anew(stamps_stay)
+        self._restart_timers(stamps_stay)
 
-    def _begin_anew(self, stamps_stay: bool = False) -> None:
-        """Everything that goes by the wall clock is due from now on. Stamps are the followed clock's; the log keeps how
-        far they are ahead of simulated time.
+    def _restart_timers(self, stamps_stay: bool = False) -> None:
+        """Restart all deadlines in wall time. Unless stamps_stay, update the stamps' offset to the followed clock and
+        log it.
         """
         if not stamps_stay and self.pace.offset_ns != self.stamps.offset_ns:
             self.stamps.offset_ns = self.pace.offset_ns
@@ -478,8 +483,8 @@ class SimulationLoop(ScenarioRun):
         self._caught_up = True
 
     def _jump(self, by_ns: int) -> None:
-        """The followed clock has jumped, and stamps go with it: ahead, simulated time does, without motion; back, it
-        goes on, and what waits for a time of before is dropped.
+        """Handle a jump of the followed clock. Forward: simulated time jumps along, without motion. Backward: simulated
+        time continues, stamps go back, and scheduled commands are dropped.
         """
         self.endpoints.warn(
             f"/clock jumped by {by_ns / 1e9:+.9g} s: "
@@ -507,13 +512,13 @@ class SimulationLoop(ScenarioRun):
         idle = not self._has_listeners and self._caught_up and (self.pace.factor > 0.0 or bool(self.pace.followed))
         present_ns = self.pace.present_ns(self.simulation.time_ns, self.publications.next_ns, idle)
         if self.pace.anchored_ns != anchored_ns:
-            self._begin_anew()
+            self._restart_timers()
         if idle:
             self.publications.pass_over(min(present_ns, self._end_ns))
         return present_ns
 
     def next_wake_ns(self) -> int:
-        """When ``tick`` is due next [ns of wall time], unless something arrives before."""
+        """Wall time [ns] at which ``tick`` is due next, unless something arrives earlier."""
         factor = self.pace.factor
         if self.stepping or self.step_requested or not self._caught_up:
             return 0
@@ -526,11 +531,11 @@ class SimulationLoop(ScenarioRun):
         if factor == 0.0:
             return 0
         if not self._has_subscribers:
-            # Recordings and viewers take states in bundles: theirs are made together, at 1 kHz ten a wake-up.
+            # Recordings and viewers take states in batches, at 1 kHz ten per wake-up.
             return min(latest_ns, self.pace.wall_ns(min(self.simulation.next_event_ns, self._end_ns)))
         publication_ns = self.pace.wall_ns(self.publications.next_ns)
         if self._commands_come:
-            # Commands taken a little before a publication show in it; those taken with it would show a period later.
+            # Commands taken shortly before a publication act on it; those taken with it would show a period later.
             early_ns = self.pace.wall_ns(self.publications.next_ns - int(LEAD * 1e9 / self.publications.rate))
             if early_ns - self._last_drain_ns >= ACTIVE_DRAIN_NS:
                 return min(latest_ns, early_ns)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The page as one HTML file: what it holds of Python's declarations, how it is built, and files made of it."""
+"""The page: its data from Python's declarations, its build to one HTML file, files with a scene, and its server."""

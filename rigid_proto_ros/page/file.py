@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The page as a file that begins with a scene, or with any mesh that Python reads."""
+"""The page as a file that opens with a scene, or with any mesh that Python can read."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from .bundle import built_page
 from .data import LONGEST, is_of_page, page_values, page_version
 
 FORM = 1
-"""Of a take in a file or link; page/src/take.ts has the same."""
+"""Version of the format of takes; page/src/take.ts has the same."""
 SPIN = {"initial.angular_velocity": [0.05, 0.1, 3.0]}
-"""Of a mesh alone [rad/s], so that there is something to see."""
+"""Initial angular velocity of a mesh without a scene [rad/s], so that it moves."""
 _PLACE = '<script type="application/gzip" id="take"></script>'
 _BEGIN = '<meta name="begin" content="">'
-"""What the page opens in if its address says nothing, as behind the # of an address."""
+"""Place for the fragment (#) that the page uses if its address has none."""
 
 
 def write_page(
     file: str | Path, values: dict[str, Any] | None = None, script: Sequence[Command] = (), begins: str = ""
 ) -> None:
-    """Write the page, to begin with a scene of these parameters, by name, and a script of it, or as with ``begins``
-    behind the # of its address (page/src/address.ts). Raises InputError.
+    """Write the page, which opens with a scene of these parameters and a script, or as with the fragment ``begins`` in
+    its address (page/src/address.ts). Raises InputError.
     """
     page = page_text(values, script)
     if begins:
@@ -48,7 +48,7 @@ def write_page(
 
 
 def page_text(values: dict[str, Any] | None = None, script: Sequence[Command] = ()) -> str:
-    """The page, to begin with a scene of these parameters, by name, and a script of it. Raises InputError."""
+    """The page, which opens with a scene of these parameters and a script. Raises InputError."""
     page = built_page().read_text("utf-8")
     if values is None:
         return page
@@ -59,8 +59,8 @@ def page_text(values: dict[str, Any] | None = None, script: Sequence[Command] = 
 
 
 def values_of_mesh(mesh: str) -> tuple[dict[str, Any], str]:
-    """Parameters with which a mesh flies alone, and what there is to say about it: its unit where it is large, and a
-    shell of 1 kg where it bounds no solid. Raises InputError.
+    """Parameters for a mesh without a scene, and a notice about them: millimetres are assumed for a large mesh, and a
+    shell of 1 kg if the mesh bounds no solid. Raises InputError.
     """
     values: dict[str, Any] = {"mesh": mesh, **SPIN}
     notes = []
@@ -77,7 +77,7 @@ def values_of_mesh(mesh: str) -> tuple[dict[str, Any], str]:
 
 
 def take_of(values: dict[str, Any], script: Sequence[Command] = ()) -> dict[str, Any]:
-    """A take in which nothing but a script was done yet, as page/src/take.ts reads it. Raises InputError."""
+    """A take with this scene and script, in the format of page/src/take.ts. Raises InputError."""
     scenario = make_scenario(values)
     ties = any(isinstance(command, TieString | MoveString) for command in script)
     used = page_values(_changed(scenario.parameters), with_hand=not ties)
@@ -96,7 +96,7 @@ def take_of(values: dict[str, Any], script: Sequence[Command] = ()) -> dict[str,
 
 
 def _entry(command: Command) -> dict[str, Any]:
-    """The entry of a take. Raises InputError for what the page can't do."""
+    """The take's entry of a command. Raises InputError for a command that the page doesn't support."""
     if isinstance(command, ThrusterCommand):
         raise InputError("--script", "thrusters", "what the page can do: it has no thrusters")
     if isinstance(command, Change):
@@ -114,8 +114,8 @@ def _changed(parameters: Parameters) -> dict[str, Any]:
 
 
 def mesh_numbers(body: BodyMesh, name: str) -> dict[str, Any]:
-    """The numbers of a mesh. solid: its moments at unit density (mass/moments.py, MOMENTS), where Python has them.
-    volume: of a body of parts, whose solid has their mass instead (mass/parts.py).
+    """A mesh in a take. solid: its moments at unit density (mass/moments.py, MOMENTS), if it bounds a solid.
+    volume: of a body of parts, whose ``solid`` has the parts' mass instead (mass/parts.py).
     """
     moments = body.moments
     mesh: dict[str, Any] = {
@@ -128,7 +128,7 @@ def mesh_numbers(body: BodyMesh, name: str) -> dict[str, Any]:
     try:
         mesh["solid"] = _base64(np.frombuffer(moments.moments("solid").record.tobytes()), "<f8")
     except InputError:
-        pass  # its surface bounds none, as the page will find, too
+        pass  # its surface bounds no solid, as the page will find, too
     if body.volume is not None:
         mesh["volume"] = body.volume
     return mesh

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""The page of a running node. Files and sockets are a child process's (watchers.py), which shares neither interpreter
-nor fate with the physics thread: that copies a state when it is asked for one, about thirty times a second while
-somebody looks, and notes what has happened. Whatever is slow behind it, a pipe, the child or a browser, waits on
-threads of its own.
+"""The page of a running node. A child process (watchers.py) handles sockets, so that neither its speed nor its failure
+affects the physics thread. The physics thread only copies a state, about thirty times a second while a page is visible,
+and queues events. Slow pipes, a slow child and slow browsers block other threads only.
 
-A picture: scene number, loads of the body, whether there is a ghost, loads of the ghost (4 numbers of 4 bytes), then
-the body's FLIGHT (simulation/flight.py) and its acting loads, LOAD_ROW each, and the ghost's. The page has the same
-kernels and so the same records, and makes of them what it shows.
+A picture consists of scene number, number of loads of the body, whether there is a ghost, and number of loads of the
+ghost (4 numbers of 4 bytes), then the body's FLIGHT (simulation/flight.py) and its acting loads, LOAD_ROW each, and the
+same of the ghost. The page has the same kernels, hence the same records, and draws from them.
 """
 
 from __future__ import annotations
@@ -48,49 +47,49 @@ from .data import is_of_page, page_version
 from .file import FORM, mesh_numbers
 from .watchers import (
     ANSWERS,
+    BROADCAST,
     COMMAND,
+    LOG,
     LOOKING,
     PICTURE,
-    SAID,
-    TOLD,
     read_frame,
     write_frame,
 )
 
 PICTURE_S = 1 / 30
-"""[s] Between two pictures, while somebody looks."""
+"""Period of pictures while a page is visible [s]."""
 
 STARTING_S = 20.0
-"""[s] For the child to listen."""
+"""Timeout of the child's start [s]."""
 
 MOST_MESH = 24_000_000
-"""[bytes] Of a mesh as text; a larger one isn't shown."""
+"""Largest mesh as text [bytes]; a larger mesh isn't shown."""
 
-MOST_NOTED = 1024
-"""Events that wait for the pages; of more the oldest are left out."""
+MOST_EVENTS = 1024
+"""Capacity of the event queue; when it is full, the oldest events are dropped."""
 
 KEPT = ("record", "publish_rate", "publish_clock", "publish_tf", "imu_contact", "schedule_horizon", "real_time_factor")
-"""Parameters that another scene leaves as they are: how one looks at the motion, not the motion."""
+"""Parameters that keep their values when another scene is started; they affect the observation, not the motion."""
 
 ENTRY = frozenset({"at", "force", "push", "torque", "axes", "duration", "slot", "impulse", "angular_impulse"})
 KINDS = frozenset({"wrench", "string", "set", "state", "service"})
-"""Keys of an entry that a page may send: neither a time of its own, nor a repetition."""
+"""Keys that a page's script entry may have; time and repetition are not among them."""
 
 _HEAD = struct.Struct("<4I")
 
 
-class _Told(Observer):
-    """Notes what has happened, on the physics thread."""
+class _EventQueue(Observer):
+    """Queues observer events on the physics thread. looking: whether a page is visible; only then are events queued."""
 
     takes = frozenset({BodyChanged, SceneChanged, Acted, Refused, Reset})
 
     def __init__(self) -> None:
-        self.events: deque[Event] = deque(maxlen=MOST_NOTED)
+        self.events: deque[Event] = deque(maxlen=MOST_EVENTS)
         self.scene_changed = True
         self.looking = False
 
     def on(self, event: Event) -> None:
-        """Note it."""
+        """Queue the event, or note that the scene has changed."""
         if isinstance(event, BodyChanged | SceneChanged):
             self.scene_changed = True
         elif self.looking:
@@ -98,16 +97,16 @@ class _Told(Observer):
 
 
 class _GhostWatcher(Observer):
-    """While it is told of states, the simulation has the ghost that its scene asks for."""
+    """Takes states, because the simulation computes the scene's ghost only for an observer of states."""
 
     takes = frozenset({Published})
 
 
 class LivePage:
-    """Serves the page until ``close``, or until this process ends. port: the one asked for, None for the first free one
-    from the default on. address: for whoever started the node; guests: for others in the network, or "".
+    """Serves the page until ``close`` or the end of this process. port: None for the first free port from the default
+    on. say(line): logs a line. address: the owner's address; guests: the address for others in the network, or "".
 
-    Raises InputError where the page isn't built or nothing can listen there.
+    Raises InputError if the page can't be built or the port can't be opened.
     """
 
     def __init__(
@@ -118,8 +117,8 @@ class LivePage:
         say: Callable[[str], None],
     ) -> None:
         self._live, self._say = live, say
-        self._told, self._ghost_watcher, self._watches_ghost = _Told(), _GhostWatcher(), False
-        # What became of commands waits for the next picture, or for nothing while nobody looks.
+        self._queue, self._ghost_watcher, self._watches_ghost = _EventQueue(), _GhostWatcher(), False
+        # Sent before the next picture, or at once while no page is visible.
         self._answers: deque[dict[str, Any]] = deque()
         self._due, self._closed = threading.Event(), False
         self._scene_number = 0
@@ -139,16 +138,16 @@ class LivePage:
         )
         self.address, self.guests = self._listens()
         threading.Thread(target=self._read, name="page commands", daemon=True).start()
-        live.add_observer(self._told)
+        live.add_observer(self._queue)
         threading.Thread(target=self._send, name="page pictures", daemon=True).start()
 
     def _listens(self) -> tuple[str, str]:
-        """Where the child does, for its owner and for others. Raises InputError."""
+        """Wait until the child listens; returns the addresses for the owner and for others. Raises InputError."""
         assert self._child.stdout is not None
-        patience = threading.Timer(STARTING_S, self._child.kill)
-        patience.start()
+        timeout = threading.Timer(STARTING_S, self._child.kill)
+        timeout.start()
         frame = read_frame(self._child.stdout)
-        patience.cancel()
+        timeout.cancel()
         found = {} if frame is None else json.loads(frame[1])
         if "address" in found:
             return found["address"], found["guests"]
@@ -156,10 +155,10 @@ class LivePage:
         raise InputError(*found.get("refused", ("workbench_port", "the page's process doesn't start")))
 
     def close(self) -> None:
-        """End the pages."""
+        """Close all pages."""
         self._closed = True
         self._due.set()
-        # It holds nothing, and a thread of this process may be writing to it.
+        # Killed, since it has no state to save, and a thread may be blocked writing to it.
         self._child.kill()
         self._child.wait()
 
@@ -167,24 +166,24 @@ class LivePage:
 
     def _put(self, kind: int, content: bytes | Mapping[str, Any] | Sequence[Any]) -> None:
         text = content if isinstance(content, bytes) else json.dumps(content).encode()
-        with self._writing, suppress(OSError, ValueError):  # the child has ended, which its reader finds
+        with self._writing, suppress(OSError, ValueError):  # the child has ended, which the reading thread reports
             assert self._child.stdin is not None
             write_frame(self._child.stdin, kind, text)
 
-    def _tell(self, about: str, content: Any) -> None:
-        self._put(TOLD, {about: content})
+    def _broadcast(self, key: str, content: Any) -> None:
+        self._put(BROADCAST, {key: content})
 
     def _send(self) -> None:
-        """Send answers; while somebody looks, tell what has changed and send pictures."""
+        """Send answers, and, while a page is visible, changes and pictures."""
         with suppress(InputError):  # the simulation has ended
             while not self._closed:
                 if self._answers:
                     self._put(ANSWERS, [self._answers.popleft() for _ in range(len(self._answers))])
-                if not self._told.looking:
+                if not self._queue.looking:
                     self._due.wait()
                     self._due.clear()
                     continue
-                self._tell_changes()
+                self._broadcast_changes()
                 picture = self._live.call(self._picture)
                 if picture != self._last:
                     self._last = picture
@@ -192,7 +191,7 @@ class LivePage:
                 time.sleep(PICTURE_S)
 
     def _picture(self) -> bytes:
-        """The present state, on the physics thread."""
+        """The picture of the present state; called on the physics thread."""
         loop = self._live.loop
         simulation, ghost = loop.simulation, loop.ghost
         body, beside, loads = simulation.memory, b"", 0
@@ -203,38 +202,38 @@ class LivePage:
         head = _HEAD.pack(self._scene_number, len(simulation.acting), bool(beside), loads)
         return head + body + beside
 
-    def _tell_changes(self) -> None:
+    def _broadcast_changes(self) -> None:
         loop = self._live.loop
         factor = float(self._live.scenario.parameters.real_time_factor)
         pace = {"paused": loop.paused, "rate": factor, "failure": loop.simulation.failure}
-        if self._told.scene_changed:
-            self._told.scene_changed = False
-            self._live.call(self._find_scene)
-            self._tell_scene()
+        if self._queue.scene_changed:
+            self._queue.scene_changed = False
+            self._live.call(self._take_scene)
+            self._broadcast_scene()
         if pace != self._pace:
             self._pace = pace
-            self._tell("time", pace)
-        events = self._told.events
+            self._broadcast("time", pace)
+        events = self._queue.events
         done: list[dict[str, Any]] = []
         while events:
             event = events.popleft()
             match event:
                 case Reset():
                     done.clear()
-                    self._tell("reset", True)
+                    self._broadcast("reset", True)
                 case Refused(message=message):
-                    self._tell("said", message)
+                    self._broadcast("said", message)
                 case Acted(time_ns, command):
                     done += _as_entry(time_ns, command)
         if done:
-            self._tell("done", done)
+            self._broadcast("done", done)
 
-    def _find_scene(self) -> None:
-        """What the pictures from now on are of, on the physics thread."""
+    def _take_scene(self) -> None:
+        """Take the scene of the following pictures; called on the physics thread."""
         self._scenario: Scenario = self._live.scenario
         self._scene_number += 1
 
-    def _tell_scene(self) -> None:
+    def _broadcast_scene(self) -> None:
         scenario = self._scenario
         body_mesh = scenario.body_mesh
         sha256 = body_mesh.mesh.sha256 if body_mesh is not None else ""
@@ -245,7 +244,7 @@ class LivePage:
             if mesh is not None and len(mesh["vertices"]) + len(mesh["triangles"]) > MOST_MESH:
                 mesh = None
                 self._say(f"the page doesn't show a mesh of more than {MOST_MESH // 1_000_000} MB")
-            self._tell("mesh", mesh)
+            self._broadcast("mesh", mesh)
         values = {name: value for name, value in scenario.parameters.named().items() if _is_settable(name)}
         values["mesh"] = _shown_name(scenario)
         record = base64.b64encode(scenario.setup.scene.tobytes()).decode()
@@ -253,7 +252,7 @@ class LivePage:
         of_ghost = base64.b64encode(ghost.scene.tobytes()).decode() if ghost is not None else ""
         scene = {"number": self._scene_number, "form": FORM, "values": values, "record": record, "ghost": of_ghost}
         self._watch_ghost(ghost is not None)
-        self._tell("scene", scene)
+        self._broadcast("scene", scene)
 
     def _watch_ghost(self, on: bool) -> None:
         if on == self._watches_ghost:
@@ -265,7 +264,7 @@ class LivePage:
         self._live.add_observer(self._ghost_watcher)
 
         def begin() -> None:
-            # Nobody has seen this one yet: at time 0 it misses nothing.
+            # At time 0 the ghost has missed no command and can start now; later it starts at the next reset.
             if self._live.loop.ghost is None and self._live.loop.simulation.time_ns == 0:
                 self._live.loop.begin_ghost()
 
@@ -278,26 +277,26 @@ class LivePage:
         while (frame := read_frame(self._child.stdout)) is not None:
             kind, content = frame
             if kind == COMMAND:
-                self._obey(json.loads(content))
+                self._execute(json.loads(content))
             elif kind == LOOKING:
-                self._look(json.loads(content))
-            elif kind == SAID:
+                self._set_looking(json.loads(content))
+            elif kind == LOG:
                 self._say(content.decode())
-        self._look(False)
+        self._set_looking(False)
         if not self._closed:
             self._say("the page's process has ended, and the node goes on without it")
         if self._holds:
             with suppress(InputError):  # the simulation has ended
                 self._release()
 
-    def _look(self, looking: bool) -> None:
-        self._told.looking = looking
-        self._last = b""  # for whoever comes
+    def _set_looking(self, looking: bool) -> None:
+        self._queue.looking = looking
+        self._last = b""  # a page that becomes visible needs a picture
         self._due.set()
 
-    def _obey(self, command: Mapping[str, Any]) -> None:
-        """Do what a page asks for. Nobody waits for what becomes of an entry: a drag brings sixty a second, and a wait
-        for another thread takes as long as the entry itself.
+    def _execute(self, command: Mapping[str, Any]) -> None:
+        """Execute a page's command. Entries are posted without waiting for their result: a drag sends sixty per second,
+        and waiting for another thread takes as long as the entry itself.
         """
         try:
             match command:
@@ -317,22 +316,22 @@ class LivePage:
                     self._live.step()
                 case {"time": "reset"}:
                     self._live.reset()
-        except Exception as error:  # for the page; the next command is obeyed
+        except Exception as error:  # sent to the page; later commands are still executed
             self._answer(command, error)
         else:
             self._answer(command)
 
     def _answer_entry(self, command: Mapping[str, Any], acted: Future[None]) -> None:
-        if not acted.cancelled():  # by the end of the simulation
+        if not acted.cancelled():  # cancelled when the simulation ends
             self._answer(command, acted.exception())
 
     def _answer(self, command: Mapping[str, Any], error: BaseException | None = None) -> None:
         refusal = None if error is None else str(error)
-        if not (error is None or isinstance(error, InputError)):  # a fault of ours
+        if not (error is None or isinstance(error, InputError)):  # a bug
             traceback.print_exception(error)
             refusal = f"{type(error).__name__}: {error}"
         self._answers.append({"watcher": command["watcher"], "answer": command["id"], "refusal": refusal})
-        if not self._told.looking:
+        if not self._queue.looking:
             self._due.set()
 
     def _release(self) -> None:
@@ -340,13 +339,13 @@ class LivePage:
         self._live.submit(ReleaseString())
 
     def _begin(self, values: Mapping[str, Any]) -> None:
-        """Another scene, in the node as it is."""
+        """Start another scene; parameters of the node keep their values."""
         check_values(values, "")
         in_force = self._live.scenario.parameters.named()
         own = {name: in_force[name] for name in in_force if name in KEPT or _is_of_the_node(name)}
         scenario = make_scenario({**values, **own})
         was_paused = self._live.paused
-        # Time stands first: a scene that begins paused begins at its time 0.
+        # Paused while the scene is replaced, so that the new scene starts exactly at its time 0.
         self._live.pause(True)
         try:
             self._live.begin(scenario)
@@ -355,10 +354,10 @@ class LivePage:
 
 
 def _as_entry(time_ns: int, command: Command) -> list[dict[str, Any]]:
-    """What was done, as an entry of a script; moves of the string's end are in the pictures."""
+    """A command that has acted, as script entries; moves of the string's end are in the pictures instead."""
     if isinstance(command, MoveString):
         return []
-    with suppress(InputError):  # no entry says it
+    with suppress(InputError):  # not expressible as an entry
         return [{"t": time_ns / 1e9, **entry_of(command)}]
     return []
 
@@ -386,7 +385,9 @@ def check_values(values: Mapping[str, Any], mesh: str) -> None:
 
 
 def _is_settable(name: str) -> bool:
-    """Whether a page shows and may set it; of these only ``mesh`` names a file, and it may set that to bundled ones."""
+    """Whether pages show and may set this parameter. Only ``mesh`` names a file, and pages may only name
+    bundled ones.
+    """
     return is_of_page(name) or name == "real_time_factor"
 
 
@@ -396,5 +397,5 @@ def _shown_name(scenario: Scenario) -> str:
 
 
 def _is_of_the_node(name: str) -> bool:
-    """Whether a parameter belongs to the running program, and not to what flies in it."""
+    """Whether a parameter belongs to the running program and not to the scene."""
     return parameter_named(name).changes == READ_ONLY and not name.startswith(("contacts.", "thrusters."))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Serves the page over HTTP, and beside a node its motion over WebSockets. Uses no physics, and imports none of it.
+"""Serves the page over HTTP and a node's motion over WebSockets. Imports no physics.
 
-The address has a random token: ``/page/TOKEN`` is the page that flies by itself, ``/live/TOKEN`` the page of a node and
-its WebSocket. What a client may hold here is bounded by the constants below: 64 MiB in all.
+The address has a random token: ``/page/TOKEN`` is a page with its own simulation, ``/live/TOKEN`` is the page of a node
+and its WebSocket. The constants below bound the memory used for clients, to 64 MiB in all.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ from ..base.ports import LOOPBACK, PORTS_TRIED, ports_to_try
 
 MOST_CONNECTIONS = 96
 MOST_OF_ONE_MACHINE = 24
-"""Connections from one address of the network, so that one machine can't keep out the others."""
+"""Largest number of connections from one network address, so that one machine can't lock out the others."""
 MOST_WATCHERS = 64
 MOST_PAGES = 16
-"""Pages that are being sent at a time: each may be held whole for a client that reads slowly (1.5 MB)."""
+"""Largest number of pages being sent; each may be buffered in full for a client that reads slowly (1.5 MB)."""
 MOST_MESSAGE = 32 * 1024
-"""[bytes] Of a client's message; the declared length is checked before anything is read."""
+"""Largest message of a client [bytes]; the declared length is checked before the message is read."""
 MOST_QUEUED = 4
-"""Messages of a client that wait."""
+"""Largest number of queued messages of a client."""
 OPENING_S = 20.0
-"""Within which a client says what it wants, and has got the page."""
+"""Timeout of a client's request and of sending it the page [s]."""
 CLOSING_S = 2.0
-"""For the goodbye of a page's socket."""
+"""Timeout of a WebSocket's closing handshake [s]."""
 CUTTING_S = 0.2
-"""For that of one that broke the rules, and may not answer it."""
+"""The same for a client that has violated the protocol and may not answer [s]."""
 
 LINE_S = 1.0
-"""[s] Between two lines about clients."""
+"""Shortest period between two log lines about clients [s]."""
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline'; "
@@ -63,9 +63,8 @@ def new_token() -> str:
 def forbidden(served_as: str, host: str, origin: str | None) -> str:
     """Why a request isn't from a page of this server, or "".
 
-    A page of any site may open a socket to this machine, and a name that somebody else owns may point here: the first
-    shows in ``Origin``, the second in ``Host``, which must be an address in numbers, localhost, or the name by which
-    the server was told to listen.
+    Any site's page may open a socket to this machine, which ``Origin`` shows. Any domain name may be made to resolve to
+    this machine (DNS rebinding), which ``Host`` shows: it must be a numeric address, localhost, or the configured name.
     """
     name = ""
     try:
@@ -80,7 +79,7 @@ def forbidden(served_as: str, host: str, origin: str | None) -> str:
 
 
 def lan_address() -> str:
-    """This machine's address in the network, as others reach it; loopback where there is none."""
+    """This machine's address in the local network, or loopback without a network."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))  # chooses a route; nothing is sent
@@ -90,14 +89,14 @@ def lan_address() -> str:
 
 
 class Lines:
-    """Tells what happened to clients, one line a second at most; none of a client's own words are in it."""
+    """Logs refused and ended clients, at most one line per second, without any text sent by the client."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
         self._next_s, self._left_out = 0.0, 0
 
     def __call__(self, client: ServerConnection | None, what: str) -> None:
-        """A client was refused or ended, and why."""
+        """Log that a client was refused or ended, with the reason."""
         now = time.monotonic()
         if now < self._next_s:
             self._left_out += 1
@@ -109,7 +108,7 @@ class Lines:
 
 
 class _Connection(ServerConnection):
-    """One that isn't taken where there are too many already."""
+    """A connection that is aborted if there are too many."""
 
     lines: Lines
     opened: dict[ServerConnection, str]
@@ -136,9 +135,8 @@ def _is_own(address: str) -> bool:
 
 
 class PageServer:
-    """Listens once ``begin`` is awaited. page: the file. tokens: of the addresses that are answered, each with what
-    stands before it, ``page`` or ``live``. on_socket(connection, token) handles a WebSocket, and returns the code that
-    it is to be closed with.
+    """The server; it listens after ``begin``. page: the HTML file. tokens: accepted tokens, each with its path prefix,
+    ``page`` or ``live``. on_socket(connection, token): handles a WebSocket and returns the code to close it with.
     """
 
     def __init__(
@@ -157,7 +155,7 @@ class PageServer:
         self.port = 0
 
     async def begin(self, asked: int | None, default: int) -> None:
-        """Listen on the port that was asked for, or on the first free one from the default on. Raises InputError."""
+        """Listen on the port ``asked``, or on the first free port from the default on. Raises InputError."""
         ports = ports_to_try("--port", asked, default)
         logger = logging.getLogger("rigid_proto_ros.page")
         logger.setLevel(logging.CRITICAL + 1)  # dropped and broken connections are not errors
@@ -190,7 +188,7 @@ class PageServer:
         raise InputError("--port", default, f"one of the {PORTS_TRIED} ports from {default} on to be free")
 
     def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request for the page; None where a WebSocket is to be opened."""
+        """The response to a request for the page; None to open a WebSocket."""
         try:
             reason = forbidden(self._host, _only(request.headers, "Host") or "", _only(request.headers, "Origin"))
         except (ValueError, LookupError):
@@ -220,7 +218,7 @@ class PageServer:
         return _response(http.HTTPStatus.OK, self._packed if packed else self._page, {**headers, **_PAGE_HEADERS})
 
     async def _until_gone(self, connection: ServerConnection) -> None:
-        """The page is sent, or the client was cut off: websockets waits for it no longer than OPENING_S."""
+        """Wait until the page is sent or the connection has ended; websockets ends it after OPENING_S."""
         await connection.wait_closed()
         self._sending -= 1
 
@@ -234,7 +232,7 @@ class PageServer:
         if code != 1000:
             connection.close_timeout = CUTTING_S
         await connection.close(code)
-        sent = connection.protocol.close_sent  # by whom ever it was ended, what this server had to say
+        sent = connection.protocol.close_sent  # this server's close code, whichever side has closed
         ended = _ENDED.get(sent.code) if sent is not None else None
         if ended:
             self.lines(connection, f"ended, {ended}")
@@ -255,7 +253,7 @@ _ENDED = {
     1011: "it answered no more",
     1013: "it read too slowly, or too many look",
 }
-"""Why this server ends a connection, by the code of its end."""
+"""Reasons for ending a connection, by close code."""
 
 _PAGE_HEADERS = {"Content-Type": "text/html; charset=utf-8", "Content-Security-Policy": POLICY}
 
@@ -282,14 +280,14 @@ def _response(status: http.HTTPStatus, body: bytes, headers: dict[str, str]) -> 
 
 
 def is_taken(error: OSError) -> bool:
-    """Whether an address is in use; asyncio wraps the number in another error's text where there are several."""
+    """Whether the address is in use. For several addresses, asyncio puts the errors into the text of another one."""
     import errno
 
     return error.errno in (errno.EADDRINUSE, errno.EACCES) or "in use" in str(error)
 
 
 def addresses(host: str, port: int, path: str) -> tuple[str, str]:
-    """Where this machine's browser finds a page, and where those of the network do, "" if it listens on loopback."""
+    """The page's address for this machine and for others in the network, "" if the server listens on loopback only."""
     lan = host if host not in ("0.0.0.0", "::", "") else lan_address()
     own = LOOPBACK if host in ("0.0.0.0", "::", "") else host
     outside = "" if host == "localhost" or _is_own(host) else f"http://{_in_address(lan)}:{port}/{path}"
@@ -297,7 +295,7 @@ def addresses(host: str, port: int, path: str) -> tuple[str, str]:
 
 
 def show_code(address: str) -> None:
-    """Draw an address as a QR code, for a camera, where stdout is a terminal."""
+    """Print an address as a QR code if stdout is a terminal."""
     if not sys.stdout.isatty() or not sys.stdout.encoding.lower().startswith("utf"):
         return
     try:
@@ -306,7 +304,7 @@ def show_code(address: str) -> None:
         return
     drawn = io.StringIO()
     segno.make(address, micro=False).terminal(drawn, compact=True, border=2)
-    # Dark on light, whatever the terminal's own colours are.
+    # Dark on light in any terminal.
     print(*(f"\033[97;40m{line}\033[0m" for line in drawn.getvalue().splitlines()), sep="\n", flush=True)
 
 
@@ -315,8 +313,8 @@ def _in_address(host: str) -> str:
 
 
 def serve_page(page: bytes, asked: int | None, default: int, host: str) -> tuple[str, str]:
-    """Serve a page that flies by itself, on a thread, until this process ends; returns its addresses, for this machine
-    and for others. Raises InputError.
+    """Serve a page with its own simulation, on a thread, until this process ends. Returns its addresses for this
+    machine and for others. Raises InputError.
     """
     token = new_token()
     server = PageServer(page, {token: "page"}, host, lambda line: print(line, file=sys.stderr, flush=True))

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Those who look at a node's page, and the one who drives: ``python -m rigid_proto_ros.page.watchers``, a child of the
-node that ends when its stdin does, however the node has ended. Its settings are its argument.
+"""The clients of a node's page: who watches, and who has control. ``python -m rigid_proto_ros.page.watchers`` is a
+child process of the node; it ends when its stdin is closed, whichever way the node ends. Its settings are its argument.
 
-Between node and child go frames: length (4 bytes, little-endian), kind (1 byte), content. From the node: what all pages
-are told (texts, JSON objects; a key that is in KEPT is told to pages that open later, too), pictures (binary, passed on
-as they are), and answers. From the child: first where it listens, or why not. From a page come JSON objects:
+Node and child exchange frames: length (4 bytes, little-endian), kind (1 byte), content. The node sends broadcasts
+(texts, JSON objects with one key; the last of each key in KEPT is also sent to pages that open later), pictures
+(binary, passed on unchanged) and answers. The child first sends its address or an error. A page sends JSON objects:
 
-    {"id": n, "entry": {...}}                                         an entry of a poke script without its time
+{"id": n, "entry": {...}}                                         an entry of a poke script without its time
     {"id": n, "time": "pause" | "resume" | "step" | "reset"}
     {"id": n, "begin": {parameter: value}}                            another scene
     {"hand": "ask" | "give" | "take" | "lock" | "unlock"}
     {"looking": true | false}
 
-One page at a time has the hand. Who does something while nobody has it gets it; who has done nothing for IDLE_S loses
-it to the next who does something. The owner, who has the address that the terminal shows, can take it and lock it.
+One page at a time has the hand, i.e. control. A command gives the hand to its page if it is free. A page idle for
+IDLE_S loses it to the next page that sends a command. The owner, who has the address shown in the terminal, can take
+and lock it.
 """
 
 from __future__ import annotations
@@ -37,30 +38,32 @@ from websockets.exceptions import ConnectionClosed
 from ..base.errors import InputError
 from .server import MOST_WATCHERS, PageServer, addresses, new_token
 
-TOLD, PICTURE, ANSWERS = range(3)
+BROADCAST, PICTURE, ANSWERS = range(3)
 """Kinds of frames from the node."""
-LISTENS, COMMAND, LOOKING, SAID = range(4)
+LISTENS, COMMAND, LOOKING, LOG = range(4)
 """Kinds of frames to the node."""
 
 HEAD = struct.Struct("<IB")
 
 KEPT = ("mesh", "scene", "time")
-"""What is told to pages that open later: of each the last one."""
+"""Keys of broadcasts whose last text is sent to pages that open later."""
 
 IDLE_S = 20.0
-"""[s] Whoever has the hand and does nothing for so long loses it to the next who does something."""
+"""A page that has the hand and sends no command for this long [s] loses it to the next page that sends one."""
 
 RATE, BURST = 200.0, 400.0
-"""[1/s], messages of a page; a drag sends one a picture. More end it."""
+"""Token bucket of a page's messages: rate [1/s] and burst; exceeding it ends the connection. A drag sends one message
+per frame.
+"""
 
 MOST_UNANSWERED = 32
-"""Of a page's commands."""
+"""Largest number of unanswered commands of a page."""
 
 MOST_TEXTS = 256
-"""Texts that wait for a page; one that reads more slowly is ended."""
+"""Largest number of texts queued for a page; a page that reads more slowly is disconnected."""
 
 PIECE = 64 * 1024
-"""[bytes] Long texts are sent in such pieces, so that no page holds more than one of them here."""
+"""Largest fragment of a text [bytes]; of a long text only one fragment per page is buffered here."""
 
 
 def read_frame(stream: IO[bytes]) -> tuple[int, bytes] | None:
@@ -74,14 +77,14 @@ def read_frame(stream: IO[bytes]) -> tuple[int, bytes] | None:
 
 
 def write_frame(stream: IO[bytes], kind: int, content: bytes) -> None:
-    """Raises OSError where nobody reads any more."""
+    """Write a frame; raises OSError if the other process has ended."""
     stream.write(HEAD.pack(len(content), kind) + content)
     stream.flush()
 
 
 class Watcher:
-    """One page. texts: what it is still to be told. holds: whether it has tied the string. unanswered: how many of its
-    commands are.
+    """One page. texts: queued texts. holds: whether it has tied the string. unanswered: number of its unanswered
+    commands.
     """
 
     def __init__(self, number: int, connection: ServerConnection, owner: bool) -> None:
@@ -95,8 +98,8 @@ class Watcher:
         self.did_s = 0.0
         self._allowed, self._asked_s = BURST, time.monotonic()
 
-    def tell(self, text: bytes) -> None:
-        """Send a text; a page that reads too slowly is ended."""
+    def send(self, text: bytes) -> None:
+        """Queue a text; disconnects a page that reads too slowly."""
         if len(self.texts) >= MOST_TEXTS:
             self.end(1013)
             return
@@ -109,7 +112,7 @@ class Watcher:
         asyncio.ensure_future(self.connection.close(code))
 
     def is_too_fast(self) -> bool:
-        """Whether it sends more than a page does."""
+        """Count a message; returns whether the page has exceeded RATE and BURST."""
         now = time.monotonic()
         self._allowed = min(BURST, self._allowed + RATE * (now - self._asked_s)) - 1.0
         self._asked_s = now
@@ -117,7 +120,9 @@ class Watcher:
 
 
 class Watchers:
-    """owner, guest: tokens. to_node(kind, content) sends a frame."""
+    """All pages of a node. owner, guest: tokens. about: sent to each page first. to_node(kind, content):
+    sends a frame.
+    """
 
     def __init__(self, owner: str, guest: str, about: dict[str, Any], to_node: Callable[[int, bytes], None]) -> None:
         self._owner, self._guest, self._about, self._to_node = owner, guest, about, to_node
@@ -131,43 +136,43 @@ class Watchers:
 
     # From the node
 
-    def told(self, text: bytes) -> None:
-        """All pages are told; JSON whose first key says what it is about."""
+    def broadcast(self, text: bytes) -> None:
+        """Send a text, JSON with one key, to all pages."""
         key = text[2 : text.index(b'"', 2)].decode()
         if key in KEPT:
             self._kept[key] = text
         for watcher in self._all.values():
-            watcher.tell(text)
+            watcher.send(text)
 
     def picture(self, picture: bytes) -> None:
-        """The newest picture takes the place of one that wasn't sent yet."""
+        """Send a picture to all pages; it replaces one that wasn't sent yet."""
         self._picture = picture
         for watcher in self._all.values():
             watcher.due.set()
 
     def answers(self, content: bytes) -> None:
-        """What became of commands goes to the pages that gave them."""
+        """Send the results of commands to the pages that sent them."""
         for found in json.loads(content):
             watcher = self._all.get(found.pop("watcher"))
             if watcher is not None:
                 watcher.unanswered -= 1
-                watcher.tell(_json(found))
+                watcher.send(_json(found))
 
     # Pages
 
     async def watch(self, connection: ServerConnection, token: str) -> int:
-        """A page, until it ends; returns the code to close it with."""
+        """Serve a page until it ends; returns the code to close the connection with."""
         if len(self._all) >= MOST_WATCHERS:
             await connection.close(1013, f"{MOST_WATCHERS} pages look at this node already, and no more can")
             return 1013
         self._opened += 1
         watcher = self._all[self._opened] = Watcher(self._opened, connection, token == self._owner)
-        watcher.tell(_json({"hello": {**self._about, "owner": watcher.owner}}))
+        watcher.send(_json({"hello": {**self._about, "owner": watcher.owner}}))
         for key in KEPT:
             if key in self._kept:
-                watcher.tell(self._kept[key])
-        self._tell_hands()
-        self._look()
+                watcher.send(self._kept[key])
+        self._send_hand_states()
+        self._update_looking()
         sending = asyncio.ensure_future(self._send(watcher))
         try:
             async for message in connection:
@@ -182,9 +187,9 @@ class Watchers:
             del self._all[watcher.number]
             if self._hand is watcher:
                 self._hand = None
-            self._let_go(watcher)
-            self._tell_hands()
-            self._look()
+            self._release_string(watcher)
+            self._send_hand_states()
+            self._update_looking()
         return 1000
 
     async def _send(self, watcher: Watcher) -> None:
@@ -200,14 +205,15 @@ class Watchers:
                     shown = self._picture
                     await watcher.connection.send(shown)
 
-    def _look(self) -> None:
+    def _update_looking(self) -> None:
+        """Inform the node whether any page is visible."""
         looking = any(watcher.looking for watcher in self._all.values())
         if looking != self._looking:
             self._looking = looking
             self._to_node(LOOKING, _json(looking))
 
     def _take(self, watcher: Watcher, message: str) -> bool:
-        """Take a page's message; whether it is one that pages send."""
+        """Process a page's message; returns whether it is valid."""
         try:
             found = json.loads(message, parse_constant=_no_number)
         except (ValueError, RecursionError):
@@ -218,7 +224,7 @@ class Watchers:
             case {"looking": bool(looking)} if len(found) == 1:
                 watcher.looking = looking
                 watcher.due.set()
-                self._look()
+                self._update_looking()
             case {"hand": "ask" | "give" | "take" | "lock" | "unlock" as wish} if len(found) == 1:
                 self._wish(watcher, wish)
             case {"id": int(number), "entry": dict()} | {"id": int(number), "begin": dict()} if len(found) == 2:
@@ -236,10 +242,10 @@ class Watchers:
         release = entry.get("string") == "release"
         if not (self._has_hand(watcher) or (release and watcher.holds)):
             who = "its owner has locked it" if self._locked else "somebody else drives"
-            watcher.tell(_json({"answer": number, "refusal": f"{who}: ask for the hand"}))
+            watcher.send(_json({"answer": number, "refusal": f"{who}: ask for the hand"}))
             return True
         if watcher.unanswered >= MOST_UNANSWERED:
-            watcher.tell(_json({"answer": number, "refusal": "too many commands at once"}))
+            watcher.send(_json({"answer": number, "refusal": "too many commands at once"}))
             return True
         if "string" in entry:
             watcher.holds = not release
@@ -250,7 +256,7 @@ class Watchers:
     # The hand
 
     def _has_hand(self, watcher: Watcher) -> bool:
-        """Whether it drives, or does from now on."""
+        """Whether the page has the hand; it gets the hand if it is free."""
         now, hand = time.monotonic(), self._hand
         if hand is not watcher:
             free = hand is None or (now > hand.did_s + IDLE_S and not hand.holds)
@@ -263,13 +269,13 @@ class Watchers:
     def _pass_to(self, watcher: Watcher | None) -> None:
         before, self._hand = self._hand, watcher
         if before is not None and before is not watcher:
-            self._let_go(before)
+            self._release_string(before)
         if watcher is not None:
             watcher.asks, watcher.did_s = False, time.monotonic()
-        self._tell_hands()
+        self._send_hand_states()
 
-    def _let_go(self, watcher: Watcher) -> None:
-        """What it held is released: nobody else can."""
+    def _release_string(self, watcher: Watcher) -> None:
+        """Release the string that the page holds, since no other page can."""
         if watcher.holds:
             watcher.holds = False
             self._to_node(COMMAND, _json({"entry": {"string": "release"}, "watcher": 0, "id": 0}))
@@ -286,13 +292,13 @@ class Watchers:
             self._locked = wish == "lock"
             if self._locked:
                 self._pass_to(watcher)
-        self._tell_hands()
+        self._send_hand_states()
 
-    def _tell_hands(self) -> None:
+    def _send_hand_states(self) -> None:
         waiting = sum(watcher.asks for watcher in self._all.values())
         for watcher in self._all.values():
             state = {"yours": self._hand is watcher, "taken": self._hand is not None, "locked": self._locked}
-            watcher.tell(
+            watcher.send(
                 _json({"hand": {**state, "asking": waiting, "asked": watcher.asks, "watchers": len(self._all)}})
             )
 
@@ -306,7 +312,7 @@ def _no_number(_: str) -> float:
 
 
 async def _pieces(text: bytes) -> AsyncIterator[str]:
-    """Texts from the node are ASCII: each piece is text by itself."""
+    """Yield the fragments of a text; the node's texts are ASCII, so each fragment is valid text."""
     for at in range(0, len(text), PIECE):
         yield text[at : at + PIECE].decode()
 
@@ -315,15 +321,15 @@ async def _pieces(text: bytes) -> AsyncIterator[str]:
 
 
 class _Child:
-    """Reads and writes frames on threads of their own: each system waits for pipes in another way."""
+    """The child process. It reads and writes frames on threads, because asyncio's pipes differ between systems."""
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._in, self._out = sys.stdin.buffer, sys.stdout.buffer
-        # Behind what the node doesn't read at once nothing here waits, but for the pages' commands.
+        # Frames wait here, so that a node that reads slowly doesn't block the event loop.
         self._waiting: deque[tuple[int, bytes]] = deque()
-        self._written = threading.Event()
-        # What a library prints doesn't come between frames.
+        self._filled = threading.Event()
+        # A library's output must not get between frames.
         sys.stdout = sys.stderr
 
     async def run(self, settings: dict[str, Any]) -> None:
@@ -333,7 +339,7 @@ class _Child:
         with open(settings["page"], "rb") as file:
             page = file.read()
         tokens = {owner: "live", guest: "live"}
-        server = PageServer(page, tokens, host, lambda line: self.put(SAID, line.encode()), watchers.watch)
+        server = PageServer(page, tokens, host, lambda line: self.put(LOG, line.encode()), watchers.watch)
         try:
             await server.begin(settings["port"], settings["default"])
         except InputError as error:
@@ -346,14 +352,14 @@ class _Child:
         await self._loop.run_in_executor(None, self._read, watchers)
 
     def put(self, kind: int, content: bytes) -> None:
-        """Write a frame, without waiting for it."""
+        """Queue a frame to the node."""
         self._waiting.append((kind, content))
-        self._written.set()
+        self._filled.set()
 
     def _write(self) -> None:
         while True:
-            self._written.wait()
-            self._written.clear()
+            self._filled.wait()
+            self._filled.clear()
             while self._waiting:
                 try:
                     write_frame(self._out, *self._waiting.popleft())
@@ -361,15 +367,15 @@ class _Child:
                     os._exit(0)  # the node has ended
 
     def _read(self, watchers: Watchers) -> None:
-        handlers = {TOLD: watchers.told, PICTURE: watchers.picture, ANSWERS: watchers.answers}
+        handlers = {BROADCAST: watchers.broadcast, PICTURE: watchers.picture, ANSWERS: watchers.answers}
         while (frame := read_frame(self._in)) is not None:
             kind, content = frame
             self._loop.call_soon_threadsafe(handlers[kind], content)
 
 
 def main() -> None:
-    """Be the child."""
-    # Ctrl-C is the node's: this process ends when that has ended.
+    """Run the child process."""
+    # The node handles Ctrl-C; this process ends when the node has ended.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     asyncio.run(_serve(json.loads(sys.argv[1])))
     os._exit(0)

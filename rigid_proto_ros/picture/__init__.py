@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One picture of a flight: what is seen of a state and of what acts on it, as meshes, arrows, lines, points and labels.
+"""The picture of a flight: its states and loads as meshes, arrows, lines, points and labels, independent of a renderer.
 
-A backend draws them, here none: Rerun, the page and the files for other tools have theirs.
+Backends that draw it are elsewhere: for Rerun and for files of other tools. The page draws the same parts itself.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How long arrows are, and the arrows of the loads that act: at their true points, in their true directions."""
+"""Lengths of arrows, and the arrows of acting loads, at their points of application and in their directions."""
 
 from __future__ import annotations
 
@@ -15,28 +15,32 @@ from . import style
 from .backend import Backend
 
 FIRST = 0.6
-"""Body sizes of the first arrow of its kind: it reaches out of most bodies, and one four times as long can be seen."""
+"""Length of the first arrow of its kind, in body sizes: it reaches out of most bodies, and an arrow four times as long
+is still in view.
+"""
 
 FIRST_MOMENTUM = 0.75
-"""That of L: where ω has the same direction, the ends of the two, and their labels, are apart."""
+"""The same for L, so that its end and label differ from those of ω if both have the same direction."""
 
 LEAST, LONGEST = 0.005, 3.0
-"""Body sizes: a shorter arrow isn't drawn, nor its label; none is drawn longer, and a label says its value."""
+"""In body sizes: a shorter arrow is not drawn, nor its label; a longer one is cut to LONGEST, and its label has its
+value.
+"""
 
 IMPULSE_SHOWN_NS = 150_000_000
-"""[ns of simulated time] An impulse acts at an instant; its arrow stays this long so that it can be seen."""
+"""How long the arrow of an impulse, which acts at an instant, is shown [ns of simulated time]."""
 
 
 class ArrowScales:
-    """Values per metre of each kind of arrow, proportional to the value: one scale of a kind as long as it is known."""
+    """Scale of each kind of arrow, as value per metre; it stays fixed once it is set."""
 
     def __init__(self) -> None:
         self._per_metre: dict[str, float] = {}
 
     def lengths(self, kind: str, values: FloatArray, size: float, usual: float = 0.0) -> FloatArray:
-        """Lengths (n,) [m] of arrows for values (n,) >= 0 on a body of this size [m]; 0 where nothing is to be drawn.
+        """Lengths (n,) [m] of arrows for values (n,) >= 0 on a body of this size [m]; 0 where none is drawn.
 
-        The first value of a kind sets its scale; one that is none, or next to ``usual`` none, has ``usual`` set it.
+        The first value of a kind sets its scale; if it is 0 or negligible compared to ``usual``, ``usual`` sets it.
         """
         known = self._per_metre.get(kind, 0.0)
         if known == 0.0 and len(values):
@@ -49,14 +53,14 @@ class ArrowScales:
         return np.where(lengths < LEAST * size, 0.0, lengths)
 
     def forget(self) -> None:
-        """Another body: scales of its own."""
+        """Reset the scales, for another body."""
         self._per_metre.clear()
 
 
 @dataclass
 class Acting:
-    """A load from begin_ns to end_ns. shown: whether some state showed it. pushes: its force pushes into the body,
-    decided at the first state.
+    """A load that acts from begin_ns to end_ns. shown: whether it was drawn for some state. pushes: whether its force
+    pushes into the body, determined at the first state.
     """
 
     load: ShownLoad
@@ -67,9 +71,9 @@ class Acting:
 
 
 class Loads:
-    """The loads of one run, by when they act; a load that ends before any state shows it is shown at the next one.
+    """The loads of one run. A load that ends before any state shows it is drawn for the next state.
 
-    acting: those that haven't ended, by number, without impulses.
+    acting: loads that haven't ended, by number, without impulses.
     """
 
     def __init__(self) -> None:
@@ -79,14 +83,14 @@ class Loads:
         self._any = False
 
     def began(self, time_ns: int, load_id: int, load: ShownLoad) -> None:
-        """A load begins to act."""
+        """Add a load that starts to act."""
         if load.kind == "impulse":
             self._ended.append(Acting(load, time_ns, time_ns + IMPULSE_SHOWN_NS))
         else:
             self.acting[load_id] = Acting(load, time_ns)
 
     def ended(self, time_ns: int, load_id: int, poke_shown_ns: int) -> None:
-        """A load acts no longer; of a poke the arrow stays for so long at least."""
+        """End a load; the arrow of a poke is shown for at least ``poke_shown_ns``."""
         acting = self.acting.pop(load_id, None)
         if acting is not None:
             least_ns = poke_shown_ns if acting.load.kind == "poke" else 0
@@ -94,15 +98,15 @@ class Loads:
             self._ended.append(acting)
 
     def body_changed(self, before: Body, after: Body) -> None:
-        """Points of attack stay where they are in the mesh; one at the COM stays there."""
+        """Keep points of application fixed in the mesh after a change of the body; one at the COM stays at the COM."""
         for acting in (*self.acting.values(), *self._ended):
             if acting.load.point.any():
                 point = before.mesh_point(acting.load.point) * after.scale - after.center_of_mass
                 acting.load = replace(acting.load, point=point)
 
     def totals(self, times_ns: IntArray, R: FloatArray) -> FloatArray | None:
-        """Magnitudes (n, 2) of the force [N] and of the torque about the COM [N m] that all of them give together, at
-        times (n,) and attitudes R (n, 3, 3); impulses act at an instant and don't count. None before the first load.
+        """Magnitudes (n, 2) of the total force [N] and the total torque about the COM [N m] of all loads, without
+        impulses, at times (n,) and attitudes R (n, 3, 3). None before the first load.
         """
         self._any |= bool(self.acting) or any(acting.load.kind != "impulse" for acting in self._ended)
         if not self._any:
@@ -131,8 +135,8 @@ class Loads:
         size: float,
         weight: float,
     ) -> None:
-        """Draw the arrows at times (n,), states (n, 13) and attitudes R (n, 3, 3), of a body of this size [m] and
-        weight on earth [N]: none, once, where they ended.
+        """Draw the arrows at times (n,), states (n, 13) and attitudes R (n, 3, 3), for a body of this size [m] and
+        weight on earth [N]. Parts whose loads have ended are drawn once more, empty.
         """
         found: dict[str, list[tuple[BoolArray, Points, Points, Points, str]]] = {}
         for acting in (*self.acting.values(), *self._ended):
@@ -150,7 +154,7 @@ class Loads:
             backend.labels(name, none, np.zeros((0, 3)), [])
         for name, arrows in found.items():
             if wanted(name):
-                # Of several loads, by state.
+                # Arrows of all loads, ordered by state.
                 present = np.stack([arrow[0] for arrow in arrows], axis=1)
                 vectors, origins, ends = (np.stack([arrow[k] for arrow in arrows], axis=1)[present] for k in (1, 2, 3))
                 backend.arrows(name, present.sum(axis=1), vectors, origins)
@@ -168,7 +172,9 @@ def _arrows(
     size: float,
     weight: float,
 ) -> Iterator[tuple[str, tuple[Points, Points, Points, str]]]:
-    """By name a load's arrows at all states: vectors, origins, the places of labels (n, 3), and the label."""
+    """Yield the part's name and a load's arrows at all states: vectors, origins, label positions (n, 3),
+    and the label.
+    """
     load, point = acting.load, np.asarray(acting.load.point, dtype=float)
     if acting.pushes is None:
         force = load.force if load.axes == "body" else R[present][0].T @ load.force
@@ -183,7 +189,7 @@ def _arrows(
         vectors = np.broadcast_to(value * (length / magnitude), (len(rows), 3))
         vectors = np.einsum("nij,nj->ni", R, vectors) if load.axes == "body" else vectors
         origins = rows[:, 0:3] + R @ point
-        # A force that pushes has its tip at the point, as a finger would stand: inside the body none is seen.
+        # The tip of a pushing force is at the point, like a finger; the arrow would be hidden inside the body.
         if part == "force" and acting.pushes:
             origins = origins - vectors
             ends = origins
@@ -193,5 +199,5 @@ def _arrows(
 
 
 def _short(value: float) -> str:
-    """Three figures, without an exponent where people wouldn't write one."""
+    """Three significant digits, without an exponent for 1,000 to 100,000."""
     return f"{value:.0f}" if 1e3 <= value < 1e5 else f"{value:.3g}"

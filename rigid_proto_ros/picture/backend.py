@@ -22,22 +22,22 @@ class DrawnMesh(NamedTuple):
 
 
 class Backend:
-    """Null object, and the interface: override what is drawn.
+    """The interface, and a null object: override the methods of the parts to be drawn.
 
-    Parts are named by paths (style.py), a tree of frames: what is below a part moves with it. Lengths are in metres.
-    ``begin`` says of which n states the calls that follow are. counts (n,) is how many of the m arrows, lines, points
-    or labels belong to each of them, in order; none end those of the state before. A backend that shows the present
-    alone takes what belongs to the last state.
+    Parts are named by paths (style.py), a tree of frames: children move with their parent. Lengths are in metres.
+    ``begin`` sets the n states of the following calls. counts (n,): number of the m arrows, lines, points or labels
+    that belong to each state, in order; 0 removes those of the state before. A backend that shows only the present uses
+    those of the last state.
     """
 
     def begin(self, times_ns: IntArray) -> None:
-        """Simulated times (n,) [ns], ascending."""
+        """Set the simulated times (n,) [ns], ascending, of the following calls."""
 
     def resize(self, size: float) -> None:
-        """A length [m] that stands for the body: widths in STYLES are in it."""
+        """Set the body's size [m], the unit of widths in STYLES."""
 
     def mesh(self, name: str, surface: DrawnMesh | None) -> None:
-        """A surface that is fixed in the part's frame, in place of the one before; None for none."""
+        """Set the surface that is fixed in the part's frame; None for none."""
 
     def place(
         self,
@@ -46,21 +46,21 @@ class Backend:
         attitudes: FloatArray | None = None,
         scale: Vector3 | None = None,
     ) -> None:
-        """The part's frame: positions (n, 3), attitudes (n, 4) xyzw, scale (3,) that stays; None leaves it out."""
+        """Set the part's frame: positions (n, 3), attitudes (n, 4) xyzw, and a scale (3,) for all; None: not set."""
 
     def arrows(self, name: str, counts: IntArray, vectors: Points, origins: Points | None = None) -> None:
-        """Vectors (m, 3) from origins (m, 3), or from the frame's."""
+        """Draw vectors (m, 3) at origins (m, 3), or at the frame's origin."""
 
     def lines(
         self, name: str, counts: IntArray, strips: Sequence[Points], colours: Sequence[Colour] | None = None
     ) -> None:
-        """m strips (p, 3) of p points each; colours of each, or the style's."""
+        """Draw m line strips (p, 3) of p points each; colours: one per strip, or the style's."""
 
     def points(self, name: str, counts: IntArray, positions: Points) -> None:
-        """Positions (m, 3); those of a trail are one of each state, and the path goes through them."""
+        """Draw points at positions (m, 3); a trail has one per state, joined by its path."""
 
     def labels(self, name: str, counts: IntArray, positions: Points, texts: Sequence[str]) -> None:
-        """m texts at positions (m, 3)."""
+        """Draw m texts at positions (m, 3)."""
 
     def scalars(self, name: str, values: FloatArray) -> None:
-        """Plotted values (n, k), named by SERIES."""
+        """Plot values (n, k), named by SERIES."""

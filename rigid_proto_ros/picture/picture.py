@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The picture of a simulation: computes the parts that a backend draws from the states and the loads on the body."""
+"""The picture of a simulation: computes the parts that a backend draws, from the states and the loads on the body."""
 
 from __future__ import annotations
 
@@ -31,20 +31,22 @@ from .string import StringRows, Strings, string_curves
 from .surface import ball_mesh, box_edges, box_mesh, shaded_surface
 
 RATE = 250
-"""[1/s, simulated] Of what is only looked at, arrows, trails and plots; the body's place is that of every state."""
+"""Rate of arrows, trails and plots [1/s, simulated]; the body's pose is drawn for every state."""
 
 AXIS_LENGTH, PRINCIPAL_LENGTH = 0.25, 0.88
-"""In body sizes. The principal axes end outside the body and beyond the first ω and L, which may lie on one of them."""
+"""Lengths of mesh and principal axes, in body sizes. The principal axes end outside the body and beyond the first ω and
+L, which may lie on one of them.
+"""
 
 LABEL_BEYOND = 1.06
-"""Of an arrow's length: where its label stands."""
+"""Position of a label, in lengths of its arrow."""
 
 LINE_SIZES = 1.1
-"""Body sizes that the line of a string that pulls is drawn on beyond its knot."""
+"""Length by which the line of a taut string extends beyond its knot, in body sizes."""
 
 
 def energies(rows: FloatArray, setup: Setup) -> FloatArray:
-    """Energies (n, 3) [J] of states (n, 13): translational, rotational, gravity's."""
+    """Energies (n, 3) [J] of states (n, 13): translational, rotational, gravitational."""
     body, velocity, w = setup.body, rows[:, 7:10], rows[:, 10:13]
     translational = 0.5 * body.mass * np.einsum("ni,ni->n", velocity, velocity)
     rotational = 0.5 * np.einsum("ni,ij,nj->n", w, body.inertia, w)
@@ -58,9 +60,10 @@ def angle_to(reference: Vector3, vectors: Points) -> FloatArray:
 
 
 class Shape:
-    """Mesh and body together. size [m]: a length that stands for the body, the diagonal of the mesh's box or of the box
-    of equal inertia. tip (3,) [m, body axes]: the vertex farthest from the COM. centre, half_sizes (3,) [m, body axes]:
-    of the box along the mesh axes; these without a mesh None. moments (3,), axes (3, 3): principal, ascending.
+    """Dimensions of mesh and body. size [m]: the diagonal of the mesh's bounding box, or of the equimomental box
+    without a mesh. tip (3,) [m, body axes]: the vertex farthest from the COM. centre, half_sizes (3,) [m, body axes]:
+    of the bounding box along the mesh axes. Without a mesh, tip, centre and half_sizes are None. moments (3,), axes (3,
+    3): principal moments, ascending, and principal axes.
     """
 
     def __init__(self, vertices: Points | None, body: Body) -> None:
@@ -77,9 +80,8 @@ class Shape:
 
 
 class Picture:
-    """Told of what changes, and given states, it calls its backend. wanted(name) says whether a part is to be drawn;
-    nothing is computed for those that aren't. poke_shown_ns [ns, simulated]: how long the arrow of a poke stays at
-    least.
+    """Draws events and states through its backend. wanted(name): whether a part is to be drawn; other parts aren't
+    computed. poke_shown_ns [ns, simulated]: shortest time for which the arrow of a poke is shown.
     """
 
     def __init__(self, backend: Backend, wanted: Callable[[str], bool] = lambda _: True, rate: int = RATE) -> None:
@@ -97,7 +99,7 @@ class Picture:
         self.restart()
 
     def restart(self) -> None:
-        """A new run: simulated time starts again at 0; mesh, body and scales stay."""
+        """Start a new run at simulated time 0; mesh, body and scales are kept."""
         self.redraw()
         self._first_momentum = np.zeros(3)
         self._poinsot = Poinsot()
@@ -108,13 +110,13 @@ class Picture:
             self._poinsot.set_body(self.shape.moments, self.shape.axes)
 
     def redraw(self) -> None:
-        """The next state is drawn even if it was before: other parts are wanted."""
+        """Draw the next state in full even if its period was drawn before, because other parts are wanted."""
         self._last_tick = -1
 
-    # What changes
+    # Changes
 
     def on(self, event: Event) -> None:
-        """Take an event of the flight; states are drawn in batches by ``draw``, so that they are none."""
+        """Process an event other than a state; ``draw`` takes states, in batches."""
         match event:
             case Started() | MeshChanged():
                 self._set_mesh(event.time_ns, event.vertices, event.triangles)
@@ -130,22 +132,22 @@ class Picture:
                 self.string.change(event)
 
     def _set_mesh(self, time_ns: int, vertices: Points | None, triangles: Triangles | None) -> None:
-        """Another mesh: vertices (n, 3) [mesh coordinates], triangles (m, 3); a BodyChanged follows."""
+        """Set another mesh: vertices (n, 3) [mesh coordinates], triangles (m, 3); a BodyChanged follows."""
         self._vertices = self._mesh = None
         if vertices is not None and triangles is not None and len(triangles):
-            # A stray vertex that no triangle uses is no part of the body.
+            # Vertices that no triangle uses are not part of the body.
             used = np.zeros(len(vertices), dtype=bool)
             used[triangles] = True
             triangles = (np.cumsum(used) - 1)[triangles]
             self._vertices = np.array(vertices, dtype=float)[used]
-            # Single precision has no digits for a mesh far from its origin.
+            # Relative to the middle, since single precision loses the digits of a mesh far from its origin.
             self._middle = 0.5 * (self._vertices.min(axis=0) + self._vertices.max(axis=0))
             self._mesh = shaded_surface(self._vertices - self._middle, triangles)
         self.backend.begin(np.array([time_ns]))
         self._describe_mesh(self.backend)
 
     def _set_body(self, time_ns: int, setup: Setup) -> None:
-        """The body is that of this setup from ``time_ns`` on."""
+        """Set the body from ``time_ns`` on."""
         size = 0.0 if self.shape is None else self.shape.size
         if self.setup is not None:
             self.loads.body_changed(self.setup.body, setup.body)
@@ -160,7 +162,7 @@ class Picture:
         self._describe_body(self.backend)
 
     def set_ghost(self, time_ns: int, ghost: Setup | None) -> None:
-        """The ghost is the body of this setup from ``time_ns`` on, or there is none."""
+        """Set or remove the ghost from ``time_ns`` on."""
         first = self.ghost is None
         self.ghost = ghost
         self.backend.begin(np.array([time_ns]))
@@ -171,7 +173,9 @@ class Picture:
         self._describe_ghost(self.backend)
 
     def describe(self, backend: Backend) -> None:
-        """Draw on a backend that comes late what is drawn only when it changes; after its ``begin`` with one time."""
+        """Draw the parts that are drawn only when they change, for a backend added later; call after its ``begin`` with
+        one time.
+        """
         if self.shape is not None:
             backend.resize(self.shape.size)
         self._describe_mesh(backend)
@@ -226,7 +230,7 @@ class Picture:
     # States
 
     def draw(self, times_ns: IntArray, rows: FloatArray) -> None:
-        """States (n, 13) at times (n,) [ns] of the present body, all those since the call before."""
+        """Draw states (n, 13) of the present body at times (n,) [ns]; all states since the previous call."""
         if self.setup is None or self.shape is None or not len(times_ns):
             return
         backend = self.backend
@@ -236,7 +240,7 @@ class Picture:
         if self.ghost is not None:
             self._body_times = np.concatenate([self._body_times, times_ns])
             self._body_attitudes = np.vstack([self._body_attitudes, rows[:, 3:7]])
-        # Of what is only looked at, the first state of each period.
+        # Arrows, trails and plots: the first state of each period.
         ticks = times_ns // self._period_ns
         chosen = np.flatnonzero(np.diff(ticks, prepend=self._last_tick) > 0)
         self._last_tick = int(ticks[-1])
@@ -270,7 +274,7 @@ class Picture:
     def _plot(self, rows: FloatArray, L: Points, string_energy: FloatArray | None) -> None:
         """Plot states (n, 13) with their angular momenta (n, 3) in world axes.
 
-        string_energy (n,) [J] is None as long as the run has had no string.
+        string_energy (n,) [J]: None if the run has had no string yet.
         """
         assert self.setup is not None and self.shape is not None
         if not self._first_momentum.any():
@@ -287,7 +291,7 @@ class Picture:
             backend.scalars(style.POSITION, rows[:, 0:3])
 
     def _draw_motion(self, spin: Points, L: Points) -> None:
-        """Arrows of ω and L at the COM (n, 3)."""
+        """Draw arrows of ω and L (n, 3) at the COM."""
         assert self.shape is not None
         natural = np.sqrt(9.81 / self.shape.size)
         moment = float(self.shape.moments.mean())
@@ -330,7 +334,7 @@ class Picture:
             backend.scalars(style.STRING_LINE_DISTANCE, plotted)
 
     def draw_ghost(self, times_ns: IntArray, rows: FloatArray) -> None:
-        """States (n, 13) of the ghost, after the body's of the same times."""
+        """Draw states (n, 13) of the ghost, after those of the body at the same times."""
         if not len(times_ns):
             return
         self.backend.begin(times_ns)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Poinsot's construction: a torque-free body's inertia ellipsoid rolls, without slipping, on the invariable plane.
 
-In ω space, body axes, the ellipsoid ω·Iω = 2T is fixed to the body. Where it touches the plane L·ω = 2T, which is fixed
-in the world, is ω itself. The point's path on the ellipsoid is the polhode, that on the plane the herpolhode.
+In ω space, the ellipsoid ω·Iω = 2T is fixed to the body. It touches the plane L·ω = 2T, which is fixed in the world, at
+ω. The path of the contact point on the ellipsoid is the polhode, its path on the plane the herpolhode.
 
 The polhode is in principal axes with moments I1 ≤ I2 ≤ I3; T [J], L [kg m²/s], ω [rad/s]. Drawn lengths are ω divided
 by the geometric mean of the ellipsoid's two longer semi-axes, so that the picture has about the same size for every
-body and spin, and it is turned to have the invariable plane as floor.
+body and spin. The picture is rotated so that the invariable plane is horizontal, below the ellipsoid.
 """
 
 from __future__ import annotations
@@ -20,21 +20,23 @@ from .backend import Backend
 from .surface import ball_mesh
 
 POINTS = 121
-"""Points of a closed curve: every 3 degrees."""
+"""Points of a closed curve, one every 3 degrees."""
 
 CHANGE, REDRAWN_NS = 5e-4, 50_000_000
-"""Relative change of T or L beyond which curve and plane are drawn anew, less can't be seen; and how soon [ns]."""
+"""Relative change of T or L beyond which curve and plane are drawn again, since a smaller one isn't visible; and
+shortest period of doing so [ns].
+"""
 
 PLANE_HALF_SIZE, PLANE_LINES = 1.6, 9
 REST = 1e-12
-"""[rad/s] Below this spin there is nothing to draw."""
+"""Angular velocity [rad/s] below which nothing is drawn."""
 
 
 def polhode(moments: Vector3, energy: float, w: Vector3) -> Points:
-    """The closed curve (n, 3) on the ellipsoid through ω (3,), which has the energy T.
+    """The polhode through w (3,), a closed curve (n, 3); energy: T.
 
-    The curve surrounds the axis of the largest moment if L² > 2T·I2, else that of the smallest. L² − 2T·Ii is taken
-    from ω directly: as a difference of L² and 2T it would cancel near the axis.
+    The curve surrounds the axis of the largest moment if L² > 2T·I2, otherwise that of the smallest. L² − 2T·Ii is
+    computed from ω directly, because the difference of L² and 2T·Ii suffers from cancellation near the axis.
     """
     I1, I2, I3 = moments
     squares = w * w
@@ -44,7 +46,7 @@ def polhode(moments: Vector3, energy: float, w: Vector3) -> Points:
         pole, first, second = 0, 1, 2
     weights = [moments[k] * abs(moments[pole] - moments[k]) for k in (first, second)]
     if min(weights) <= 0.0:
-        # Equal moments and no spin about the third axis: ω stays where it is.
+        # Two equal moments and no spin about the third axis: ω is constant.
         return np.tile(w, (POINTS, 1))
     radius2 = weights[0] * squares[first] + weights[1] * squares[second]
     angle = np.linspace(0.0, 2.0 * np.pi, POINTS)
@@ -57,7 +59,7 @@ def polhode(moments: Vector3, energy: float, w: Vector3) -> Points:
 
 
 def turn_down(L: Vector3) -> Attitude:
-    """Quaternion xyzw (4,) that turns the direction of L (3,) onto −z, the shorter way."""
+    """Quaternion xyzw (4,) of the shortest rotation of the direction of L (3,) to −z."""
     x, y, z = L / np.linalg.norm(L)
     if z > 1.0 - 1e-12:
         return np.array([1.0, 0.0, 0.0, 0.0])
@@ -73,19 +75,19 @@ class Poinsot:
         self._drawn = -REDRAWN_NS, 0.0, np.zeros(3)
 
     def set_body(self, moments: Vector3, axes: Matrix3) -> None:
-        """Another tensor, as ``principal_axes`` has it: another ellipsoid, in other axes."""
+        """Set the tensor by its principal moments and axes, as returned by ``principal_axes``."""
         self._moments, self._axes = moments, axes
         self._drawn = -REDRAWN_NS, 0.0, np.zeros(3)
 
     def describe(self, backend: Backend) -> None:
-        """What is the same for every spin at this scale."""
+        """Draw the ellipsoid, which doesn't depend on the spin at this scale."""
         backend.place(style.POINSOT_PRINCIPAL, attitudes=quaternion_from_matrix(self._axes)[np.newaxis])
         backend.mesh(style.POINSOT_ELLIPSOID, ball_mesh())
         I1, I2, _ = self._moments
         backend.place(style.POINSOT_ELLIPSOID, scale=(I1 * I2) ** 0.25 / np.sqrt(self._moments))
 
     def draw(self, backend: Backend, times_ns: IntArray, rows: FloatArray, spin: Points, L: Points) -> None:
-        """States (n, 13) at times (n,) with their spins and angular momenta (n, 3) in world axes."""
+        """Draw states (n, 13) at times (n,), with angular velocities and angular momenta (n, 3) in world axes."""
         w = rows[:, 10:13] @ self._axes
         energy = 0.5 * np.einsum("ni,i,ni->n", w, self._moments, w)
         turns = np.linalg.norm(w, axis=1) > REST
@@ -103,7 +105,7 @@ class Poinsot:
         backend.points(style.POINSOT_HERPOLHODE, counts, ends)
 
     def _changes(self, time_ns: int, energy: float, L: Vector3) -> bool:
-        """Whether T and L are no longer those drawn."""
+        """Whether T or L differ from those drawn last, and REDRAWN_NS has passed."""
         drawn_ns, drawn_energy, drawn_L = self._drawn
         same = abs(energy - drawn_energy) <= CHANGE * drawn_energy
         same = same and np.linalg.norm(L - drawn_L) <= CHANGE * np.linalg.norm(drawn_L)
@@ -113,7 +115,7 @@ class Poinsot:
         return True
 
     def _draw_curves(self, backend: Backend, scale: FloatArray, energy: FloatArray, w: Points, L: Points) -> None:
-        """Polhode, plane and L from each of these states on; a body at rest has none."""
+        """Draw polhode, plane and L from each of these states on; nothing for a body at rest."""
         turns = scale > 0.0
         counts = turns.astype(int)
         curves, planes, ends = [], [], []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The string from its free end to the knot: straight while it pulls, sagging along gravity while it is slack."""
+"""The string from its free end to its knot: straight while taut, sagging along gravity while slack."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from ..motion.string import StringState
 from ..simulation.observer import StringChanged
 
 POINTS = 25
-"""Of a slack string's curve."""
+"""Points of a slack string's curve."""
 BISECTIONS = 40
-"""Enough for the sag to 12 digits."""
+"""Bisections of the sag, to 12 digits."""
 DEEPEST = 0.6
-"""Of the length: a loop whose ends meet is half as deep as it is long, and no other one is much deeper."""
+"""Upper bound of the sag relative to the length: 0.5 if the ends coincide, and hardly more otherwise."""
 DOWN = np.array([0.0, 0.0, -1.0])
-"""Where a slack string hangs without gravity, so that it is seen to be slack."""
+"""Direction of the sag without gravity, so that the string is visibly slack."""
 
 
 def string_curves(free: Points, knots: Points, lengths: FloatArray, gravity: Vector3) -> FloatArray:
-    """Points (n, POINTS, 3) of slack strings from their free ends (n, 3) to their knots (n, 3): on a parabola along
-    gravity (3,) [m/s², world], so deep that the line through them is ``lengths`` (n,) long.
+    """Points (n, POINTS, 3) of slack strings from their free ends (n, 3) to their knots (n, 3): parabolas that sag
+    along gravity (3,) [m/s², world], each with the polyline length ``lengths`` (n,).
     """
     pull = float(np.linalg.norm(gravity))
     down = gravity / pull if pull else DOWN
@@ -42,8 +42,9 @@ def string_curves(free: Points, knots: Points, lengths: FloatArray, gravity: Vec
 
 @dataclass(frozen=True)
 class StringRows:
-    """The string at those m of n states at which one is tied: tied (n,) says which. free and knots (m, 3) [m, world];
-    lengths (m,) [m] of a slack one, 0 of one that is always straight; energies (m,) [J]; pulls (m,): it is taut.
+    """The string at the m of n states at which one is tied. tied (n,): which states. free, knots (m, 3) [m, world]:
+    ends; lengths (m,) [m]: rest length, 0 for a bilateral string, which is always straight; energies (m,) [J]; pulls
+    (m,): it is taut.
     """
 
     tied: BoolArray
@@ -62,14 +63,14 @@ class StringRows:
 
     @property
     def held(self) -> FloatArray:
-        """Energy stored in the string at each of the n states (n,) [J]: 0 where no string is tied."""
+        """Energy stored in the string at each state (n,) [J]; 0 where no string is tied."""
         found = np.zeros(len(self.tied))
         found[self.tied] = self.energies
         return found
 
 
 class Strings:
-    """The string of one run, by the times from which it is tied as it is."""
+    """The string of one run, as a list of its changes."""
 
     def __init__(self) -> None:
         self._changes: list[StringChanged] = []
@@ -77,7 +78,7 @@ class Strings:
         """Whether the run has had a string."""
 
     def change(self, event: StringChanged) -> None:
-        """Another target, another knot, tied or let go."""
+        """Add a change: target, knot, tied or released."""
         self._changes.append(event)
         self.was_tied = self.was_tied or event.string is not None
 
@@ -87,7 +88,7 @@ class Strings:
         return bool(self._changes) and self._changes[-1].string is not None
 
     def _spells(self, times_ns: IntArray) -> Iterator[tuple[slice, StringState, Vector3]]:
-        """The string that is tied at each of the times (n,) with its knot, by slices of them."""
+        """Yield the tied strings with their knots relative to the COM, each with a slice of the times (n,)."""
         begins = np.searchsorted(times_ns, [change.time_ns for change in self._changes], side="left").tolist()
         for begin, end, change in zip(begins, [*begins, len(times_ns)][1:], self._changes, strict=True):
             if change.string is not None and change.arm is not None and end > begin:
@@ -108,6 +109,6 @@ class Strings:
         return StringRows(tied, free[tied], knots[tied], lengths[tied], energies[tied], pulls[tied])
 
     def forget_before(self, time_ns: int) -> None:
-        """Keep what later states need."""
+        """Discard changes that later states don't need."""
         while len(self._changes) > 1 and self._changes[1].time_ns <= time_ns:
             self._changes.pop(0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Parts of the picture and plots by name, and how they look: the same wherever they are drawn.
+"""Names and styles of the picture's parts and plots, common to all backends.
 
 Colours are RGB of 0 to 255. Vectors in principal axes have components 1, 2, 3 in ascending order of the principal
 moments.
@@ -15,7 +15,7 @@ RED, GREEN, BLUE = (235, 85, 85), (90, 200, 110), (85, 150, 250)
 GREY, YELLOW, VIOLET, ORANGE = (150, 150, 150), (240, 200, 70), (190, 120, 245), (250, 150, 60)
 
 AXES_COLOURS = (RED, GREEN, BLUE)
-"""Of axes x y z, and of principal axes 1 2 3."""
+"""Colours of the axes x y z and of the principal axes 1 2 3."""
 BODY_COLOUR = (214, 205, 190)
 GHOST_COLOUR = (120, 180, 255)
 OMEGA_COLOUR, MOMENTUM_COLOUR = (60, 190, 190), VIOLET
@@ -25,11 +25,11 @@ FORCE_COLOUR, TORQUE_COLOUR = (205, 25, 25), (255, 210, 120)
 LOAD_COLOURS = {"wrench": ORANGE, "poke": FORCE_COLOUR, "impulse": (255, 70, 200), "thruster": (90, 220, 255)}
 """By kind of load."""
 TRAIL_COLOUR, POINT_TRAIL_COLOUR = (230, 160, 30), (225, 80, 160)
-"""Paths of the centre of mass and of one point of the body."""
+"""Trails of the COM and of one point of the body."""
 
 WORLD = "world"
 BODY = "world/body"
-"""The body's frame: its axes, from the COM."""
+"""The body frame: body axes, origin at the COM."""
 BODY_MESH = "world/body/mesh"
 BODY_AXES = "world/body/axes"
 PRINCIPAL_AXES = "world/body/principal_axes"
@@ -37,9 +37,9 @@ BOUNDING_BOX = "world/body/bounding_box"
 INERTIA_BOX = "world/body/equimomental_box"
 INERTIA_ELLIPSOID = "world/body/equimomental_ellipsoid"
 FLOOR = "world/floor"
-"""Lines at rest, with their distance, so that sizes and ways can be read off."""
+"""Lines at rest, labelled with their spacing, as a scale of sizes and distances."""
 CENTRE = "world/centre"
-"""The COM with world axes: the place from which views follow the body without turning with it."""
+"""A frame at the COM with world axes; views follow it, so that they don't rotate with the body."""
 OMEGA = "world/centre/angular_velocity"
 MOMENTUM = "world/centre/angular_momentum"
 GHOST = "world/ghost"
@@ -47,15 +47,15 @@ GHOST_MESH = "world/ghost/mesh"
 GHOST_BOX = "world/ghost/equimomental_box"
 LOADS = "world/loads"
 TRAIL = "world/trail"
-"""The path of the vertex farthest from the COM, and that of the COM."""
+"""Trail of the vertex farthest from the COM."""
 COM_TRAIL = "world/com_trail"
 STRING = "world/string"
 HAND = "world/string/hand"
 STRING_LINE = "world/string_line"
-"""The line of a string that pulls, on through the body."""
+"""The line of a taut string, extended through the body."""
 
 POINSOT = "poinsot"
-"""A picture of its own, in units of about its size."""
+"""Poinsot's construction, a separate picture, in units of about its size."""
 POINSOT_UPRIGHT = "poinsot/upright"
 POINSOT_PLANE = "poinsot/invariable_plane"
 POINSOT_OMEGA = "poinsot/upright/angular_velocity"
@@ -68,14 +68,14 @@ POINSOT_POLHODE = "poinsot/upright/body/principal/polhode"
 
 
 def load_part(kind: str, part: str) -> str:
-    """The arrows of a kind of load, of its ``force`` or its ``torque``."""
+    """Name of the arrows of a kind of load; part: ``force`` or ``torque``."""
     return f"{LOADS}/{kind}/{part}"
 
 
 @dataclass(frozen=True)
 class Style:
-    """colours: one, or one of each item. width: radius of lines, arrows and points, in body sizes, in Poinsot's picture
-    in its own unit.
+    """Style of a part. colours: one, or one per item. width: radius of lines, arrows and points, in body sizes; in
+    Poinsot's picture, in its own unit.
     """
 
     colours: tuple[Colour, ...]
@@ -117,7 +117,7 @@ POSITION = "plots/position"
 GHOST_ANGLE = "plots/ghost_angle"
 STRING_LINE_DISTANCE = "plots/string_line_distance"
 COMMANDED = "plots/commanded"
-"""What the commands that act give together: not the string's force."""
+"""Total force and torque of the acting commands, without the string's."""
 
 ENERGY_SERIES = (("translational", BLUE), ("rotational", ORANGE), ("gravity", GREEN))
 TOTAL_ENERGY_SERIES, STRING_ENERGY_SERIES = (("total", GREY),), (("string", YELLOW),)
@@ -135,13 +135,13 @@ SERIES = {
     STRING_LINE_DISTANCE: (("COM to the string's line", YELLOW),),
     COMMANDED: (("|force| [N]", RED), ("|torque| [N m]", VIOLET)),
 }
-"""Per plot the names and colours of its scalars, in order. Of energies the last is there with a string alone."""
+"""Names and colours of the scalars of each plot, in order. The last energy is plotted only with a string."""
 
 WHOLES = ("|L|", "total")
-"""Scalars that are the sum or the size of others of their plot."""
+"""Scalars that are the sum or the norm of others in their plot."""
 
 ROUNDING = 1e-9
-"""Relative: what is smaller comes from the arithmetic, or from the digits of a mesh's coordinates."""
+"""Relative size below which a value is a rounding error, of the arithmetic or of a mesh's coordinates."""
 
 ENERGY_UNIT, OMEGA_UNIT, MOMENTUM_UNIT, ANGLE_UNIT = "J", "rad/s", "kg m²/s", "°"
 
@@ -153,5 +153,5 @@ GHOST_ANGLE_TITLE = "Angle of the ghost to the body"
 
 
 def without_rounding(value: float, largest: float = 1.0) -> float:
-    """A number for people to read: 0 for what the arithmetic's rounding leaves beside ``largest``."""
+    """A value for display; 0 if it is a rounding error compared to ``largest``."""
     return float(value) if abs(value) > ROUNDING * largest else 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Surfaces with normals for shading, smooth over curved parts and flat at sharp edges; box and ball."""
+"""Surfaces with normals for shading, smooth except at sharp edges; box and ball."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from ..base.vectors import IntArray, Points, Triangles, Vector3
 from .backend import DrawnMesh
 
 CREASE_ANGLE = np.deg2rad(35.0)
-"""[rad] Faces that meet at more than this are drawn with an edge between them."""
+"""Angle between adjacent faces [rad] above which their edge is sharp."""
 
 CREASED_TRIANGLES_MAX = 200_000
-"""Above this every vertex is shaded smoothly: the facets are finer than a picture shows, and the pairs too many."""
+"""Largest number of triangles with sharp edges; larger meshes are shaded smoothly, because their facets are finer than
+a picture shows, and the pairs of corners too many.
+"""
 
 
 def shaded_surface(vertices: Points, triangles: Triangles) -> DrawnMesh:
-    """The surface to draw, in float32 and uint32.
+    """The surface to draw, in float32 and uint32, from vertices (n, 3) and triangles (m, 3).
 
-    vertices (n, 3), triangles (m, 3) as loaded. A vertex on a sharp edge is split into one per smooth side, so p ≥ the
-    number of referenced vertices; the order of triangles is kept.
+    A vertex on a sharp edge is split into one per smooth side, so there are at least as many vertices as referenced
+    ones; the order of triangles is kept.
     """
     triangles = np.asarray(triangles, dtype=np.int64)
     centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
@@ -36,7 +38,7 @@ def shaded_surface(vertices: Points, triangles: Triangles) -> DrawnMesh:
     corner_vertex = triangles.ravel()
     corner_face = np.repeat(np.arange(len(triangles)), 3)
     corner_normals = _corner_normals(corner_vertex, corner_face, face_area_normals)
-    # Corners of one vertex whose normals agree to 1e-4 are one drawn vertex again.
+    # Corners of one vertex whose normals agree to 1e-4 are merged into one drawn vertex.
     key = np.column_stack([corner_vertex, np.rint(corner_normals * 1e4).astype(np.int64)])
     _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
     drawn = vertices[corner_vertex[first]]
@@ -48,7 +50,9 @@ def shaded_surface(vertices: Points, triangles: Triangles) -> DrawnMesh:
 
 
 def _corner_normals(corner_vertex: IntArray, corner_face: IntArray, face_area_normals: Points) -> Points:
-    """Per corner the area-weighted mean of the normals around its vertex that lie within the crease angle of it."""
+    """Normal of each corner: the area-weighted mean of the normals of faces around its vertex that are within
+    CREASE_ANGLE of the corner's face.
+    """
     unit = _unit(face_area_normals)
     order = np.argsort(corner_vertex, kind="stable")
     counts = np.bincount(corner_vertex)
@@ -71,7 +75,7 @@ def _corner_normals(corner_vertex: IntArray, corner_face: IntArray, face_area_no
 
 
 def _unit(vectors: Points) -> Points:
-    """Rows (n, 3) at unit length; a zero row becomes +z, since a viewer can't shade with a zero normal."""
+    """Rows (n, 3) normalized; a zero row becomes +z, since a viewer can't shade with a zero normal."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 1.0])
 
@@ -94,7 +98,7 @@ def box_mesh() -> DrawnMesh:
 
 
 def box_edges(centre: Vector3, half_sizes: Vector3) -> list[Points]:
-    """The twelve edges (2, 3) of a box along the axes."""
+    """The twelve edges (2, 3) of an axis-aligned box."""
     return list((centre + half_sizes * BOX_CORNERS)[BOX_EDGES])
 
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Everything that touches Rerun: showing a flight, drawing it into a file, and taking its picture.
+"""Everything that uses Rerun: live views, .rrd files, and pictures of a flight.
 
-``rerun`` itself is imported where a sink is opened, never when this package is imported, so that a run that nobody
-watches doesn't pay for it.
+``rerun`` is imported only when a sink is opened, not with this package, so that runs without a view don't pay for it.
 """

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A flight as columns of Rerun: the stream that takes them, and the backend that draws the picture on it.
+"""A Rerun recording of a run, and the backend that draws the picture into it.
 
-Timelines: ``sim_time`` (simulated time since the run's start) and ``ros_time`` (wall clock when the row was taken).
+Timelines: ``sim_time`` (simulated time since the run's start) and ``ros_time`` (wall clock when the row was queued).
 
-Two things are done by functions of the SDK that it doesn't promise (tried with rerun-sdk 0.41.0):
-``rr.send_blueprint`` keeps a stream of every layout for ever, two threads and a third of a megabyte each, and threads
+Two tasks use private functions of the SDK (tried with rerun-sdk 0.41.0), because the public ones leak:
+``rr.send_blueprint`` keeps a stream of every layout forever, two threads and a third of a megabyte each, and threads
 and memory of closed recordings are kept until the process ends.
 """
 
@@ -28,42 +28,44 @@ from ..picture.backend import Backend, DrawnMesh
 from ..picture.style import Colour
 
 APPLICATION_ID = "rigid_proto_ros"
-"""Of live streams: viewers keep one layout for all recordings of an application."""
+"""Application ID of live streams; viewers keep one layout for all recordings of an application."""
 
 SIM_TIME = "sim_time"
 ROS_TIME = "ros_time"
 
 SCENE = "session/scene"
-"""The parameters in force."""
+"""The present parameters."""
 EVENTS = "events"
-"""What the event log tells, in words."""
+"""The event log, in words."""
 REFUSALS = "log/refusals"
 ACCURACY = "log/accuracy"
 """Why the motion is held to less than its accuracy."""
 
 TAKEN_S = 0.05
-"""A stream that hasn't taken half a second of data in this time is behind: some viewer doesn't read."""
+"""Timeout of flushing half a second of data [s]; a stream that exceeds it is behind, because a viewer doesn't read."""
 
 ONE_AT_A_TIME = threading.Lock()
-"""For who makes recordings and who gives closed ones back: some of these functions wait for the library's own lock
-without letting other threads of Python run, which its holder may wait for (seen once, of two files that were recorded).
+"""Held while recordings are created or cleaned up. Some of these functions wait for the library's own lock without
+releasing Python's GIL, which the holder may wait for (a deadlock was seen once, with two recorded files).
 """
 
 LINE, BAND, CLEAR = 1.5, 7.0, 110
-"""Widths of plotted lines, and how opaque a whole is: a band, in which the line of a part shows that is equal to it."""
+"""Widths of plotted lines, and opacity of sums (style.WHOLES): a sum is a wide band, so that a part that is equal to it
+stays visible.
+"""
 
 INVISIBLE = 1e-9
-"""A scale that nobody sees; the viewer refuses 0, which has no inverse."""
+"""Scale of a hidden mesh; the viewer refuses 0, which has no inverse."""
 
 
 class Stream:
     """A Rerun recording: one run of the simulation, with simulated time from 0.
 
-    meshes: by part what it was sent, each once: viewers forget none. shown: by part the number of the mesh that is
-    seen, from 1; 0 for none. forgets: who takes it drops what is oldest, but never what holds at all times, so that
-    meshes are of a time and told again with all else that ``describe`` tells. styled: by entity what its look was sent
-    for. arranged: it was sent a layout. behind: what was sent hasn't been taken yet, so that nothing more should be;
-    missed: something was left out meanwhile.
+    meshes: hashes of the meshes sent, by part; each is sent once, since viewers keep them. shown: number of the visible
+    mesh by part, from 1; 0 for none. forgets: the receiver drops the oldest temporal data but no static data, so meshes
+    are logged as temporal and are sent again by ``describe``. styled: by entity, the key for which its style was sent.
+    arranged: a layout was sent. behind: data sent hasn't been taken yet, so no more should be sent; missed: data was
+    left out meanwhile.
     """
 
     def __init__(self, sink: Any, recording_id: str, name: str, application_id: str = APPLICATION_ID) -> None:
@@ -87,18 +89,18 @@ class Stream:
         rr.send_columns(entity, indexes=times, columns=columns, recording=self.recording)
 
     def log_static(self, entity: str, value: Any) -> None:
-        """Log a value that holds at all times. It arrives before what is sent after it: rr.log would put it aside
-        until a flush, and columns would overtake it.
+        """Log a static value. It keeps its order with later data, whereas rr.log would queue it until a flush, and
+        columns would overtake it.
         """
         self.log(entity, [], value)
 
     def log(self, entity: str, times: list[Any], value: Any) -> None:
-        """Log a value at one time, in time columns."""
+        """Log a value at one time, given as time columns."""
         batches = value.as_component_batches()
         self.send(entity, times, [batch.partition([len(batch.as_arrow_array())]) for batch in batches])
 
     def send_layout(self, layout: Any) -> None:
-        """Make a viewer open with this blueprint."""
+        """Send the blueprint with which a viewer opens."""
         self.arranged = True
         with ONE_AT_A_TIME:
             native = rerun_bindings.new_blueprint(
@@ -112,7 +114,9 @@ class Stream:
         stream.disconnect()
 
     def flush(self) -> None:
-        """Ask whether all has been taken: a server waits for its slowest viewer, as would what is sent then."""
+        """Flush, and note whether the stream is behind; a server waits for its slowest viewer, which would block later
+        data.
+        """
         try:
             self.recording.flush(timeout_sec=TAKEN_S)
             self.behind = False
@@ -120,8 +124,8 @@ class Stream:
             self.behind = True
 
     def leave(self) -> threading.Thread:
-        """Close on a thread of its own: the library waits without limit for a viewer that doesn't read, and at times
-        for a writer that has died.
+        """Close the recording on a thread, because the library waits without limit for a viewer that doesn't read, and
+        sometimes for a writer that has died.
         """
         leaving = threading.Thread(target=self.recording.disconnect, name="rerun leaving", daemon=True)
         leaving.start()
@@ -129,20 +133,20 @@ class Stream:
 
 
 def forget_closed_recordings() -> None:
-    """Give back threads and memory of recordings that are closed. Waits for all others to take what they were sent."""
+    """Free threads and memory of closed recordings. Waits until all other recordings are flushed."""
     users_own = rr.get_global_data_recording()
     try:
         with ONE_AT_A_TIME:
             rerun_bindings.flush_and_cleanup_orphaned_recordings()
     except RuntimeError:
-        # Some other recording of this process can't be flushed; another time.
+        # Another recording of this process can't be flushed; the next call tries again.
         pass
     if users_own is not None:
         rr.set_global_data_recording(users_own)
 
 
 def last_line(error: BaseException) -> str:
-    """What the library says last of an error."""
+    """The last line of an error of the library."""
     return (str(error).strip().splitlines() or [type(error).__name__])[-1]
 
 
@@ -158,15 +162,14 @@ def time_columns(times_ns: IntArray, walls_ns: IntArray) -> list[Any]:
 
 
 def scalar_columns(values: FloatArray) -> Any:
-    """Scalars of the rows of values (n, k)."""
+    """Columns of scalars from the rows of values (n, k)."""
     return rr.Scalars.columns(scalars=np.ascontiguousarray(values).ravel()).partition([values.shape[1]] * len(values))
 
 
 class RerunBackend(Backend):
-    """Draws on ``stream``, or, where that is None, nothing.
+    """Draws into ``stream``, or nothing while it is None.
 
-    plotted: the least and the largest value of each plot of the run, by name. on_sent() is called when the stream has
-    taken something.
+    plotted: smallest and largest value of each plot of the run, by name. on_sent() is called after each entity sent.
     """
 
     def __init__(self, on_sent: Callable[[], None] = lambda: None) -> None:
@@ -179,7 +182,7 @@ class RerunBackend(Backend):
         self.restart()
 
     def restart(self) -> None:
-        """Another run: nothing has been plotted, and paths begin anew."""
+        """Start another run, without plotted values and paths."""
         self.plotted: dict[str, tuple[float, float]] = {}
         self._begun = np.zeros(0, np.int64)
         self._path_ends: dict[str, Points] = {}
@@ -191,8 +194,8 @@ class RerunBackend(Backend):
             self._on_sent()
 
     def begin(self, times_ns: IntArray, walls_ns: IntArray | None = None) -> None:
-        """What follows is of these times (n,) [ns]; walls_ns (n,) [ns]: when they were by the wall's clock, None for
-        times of which that was said before.
+        """Set the times (n,) [ns] of the following calls; walls_ns (n,) [ns]: their wall times, None if an earlier call
+        had them.
         """
         if walls_ns is None:
             walls_ns = self._walls[np.minimum(np.searchsorted(self._known, times_ns), len(self._known) - 1)]
@@ -203,11 +206,11 @@ class RerunBackend(Backend):
         self._count = len(times_ns)
 
     def resize(self, size: float) -> None:
-        """Widths are in this length [m]; the stream is sent them as they come to the parts."""
+        """Set the unit of widths [m]; parts are styled with it when they are drawn next."""
         self._size = size
 
     def mesh(self, name: str, surface: DrawnMesh | None) -> None:
-        """Log a mesh once a run, and hide the one before from now on; ``place`` follows."""
+        """Log a mesh once per run, and hide the previous one from now on; ``place`` follows."""
         stream = self.stream
         if stream is None:
             return
@@ -249,17 +252,17 @@ class RerunBackend(Backend):
         number = 1 if self.stream is None else self.stream.shown.get(name, 1)
         self.send(_mesh_entity(name, number or 1), columns)
 
-    def _look(self, entity: str, known: float, look: Callable[[], Any]) -> None:
-        """Log how an entity looks, where the stream doesn't know that. known: a size, or how many columns it has."""
-        if self.stream is not None and self.stream.styled.get(entity) != known:
-            self.stream.styled[entity] = known
-            self.stream.log_static(entity, look())
+    def _set_style(self, entity: str, key: float, style_of: Callable[[], Any]) -> None:
+        """Log an entity's style unless it was sent for this key: a size, or the number of its columns."""
+        if self.stream is not None and self.stream.styled.get(entity) != key:
+            self.stream.styled[entity] = key
+            self.stream.log_static(entity, style_of())
 
     def _draw(self, name: str, archetype: Any, counts: IntArray, **values: Any) -> None:
-        """Log parts of a kind, and how they look."""
+        """Log a part and its style."""
         size = self._size if name.startswith(style.WORLD) else 1.0
         own = style.STYLES[name]
-        self._look(name, size, lambda: archetype.from_fields(colors=list(own.colours), radii=own.width * size))
+        self._set_style(name, size, lambda: archetype.from_fields(colors=list(own.colours), radii=own.width * size))
         self.send(name, archetype.columns(**values).partition(counts))
 
     def arrows(self, name: str, counts: IntArray, vectors: Points, origins: Points | None = None) -> None:
@@ -269,7 +272,7 @@ class RerunBackend(Backend):
     def lines(
         self, name: str, counts: IntArray, strips: Sequence[Points], colours: Sequence[Colour] | None = None
     ) -> None:
-        """Log line strips; made by the library itself, a strip costs .1 ms."""
+        """Log line strips, as Arrow arrays, since the library takes 0.1 ms to convert a strip."""
         points = np.concatenate([np.zeros((0, 3)), *strips]).astype(np.float32)
         ends = np.cumsum([0, *map(len, strips)], dtype=np.int32)
         kind = rr.components.LineStrip3DBatch([]).as_arrow_array().type
@@ -277,7 +280,7 @@ class RerunBackend(Backend):
         self._draw(name, rr.LineStrips3D, counts, strips=pa.ListArray.from_arrays(ends, rows, kind), colors=colours)
 
     def points(self, name: str, counts: IntArray, positions: Points) -> None:
-        """Log points; of a trail the straight way from each to the next one."""
+        """Log points; of a trail, the line segments between successive points."""
         if name in (style.TRAIL, style.COM_TRAIL):
             before = self._path_ends.get(name, positions[0])
             self._path_ends[name] = positions[-1].copy()
@@ -286,11 +289,11 @@ class RerunBackend(Backend):
             self._draw(name, rr.Points3D, counts, positions=positions)
 
     def labels(self, name: str, counts: IntArray, positions: Points, texts: Sequence[str]) -> None:
-        """Log labels as points of no size, below the part; those of loads change, others are logged once."""
+        """Log labels as points without size, below the part; texts of loads change, others are logged once."""
         entity, changes = f"{name}/label", name.startswith(style.LOADS)
         if len(texts):
             colours, known = list(style.STYLES[name].colours), None if changes else list(texts[: counts.max()])
-            self._look(
+            self._set_style(
                 entity,
                 0.0,
                 lambda: rr.Points3D.from_fields(colors=colours, radii=0.0, labels=known, show_labels=True),
@@ -299,27 +302,27 @@ class RerunBackend(Backend):
         self.send(entity, rr.Points3D.columns(positions=positions, labels=labels).partition(counts))
 
     def scalars(self, name: str, values: FloatArray) -> None:
-        """Log plotted values, and keep their range."""
+        """Log plotted values and update their range."""
         finite = values[np.isfinite(values)]
         if finite.size:
             low, high = self.plotted.get(name, (np.inf, -np.inf))
             self.plotted[name] = (min(low, float(finite.min())), max(high, float(finite.max())))
         series = style.SERIES[name][: values.shape[1]]
-        # Bands first: what comes later is drawn on them.
+        # Bands first, because later series are drawn on top.
         order = sorted(range(len(series)), key=lambda k: series[k][0] not in style.WHOLES)
         names, colours = zip(*(series[k] for k in order), strict=True)
         widths = [BAND if name in style.WHOLES else LINE for name in names]
         colours = [(*c, CLEAR if n in style.WHOLES else 255) for n, c in zip(names, colours, strict=True)]
-        self._look(name, len(names), lambda: rr.SeriesLines(names=names, colors=colours, widths=widths))
+        self._set_style(name, len(names), lambda: rr.SeriesLines(names=names, colors=colours, widths=widths))
         self.send(name, scalar_columns(values[:, order]))
 
 
 def _content(surface: DrawnMesh) -> bytes:
-    """Equal for equal meshes."""
+    """Hash of a mesh."""
     parts = (np.ascontiguousarray(part).tobytes() for part in (surface.vertices, surface.triangles))
     return hashlib.sha256(b"".join(parts)).digest()
 
 
 def _mesh_entity(name: str, number: int) -> str:
-    """Where the run's mesh of a part with this number, from 1, is logged: a static mesh can't be replaced."""
+    """Entity of a part's mesh with this number, from 1; each has its own, since a static mesh can't be replaced."""
     return name if number == 1 else f"{name}_{number}"

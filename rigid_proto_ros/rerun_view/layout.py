@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How a viewer arranges a flight when it opens: the body, its commands, and the plots that tell most of it."""
+"""The initial layout of a viewer: the body, its commands, and the most informative plots of the flight."""
 
 from __future__ import annotations
 
@@ -21,33 +21,35 @@ TRAIL_SECONDS = 3.0
 HERPOLHODE_SECONDS = 20.0
 
 PLOTTED_SECONDS = 20.0
-"""[simulated s] Of the plots of a flight that goes on; those of a recording that has ended show all of it."""
+"""[simulated s] Time span of the plots of a running flight; plots of a finished one show all of it."""
 
 LEGEND_ROOM = 0.45
-"""Width left free for the legend at the right end of a plot, in widths of the curves; the longest takes
-.42 of a small plot.
+"""Free width for the legend at the right end of a plot, relative to the curves' width; the longest legend takes 0.42 of
+a small plot.
 """
 
 LEAST_SPANS = {style.ANGULAR_MOMENTUM_ANGLE: 1.0, style.GHOST_ANGLE: 1.0}
-"""[°] That the axis of an angle spans at least: rounding doesn't fill the plot."""
+"""[°] Smallest span of an angle's axis, so that rounding errors don't fill the plot."""
 
 NARROWEST = 0.05
-"""Of the largest value: an axis isn't narrower, so that rounding isn't blown up to fill the plot."""
+"""Smallest span of an axis relative to its largest value, so that rounding errors don't fill the plot."""
 
 NUMBERED_TICKS_MAX = 5.0
-"""Rerun numbers ticks at one power of ten, the least of which no more than these fit on the axis of a small plot."""
+"""Largest number of numbered ticks on the axis of a small plot; Rerun numbers the ticks of one power of ten."""
 
 ROOM = 0.08
-"""Of what is plotted, at both ends of an axis: no curve lies on the frame, and no number on the time axis."""
+"""Margin at both ends of an axis, relative to its span, so that no curve lies on the frame and no number on the time
+axis.
+"""
 
 FLOOR_CELLS, FLOOR_BELOW = 5, 1.0
-"""Of the floor: squares from its middle to its edge, and how far below the body it is, in the reach of the flight."""
+"""Squares of the floor from its middle to its edge, and its distance below the body in units of the flight's reach."""
 
 FAR_SECONDS = 3600.0
-"""[simulated s] Of the path of a COM that falls: all of it."""
+"""[simulated s] Length of the trail of a falling COM: in practice all of it."""
 
 PATH_SIZES = 4.5
-"""How much farther off the camera stands where the path is what matters."""
+"""Factor of the camera's distance for a falling body, whose path is of interest."""
 
 TITLES = {
     style.ENERGY: f"{style.ENERGY_TITLE} [{style.ENERGY_UNIT}]",
@@ -61,14 +63,16 @@ TITLES = {
 }
 
 HIDDEN = (style.BOUNDING_BOX, style.INERTIA_BOX, style.INERTIA_ELLIPSOID, style.PRINCIPAL_AXES)
-"""Parts of the body that are shown at a click in the viewer's list; of one without a mesh its box is seen at once."""
+"""Parts of the body that are hidden until they are switched on in the viewer's list; a body without a mesh shows its
+box.
+"""
 
 
 @dataclass(frozen=True)
-class Subject:
-    """What a flight is about, so what is shown of it. reach [m]: how far about the COM it is to be seen. ghost:
-    another body beside it. falls: under gravity, on no string. tied: to one. dropped_term: its motion lacks ω × Iω.
-    mesh: it has one.
+class FlightTraits:
+    """Properties of a flight that determine the layout. reach [m]: radius about the COM to be visible. mesh: it has a
+    mesh. ghost: it has a ghost. falls: under gravity without a string. tied: to a string. dropped_term: the motion
+    lacks ω × Iω.
     """
 
     reach: float = 1.0
@@ -80,9 +84,9 @@ class Subject:
 
     @property
     def plots(self) -> list[str]:
-        """What tells most of a flight of its kind."""
+        """The most informative plots of such a flight."""
         if self.ghost:
-            # How far the two have come apart matters more than the energy, which both keep.
+            # The angle between the two matters more than the energy, which both conserve.
             return [style.GHOST_ANGLE, style.ANGULAR_VELOCITY_PRINCIPAL, style.ANGULAR_MOMENTUM]
         if self.dropped_term:
             return [style.ANGULAR_MOMENTUM_ANGLE, style.ANGULAR_MOMENTUM, style.ENERGY]
@@ -94,9 +98,9 @@ class Subject:
 
 
 @dataclass(frozen=True)
-class Finished:
-    """A run that is complete: duration_s [simulated], the least and the largest value of each plot that has any, by
-    name, and whether any command was logged.
+class RunSummary:
+    """A complete run. duration_s: simulated time; plotted: smallest and largest value of each plot with values, by
+    name; commanded: whether any command was logged.
     """
 
     duration_s: float
@@ -104,8 +108,8 @@ class Finished:
     commanded: bool
 
 
-def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
-    """The views of a running or a finished simulation, without those that have nothing to show."""
+def blueprint(traits: FlightTraits, finished: RunSummary | None = None) -> Any:
+    """The views of a running or finished simulation, without empty ones."""
     below = []
     if finished is None or finished.commanded:
         commands = rrb.TextLogView(
@@ -118,18 +122,18 @@ def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
         if finished is None or style.COMMANDED in finished.plotted:
             below.append(_plot(style.COMMANDED, finished))
     row_shares = [4, 1]
-    if subject.ghost or not (subject.dropped_term or subject.tied or subject.falls):
-        # It turns freely. Beside the commands there is more room than above the plots.
+    if traits.ghost or not (traits.dropped_term or traits.tied or traits.falls):
+        # Free rotation: Poinsot's construction, beside the commands, where there is more room than above the plots.
         # Six commands, as `make run` has, are seen without scrolling in a window of 1600 x 900.
         listed = [rrb.Vertical(*below, row_shares=[3, 2][: len(below)])] if below else []
         below = [_poinsot_view(), *listed]
         row_shares = [3, 2]
-    flight = _body_view(subject)
+    flight = _body_view(traits)
     if below:
         flight = rrb.Vertical(flight, rrb.Horizontal(*below), row_shares=row_shares)
-    plots = [_plot(name, finished) for name in subject.plots if finished is None or name in finished.plotted]
+    plots = [_plot(name, finished) for name in traits.plots if finished is None or name in finished.plotted]
     return rrb.Blueprint(
-        # Three plots have room for the four lines of a legend in a window of 1200 x 675.
+        # In a window of 1200 x 675, a legend of four lines fits into each of three plots.
         rrb.Horizontal(flight, rrb.Vertical(*plots), column_shares=[3, 2]),
         rrb.TimePanel(state="collapsed", timeline=e.SIM_TIME),
         rrb.BlueprintPanel(state="collapsed"),
@@ -138,10 +142,10 @@ def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
     )
 
 
-def floor(subject: Subject, start: Vector3) -> tuple[Any, Any]:
-    """A square of lines below where the body starts (3,) [m], and the label that says how far apart they are."""
-    apart = _round_below(0.5 * subject.reach)
-    half, z = FLOOR_CELLS * apart, float(start[2]) - FLOOR_BELOW * subject.reach
+def floor(traits: FlightTraits, start: Vector3) -> tuple[Any, Any]:
+    """A grid of lines below the body's start (3,) [m], and a label with their spacing."""
+    apart = _round_below(0.5 * traits.reach)
+    half, z = FLOOR_CELLS * apart, float(start[2]) - FLOOR_BELOW * traits.reach
     ends = [(apart * k, sign * half) for k in range(-FLOOR_CELLS, FLOOR_CELLS + 1) for sign in (-1.0, 1.0)]
     across = [[start[0] + u, start[1] + v, z] for u, v in ends]
     along = [[start[0] + v, start[1] + u, z] for u, v in ends]
@@ -153,31 +157,31 @@ def floor(subject: Subject, start: Vector3) -> tuple[Any, Any]:
 
 
 def _round_below(length: float) -> float:
-    """The largest of 1, 2 and 5 times a power of ten that isn't longer."""
+    """The largest of 1, 2 and 5 times a power of ten that isn't larger than ``length``."""
     power = 10.0 ** math.floor(math.log10(length))
     return next(n * power for n in (5.0, 2.0, 1.0) if n * power <= length or n == 1.0)
 
 
 def value_axis(low: float, high: float, least: float = 0.0) -> tuple[float, float]:
-    """The ends of an axis for values from ``low`` to ``high``, on which two ticks have numbers. ``least``: it spans no
-    less.
+    """The ends of an axis for values from ``low`` to ``high``, with at least two numbered ticks. least:
+    smallest span.
     """
     span = max(high - low, NARROWEST * max(abs(low), abs(high)), least) or 2.0
     middle = 0.5 * (low + high)
     low, high = min(low, middle - 0.5 * span), max(high, middle + 0.5 * span)
-    # The ends are numbered ticks, and no curve lies on the frame.
+    # The ends are numbered ticks plus a margin.
     step = 10.0 ** math.ceil(math.log10((1.0 + 2.0 * ROOM) * (high - low) / NUMBERED_TICKS_MAX))
     low, high = step * math.floor(low / step), step * math.ceil(high / step)
     room = ROOM * (high - low)
     return low - room, high + room
 
 
-def _plot(name: str, finished: Finished | None) -> Any:
-    """Scalars of one entity over time. Curves end at the cursor, and room for the legend follows: all plots show the
-    same time, without being linked, as linked ones know no room.
+def _plot(name: str, finished: RunSummary | None) -> Any:
+    """Scalars of one entity over time. Curves end at the cursor, followed by free width for the legend. All plots show
+    the same time span; they aren't linked, because linked plots have no free width.
     """
     boundary = rrb.TimeRangeBoundary
-    # Ends relative to the cursor hold on both timelines, absolute ones on one alone.
+    # Ends relative to the cursor work on both timelines, absolute ones only on one.
     start = boundary.cursor_relative(seconds=-PLOTTED_SECONDS) if finished is None else boundary.infinite()
     room_s = LEGEND_ROOM * (PLOTTED_SECONDS if finished is None else finished.duration_s)
     ends = None if finished is None else value_axis(*finished.plotted[name], LEAST_SPANS.get(name, 0.0))
@@ -191,26 +195,26 @@ def _plot(name: str, finished: Finished | None) -> Any:
     )
 
 
-def _body_view(subject: Subject) -> Any:
+def _body_view(traits: FlightTraits) -> Any:
     """The body in the world, followed by the camera, with its trail."""
-    if subject.falls:
-        # Beside the plane of a throw along x, and above the body, where it has come from.
+    if traits.falls:
+        # Beside the plane of a throw along x, looking at a point above the body, towards its path.
         target = PATH_SIZES * np.array([-0.1, 0.0, 0.2])
         eye = target + PATH_SIZES * np.array([0.3, -1.2, 0.2])
     else:
-        # So far off that the arrow of a force at the body's end is seen whole, with its label.
+        # Far enough to show the whole arrow of a force at the body's end, with its label.
         eye, target = np.array([1.65, -1.3, 0.85]), np.zeros(3)
-    shown = {style.BOUNDING_BOX} if subject.ghost else set()
-    shown |= set() if subject.mesh else {style.INERTIA_BOX}
+    shown = {style.BOUNDING_BOX} if traits.ghost else set()
+    shown |= set() if traits.mesh else {style.INERTIA_BOX}
     hidden = [name for name in HIDDEN if name not in shown]
     overrides: dict[Any, Any] = {"/" + name: rrb.EntityBehavior(visible=False) for name in hidden}
     overrides["/" + style.TRAIL] = _last_seconds(TRAIL_SECONDS)
-    overrides["/" + style.COM_TRAIL] = _last_seconds(FAR_SECONDS if subject.falls else TRAIL_SECONDS)
-    return _view(style.CENTRE, f"/{style.WORLD}/**", "Motion", subject.reach * eye, subject.reach * target, overrides)
+    overrides["/" + style.COM_TRAIL] = _last_seconds(FAR_SECONDS if traits.falls else TRAIL_SECONDS)
+    return _view(style.CENTRE, f"/{style.WORLD}/**", "Motion", traits.reach * eye, traits.reach * target, overrides)
 
 
 def _poinsot_view() -> Any:
-    """The ellipsoid of inertia rolling on the invariable plane."""
+    """The inertia ellipsoid rolling on the invariable plane."""
     name = "Poinsot: the ellipsoid of inertia rolls"
     overrides = {"/" + style.POINSOT_HERPOLHODE: _last_seconds(HERPOLHODE_SECONDS)}
     eye, target = np.array([2.1, -1.65, 0.75]), np.array([0.0, 0.0, -0.35])
@@ -231,7 +235,7 @@ def _view(origin: str, contents: str, name: str, eye: Vector3, target: Vector3, 
 
 
 def _last_seconds(seconds: float | None = None) -> Any:
-    """Shows what was logged in the last seconds before the cursor, or all before it, on either timeline."""
+    """The time range of the last ``seconds`` before the cursor, or of all time before it, on both timelines."""
     boundary = rrb.TimeRangeBoundary
     start = boundary.infinite() if seconds is None else boundary.cursor_relative(seconds=-seconds)
     end = boundary.cursor_relative()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A flight as viewers on this machine show it while it goes on."""
+"""The live view of a running flight, for viewers on this machine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import rerun as rr
 
 from ..base.errors import InputError
 from ..base.ports import LOOPBACK
-from ..session.mailbox import Noted
+from ..session.mailbox import TimedEvent
 from . import viewers
 from .backend import Stream, last_line
 from .observer import RerunObserver
@@ -23,23 +23,23 @@ DEFAULT_RERUN_PORT = 9876
 DEFAULT_WEB_PORT = 9090
 
 LIVE_MEMORY_LIMIT = "32MiB"
-"""What the server keeps for viewers that come late, a minute at 1 kHz; the oldest is dropped first. It takes about
-twice that of this process's memory.
+"""Memory limit of the server's buffer for viewers that connect late, a minute at 1 kHz; the oldest data is dropped
+first. The process uses about twice as much.
 """
 
 REPEATED_ROWS = 16384
-"""After as many states viewers are told again what holds since long: a fourth of what the live server keeps."""
+"""Number of states after which long-lived data is sent again, a fourth of the server's buffer."""
 
 START_TIMEOUT_S = 5.0
 
 LEAVE_S = 2.0
-"""How long the end of a run waits for live streams; a viewer that doesn't read holds nobody up."""
+"""How long the end of a run waits for live streams [s], so that a viewer that doesn't read can't block it."""
 
 
 class LiveView(RerunObserver):
-    """viewer: ``web`` serves the web viewer, ``native`` opens the viewer's window. rerun_port and web_port: None takes
-    the first free port from the default on; a number is used or refused. ``report`` gets one line for every address
-    and every warning.
+    """Shows a running flight. viewer: ``web`` serves the web viewer, ``native`` opens the viewer's window. rerun_port
+    and web_port: None for the first free port from the default on; a number is used or refused. report(line) is called
+    for every address and warning.
 
     Raises InputError for a port that is taken.
     """
@@ -75,8 +75,8 @@ class LiveView(RerunObserver):
             elif viewers.has_display():
                 self._process = viewers.open_native(self.live_address)
             else:
-                # Without --connect the program takes the server at its usual port for a viewer, and feeds the stream
-                # back into itself.
+                # Without --connect, rerun would treat the server at its usual port as a viewer and send the stream back
+                # to it.
                 self._report(
                     f"no display for the viewer; elsewhere on this machine: rerun --connect {self.live_address}"
                 )
@@ -91,23 +91,25 @@ class LiveView(RerunObserver):
         stream = Stream(rr.GrpcSink(self.live_address), run_id, name)
         stream.forgets = True
         stream.arranged = before.arranged  # viewers keep their layout
-        if before is not self._host:  # whose server stays
+        if before is not self._host:  # the host's server must persist
             before.leave()
         return stream
 
     def _end(self, stream: Stream) -> None:
-        # Also of runs before.
+        # Includes the streams of earlier runs.
         leaving = [thread for thread in threading.enumerate() if thread.name == "rerun leaving"]
         leaving += [each.leave() for each in {stream, self._host}]
         deadline = time.monotonic() + LEAVE_S
         for thread in leaving:
             thread.join(max(0.0, deadline - time.monotonic()))
         if any(thread.is_alive() for thread in leaving):
-            # At the end of the process the library would wait, without limit, for every recording to be taken.
+            # Otherwise the library waits at the end of the process, without limit, until every recording is taken.
             rr.unregister_shutdown()
 
-    def _write(self, events: list[Noted]) -> None:
-        """Now and then what was said long ago again: the server drops the oldest, so viewers that come late lack it."""
+    def _write(self, events: list[TimedEvent]) -> None:
+        """Write events, and from time to time send long-lived data again, since the server drops the oldest data, which
+        viewers that connect late would lack.
+        """
         super()._write(events)
         self._rows_since_repeat += len(events)
         if self._rows_since_repeat >= REPEATED_ROWS and self._stream is not None:
@@ -116,21 +118,21 @@ class LiveView(RerunObserver):
                 self._describe(self._stream)
 
     def close(self) -> None:
-        """With the viewer that was started here."""
+        """Close the stream, and stop the viewer if it was started here."""
         super().close()
         if self._process is not None:
             self._process.stop()
 
 
 def host(port: int, recording_id: str, name: str) -> tuple[Stream, str]:
-    """A stream with a gRPC server on loopback, which lives as long as it does, and the address to which other streams
-    send and viewers come. Raises PortTakenError where another process listens on the port.
+    """A stream with a gRPC server on loopback, which ends with the stream, and its address for other streams and
+    viewers. Raises PortTakenError if another process listens on the port.
     """
     stream = Stream(rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=LIVE_MEMORY_LIMIT), recording_id, name)
     stream.forgets = True
     deadline = time.monotonic() + START_TIMEOUT_S
     try:
-        # A server that can't listen says so to nobody but who waits for what was sent, and not at once.
+        # The library reports a server that can't listen only as a failed flush, and with delay.
         while time.monotonic() < deadline:
             stream.recording.flush(timeout_sec=START_TIMEOUT_S)
             if listens(os.getpid(), port):

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""The observers that show and record a flight with Rerun: the picture, the plots, and what happened as text.
+"""The observers that show and record a flight with Rerun: the picture, the plots, and events as text.
 
-The stepping thread only copies a row into a mailbox. One thread of our own empties it and sends columns to one stream,
-which is a file's or the viewers' (live_view.py): replacing a stream's sinks shuts its server down, so no file could be
-begun anew at a reset while somebody watches.
+The stepping thread only queues events. A writing thread sends columns to one stream, of a file or of viewers
+(live_view.py). One stream can't serve both: replacing a stream's sinks shuts its server down, so a reset couldn't start
+another file while a viewer is connected.
 
-Runs. A reset starts simulated time again at 0, and rows of two runs on one timeline could not be told apart, so every
-run is a recording of its own. Viewers show them side by side. In files, FILE.rrd always holds the newest run; at a
-reset the one before is kept beside it as FILE.run1.rrd, FILE.run2.rrd and so on, unless its time never left 0.
+A reset starts simulated time again at 0, and rows of two runs on one timeline can't be distinguished, so every run is a
+recording of its own. Viewers show them side by side. FILE.rrd always holds the newest run; at a reset the previous run
+is kept as FILE.run1.rrd, FILE.run2.rrd and so on, unless its time never left 0.
 
-An .rrd is for people's eyes and is never read back: the .mcap of the same flight is its recording.
+An .rrd file is only a view and is never read back: the .mcap of the same flight is the recording.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ..base.rotation import matrix_from_quaternion
 from ..base.vectors import StateRow
 from ..picture import style
 from ..picture.picture import Picture
-from ..session.mailbox import BATCH, Noted, WritingObserver
+from ..session.mailbox import BATCH, TimedEvent, WritingObserver
 from ..simulation.observer import (
     AccuracyFloor,
     Applied,
@@ -50,28 +50,30 @@ from ..simulation.observer import (
 from ..simulation.setup import Setup
 from . import backend as e
 from .backend import RerunBackend, Stream, forget_closed_recordings, last_line
-from .layout import Finished, Subject, blueprint, floor
+from .layout import FlightTraits, RunSummary, blueprint, floor
 from .words import words_of
 
 FLUSH_TIMEOUT_S = 5.0
-"""A disk that takes longer than this to take half a second of data counts as lost."""
+"""Timeout of flushing half a second of data to a disk [s], after which the disk is considered lost."""
 
 FULL_BYTES = 1_000_000
-"""A disk with less than this free counts as full."""
+"""A disk with less free space [bytes] than this is considered full."""
 
 REACH_PER_TIP = 1.7
-"""A body that turns about an end needs more room than one that turns about its middle, where this would be 2."""
+"""Smallest reach per distance from the COM to the farthest vertex: a body that turns about an end needs more room than
+one that turns about its middle, for which the factor would be 2.
+"""
 
 WRITE_S = 5.0
-"""Between two writes to a file [s]. Each makes about 23 pieces, of each of which the library keeps 1.8 kB in memory for
-the file's index: 30 MB an hour, where half a second would take 300.
+"""Period of writing to a file [s]. Each write makes about 23 chunks, and the library keeps 1.8 kB of index in memory
+for each: 30 MB an hour, whereas a period of half a second would take 300.
 """
 
 
 class RerunObserver(WritingObserver):
-    """Sends what it is told to a stream, which FileRecorder and LiveView open."""
+    """Draws events into a stream, which FileRecorder and LiveView open."""
 
-    # How far viewers lag; every flush costs about 5 ms and 20 kB of overhead.
+    # The delay of viewers; every flush costs about 5 ms and 20 kB of overhead.
     period_s = 0.5
     takes = frozenset(get_args(Event)) - {Applied}
 
@@ -81,7 +83,7 @@ class RerunObserver(WritingObserver):
         self._run, self._last_time_ns = 1, 0
         self._begin_ns: int | None = None
         self._stream: Stream | None = self._open(uuid.uuid4().hex, name)
-        # A machine that is busy may take seconds for all that a bundle of states has to be drawn.
+        # Progress is reported per entity, because a busy machine may take seconds to draw a batch of states.
         self._backend = RerunBackend(on_sent=lambda: self._mailbox.moved())
         self._picture = Picture(self._backend)
         self._scene = ""
@@ -103,7 +105,7 @@ class RerunObserver(WritingObserver):
         raise NotImplementedError
 
     def _open_next(self, before: Stream, run_id: str, name: str) -> Stream:
-        """End a run's stream, and open that of the next one; raises OSError and InputError."""
+        """End the stream of a run and open that of the next run; raises OSError and InputError."""
         raise NotImplementedError
 
     def _end(self, stream: Stream) -> None:
@@ -112,7 +114,7 @@ class RerunObserver(WritingObserver):
 
     # The thread
 
-    def _write_what_waits(self) -> None:
+    def _write_waiting(self) -> None:
         for events in self._mailbox.take():
             if self._stream is not None:
                 self._write(events)
@@ -129,8 +131,8 @@ class RerunObserver(WritingObserver):
     def _give_up(self, error: Exception) -> None:
         stream, self._stream = self._stream, None
         refused = isinstance(error, OSError)
-        # Told first: what the library does with a file that it can't write may take for ever.
-        self._tell_end(str(error) if refused else f"{type(error).__name__}: {error}")
+        # Reported first, because closing a file that can't be written may block forever.
+        self._report_failure(str(error) if refused else f"{type(error).__name__}: {error}")
         if refused:
             rr.unregister_shutdown()
         if stream is None:
@@ -139,14 +141,14 @@ class RerunObserver(WritingObserver):
             if not refused:
                 self._end(stream)
                 return
-        except Exception:  # as where the disk is full
+        except Exception:  # such as a full disk
             pass
         stream.leave()
 
-    # What holds for a run
+    # Runs
 
     def _next_run(self, stream: Stream) -> None:
-        """Start a new run after a reset, in a new recording; the parameters in force, mesh and body are kept."""
+        """Start a new run after a reset, in a new recording; parameters, mesh and body are kept."""
         self._run += self._last_time_ns > 0
         name = self._name if self._run == 1 else f"{self._name}, run {self._run}"
         self._stream = self._backend.stream = self._open_next(stream, uuid.uuid4().hex, name)
@@ -160,27 +162,27 @@ class RerunObserver(WritingObserver):
             forget_closed_recordings()
 
     def _send_scene(self) -> None:
-        """The parameters in force as text, at the time of the backend's ``begin``."""
+        """Send the present parameters as text, at the time of the backend's ``begin``."""
         self._backend.send(e.SCENE, rr.TextDocument.columns(text=[self._scene], media_type=["text/plain"]))
 
     def _describe(self, stream: Stream) -> None:
-        """Tell a stream that knows nothing yet, or that has missed something, how things are now."""
+        """Send the present mesh, body and ghost to a stream that is new or has missed data."""
         stream.missed = False
         self._backend.stream = stream
         self._backend.begin(np.array([self._last_time_ns]), np.array([time.time_ns()]))
         self._picture.describe(self._backend)
         self._arrange(stream)
 
-    def _arrange(self, stream: Stream, finished: Finished | None = None) -> None:
-        """Send the layout for what the flight is about: once, and again when it is finished; nothing that somebody has
-        arranged is undone in between.
+    def _arrange(self, stream: Stream, finished: RunSummary | None = None) -> None:
+        """Send the layout for this flight once, and again when it is finished, so that a user's own arrangement isn't
+        reset in between.
         """
         picture, tied = self._picture, self._picture.string.was_tied
         setup, shape = picture.setup, picture.shape
         if setup is None or shape is None or (stream.arranged and finished is None):
             return
         tip = 0.0 if shape.tip is None else float(np.linalg.norm(shape.tip))
-        subject = Subject(
+        traits = FlightTraits(
             reach=max(shape.size, REACH_PER_TIP * tip),
             mesh=shape.tip is not None,
             ghost=picture.ghost is not None,
@@ -188,24 +190,24 @@ class RerunObserver(WritingObserver):
             tied=tied,
             dropped_term=not setup.scene.gyroscopic,
         )
-        if not subject.falls:
-            # Below a body that falls it would look like ground.
-            lines, label = floor(subject, setup.initial[0:3])
+        if not traits.falls:
+            # Below a falling body it would look like the ground.
+            lines, label = floor(traits, setup.initial[0:3])
             stream.log_static(style.FLOOR, lines)
             stream.log_static(f"{style.FLOOR}/scale", label)
-        stream.send_layout(blueprint(subject, finished))
+        stream.send_layout(blueprint(traits, finished))
 
-    # What happens in it
+    # Events
 
-    def _write(self, events: list[Noted]) -> None:
-        """Send what happened; nothing to a stream that is behind, which must be told later how things are then."""
-        states: list[Noted] = []
+    def _write(self, events: list[TimedEvent]) -> None:
+        """Send events; nothing to a stream that is behind, which gets the state of things later by ``_describe``."""
+        states: list[TimedEvent] = []
         stream = self._stream
         if stream is not None and events:
             stream.missed |= stream.behind
             self._backend.stream = None if stream.behind else stream
         for wall_ns, event in events:
-            self._mailbox.moved()  # there may be thousands
+            self._mailbox.moved()  # a batch may have thousands of events
             time_ns = event.time_ns
             self._last_time_ns = max(self._last_time_ns, time_ns)
             match event:
@@ -224,7 +226,7 @@ class RerunObserver(WritingObserver):
                 case AccuracyFloor(_, floor):
                     self._lines.setdefault(e.ACCURACY, []).append((time_ns, wall_ns, floor))
                 case _:
-                    # What changes the meaning of the states that follow.
+                    # Events that change how the following states are drawn.
                     self._write_states(states)
                     states = []
                     self._change(event, wall_ns)
@@ -245,8 +247,8 @@ class RerunObserver(WritingObserver):
             self._send_scene()
 
     def _stay_in_place(self, kind: type, frames: tuple[str, ...], before: Setup | None, after: Setup | None) -> None:
-        """Move the frames of a body whose COM moves within its mesh: the mesh stays where it is, as it does in flight,
-        also until the next state.
+        """After a change of the COM within the mesh, move the body's frames so that the mesh stays in place until the
+        next state.
         """
         if kind not in self._rows or before is None or after is None or not after.stays_in_place_of(before):
             return
@@ -257,8 +259,8 @@ class RerunObserver(WritingObserver):
                 attitudes = None if frame == style.CENTRE else row[np.newaxis, 3:7]
                 self._backend.place(frame, row[np.newaxis, 0:3], attitudes)
 
-    def _write_states(self, states: list[Noted]) -> None:
-        """The picture of states, which all belong to the present body, and what happened."""
+    def _write_states(self, states: list[TimedEvent]) -> None:
+        """Draw states, which all belong to the present body, and write the lines of events."""
         self._commanded |= bool(self._lines)
         for entity, lines in self._lines.items():
             times_ns, walls_ns, texts = zip(*lines, strict=True)
@@ -303,20 +305,22 @@ class FileRecorder(RerunObserver):
         return FileStream(self.path, run_id, name)
 
     def _end(self, stream: Stream) -> None:
-        """Finish the file, with the layout for what it holds."""
+        """Finish the file, with the layout for its content."""
         assert isinstance(stream, FileStream)
         duration_s = 1e-9 * (self._last_time_ns - (self._begin_ns or 0))
-        self._arrange(stream, Finished(duration_s, self._backend.plotted, self._commanded))
+        self._arrange(stream, RunSummary(duration_s, self._backend.plotted, self._commanded))
         stream.close()
         self._mailbox.moved()
         self._stream = None
 
-    def _write_what_waits(self) -> None:
-        """Every WRITE_S, when much waits, and at the end; in between only look whether the file can be written."""
+    def _write_waiting(self) -> None:
+        """Write every WRITE_S, when a batch is queued, and at the end; in between only check that the file
+        is writable.
+        """
         now_s, mailbox = time.monotonic(), self._mailbox
         if now_s >= self._write_at_s or mailbox.closed or mailbox.waiting >= BATCH:
             self._write_at_s = now_s + WRITE_S
-            super()._write_what_waits()
+            super()._write_waiting()
         elif isinstance(self._stream, FileStream):
             self._stream.check()
 
@@ -332,7 +336,7 @@ class FileStream(Stream):
             raise InputError("record", str(path), "a path that ends in .rrd or .mcap")
         try:
             self._held = file_for_one_writer("record", path)
-            # An application of its own: in a viewer that shows another recording, too, it has its own layout.
+            # A separate application ID, so that the file has its own layout in a viewer that shows other recordings.
             application_id = f"{e.APPLICATION_ID}_{recording_id[:8]}"
             super().__init__(rr.FileSink(path), recording_id, name, application_id)
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
@@ -341,7 +345,7 @@ class FileStream(Stream):
             raise InputError("record", str(path), f"a file that can be written ({last_line(error)})") from error
 
     def flush(self) -> None:
-        """Write out; raises OSError where the data would not arrive in the file of this name."""
+        """Write buffered data; raises OSError if it would not arrive in the file of this name."""
         try:
             self.recording.flush(timeout_sec=FLUSH_TIMEOUT_S)
         except RuntimeError as error:
@@ -350,7 +354,7 @@ class FileStream(Stream):
         self.check()
 
     def check(self) -> None:
-        """Raise OSError where what is written next would not arrive in the file of this name."""
+        """Raise OSError if further data would not arrive in the file of this name."""
         if self._path.stat().st_ino != self._inode:
             raise OSError("another file took its place")
         if shutil.disk_usage(self._path.parent).free < FULL_BYTES:
@@ -363,6 +367,6 @@ class FileStream(Stream):
         self._held.close()
 
     def leave(self) -> Thread:
-        """Close it as it is."""
+        """Close the file without its index."""
         self._held.close()
         return super().leave()

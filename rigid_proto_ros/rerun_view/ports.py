@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""TCP ports on the loopback interface: nothing here listens beyond this machine."""
+"""TCP ports on the loopback interface."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _Served = TypeVar("_Served")
 def is_free(port: int) -> bool:
     """Whether a server could listen on this loopback port now."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        # As servers set it: a port whose last connection is still in TIME_WAIT counts as free.
+        # As servers do, so that a port whose last connection is in TIME_WAIT counts as free.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((LOOPBACK, port))
@@ -27,14 +27,14 @@ def is_free(port: int) -> bool:
 
 
 class PortTakenError(OSError):
-    """Another process took the port between the look at it and the server's own attempt."""
+    """Another process took the port between the check and the server's own attempt."""
 
 
 def serve_on_port(field: str, asked: int | None, default: int, serve: Callable[[int], _Served]) -> _Served:
-    """What ``serve(port)`` returns for ``asked``, or for the first port from ``default`` on where it can serve.
+    """The result of serve(port) for the port ``asked``, or for the first free port from ``default`` on.
 
-    ``serve`` raises PortTakenError where another process was faster. Raises InputError where ``asked`` is given and
-    taken, or no port near the default is free.
+    serve(port) raises PortTakenError if another process was faster. Raises InputError if ``asked`` is taken, or if no
+    port near the default is free.
     """
     for port in ports_to_try(field, asked, default):
         if is_free(port):
@@ -48,7 +48,7 @@ def serve_on_port(field: str, asked: int | None, default: int, serve: Callable[[
 
 
 def listens(process_id: int, port: int) -> bool:
-    """Whether this process listens on an IPv4 port; where there is no /proc, whether any does."""
+    """Whether the process listens on an IPv4 port; without /proc, whether any process does."""
     if not os.path.isfile("/proc/net/tcp"):
         return not is_free(port)
     with open("/proc/net/tcp", encoding="ascii") as table:
@@ -59,4 +59,4 @@ def listens(process_id: int, port: int) -> bool:
     try:
         return any(os.readlink(f"{folder}/{name}") in sockets for name in os.listdir(folder))
     except OSError:
-        return False  # it has ended, or closed one meanwhile
+        return False  # the process has ended or closed a file meanwhile

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Recorders for the names that ``record`` and ``--record`` give: an .mcap recording, an .rrd view, or both; and a
-recorded session played into them.
+"""Recorders for the files that ``record`` and ``--record`` name: an .mcap recording, an .rrd view, or both; and
+playback of a recorded session into them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 LIBRARIES = {".mcap": ("mcap", "mcap", "mcap"), ".rrd": ("rerun", "rerun-sdk", "rerun")}
-"""What writes a file of this ending: module, package, and the extra that installs it."""
+"""Library that writes files of this suffix: module, package, and the extra that installs it."""
 
 
 def recording_names(names: str) -> list[str]:
@@ -43,13 +43,14 @@ def make_recorders(
     simulated_log: bool = False,
     files: Sequence[tuple[str, bytes]] = (),
 ) -> list[WritingObserver]:
-    """Observers that record to the files of these names; raises InputError where one can't, and then none does.
+    """Observers that record to these files; raises InputError if one can't, and then none does.
 
-    parameters: the scene's, of which frames' names count. simulated_log: messages of an .mcap are logged at simulated
-    time, as suits a run without a clock; else at the wall's. files (name, bytes): meshes whose own files may be gone.
+    parameters: the scene's, for frame names. simulated_log: messages of an .mcap are logged at simulated time, for a
+    run without a real-time clock; otherwise at wall time. files: (name, bytes) of meshes whose own files may be
+    gone.
     """
     recorders: list[WritingObserver] = []
-    # What can be refused is refused before an earlier recording is overwritten.
+    # All checks come before an earlier recording is overwritten.
     for file in recording_names(names):
         _check_place(file)
         module, package, extra = LIBRARIES[Path(file).suffix.lower()]
@@ -72,9 +73,9 @@ def make_recorders(
 
 
 def _check_place(path: str) -> None:
-    """A scene, or any node, may name the place: a recording that stands there is overwritten, and nothing else is."""
+    """Raise InputError if the path has something else than a recording, since any scene or node may name the path."""
     place, head = Path(path), b""
-    with suppress(OSError):  # what can't be read is refused where it can't be written
+    with suppress(OSError):  # an unreadable file is refused later if it can't be written
         if place.is_file():
             with open(place, "rb") as stream:
                 head = stream.read(5)
@@ -90,21 +91,21 @@ def record(
     given: Scenario | None = None,
     progress: Callable[[float, float], None] = lambda *_: None,
 ) -> None:
-    """Play all runs of a session into recordings; ``path`` names them as ``record`` does. given: the scene of a session
-    that lacks it. ``progress`` is called with (states told, all states).
+    """Play all runs of a session into the recordings that ``path`` names, as the parameter ``record`` does. given: the
+    scene of a session that lacks it. progress(sent, total) is called with numbers of states.
 
-    Raises InputError for a session without a scene and a file that can't be written.
+    Raises InputError for a session without a scene, and for a file that can't be written.
     """
     from ..session.recorded_session import check_playable, play, recorded_parameters
 
-    # What is refused is refused before a recording of an earlier flight is overwritten.
+    # All checks come before an earlier recording is overwritten.
     for session in runs:
         check_playable(session, given)
     total = sum(session.states.count for session in runs)
-    told, last = 0, runs[-1]
+    played, last = 0, runs[-1]
 
-    def so_far(done: float, _: float) -> None:
-        progress(told + done, total)
+    def report(done: float, _: float) -> None:
+        progress(played + done, total)
 
     recorders = make_recorders(
         str(path),
@@ -121,8 +122,8 @@ def record(
         for number, session in enumerate(runs):
             if number:
                 observer.on(Reset())
-            play(session, observer, given, so_far, all_events=True)
-            told += session.states.count
+            play(session, observer, given, report, all_events=True)
+            played += session.states.count
     for recorder in recorders:
         if recorder.error:
             raise InputError("--record", str(path), f"a file that can be written ({recorder.error})")

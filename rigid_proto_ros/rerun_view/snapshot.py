@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of a flight drawn into an .rrd file, without a display."""
+"""Pictures of a flight from an .rrd file, without a display."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from .ports import PortTakenError, is_free, listens, serve_on_port
 from .viewers import ViewerProcess, open_headless
 
 FIRST_PORT = 19876
-"""Where the search for a port begins: away from those that nodes and viewers serve on."""
+"""First port tried, away from the ports of nodes and viewers."""
 
 START_TIMEOUT_S = 60.0
 LOAD_TIMEOUT_S = 120.0
 DRAWN_STEADY_S = 10.0
-"""How long a picture may keep changing (plots load, the camera comes to rest) before it is taken as it is."""
+"""Timeout of waiting for a steady picture while plots load and the camera moves [s]."""
 
 NOTICE_GONE_S = 6.0
-"""After this the viewer's note that it runs without a window has left the corner of the window."""
+"""Time until the viewer's notice that it runs without a window disappears [s]."""
 
 DRIVERS = "a graphics driver: on Debian and Ubuntu `sudo apt install mesa-vulkan-drivers` draws without a graphics card"
 
 BAR = 37
-"""Rows of the window's own bar, which isn't of the flight: menu, search, and what the viewer says of the machine."""
+"""Height of the window's top bar [pixels], which is cut off: menu, search, and information about the machine."""
 
 STAGES = 3
-"""Of a picture: viewer started, recording loaded, drawn."""
+"""Stages of progress: viewer started, recording loaded, drawn."""
 
 
 def take_picture(
@@ -48,10 +48,9 @@ def take_picture(
     size: tuple[int, int] = (1600, 900),
     progress: Callable[[float, float], None] = lambda *_: None,
 ) -> None:
-    """Write a .png of what an .rrd file shows at simulated time ``at_s``. ``progress`` is called with (stages done, all
-    stages).
+    """Write a .png of an .rrd file at simulated time ``at_s``. progress(done, total) is called with numbers of stages.
 
-    Raises InputError for a picture that can't be written, and a machine without the drivers.
+    Raises InputError for a picture that can't be written, and on a machine without graphics drivers.
     """
     picture = Path(picture).absolute()
     check_picture(picture)
@@ -71,7 +70,7 @@ def take_picture(
 
 
 def check_picture(picture: str | Path) -> None:
-    """Raise InputError unless a picture could be written there; its folder is made."""
+    """Raise InputError unless a picture can be written there; creates its folder."""
     if Path(picture).suffix.lower() != ".png":
         raise InputError("-o", str(picture), "a file that ends in .png")
     check_whole_file("-o", picture)
@@ -79,7 +78,9 @@ def check_picture(picture: str | Path) -> None:
 
 @contextmanager
 def headless_viewer(width: int, height: int) -> Iterator[Any]:
-    """A viewer without a window, on loopback, ended on leaving; yields its ``ViewerClient``."""
+    """Context of a viewer without a window, on loopback; yields its ``ViewerClient`` and stops the viewer
+    at the end.
+    """
     with tempfile.TemporaryFile() as log:
         try:
             port, process = serve_on_port("snapshot", None, FIRST_PORT, lambda port: _start(port, width, height, log))
@@ -110,7 +111,7 @@ def _connected(address: str, process: ViewerProcess, log: Any) -> Any:
     while process.running and time.monotonic() < deadline:
         try:
             client = ViewerClient.connect(address)
-            # A viewer opens with a driver that it can't draw with, and ends at its first picture.
+            # With an unsuitable driver the viewer starts, but ends at its first picture.
             client.take_screenshot(None)
             return client
         except Exception:
@@ -123,7 +124,8 @@ def _ended(log: Any) -> InputError:
     """Why the viewer has ended, from the last line of its output."""
     log.seek(0)
     words = log.read().decode(errors="replace")
-    # Without any adapter it says so; with one of OpenGL alone it has no render context at its first picture.
+    # Without any adapter the viewer says so; with an OpenGL adapter only, it has no render context at its first
+    # picture.
     if "adapter" in words.lower() or "render context" in words:
         return InputError("snapshot", f"there is no graphics adapter that the viewer can draw with; install {DRIVERS}")
     last = (words.strip().splitlines() or ["no message"])[-1]
@@ -144,7 +146,7 @@ def show(client: Any, recording: Path) -> None:
 
 
 def _stable_picture(client: Any) -> bytes:
-    """A screenshot of the window, once two in a row are alike (the first ones still load)."""
+    """A screenshot of the window, taken when two in a row are equal, since the first ones are still loading."""
     deadline = time.monotonic() + DRAWN_STEADY_S
     before = client.take_screenshot(None)
     while True:
@@ -162,7 +164,7 @@ def _without_bar(png: bytes) -> bytes:
 
 
 def is_one_colour(png: bytes) -> bool:
-    """Whether a picture is one colour all over, give or take."""
+    """Whether a picture has approximately one colour."""
     with Image.open(io.BytesIO(png)) as image:
         pixels = np.asarray(image.convert("RGB").resize((128, 128)), dtype=float)
     return float(pixels.std(axis=(0, 1)).max()) < 1.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Viewer processes: the web viewer's server and the native window. Missing ones are a warning, not an error."""
+"""Viewer processes: the web viewer's server, the native window and the headless viewer."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from .ports import PortTakenError, listens
 
 STOP_TIMEOUT_S = 1.0
 START_TIMEOUT_S = 30.0
-"""What a busy machine may take to start a viewer that takes .3 s alone [s]."""
+"""Timeout of a viewer's start [s], for a busy machine; usually it takes 0.3 s."""
 
 
 def viewer_program() -> str | None:
-    """Path of the ``rerun`` program: that installed with the library, otherwise the one on PATH."""
+    """Path of the ``rerun`` program, installed with the library or on PATH."""
     found = importlib.util.find_spec("rerun_cli")
     for folder in (found.submodule_search_locations or []) if found else []:
         program = Path(folder) / ("rerun.exe" if sys.platform == "win32" else "rerun")
@@ -41,8 +41,8 @@ def has_display() -> bool:
 
 
 def _run(command: list[str], log: int, started: Future[subprocess.Popen[bytes]]) -> None:
-    # RERUN_APP_ONLY: no analytics question on the terminal of a program that only wants a picture. TMPDIR: the viewer
-    # doesn't remove its folder there when it is ended by a signal.
+    # RERUN_APP_ONLY suppresses the analytics question on the terminal. TMPDIR: the viewer leaves its temporary folder
+    # behind when it is ended by a signal.
     with tempfile.TemporaryDirectory(prefix="rigid_proto_", ignore_cleanup_errors=True) as folder:
         environment = {**os.environ, "RERUN_APP_ONLY": "true", "TMPDIR": folder}
         try:
@@ -62,14 +62,15 @@ def _run(command: list[str], log: int, started: Future[subprocess.Popen[bytes]])
 
 
 class ViewerProcess:
-    """A viewer that was started here, and that ends with ``stop``, or with this process."""
+    """A viewer started here; it ends with ``stop`` or with this process."""
 
     def __init__(self, *arguments: str, log: int = subprocess.DEVNULL) -> None:
         program = viewer_program()
         if program is None:
             raise FileNotFoundError(is_missing("rerun-sdk", "rerun"))
         started: Future[subprocess.Popen[bytes]] = Future()
-        # On a thread that waits for it: the one that calls this may end before the viewer.
+        # Started by a thread that waits for it, because the viewer ends with the thread that starts it, and the calling
+        # thread may end before.
         run = ([program, *arguments], log, started)
         self._thread = threading.Thread(target=_run, args=run, name="viewer", daemon=True)
         self._thread.start()
@@ -77,11 +78,11 @@ class ViewerProcess:
 
     @property
     def running(self) -> bool:
-        """Whether the process hasn't ended."""
+        """Whether the process is running."""
         return self.process.poll() is None
 
     def stop(self) -> None:
-        """End the process, kindly and then not."""
+        """End the process by SIGTERM, and by SIGKILL after STOP_TIMEOUT_S."""
         if self.running:
             self.process.terminate()
             try:
@@ -94,8 +95,8 @@ class ViewerProcess:
 def serve_web(web_port: int, stream_address: str) -> tuple[ViewerProcess, str]:
     """Serve the web viewer on loopback; returns its process and the address to open, which shows the stream.
 
-    A process of its own because the library's server inside this one would listen on all interfaces. Raises
-    PortTakenError where another process listens there, and OSError where the viewer doesn't start.
+    It is a separate process because the library's in-process server would listen on all interfaces. Raises
+    PortTakenError if another process listens on the port, and OSError if the viewer doesn't start.
     """
     process = ViewerProcess(
         *("--serve-web", "--bind", LOOPBACK, "--web-viewer-port", str(web_port), "--port", "auto", stream_address)
@@ -117,7 +118,7 @@ def open_native(stream_address: str) -> ViewerProcess:
 
 
 def open_headless(port: int, width: int, height: int, log: int = subprocess.DEVNULL) -> ViewerProcess:
-    """A viewer without a window that is driven through ``port`` on loopback."""
+    """A viewer without a window, controlled through ``port`` on loopback."""
     return ViewerProcess(
         *("--headless", "--bind", LOOPBACK, "--port", str(port), "--window-size", f"{width}x{height}"),
         "--hide-welcome-screen",

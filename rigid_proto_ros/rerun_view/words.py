@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A line of the event log in words, for people's eyes: ``poke 0.03 N at tip, 0.1 s``."""
+"""A line of the event log in words: ``poke 0.03 N at tip, 0.1 s``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PLAIN = {
 
 
 def words_of(line: str) -> str:
-    """What a line says, which is JSON."""
+    """A line of the event log, JSON, in words."""
     event = json.loads(line)
     kind, content = str(event["kind"]), event["content"]
     match kind:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The ROS 2 side: a node and a client. Callbacks convert messages; one physics thread owns the motion."""
+"""The ROS 2 node and its client. Callbacks convert messages; one physics thread owns the motion."""

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The command line of the node, read before rcl reads it, so that a mistake gives one line with a remedy instead of a
-stack of errors; and the beginning of ROS with what it leaves.
+"""The node's command line, parsed before rcl parses it, so that a mistake gives one line with a remedy instead of a
+stack of errors; and the initialization of rclpy with the remaining arguments.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
     parser.add_argument("--until", type=seconds, metavar="S", help="end when simulated time reaches this many seconds")
     for word in argv[1 : argv.index("--ros-args")] if "--ros-args" in argv else argv[1:]:
         if ":=" in word and word.partition(":=")[0] in PARAMETERS:
-            # To rcl, which removes it, it renames a topic.
+            # rcl would take it as a remapping of a topic.
             raise InputError(word, f"not an option; a parameter is given by --ros-args -p {word}")
     try:
         own = remove_ros_args(argv)[1:]
@@ -58,8 +58,8 @@ def own_arguments(argv: list[str]) -> argparse.Namespace:
 
 
 def begin_ros(argv: list[str]) -> None:
-    """Initialize rclpy without its handlers of signals, since it must outlive all that is closed after one. Raises
-    InputError for arguments that it refuses.
+    """Initialize rclpy without its signal handlers, because rclpy must still work while everything else is closed after
+    a signal. Raises InputError for arguments that rclpy refuses.
     """
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
@@ -80,13 +80,12 @@ def _parameter_help() -> str:
 
 
 def given_arguments(argv: list[str], node_name: str, warn: Callable[[str], None]) -> dict[str, object]:
-    """The parameters that files and ``-p name:=value`` in ``argv`` give this node, later ones winning; raises
-    InputError.
+    """The parameters of this node from files and ``-p name:=value`` in ``argv``; later values override earlier ones.
+    Raises InputError.
 
-    A file records only below the working folder. rcl reads the same arguments, but if a later value has another type
-    than an earlier one, rcl keeps the earlier one.
-    An unknown name is an error that gives the nearest known name; in a ``/**`` section, which other nodes share, it is
-    a warning.
+    A parameter file may record only below the working folder. rcl reads the same arguments, but if a later value has
+    another type than an earlier one, rcl keeps the earlier one. An unknown name is an error that gives the nearest
+    known name; in a ``/**`` section, which other nodes share, it is a warning.
     """
     given: dict[str, object] = {}
     recorded: object = ""
@@ -135,8 +134,8 @@ def _assignment(text: str, node_name: str) -> dict[str, object]:
 
 
 def remapped_node_name(argv: list[str], name: str = NODE_NAME) -> str:
-    """The node's name, after its namespace if there is one, by ``-r __node:=name`` and ``-r __ns:=/namespace``. As in
-    rcl, the first such rule counts, and one that begins with a node's name is for that node.
+    """The node's name, prefixed by its namespace if any, after ``-r __node:=name`` and ``-r __ns:=/namespace``. As in
+    rcl, the first such rule applies, and a rule that starts with a node's name applies to that node only.
     """
     new: dict[str, str] = {}
     for option, text in _ros_options(argv):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Messages and requests that the physics thread takes itself, and its wait for them.
+"""Messages and service requests that the physics thread takes directly from the middleware, and the wait for them.
 
-A message taken from the middleware's queue costs a third of one that an executor hands to a callback, and is taken at
-the moment that the motion needs it. rclpy has no public way for it, so this file, and no other, uses what rclpy's own
-executors use: ``take_message`` of a subscription's handle, ``service_take_request`` of a service's, wait sets, and a
-callback group that keeps executors away. Tried with rclpy 7.1.6 (Jazzy). Where they are missing or fail at the start,
-ordinary callbacks take their place, which costs time and is said.
+Taking a message directly costs a third of an executor's callback, and happens exactly when the motion needs it. rclpy
+has no public interface for this, so this file, and no other, uses what rclpy's executors use: ``take_message`` of a
+subscription's handle, ``service_take_request`` of a service's handle, wait sets, and a callback group that excludes
+executors. Tried with rclpy 7.1.6 (Jazzy). If one of them is missing or fails at the start, ordinary callbacks are used
+instead, with a warning, since they cost more time.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from . import qos
 
 
 class ManualCallbackGroup(CallbackGroup):
-    """A callback group of whose entities an executor serves the events alone."""
+    """A callback group of which an executor serves only the events, not the messages and requests."""
 
     def can_execute(self, entity: object) -> bool:
         """Whether it is an event."""
@@ -42,11 +42,11 @@ class ManualCallbackGroup(CallbackGroup):
         return isinstance(entity, Waitable)
 
     def ending_execution(self, entity: object) -> None:
-        """Nothing is held."""
+        """Do nothing, since the group holds no lock."""
 
 
 class Messages:
-    """The messages of one subscription, as bytes, in the order in which they arrived."""
+    """The messages of one subscription, as bytes, in order of arrival."""
 
     def __init__(self, message_type: type) -> None:
         self.message_type = message_type
@@ -55,18 +55,18 @@ class Messages:
 
     @property
     def depth(self) -> int:
-        """How many the queue holds."""
+        """Capacity of the middleware's queue."""
         assert self.subscription is not None
         return int(self.subscription.qos_profile.depth)
 
     def take(self) -> Iterator[bytes]:
-        """Each that has arrived, at most as many as a queue holds: a flood can't hold up the motion for ever."""
+        """Yield the messages that have arrived, at most qos.COMMAND_DEPTH, so that a flood can't block the motion."""
         for _ in range(min(len(self.arrived), qos.COMMAND_DEPTH)):
             yield self.arrived.popleft()
 
 
 class DirectMessages(Messages):
-    """The same from the middleware's own queue."""
+    """Messages taken directly from the middleware's queue."""
 
     def take(self) -> Iterator[bytes]:
         """See Messages."""
@@ -81,7 +81,7 @@ class DirectMessages(Messages):
 
 
 class Requests:
-    """The requests of one service, answered by whoever takes them."""
+    """The requests of one service; the caller that takes a request answers it."""
 
     def __init__(self, service_type: Any) -> None:
         self.service_type = service_type
@@ -89,16 +89,16 @@ class Requests:
         self.service: Service | None = None
 
     def take(self) -> Any:
-        """What ``answer`` needs of the next request, or None."""
+        """The next request as ``answer`` needs it, or None."""
         return self.arrived.popleft() if self.arrived else None
 
     def answer(self, request: Any, response: Any) -> None:
-        """Send the response to a request that was taken."""
+        """Send the response to a taken request."""
         request.set_result(response)
 
 
 class DirectRequests(Requests):
-    """The same from the middleware's own queue."""
+    """Requests taken directly from the middleware's queue."""
 
     def take(self) -> Any:
         """See Requests."""
@@ -114,7 +114,9 @@ class DirectRequests(Requests):
 
 
 class Arrivals:
-    """What one node's physics thread takes. Make all subscriptions and services before the first ``wait``."""
+    """The messages and requests that one node's physics thread takes. Create all subscriptions and services before the
+    first ``wait``.
+    """
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -132,7 +134,7 @@ class Arrivals:
     def subscribe(
         self, message_type: type, topic: str, profile: QoSProfile, events: SubscriptionEventCallbacks
     ) -> Messages:
-        """The messages of a topic below the node's name, whose QoS may be overridden."""
+        """Subscribe to a topic in the node's private namespace; users may override its QoS."""
         messages = DirectMessages(message_type) if self.direct else Messages(message_type)
 
         def arrive(data: bytes) -> None:
@@ -153,11 +155,11 @@ class Arrivals:
         return messages
 
     def serve(self, service_type: Any, name: str) -> Requests:
-        """The requests of a service below the node's name."""
+        """Create a service in the node's private namespace."""
         requests = DirectRequests(service_type) if self.direct else Requests(service_type)
 
         def arrive(*_: Any) -> Any:
-            # On the executor's thread, which serves nothing else meanwhile.
+            # On the executor's thread, which is blocked until the answer.
             answer: Future[Any] = Future()
             requests.arrived.append(answer)
             self._woken.set()
@@ -168,19 +170,21 @@ class Arrivals:
         return requests
 
     def note(self) -> None:
-        """Something else has arrived: ``wait`` ends and says so; from any thread."""
+        """End the wait and make it return true; may be called from any thread."""
         self._noted = True
         self.wake()
 
     def wake(self) -> None:
-        """End the wait, from any thread."""
+        """End the wait; may be called from any thread."""
         if self.direct:
             self._guard.trigger()
         else:
             self._woken.set()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until something arrives, ``wake`` is called or the time is over; whether something may have arrived."""
+        """Wait until something arrives, ``wake`` is called or the timeout ends. Returns whether something may have
+        arrived.
+        """
         if not self.direct:
             woken = self._woken.wait(timeout_s)
             self._woken.clear()
@@ -209,7 +213,7 @@ class Arrivals:
 
 
 def why_not_direct(node: Node) -> str:
-    """What this rclpy lacks of what is private; empty where all is there and a wait ends as it should."""
+    """Why this rclpy can't be used directly: the missing private function, or wait sets that don't work; else empty."""
     for owner, name in (
         (rclpy_implementation.Subscription, "take_message"),
         (rclpy_implementation.Service, "service_take_request"),
@@ -227,6 +231,6 @@ def why_not_direct(node: Node) -> str:
             wait_set.wait(0)
             ended = wait_set.get_ready_entities("guard_condition")
         guard.destroy()
-    except Exception as error:  # whatever another version raises
+    except Exception as error:  # exception types differ between versions
         return f"other wait sets ({type(error).__name__}: {error})"
     return "" if ended else "wait sets that nothing wakes"

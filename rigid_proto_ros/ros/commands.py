@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The command topics: taken by the physics thread (arrivals.py), converted, and submitted; and ``~/step``, taken
-likewise.
+"""The command topics and ``~/step``: the physics thread takes their messages (arrivals.py), converts and submits them.
 
-Lost messages are counted by the middleware, which tells the executor of them in the public way: those that a sender had
-to drop before they were fetched. What this side's own queue drops when it is full nobody counts.
+The middleware counts messages that a publisher had to drop before they were fetched, and reports the count by an event
+callback. Messages dropped by this subscriber's full queue are not counted anywhere.
 """
 
 from __future__ import annotations
@@ -31,10 +30,10 @@ from . import qos
 from .arrivals import Arrivals
 
 QUIET_NS = 4_000_000
-"""How often topics are read while nothing comes [ns of wall time]."""
+"""Polling period of the topics while no messages arrive [ns of wall time]."""
 
 ACTIVE_NS = 5_000_000_000
-"""They are read in every tick for this long after a message [ns of wall time]."""
+"""How long after a message the topics are polled in every tick [ns of wall time]."""
 
 TOPICS = {
     "wrench": WrenchStamped,
@@ -48,11 +47,11 @@ TOPICS = {
 
 
 class CommandQueue:
-    """The messages of one topic below the node's name, as bytes.
+    """The messages of one topic in the node's private namespace, as bytes.
 
-    queue_full: how often the queue was found full, so that messages may have been dropped here, nobody knows how many.
-    messages_lost: how many the middleware has said that their senders dropped. contended: several publishers are there,
-    and nobody was told yet.
+    queue_full: how often the queue was found full, after which an unknown number of messages may be lost.
+    messages_lost: number of messages dropped by publishers, as reported by the middleware. contended: the topic has
+    several publishers, and no warning was logged yet.
     """
 
     def __init__(self, node: Node, topic: str, arrivals: Arrivals) -> None:
@@ -70,14 +69,14 @@ class CommandQueue:
         self._topic_name = node.resolve_topic_name(f"~/{topic}")
 
     def take(self) -> Iterator[bytes]:
-        """What has arrived, message by message."""
+        """Yield the messages that have arrived."""
         for count, data in enumerate(self._messages.take()):
             if count == self._messages.depth - 1:
                 self.queue_full += 1
             yield data
 
     def note_sender(self, command: Command) -> None:
-        """Warn, once for each publisher that comes, where a command replaces what another publisher may hold."""
+        """Warn, once per new publisher, if a command replaces one that another publisher may hold."""
         held = isinstance(command, WrenchCommand) and command.held and not command.frame.slot
         if self.contended and (held or isinstance(command, MoveString | ThrusterCommand)):
             self.contended = False
@@ -102,7 +101,7 @@ class CommandQueue:
 
 
 class CommandSubscriber:
-    """The subscriptions of one node. frames: what it calls the world's and the body's frame."""
+    """The command subscriptions of one node. frames: names of its world and body frames."""
 
     def __init__(self, node: Node, arrivals: Arrivals, frames: Names, has_thrusters: bool) -> None:
         self._frames = frames
@@ -113,25 +112,26 @@ class CommandSubscriber:
 
     @property
     def queue_full(self) -> int:
-        """How often a queue was found full."""
+        """Number of times that a queue was found full."""
         return sum(queue.queue_full for queue in self._queues)
 
     @property
     def messages_lost(self) -> int:
-        """How many messages the middleware has said to be lost."""
+        """Number of lost messages, as reported by the middleware."""
         return sum(queue.messages_lost for queue in self._queues)
 
     def take(self, commands: CommandReceiver, wall_ns: int, at_once: bool) -> bool:
-        """Take every message that has arrived, convert it, and submit its command; what is refused is counted and
-        notified of, and the rest goes on; in lockstep only up to one that is followed by a step. Returns whether
-        something has arrived within the last ACTIVE_NS. Quiet topics are read every QUIET_NS, or now if ``at_once``.
+        """Take all messages that have arrived, convert them, and submit their commands. A refused command is counted,
+        observers are notified, and the others are still taken. In lockstep, stop after a command that a step must
+        follow. Returns whether a message has arrived within the last ACTIVE_NS. Quiet topics are polled every QUIET_NS,
+        or now if ``at_once``.
         """
         if at_once or wall_ns >= self._next_quiet_ns or wall_ns < self._active_until_ns:
             self._next_quiet_ns = wall_ns + QUIET_NS
             for queue in self._queues:
                 for data in queue.take():
                     self._active_until_ns = wall_ns + ACTIVE_NS
-                    with suppress(CommandRefused):  # counted, and the observer was told
+                    with suppress(CommandRefused):  # already counted, and sent to the observer
                         if queue.topic == "schedule":
                             commands.receive_schedule(partial(read_text, data))
                         else:
@@ -153,7 +153,7 @@ def read_command(topic: str, data: bytes, frames: Names) -> Command:
     try:
         if topic == "thrusters":
             return ThrusterCommand(tuple(deserialize_message(data, Float64MultiArray).data))
-        # From its bytes, without a message object.
+        # Decodes the bytes without a message object, which is faster.
         return of_message(topic, data, frames)
     except CommandRefused:
         raise
@@ -175,8 +175,8 @@ def _undecodable(topic: str, data: bytes) -> CommandRefused:
 
 
 class StepService:
-    """``~/step`` of one node. A controller in lockstep waits for every answer, and an executor, which gathers all that
-    it waits for anew each time, costs several times what the step itself does.
+    """The service ``~/step`` of one node. A controller in lockstep waits for every answer, and an executor, which
+    rebuilds its wait set each time, would cost several times as much as the step itself.
     """
 
     def __init__(self, arrivals: Arrivals) -> None:
@@ -184,7 +184,7 @@ class StepService:
         self._under_way: tuple[Any, Iterator[None]] | None = None
 
     def serve(self, loop: SimulationLoop) -> None:
-        """Take what is asked for, one request after another, each for as long as a tick has time, and answer."""
+        """Serve the requests in order, each within the tick's time budget, and answer those that are complete."""
         while True:
             if self._under_way is None:
                 request = self._requests.take()

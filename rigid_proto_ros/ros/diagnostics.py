@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What /diagnostics says of one body, once a second: counters, energies, and what went wrong since the last report."""
+"""Diagnostics of one body, once a second: counters, energies, and new problems since the last report."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from .commands import TOPICS as COMMAND_TOPICS
 from .commands import CommandSubscriber
 
 WARNING_S = 10.0
-"""How often the log says that real time is given up."""
+"""Shortest period of the log's warning that real time is given up [s]."""
 
 REPORT_S = 1.0
-"""Time between two reports on /diagnostics."""
+"""Period of reports on /diagnostics [s]."""
 
 UNREAD_S = 5.0
-"""The same while nobody subscribes, for what the log says: a wake-up of rclpy's executor costs 2 ms."""
+"""Period without subscribers [s], for the warnings in the log; a wake-up of rclpy's executor costs 2 ms."""
 
 REFUSAL_REASONS = (
     *("frame", "nonfinite", "magnitude", "stamp", "ray_miss"),
@@ -40,11 +40,11 @@ WARNED_OF = {
     "real_time_lost_s": "{:.2g} s behind real time",
     "clock_jumps": "/clock jumped {} times",
 }
-"""Counters whose growth makes a report a warning, and what it says of how much they grew."""
+"""Counters whose growth raises a report to WARN, and the text for the increase."""
 
 
 class Diagnostics:
-    """Of one node; the level of a report follows from what went wrong since the one before."""
+    """Diagnostics of one node; a report's level depends on new problems since the previous report."""
 
     def __init__(self, node: Node, live: LiveSimulation, subscriber: CommandSubscriber) -> None:
         self._node = node
@@ -59,20 +59,22 @@ class Diagnostics:
             for topic, kind in COMMAND_TOPICS.items()
         }
         self._other_types: set[tuple[str, str]] = set()
-        # Steady: the node's own clock stands still with /clock.
+        # A steady clock, because the node's clock stops when /clock does.
         self._timer = node.create_timer(UNREAD_S, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_matched(self, status: Any) -> None:
-        """Somebody subscribed or left: the first one's first report is of the second before it."""
+        """A subscriber has come or gone: adapt the period; the first report to the first subscriber covers
+        one second.
+        """
         period_ns = int((REPORT_S if status.current_count else UNREAD_S) * 1e9)
         if period_ns != self._timer.timer_period_ns:
             self._timer.timer_period_ns = period_ns
             self._timer.reset()
-            with suppress(InputError):  # it has ended
+            with suppress(InputError):  # the simulation has ended
                 self._before = self._live.call(self._values)
 
     def _values(self) -> dict[str, Any]:
-        """Counters and values by their keys; on the physics thread, so that they belong together."""
+        """Counters and values by their keys; called on the physics thread, so that they are consistent."""
         loop = self._live.loop
         commands, simulation = loop.commands, loop.simulation
         momentum, received, refused = simulation.angular_momentum, commands.received, simulation.refused
@@ -104,7 +106,7 @@ class Diagnostics:
         }
 
     def _warn_of_namesakes(self) -> None:
-        """Log when another node of this name comes: its topics are the same, so that nobody can tell the two apart."""
+        """Warn if another node has the same name: clients can't distinguish the two nodes' topics."""
         node = self._node
         count = node.get_node_names_and_namespaces().count((node.get_name(), node.get_namespace()))
         if count > self._of_this_name:
@@ -115,7 +117,7 @@ class Diagnostics:
         self._of_this_name = max(count, 1)
 
     def _warn_of_other_types(self) -> None:
-        """Log when a publisher of another type comes to a command topic, of which nobody else would tell it."""
+        """Warn of a publisher of another type on a command topic, which the middleware doesn't report."""
         for topic, types in self._node.get_topic_names_and_types():
             wanted = self._command_types.get(topic)
             for other in types:
@@ -130,12 +132,12 @@ class Diagnostics:
         """Publish the diagnostics, and log when simulated time falls behind real time."""
         self._warn_of_namesakes()
         self._warn_of_other_types()
-        # Before the values are read: what was done before the stamp is in them.
+        # Read before the values, so that they include everything done before the stamp.
         stamp = self._node.get_clock().now().to_msg()
         try:
             before, values = self._before, self._live.call(self._values)
         except InputError:
-            return  # it has ended, or is busy and has nothing to report
+            return  # the simulation has ended or is busy
         self._before = values
         if (lost_s := values["real_time_lost_s"] - before["real_time_lost_s"]) > 0.0:
             self._node.get_logger().warning(

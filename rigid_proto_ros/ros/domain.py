@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""ROS domains, each held by one user of this machine at a time: all nodes of a domain hear what one of them says."""
+"""Locks of ROS domains on this machine, since all nodes of a domain receive each other's messages."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import sys
 from collections.abc import Iterable
 
 DOMAINS = range(102)
-"""Domains whose ports lie below those that Linux gives to anybody (docs.ros.org, "The ROS_DOMAIN_ID")."""
+"""Domains whose ports lie below Linux's ephemeral ports (docs.ros.org, "The ROS_DOMAIN_ID")."""
 
 
 def hold_domain(domains: Iterable[int]) -> tuple[int, socket.socket] | None:
-    """The first of the domains that nobody here holds, and the lock that holds it until it is closed; None without one.
+    """The first free domain and its lock, which holds the domain until it is closed; None if none is free, or without
+    Linux.
 
-    An abstract socket is the lock, which Linux alone has: the kernel frees it with the process, so that a crash leaves
-    nothing behind.
+    The lock is an abstract socket, which only Linux has: the kernel frees it when the process ends, even by a crash.
     """
     if not sys.platform.startswith("linux"):
         return None
@@ -32,7 +32,7 @@ def hold_domain(domains: Iterable[int]) -> tuple[int, socket.socket] | None:
 
 
 def hold_own_domain() -> socket.socket | None:
-    """The lock of the domain that this process' nodes are in, unless somebody else holds it already."""
+    """The lock of this process's domain, or None if another process holds it."""
     number = os.environ.get("ROS_DOMAIN_ID") or "0"
     held = hold_domain([int(number)]) if number.isdecimal() else None
     return None if held is None else held[1]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""``rigid_body_node``: start the node and keep it until SIGINT or SIGTERM, or ``--until``.
+"""``rigid_body_node``: start the node and run it until SIGINT or SIGTERM, or ``--until``.
 
-The main thread waits for the end and does nothing else: what starts the node runs on a thread of its own, imports
-included, since compiling kernels can take minutes and nothing interrupts it.
+The main thread only waits for the end. A second thread starts the node, including its imports, because compiling
+kernels can take minutes and can't be interrupted.
 """
 
 from __future__ import annotations
@@ -28,15 +28,17 @@ if TYPE_CHECKING:
     from .node import RigidBodyNode
 
 LOOK_S = 1.0
-"""Between looks of the main thread."""
+"""Polling period of the main thread [s]."""
 
 LAST_START_S = 0.2
-"""How long shutdown waits for a start that is nearly complete; a start that compiles isn't waited for."""
+"""How long shutdown waits for the start thread [s]: enough for a start that is nearly complete, not for one that
+compiles.
+"""
 
 
 def main(argv: list[str] | None = None, as_job: bool = False) -> int:
-    """Run the node; returns 2 when the input was refused (one line on stderr), else ends the process: after a signal
-    with 0, since launch reports any other status as a death, or as a job's with 128 + its number.
+    """Run the node. Returns 2 if the input was refused (one line on stderr), otherwise exits the process: after a
+    signal with 0, since launch reports any other status as a crash, or with 128 + signal number if as_job.
     """
     try:
         ended = threading.Event()
@@ -44,7 +46,7 @@ def main(argv: list[str] | None = None, as_job: bool = False) -> int:
         process.start()
         interrupt = Interrupt()
         with suppress(KeyboardInterrupt):
-            # A signal that the system delivers to another thread is noticed at the next turn.
+            # A signal that the system delivers to another thread is handled at the next iteration.
             while not ended.wait(LOOK_S):
                 pass
         status = process.end()
@@ -56,10 +58,10 @@ def main(argv: list[str] | None = None, as_job: bool = False) -> int:
 
 
 class NodeProcess(threading.Thread):
-    """The thread that starts the node which the arguments ask for, and what has to be closed at the end.
+    """The thread that starts the node, and the owner of everything that must be closed at the end.
 
-    request_end() is called when the process should end by itself: after a fault, or when simulated time has come to
-    ``--until``.
+    request_end() is called when the process should end without a signal: after an error, or when simulated time has
+    reached ``--until``.
     """
 
     def __init__(self, argv: list[str], request_end: Callable[[], None]) -> None:
@@ -67,7 +69,7 @@ class NodeProcess(threading.Thread):
         self._argv = argv
         self._request_end = request_end
         self._error: BaseException | None = None
-        # Held until this process ends: what `rigid_proto demo` says to its own node is then said elsewhere.
+        # Held until this process ends, so that `rigid_proto demo` uses another domain for its own node.
         self._domain = hold_own_domain()
         self._crashed = self._ending = False
         self._node: RigidBodyNode | None = None
@@ -76,20 +78,20 @@ class NodeProcess(threading.Thread):
         self._leave_executor: Callable[[], None] = lambda: None
 
     def run(self) -> None:
-        """On the thread."""
+        """Start the node, on this thread."""
         try:
             from .arguments import given_arguments, own_arguments, remapped_node_name
 
-            # First, since it says better than ROS what is wrong with a parameter.
-            given = given_arguments(self._argv, remapped_node_name(self._argv), _tell)
+            # Before ROS parses the parameters, since its error messages are worse.
+            given = given_arguments(self._argv, remapped_node_name(self._argv), _warn)
             self._begin(given, own_arguments(self._argv).until)
         except BaseException as error:  # raised again by the main thread
-            if not self._ending:  # else what was closed refuses what is still asked of it
+            if not self._ending:  # else a closed object has refused a late call
                 self._error = error
             self._request_end()
 
     def _begin(self, given: Mapping[str, object], until_s: float | None) -> None:
-        """Make the node and let it run. Raises InputError."""
+        """Create the node and start it. Raises InputError."""
         from rclpy.exceptions import ParameterException
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.qos_overriding_options import InvalidQosOverridesError
@@ -102,7 +104,7 @@ class NodeProcess(threading.Thread):
         try:
             node = self._node = RigidBodyNode(given, self._make_viewer)
         except (ParameterException, InvalidQosOverridesError, RuntimeError) as error:
-            # rclpy's own parameters: its text says which, and what is accepted.
+            # Parameters of rclpy itself: its message names the parameter and the accepted values.
             if isinstance(error, RuntimeError) and "QoS override" not in str(error):
                 raise
             raise InputError("ROS arguments", " ".join(str(error).split())) from None
@@ -143,7 +145,7 @@ class NodeProcess(threading.Thread):
             except ExternalShutdownException:
                 break
             except Exception:
-                # One request that fails by a fault of ours must not take the other services with it.
+                # An exception in one callback must not stop the other services.
                 traceback.print_exc()
         self._request_end()
 
@@ -152,8 +154,8 @@ class NodeProcess(threading.Thread):
         self._request_end()
 
     def end(self) -> int:
-        """On the main thread, when the shutdown was requested: close what there is. Returns the exit status, or raises
-        what the start has raised.
+        """Close everything, on the main thread, after shutdown was requested. Returns the exit status, or raises the
+        exception of the start thread.
         """
         self.join(LAST_START_S)
         if self._error is None:
@@ -163,7 +165,7 @@ class NodeProcess(threading.Thread):
         if self._node is not None:
             self._node.live.stop()
         elif self._viewer is not None:
-            # What the node was refused for came behind it.
+            # The node was refused after its viewer had been created.
             self._viewer.close()
         status = 1 if self._crashed else 0
         if self._error is None and not self.is_alive():
@@ -184,9 +186,7 @@ class NodeProcess(threading.Thread):
 
 
 def make_viewer(scenario: Scenario, node: Node) -> Observer | None:
-    """The live view, which says its addresses in the node's log, or None; Rerun is imported only when something is to
-    be shown or recorded with it.
-    """
+    """The live view, which logs its addresses to the node's log, or None. Rerun is imported only if it is used."""
     parameters = scenario.parameters
     viewer = parameters.viewer.partition(",")[0]
     if viewer in ("none", "workbench"):
@@ -206,7 +206,7 @@ def make_viewer(scenario: Scenario, node: Node) -> Observer | None:
 
 
 def open_page(node: RigidBodyNode) -> Callable[[], None]:
-    """The interactive page, where it is asked for; returns what closes it."""
+    """Serve the interactive page if the parameter ``viewer`` asks for it; returns the function that closes it."""
     parameters = node.live.scenario.parameters
     if "workbench" not in parameters.viewer:
         return lambda: None
@@ -219,7 +219,7 @@ def open_page(node: RigidBodyNode) -> Callable[[], None]:
     try:
         page = LivePage(node.live, port, parameters.workbench_host, say)
     except InputError as error:
-        # By the name that the node knows it by, which isn't the command's option.
+        # Name the node's parameter instead of the command-line option.
         names = {"--port": "workbench_port", "--host": "workbench_host"}
         raise InputError(names.get(error.field, error.field), error.received, error.accepted) from None
     node.get_logger().info(f"the workbench is at {page.address}")
@@ -239,5 +239,5 @@ def _asked_for(name: str, port: int) -> int | None:
     return None if port == PARAMETERS[name].default else port
 
 
-def _tell(line: str) -> None:
+def _warn(line: str) -> None:
     print(f"rigid_body_node: {line}", file=sys.stderr)

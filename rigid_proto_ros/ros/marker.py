@@ -20,17 +20,17 @@ from ..scene.scenario_run import ScenarioRun
 from ..simulation.setup import Setup
 
 PERIOD_S = 1.0 / 30.0
-"""Of the wall clock, between two markers."""
+"""Shortest period between two markers [s of wall time]."""
 
 MOST_TRIANGLES = 5000
-"""A marker holds so many, 0.36 MB of them; of a larger mesh it names the file."""
+"""Largest number of triangles sent in a marker, 0.36 MB; for a larger mesh the marker names the file."""
 
 TRIANGLE_LIST, MESH_RESOURCE, ADD = 11, 10, 0
-"""Of visualization_msgs/Marker."""
+"""Constants of visualization_msgs/Marker."""
 
 
 class BodyMarker:
-    """The marker of one body, as bytes. frames: the world's and the body's."""
+    """The marker of one body, as bytes. frames: names of the world and body frames."""
 
     def __init__(self, frames: tuple[str, str], stamps: Stamps) -> None:
         self._frames = frames
@@ -42,7 +42,7 @@ class BodyMarker:
         self._next_s = 0.0
 
     def message(self, run: ScenarioRun, time_ns: int, row: list[float]) -> bytes | None:
-        """The message at a time and state (13,), or None without a mesh and while the last one is new enough."""
+        """The message at a time and state (13,); None without a mesh, or within PERIOD_S of the last message."""
         now_s, body_mesh, setup = time.monotonic(), run.scenario.body_mesh, run.simulation.setup
         if body_mesh is None or now_s < self._next_s:
             return None
@@ -56,7 +56,7 @@ class BodyMarker:
         return bytes(self._message)
 
     def _make(self, body_mesh: BodyMesh, body: Body) -> None:
-        """All but stamp and pose. Corners count from the centre of mass, those of a file from the mesh's origin."""
+        """Pack all but stamp and pose. Sent corners are relative to the centre of mass, a file's to the mesh origin."""
         mesh, com = body_mesh.mesh, body.center_of_mass
         listed = len(mesh.triangles) <= MOST_TRIANGLES
         corners = mesh.vertices[mesh.triangles.ravel()] * body.scale - com if listed else np.empty((0, 3))
@@ -69,8 +69,8 @@ class BodyMarker:
         self._pose_at = layout.pack("7d", *(0.0,) * 7)
         layout.pack("3d", *((1.0,) * 3 if listed else (body.scale * mesh.unit).tolist()))
         layout.pack("4f", *(part / 255 for part in BODY_COLOUR), 1.0)
-        layout.pack("iI", 0, 0)  # for ever
-        layout.pack("?", False)  # not moved by /tf
+        layout.pack("iI", 0, 0)  # lifetime: forever
+        layout.pack("?", False)  # frame_locked
         layout.pack("I", len(corners))
         if listed:
             layout.pack(f"{corners.size}d", *corners.ravel().tolist())
@@ -79,10 +79,10 @@ class BodyMarker:
         layout.pack("iI", 0, 0)
         for _ in range(2):
             layout.string("")
-        layout.pack("2I", 0, 0)  # and its coordinates
+        layout.pack("2I", 0, 0)  # texture: bytes and coordinates
         layout.string("")  # text
         layout.string("" if listed else Path(mesh.path).as_uri())
-        layout.string("")  # a mesh of its own: name and bytes
+        layout.string("")  # embedded mesh: name and bytes
         layout.pack("I", 0)
-        layout.pack("?", False)  # with its own materials
+        layout.pack("?", False)  # mesh_use_embedded_materials
         self._message = layout.data

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The node: topics, services and parameters around one body that the physics thread advances.
+"""The node: topics, services and parameters of one body, which the physics thread advances.
 
-Callbacks run on the executor's thread; they convert and hand over. Commands don't come through callbacks at all: the
-physics thread takes them itself (commands.py).
+Callbacks run on the executor's thread: they convert a request and pass it to the physics thread. Commands use no
+callbacks: the physics thread takes them from the middleware (commands.py).
 """
 
 from __future__ import annotations
@@ -35,10 +35,12 @@ from .simulation_interfaces import offer_simulation_interfaces
 
 
 def offer_services(node: Node, live: LiveSimulation) -> None:
-    """Create reset, pause and the ends of wrench and string, private to the node; ``~/step`` is in commands.py."""
+    """Create the services reset, clear_wrench, string/release and pause in the node's private namespace; ``~/step`` is
+    in commands.py.
+    """
 
     def offer(service_type: Any, name: str, function: Callable[[Any], None], done: Callable[[Any], str]) -> None:
-        """A service that calls function(request) and answers with done(request), or with what was wrong."""
+        """A service that calls function(request) and answers with done(request), or with the error."""
 
         def answer(request: Any, response: Any) -> Any:
             try:
@@ -59,7 +61,7 @@ def offer_services(node: Node, live: LiveSimulation) -> None:
 
 
 class NodeEndpoints(Endpoints):
-    """Topics, commands and the log of one node, for the loop."""
+    """Connects the loop to topics, commands and the log of one node."""
 
     def __init__(
         self, node: RigidBodyNode, states: StatePublisher, arrivals: Arrivals, subscriber: CommandSubscriber
@@ -89,7 +91,7 @@ class NodeEndpoints(Endpoints):
         self._steps.serve(loop)
 
     def parameters_changed(self) -> None:
-        """See Endpoints; the node's own parameters follow on the executor's thread."""
+        """See Endpoints; the node's ROS parameters are updated on the executor's thread."""
         self._parameters_behind.trigger()
 
     def wait(self, timeout_s: float) -> bool:
@@ -110,10 +112,11 @@ class NodeEndpoints(Endpoints):
 
 
 class RigidBodyNode(Node):
-    """values: parameters by name as scene files give them, the others at their defaults. make_viewer(scenario, node)
-    gives an observer that shows the body, or None. ``live`` flies once it is announced and started.
+    """The node of one body. values: parameters by name as in scene files; the others have their defaults.
+    make_viewer(scenario, node): returns an observer that shows the body, or None. ``live``, the simulation, runs after
+    its ``announce`` and ``start``.
 
-    Raises InputError when a parameter given at start is refused.
+    Raises InputError if a parameter given at start is refused.
     """
 
     def __init__(
@@ -134,7 +137,7 @@ class RigidBodyNode(Node):
         self.states.configure(scenario.parameters)
         subscriber = CommandSubscriber(self, arrivals, frames, bool(scenario.parameters.thrusters))
         endpoints = NodeEndpoints(self, self.states, arrivals, subscriber)
-        # With its namespace: a recording has the node's own topics.
+        # With the namespace, so that a recording has the node's topic names.
         name = self.get_fully_qualified_name().strip("/")
         self.live = LiveSimulation(scenario, name, [events, *filter(None, [viewer])], endpoints, stamps)
         self._parameters_in_flight = LiveParameters(self, super().set_parameters_atomically, self.live, self.states)
@@ -143,16 +146,18 @@ class RigidBodyNode(Node):
         Diagnostics(self, self.live, subscriber)
 
     def _followed_clock(self, scenario: Scenario) -> Callable[[], int] | None:
-        """/clock, when use_sim_time asks for it and it isn't our own."""
+        """The time of /clock [ns] if use_sim_time is set and this node doesn't publish /clock itself."""
         if not self.get_parameter("use_sim_time").value or scenario.parameters.publish_clock:
             return None
         clock = self.get_clock()
         return lambda: clock.now().nanoseconds
 
     def follow_parameters(self) -> None:
-        """Set the ROS parameters to those in force."""
+        """Set the ROS parameters to the simulation's present ones."""
         self._parameters_in_flight.follow()
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """All changes of parameters come here, on the executor's thread: checked, and handed to the physics thread."""
+        """Check parameter changes and pass them to the physics thread; rclpy calls this for every change, on the
+        executor's thread.
+        """
         return self._parameters_in_flight.set_together(parameter_list)

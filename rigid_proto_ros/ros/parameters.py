@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The declared parameters on a ROS node: descriptors, and values converted before rclpy sees them.
+"""The declared parameters as ROS parameters: descriptors, and values converted before rclpy sees them.
 
-Changes in flight are checked together and handed to the physics thread; what commands changed, the ROS parameters
-follow.
+Changes in flight are checked together and passed to the physics thread. The ROS parameters are updated after commands
+change the simulation's.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ _ROS_TYPES = {name: RosParameter.Type(value) for name, value in _TYPES.items()}
 
 def descriptor(parameter: Parameter) -> ParameterDescriptor:
     """The ROS descriptor of a declared parameter."""
-    told = {READ_ONLY: "Set at start only.", LIVE: "Can be changed while the simulation runs."}
-    when = told.get(parameter.changes, f"Changes take effect {parameter.changes}.")
+    known = {READ_ONLY: "Set at start only.", LIVE: "Can be changed while the simulation runs."}
+    when = known.get(parameter.changes, f"Changes take effect {parameter.changes}.")
     result = ParameterDescriptor(
         name=parameter.name,
         type=_TYPES[parameter.type],
@@ -58,10 +58,10 @@ def descriptor(parameter: Parameter) -> ParameterDescriptor:
 
 
 def declare_parameters(node: Node, given: Mapping[str, object]) -> dict[str, Any]:
-    """Declare all parameters on the node, those ``given`` at start with their values, and return them all, converted.
+    """Declare all parameters on the node, with the values ``given`` at start or their defaults; returns them converted.
 
-    What rcl has read from the same files and arguments is ignored: rclpy would refuse an integer where a double is
-    declared. Raises InputError.
+    Values that rcl has read from the same files and arguments are ignored, because rclpy would refuse an integer where
+    a double is declared. Raises InputError.
     """
     values = {}
     for name in dict.fromkeys([*PARAMETERS, *given]):
@@ -72,12 +72,12 @@ def declare_parameters(node: Node, given: Mapping[str, object]) -> dict[str, Any
 
 
 def ros_parameter(name: str, value: object) -> RosParameter:
-    """A converted value as rclpy's parameter."""
+    """A converted value as a parameter of rclpy."""
     return RosParameter(name, _ROS_TYPES[parameter_named(name).type], value)
 
 
 def converted(changes: list[RosParameter]) -> list[RosParameter]:
-    """Parameters as a client sent them, each in its declared type; raises InputError."""
+    """A client's parameters converted to their declared types; raises InputError."""
     result = []
     for change in changes:
         if is_ros_parameter(change.name):
@@ -92,19 +92,20 @@ def converted(changes: list[RosParameter]) -> list[RosParameter]:
 
 
 def is_read_only(name: str) -> bool:
-    """Whether a parameter takes effect at start only, for those of this node and those of every rclpy node."""
+    """Whether a parameter can be set at start only; true for the parameters that every rclpy node has."""
     return is_ros_parameter(name) or parameter_named(name).changes == READ_ONLY
 
 
 Store = Callable[[list[RosParameter]], SetParametersResult]
-"""rclpy's own way to set parameters atomically."""
+"""rclpy's function that sets parameters atomically."""
 
 
 class LiveParameters:
-    """The parameters of a node; all runs on the executor's thread.
+    """Changes of a node's parameters in flight, on the executor's thread.
 
-    The node's ``set_parameters_atomically`` calls ``set_together``: rclpy's pre-set callback can't refuse; before its
-    on-set callback all that is read-only or of another type is refused, also where it is in force already.
+    The node's ``set_parameters_atomically`` calls ``set_together``. rclpy's callbacks don't serve: its pre-set callback
+    can't refuse, and before its on-set callback rclpy refuses a read-only parameter or another type even if the value
+    is unchanged.
     """
 
     def __init__(self, node: Node, store: Store, live: LiveSimulation, states: StatePublisher) -> None:
@@ -114,8 +115,8 @@ class LiveParameters:
         self._states = states
 
     def set_together(self, parameters: list[RosParameter]) -> SetParametersResult:
-        """Convert, check together, and pass to the physics thread; after a refusal nothing is changed. A ballast that
-        is deleted has no mass any more.
+        """Convert and check all, then pass them to the physics thread; after a refusal nothing is changed. Deleting a
+        ballast sets its mass to 0.
         """
         gone = [p.name for p in parameters if p.type_ == RosParameter.Type.NOT_SET and self._is_ballast(p.name)]
         given = [p for p in parameters if p.name not in gone]
@@ -158,9 +159,7 @@ class LiveParameters:
         return self._store(changed)
 
     def follow(self) -> None:
-        """Set the ROS parameters to what scheduled commands and inertia messages have changed, and to no recording
-        where one has stopped.
-        """
+        """Update the ROS parameters after scheduled commands and inertia messages, or after a failed recording."""
         self._live.give_up_failed_recording()
         now = self._live.scenario.parameters
         named = [ros_parameter(name, value) for name, value in now.named().items() if not is_read_only(name)]
@@ -170,22 +169,22 @@ class LiveParameters:
             self._states.configure(now)
 
     def _store(self, parameters: list[RosParameter]) -> SetParametersResult:
-        """Into rclpy's table, which tells /parameter_events; a ballast that comes along in flight is declared."""
+        """Store parameters in rclpy, which publishes them on /parameter_events; declare ballasts added in flight."""
         for p in parameters:
             if not self._node.has_parameter(p.name):
                 self._node.declare_parameter(p.name, p.value, descriptor(parameter_named(p.name)), ignore_override=True)
         return self._store_in_ros(parameters)
 
     def _is_set(self, parameter: RosParameter, values: Mapping[str, Any] = MappingProxyType({})) -> bool:
-        """Whether it has that value: among these by name, or else as rclpy's parameter."""
+        """Whether the parameter has this value already, in ``values`` or else in rclpy."""
         name = parameter.name
         if name not in values and not self._node.has_parameter(name):
-            # A ballast that was deleted.
+            # A deleted ballast.
             return bool(name.startswith("ballast.") and parameter.value[0] == 0.0)
         value = values[name] if name in values else self._node.get_parameter(name).value
         return bool(_plain(value) == _plain(parameter.value))
 
 
 def _plain(value: Any) -> Any:
-    """rclpy keeps arrays of doubles as array.array."""
+    """A value as plain Python; rclpy stores arrays of doubles as array.array."""
     return value if isinstance(value, (str, bool, int, float)) else list(value)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """``poke_client``: send a poke script, or one command, to a running node.
 
-    poke_client SCRIPT.yaml [--reset] [--lead S] [--node NAME]
+poke_client SCRIPT.yaml [--reset] [--lead S] [--node NAME]
     poke_client poke --at tip --push 5
     poke_client wrench --force 1 0 0 --for 2
 
-Exit status: 0 all commands were sent, 1 a command was late or refused, or dropped by somebody's reset, 2 the input was
-refused or no node was found, 130 ended by Ctrl-C (143 by SIGTERM): commands already sent still act.
+Exit status: 0 all commands were sent; 1 a command was late or refused, or dropped by another client's reset; 2 the
+input was refused or no node was found; 130 ended by Ctrl-C (143 by SIGTERM), and commands already sent still act.
 """
 
 from __future__ import annotations

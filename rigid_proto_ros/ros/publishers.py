@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What the node publishes of its body: states as packed bytes, for topics that somebody listens to, and what happens to
-it: inertia and scene (latched), applied commands and the event log.
+"""The node's publishers: states as packed bytes, on topics with subscribers; and events: inertia and scene (latched),
+applied commands and the event log.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from . import qos
 from .marker import BodyMarker
 
 WARNING_S = 1.0
-"""Between two warnings of one reason, wall time."""
+"""Shortest period between two warnings of the same reason [s of wall time]."""
 
-NOT_TURNED = (0.0, 0.0, 0.0, 1.0)
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 Topics = list[tuple[Publisher, Callable[[ScenarioRun, int, list[float]], Any]]]
-"""A publisher, and how its message is made from what flies, time and state; None for none now."""
+"""Publishers, each with the function that makes its message from run, time and state; None: no message now."""
 
 
 def _publisher(
@@ -59,10 +59,11 @@ def _publisher(
 
 
 class StatePublisher:
-    """Pose, twist, odometry, IMU, marker, /clock, /tf and /tf_static of one body. Use ``configure`` for what parameters
-    switch on and off.
+    """Publishes pose, twist, odometry, IMU, marker, /clock, /tf and /tf_static of one body; ``configure`` switches
+    those that depend on parameters.
 
-    frames: the world's and the body's. on_matched() is called on the executor's thread when a subscriber comes or goes.
+    frames: names of the world and body frames. on_matched() is called on the executor's thread when a subscriber comes
+    or goes.
     """
 
     def __init__(
@@ -101,7 +102,7 @@ class StatePublisher:
         if parameters.publish_tf and not self._sought_tf:
             self._sought_tf = True
             self._begin_tf()
-        # Once made they are kept: the physics thread may be publishing at the moment that they are switched off.
+        # Publishers are never destroyed: the physics thread may be using them while they are switched off.
         self._silent = tuple(
             publisher
             for publisher, on in ((self._clock, parameters.publish_clock), (self._tf, parameters.publish_tf))
@@ -120,7 +121,7 @@ class StatePublisher:
         self._topics = [*self._topics, (self._tf, self._transform)]
 
     def find_subscribers(self) -> bool:
-        """Note which topics have subscribers, for ``publish``; whether any has."""
+        """Find the topics with subscribers, for ``publish``; returns whether there are any."""
         self._wanted = [
             (publisher, message)
             for publisher, message in self._topics
@@ -129,7 +130,7 @@ class StatePublisher:
         return bool(self._wanted)
 
     def publish(self, run: ScenarioRun) -> None:
-        """Publish the present state on every topic that had a subscriber when that was last noted."""
+        """Publish the present state on every topic that ``find_subscribers`` has found."""
         if self._wanted:
             state = run.simulation.state
             row = state.row.tolist()
@@ -138,7 +139,7 @@ class StatePublisher:
                     publisher.publish(message)
 
     def pack_all(self, run: ScenarioRun) -> None:
-        """Make every message once and publish none, so that what they need is loaded."""
+        """Make every message once without publishing it, so that their modules are loaded before the start."""
         state = run.simulation.state
         for _, message in self._topics:
             message(run, state.time_ns, state.row.tolist())
@@ -153,7 +154,7 @@ class StatePublisher:
         return cdr.odometry(time_ns + self._stamps.offset_ns, self._frames, PROJECTIONS["odom"](row))
 
     def _imu_message(self, run: ScenarioRun, time_ns: int, row: list[float]) -> Imu:
-        """Attitude, angular velocity and specific force, both in body axes, at the contact that was chosen."""
+        """Attitude, and angular velocity and specific force in body axes, at the contact ``imu_contact``."""
         parameters = run.scenario.parameters
         contact = parameters.imu_contact
         if parameters is not self._imu_of:
@@ -179,11 +180,11 @@ class StatePublisher:
     def _transform(self, run: ScenarioRun, time_ns: int, row: list[float]) -> Any:
         setup = run.simulation.setup
         if setup is not self._framed:
-            # Frames that messages name, from the centre of mass in body axes; behind those of another body.
+            # Frames that messages name, relative to the centre of mass in body axes; published again for a new setup.
             self._framed, body = setup, setup.body
             places = {"mesh": -body.center_of_mass, **{n: body.point(p) for n, p in setup.contacts.items()}}
             fixed = [
-                self._stamped_transform(time_ns, (self._frames[1], f"{self._frames[1]}/{name}"), [*place, *NOT_TURNED])
+                self._stamped_transform(time_ns, (self._frames[1], f"{self._frames[1]}/{name}"), [*place, *IDENTITY])
                 for name, place in places.items()
             ]
             self._tf_static.publish(self._tf_message(transforms=fixed))
@@ -199,7 +200,7 @@ class StatePublisher:
 
 
 class EventPublisher(Observer):
-    """An observer that publishes on the physics thread what happens, which is rare."""
+    """Publishes events on the physics thread; they are rare."""
 
     takes = frozenset({SceneChanged, BodyChanged, Applied, Refused, Logged})
 
@@ -214,11 +215,11 @@ class EventPublisher(Observer):
         self._warned: dict[str, float] = {}
 
     def wants(self, kind: type) -> bool:
-        """Lines of the event log only while somebody listens to their topic."""
+        """Whether an event is needed; lines of the event log only while their topic has subscribers."""
         return self._events.get_subscription_count() > 0 if kind is Logged else kind in self.takes
 
     def on(self, event: Event) -> None:
-        """Publish it, or warn of it."""
+        """Publish the event; of a refusal, log a warning."""
         match event:
             case Logged(_, line):
                 if self.wants(Logged):
@@ -230,17 +231,17 @@ class EventPublisher(Observer):
                 stamp_ns = time_ns + self._stamps.offset_ns
                 self._inertia.publish(inertia_bytes(stamp_ns, self._body_frame, setup.body))
             case Applied(time_ns) if self._applied.get_subscription_count():
-                # About the COM in the body's frame, which TF knows. What its sender said of point, axes, slot and
-                # duration stands in its event.
+                # About the COM in the body frame, which TF has. The event log has the command's own point, axes, slot
+                # and duration.
                 stamp_ns = time_ns + self._stamps.offset_ns
                 self._applied.publish(applied_bytes(stamp_ns, self._body_frame, event.load, event.body, event.attitude))
             case Refused(_, reason, message):
                 self._warn(reason, message)
 
     def _warn(self, reason: str, message: str) -> None:
-        """For what is refused when it comes and for what turns out impossible when it is to act.
+        """Warn of commands refused on arrival or when they take effect.
 
-        At most one a second for each reason: a flood of one kind doesn't hide what else goes wrong.
+        At most one warning per second and reason, so that a flood of one kind doesn't hide other problems.
         """
         now = time.monotonic()
         if now >= self._warned.get(reason, -math.inf) + WARNING_S:

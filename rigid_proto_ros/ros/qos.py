@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Quality of service of the node's topics, and which of it users may override by parameter."""
+"""Quality of service (QoS) of the node's topics, which users may override by parameter."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rclpy.qos_overriding_options import QosCallbackResult, QoSOverridingOptions
 from ..session.messages import EVENT_DEPTH, STATE_DEPTH
 
 COMMAND_DEPTH = 5000
-"""Commands kept until the next drain; Fast DDS holds no more in its history."""
+"""Commands queued until they are taken; the limit of Fast DDS's history."""
 
 LARGEST_DEPTH = 2**31 - 1
 
@@ -30,7 +30,7 @@ TF = QoSProfile(depth=100, history=HistoryPolicy.KEEP_LAST, reliability=Reliabil
 
 
 def _check(profile: QoSProfile) -> QosCallbackResult:
-    """Whether the middleware takes what a user overrides; it gives no reason itself."""
+    """Whether the middleware accepts an overridden profile; it gives no reason itself."""
     reason = f"depth: got {profile.depth}; accepted: 0 to {LARGEST_DEPTH}"
     return QosCallbackResult(successful=0 <= profile.depth <= LARGEST_DEPTH, reason=reason)
 
@@ -39,5 +39,5 @@ OVERRIDABLE = QoSOverridingOptions.with_default_policies(callback=_check)
 
 
 def own(profile: QoSProfile) -> QoSProfile:
-    """A copy for one topic: rclpy writes what a user overrides into the very profile that it is given."""
+    """A copy for one topic, because rclpy writes overridden values into the profile that it is given."""
     return copy(profile)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Publish a recorded session over ROS: its states with their recorded stamps, or its commands to a running node."""
+"""Publication of a recorded session over ROS: its states with their stamps, or its commands to a running node."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from .script_sender import ros_context, send_script
 WAIT_FOR_NODE_S = 10.0
 
 WAIT_FOR_SUBSCRIBERS_S = 3.0
-"""States wait this long for somebody to listen; then they go out all the same."""
+"""Longest wait for a first subscriber [s]; then states are published anyway."""
 
 SETTLED_S = 0.5
-"""After the last subscriber that was found, states wait this long for others."""
+"""How long publication waits for further subscribers after the last one [s]."""
 
 
 def publish_commands(session: RecordedSession, node_name: str) -> int:
-    """Reset the node and send it what moved the session's body, as a script; returns the exit status, 1 if any was
-    late. Raises InputError when no such node answers, and for a session that holds no whole run.
+    """Reset the node and send it the session's commands as a script. Returns the exit status: 1 if a command was late,
+    refused or dropped. Raises InputError if no such node answers, and for a session without a complete run.
     """
     commands = parse_script(script_of_session(session).script)
     with ros_context():
@@ -42,7 +42,9 @@ def publish_commands(session: RecordedSession, node_name: str) -> int:
 
 
 def publish_states(session: RecordedSession, speed: float) -> int:
-    """Publish the recorded states on their topics, with their stamps, which go out on /clock, too; the exit status."""
+    """Publish the recorded states on their topics with their stamps, and the stamps on /clock; returns the
+    exit status.
+    """
     if not session.states.topics:
         raise InputError("session", "the session has no states to publish")
     with ros_context():
@@ -56,17 +58,17 @@ def publish_states(session: RecordedSession, speed: float) -> int:
 
 def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
     types = {"pose": PoseStamped, "twist": TwistStamped, "odom": Odometry}
-    # The frames' names that the session flew with.
+    # The session's own frame names.
     frames = frame_names(recorded_parameters(session), session.node_name)
     topics = session.states.topics
     senders = {name: node.create_publisher(types[name], f"/{session.node_name}/{name}", qos.STATE) for name in topics}
     clock = node.create_publisher(Clock, "/clock", qos.CLOCK)
     _wait_for_subscribers(node, [*senders.values(), clock])
-    first_ns, begin, told_ns = session.states.first_ns, time.monotonic(), -1
+    first_ns, begin, clock_ns = session.states.first_ns, time.monotonic(), -1
     for time_ns, name, row in session.states:
         time.sleep(max(0.0, begin + 1e-9 * (time_ns - first_ns) / speed - time.monotonic()))
-        if time_ns != told_ns:
-            told_ns = time_ns
+        if time_ns != clock_ns:
+            clock_ns = time_ns
             clock.publish(cdr.time(time_ns))
         if name == "odom":
             senders[name].publish(cdr.odometry(time_ns, frames, row))
@@ -77,7 +79,9 @@ def _send_states(node: Node, session: RecordedSession, speed: float) -> None:
 
 
 def _wait_for_subscribers(node: Node, publishers: list[Publisher]) -> None:
-    """Until somebody listens and no more have come for SETTLED_S: who listens to several topics isn't found at once."""
+    """Wait for a first subscriber, and until no more come for SETTLED_S, because a client of several topics isn't
+    discovered at once.
+    """
     counts, since = [0] * len(publishers), time.monotonic()
     deadline = since + WAIT_FOR_SUBSCRIBERS_S
     while time.monotonic() < (since + SETTLED_S if any(counts) else deadline):

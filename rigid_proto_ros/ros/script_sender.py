@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Sending a script to a node: as entries of its schedule, ahead of time, never faster than the node confirms, and
-counted at the end.
+"""Sends a script to a node as lists of schedule entries, ahead of time and no faster than the node confirms them, and
+reports how many were late or refused.
 """
 
 from __future__ import annotations
@@ -34,30 +34,30 @@ from . import qos
 from .arguments import begin_ros
 
 MAX_UNCONFIRMED = 500
-"""Commands sent beyond what the node has reported as received: far below what its queues hold."""
+"""Largest number of commands sent that the node hasn't reported as received; far below the capacity of its queues."""
 
 SEND_AHEAD_NS = 60 * 1_000_000_000
-"""Commands to a node whose time runs go out at most this far ahead of simulated time, so that a client that is ended
-leaves little behind; while its time is held at 0 it gets all that its schedule_horizon lets in.
+"""How far ahead of simulated time commands are sent while it runs [ns], so that a client that is ended leaves few
+behind. While time is held at 0, all commands within the node's schedule_horizon are sent.
 """
 
 KEEP_HELD_S = 0.25
-"""A node that holds its time waits 1 s for the next list: it is told so often that there will be one."""
+"""Period of the message that keeps time held at 0 [s]; the node holds it for 1 s after each list."""
 
 STALLED_S = 15.0
-"""A node that confirms nothing for this long is gone, or receives nothing."""
+"""Timeout of a report or confirmation [s], after which the node is considered gone."""
 
 STANDSTILL_S = 5.0
-"""Simulated time that reports, one a second, find unmoved for so long is paused by somebody, or follows a clock that
-stands.
+"""If simulated time hasn't advanced for this long [s] by the reports, one a second, another client has paused it, or it
+follows a clock that has stopped.
 """
 
 
 @dataclass(frozen=True)
 class Report:
-    """sent: commands by kind. late, refused: what the node's counters rose by until ``reached_ns``; reasons: refused
-    ones by reason. last_ns: when the last command acts. was_reset: whether somebody else has reset or restarted
-    the node meanwhile.
+    """Outcome of sending a script. sent: commands by kind. late, refused: increase of the node's counters up to
+    ``reached_ns``; reasons: refused commands by reason. last_ns: time at which the last command acts. was_reset:
+    whether another client has reset the node meanwhile, or it was restarted.
     """
 
     sent: dict[str, int]
@@ -89,7 +89,7 @@ class Report:
 
 @contextmanager
 def ros_context(*arguments: str) -> Iterator[None]:
-    """ROS with these arguments; raises InputError for those that it refuses."""
+    """Context of an initialized rclpy; raises InputError for arguments that it refuses."""
     begin_ros([sys.argv[0], *arguments])
     try:
         yield
@@ -100,7 +100,7 @@ def ros_context(*arguments: str) -> Iterator[None]:
 def send_script(
     script: list[Command], node_name: str, timeout_s: float, reset: bool = False, lead_s: float = 0.2
 ) -> Report:
-    """Send a script's commands to the node of this name, and wait until all have acted; within a ``ros_context``."""
+    """Send a script's commands to the node and wait until all have acted; call within a ``ros_context``."""
     sender = ScriptSender(node_name, timeout_s)
     try:
         return sender.send(script, reset, lead_s)
@@ -109,8 +109,8 @@ def send_script(
 
 
 class ScriptSender(Node):
-    """A client of the node with this name. Raises InputError when it doesn't answer within timeout_s; 0
-    waits for ever.
+    """A client of the node ``node_name``. Raises InputError if the node doesn't answer within timeout_s; 0:
+    no limit.
     """
 
     def __init__(self, node_name: str, timeout_s: float) -> None:
@@ -130,8 +130,8 @@ class ScriptSender(Node):
         self._wait_for_node(timeout_s)
 
     def send(self, script: list[Command], reset: bool, lead_s: float) -> Report:
-        """Send all commands, each for the simulated time at which it acts, and wait until all have acted. With
-        ``reset``, simulated time begins at 0 when all within the horizon are there, also where it was paused.
+        """Send all commands, each for its simulated time, and wait until all have acted. With ``reset``, simulated time
+        starts at 0 when all commands within the horizon have arrived, even if it was paused.
         """
         before = dict(self._counters)
         self._received_before = int(before["commands_received"])
@@ -141,7 +141,7 @@ class ScriptSender(Node):
         lists = list(schedules(script, start_ns))
         held = sum(time_ns <= horizon_ns for time_ns, _ in lists) if reset else 0
         if reset:
-            # Alone: a command that is refused takes its own list with it.
+            # In a list of its own, because a refused command makes its whole list refused.
             self._publish([RESET], held > 0)
         paused, number = reset and before.get("state") == "paused", 0
         for place, (time_ns, entries) in enumerate(lists):
@@ -166,16 +166,16 @@ class ScriptSender(Node):
             self._wait_until_acted(last_ns)
         if self._restarted:
             before = dict.fromkeys(before, "0")
-        # All of one report: what it has reached, it has counted.
-        rose = {key: int(self._counters[key]) - int(before[key]) for key in before if key.startswith("refused_")}
-        refused = rose.pop("refused_total")
-        reasons = {key.removeprefix("refused_"): count for key, count in rose.items() if count}
+        # All values are from one report, so the counters include everything up to its time.
+        grown = {key: int(self._counters[key]) - int(before[key]) for key in before if key.startswith("refused_")}
+        refused = grown.pop("refused_total")
+        reasons = {key.removeprefix("refused_"): count for key, count in grown.items() if count}
         late = int(self._counters["late"]) - int(before["late"])
         sent = Counter(command.kind for command in script[:number])
         return Report(sent, late, refused, reasons, last_ns, self._reached_ns(), self._was_reset())
 
     def _publish(self, entries: list[dict[str, Any]], more: bool = False) -> None:
-        """Send a list; more: the node keeps time at 0 for the next one."""
+        """Send a list. more: the node holds time at 0 until the next list."""
         if more:
             entries = [{"more": True, **entries[0]}, *entries[1:]]
         self._schedule.publish(String(data=json.dumps(entries)))
@@ -183,7 +183,7 @@ class ScriptSender(Node):
         self._sent_s = time.monotonic()
 
     def _resume(self) -> bool:
-        """Let the time of a paused node go on; returns whether it is paused."""
+        """Resume a paused node; returns False, since it is no longer paused."""
         client = self.create_client(SetBool, f"{self.target}/pause")
         self._spin_until(client.service_is_ready, f"the service {client.srv_name}")
         answer = self._answer(client, SetBool.Request(data=False))
@@ -192,8 +192,8 @@ class ScriptSender(Node):
         return False
 
     def _make_room(self, count: int, holding: bool = False) -> None:
-        """Wait until the node has confirmed all but MAX_UNCONFIRMED of what is sent with ``count`` more. holding: it
-        keeps time at 0 meanwhile.
+        """Wait until ``count`` more commands would leave at most MAX_UNCONFIRMED unconfirmed. holding: the node holds
+        time at 0 meanwhile.
         """
 
         def has_room() -> bool:
@@ -204,11 +204,11 @@ class ScriptSender(Node):
         self._spin_until(has_room, f"{self.target} to confirm {self._sent} commands")
 
     def _was_reset(self) -> bool:
-        """Whether somebody else has reset the node since ``send`` began, or it has restarted."""
+        """Whether another client has reset the node since ``send`` began, or it was restarted."""
         return self._restarted or int(self._counters.get("resets", 0)) > self._resets
 
     def _parameter(self, name: str) -> Any:
-        """The node's value of a parameter; None where it has none of that name."""
+        """The node's value of a parameter, or None if it has no such parameter."""
         answer = self._answer(self._get_parameters, GetParameters.Request(names=[name]))
         return parameter_value_to_python(answer.values[0]) if answer.values else None
 
@@ -230,7 +230,9 @@ class ScriptSender(Node):
                 self._reported_s = time.monotonic()
 
     def _present_ns(self) -> int:
-        """Simulated time now: by the next state or, where states are rare or stamped by a /clock, the next report."""
+        """Simulated time now, from the next state or, if states are rare or stamped by a /clock, from the
+        next report.
+        """
         stamps: list[int] = []
 
         def on_pose(message: PoseStamped) -> None:
@@ -250,8 +252,8 @@ class ScriptSender(Node):
         return int(self._counters["commands_received"]) - self._received_before
 
     def _wait_until_acted(self, last_ns: int) -> None:
-        """Until a report from after the last command: only there a ray meets the body or misses it. Not for ever where
-        simulated time doesn't get there.
+        """Wait for a report from after the last command, because a ray hits or misses the body only when it acts. Give
+        up if simulated time doesn't advance for STANDSTILL_S.
         """
         reached_ns, since_s = -1, 0.0
         while self._reached_ns() <= last_ns and not self._was_reset():
@@ -262,13 +264,13 @@ class ScriptSender(Node):
             self._listen()
 
     def _listen(self) -> None:
-        """Wait a moment for the next report; raises InputError where there are none any more."""
+        """Wait briefly for the next report; raises InputError if there was none for STALLED_S."""
         rclpy.spin_once(self, timeout_sec=0.1)
         if time.monotonic() > self._reported_s + STALLED_S:
             raise InputError("--node", self.target, f"a report within {STALLED_S:g} s")
 
     def _reached_ns(self) -> int:
-        """Simulated time of the last report."""
+        """Simulated time of the last report [ns]."""
         return int(self._counters["sim_time_ns"])
 
     def _answer(self, client: Client, request: Any) -> Any:

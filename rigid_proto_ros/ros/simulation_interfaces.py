@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The standard simulator services (simulation_interfaces), where that package is installed: the typed interface, which
-answers every request with a result code.
+"""The standard simulator services (package simulation_interfaces), if it is installed: typed requests, each answered
+with a result code.
 
-Only what this simulator does is offered and listed: reset, pause and play, steps, and the state of its one body, read
-and set. There is no world, so nothing is spawned, loaded or deleted.
+Offered are reset, pause and play, steps, and reading and setting the state of the one body. There is no world, so
+nothing can be spawned, loaded or deleted.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SERVICES = (
     ("SetEntityState", "set_entity_state"),
 )
 MAX_STEPS = 1_000_000
-"""Publications that one call may step over."""
+"""Largest number of publications in one request to step."""
 
 
 class SimulationInterfaces:
@@ -46,7 +46,7 @@ class SimulationInterfaces:
             node.create_service(getattr(services, service_type), f"~/{name}", partial(self.answer, getattr(self, name)))
 
     def answer(self, serve: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
-        """What serve(request, response) returns, or what was wrong."""
+        """The response of serve(request, response), or one with the error."""
         try:
             return serve(request, response)
         except InputError as error:
@@ -55,8 +55,8 @@ class SimulationInterfaces:
     # The simulation
 
     def get_simulator_features(self, _: Any, response: Any) -> Any:
-        """What is really supported, and nothing else: a feature of a single scope would mean that a reset
-        takes it alone.
+        """List the supported features. Features of a single reset scope are left out, since time and state are reset
+        together.
         """
         features = self._messages.SimulatorFeatures
         response.features.features = [
@@ -77,7 +77,7 @@ class SimulationInterfaces:
         return response
 
     def reset_simulation(self, request: Any, response: Any) -> Any:
-        """Time and state together: SCOPE_ALL, or both scopes; nothing was spawned."""
+        """Reset time and state together: SCOPE_ALL, or both scopes. Spawned entities don't exist."""
         both = request.SCOPE_TIME | request.SCOPE_STATE
         if request.scope not in (request.SCOPE_DEFAULT, request.SCOPE_ALL) and request.scope & both != both:
             unsupported = self._results.RESULT_FEATURE_UNSUPPORTED
@@ -90,7 +90,7 @@ class SimulationInterfaces:
         return int(states.STATE_PAUSED if self._live.paused else states.STATE_PLAYING)
 
     def get_simulation_state(self, _: Any, response: Any) -> Any:
-        """Playing or paused."""
+        """Return playing or paused."""
         response.state.state = self._simulation_state()
         return _ended(response, self._results.RESULT_OK)
 
@@ -107,7 +107,7 @@ class SimulationInterfaces:
         return _ended(response, self._results.RESULT_OK)
 
     def step_simulation(self, request: Any, response: Any) -> Any:
-        """Step over publications, while paused."""
+        """Advance over ``steps`` publications, while paused."""
         if not 1 <= request.steps <= MAX_STEPS:
             raise InputError("steps", request.steps, f"1 to {MAX_STEPS}")
         self._live.step(request.steps)
@@ -116,7 +116,7 @@ class SimulationInterfaces:
     # The body
 
     def get_entity_state(self, request: Any, response: Any) -> Any:
-        """True pose, twist and acceleration, in world axes."""
+        """Return exact pose, twist and acceleration, in world axes."""
         if not self._is_known(request.entity, response):
             return response
         simulation, message = self._loop.simulation, response.state
@@ -136,11 +136,11 @@ class SimulationInterfaces:
         return response
 
     def set_entity_state(self, request: Any, response: Any) -> Any:
-        """Put the body elsewhere, as a command that is logged and replayed; accelerations follow from the loads."""
+        """Set the body's state by a command, which is logged and replayed; accelerations follow from the loads."""
         if not self._is_known(request.entity, response):
             return response
         frame, world = request.state.header.frame_id, self._live.frames[0]
-        # The releases for Jazzy and Kilted have no switches: pose and twist are meant, the acceleration may be ignored.
+        # The requests of Jazzy and Kilted have no set_... flags: pose and twist are set, the acceleration is ignored.
         accelerates = getattr(request, "set_acceleration", False)
         if accelerates or frame not in ("", "world", world):
             what = "set_acceleration" if accelerates else f"frame {frame!r}"

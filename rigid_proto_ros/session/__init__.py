@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Recorded flights: written, read, verified, replayed and branched."""
+"""Recorded flights: writing, reading, verification, replay and branching."""

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""A session as a scene and a poke script: all of it, which gives the same motion bit for bit, or what goes on from a
-moment of it.
+"""A session as a scene and a poke script: the whole run, which reproduces its motion bit for bit, or a branch that
+starts at a given time of it.
 
-The events of a run say all that acted on the body, and when. The run is computed anew, and each event becomes a script
-entry as it acts. Entries of one time act in the order in which the script lists them, so what was done in one instant
-acts again as it did. A what-if from a moment is a session of its own: its time begins at 0, and its steps with it, so
-that it follows the session it left within ``accuracy``, and not to the very bits.
+The events of a run record everything that acted on the body, with its time. The run is simulated again, and each event
+becomes a script entry when it acts. Entries of the same time act in the order of the script, so the order of events
+within one instant is kept. A branch is a new session: its time and its integration steps start at 0, so it follows the
+original session within ``accuracy``, but not bit for bit.
 """
 
 from __future__ import annotations
@@ -36,21 +36,21 @@ from .recorded_session import RecordedSession, Resimulation, decode_event, resim
 NOT_OF_THE_MOTION = frozenset(
     {"record", "viewer", "rerun_port", "web_port", "workbench_port", "workbench_host", "start_paused"}
 )
-"""Parameters of a running node that a scene to keep or to send doesn't carry."""
+"""Parameters of a running node that don't affect the motion; exported scenes leave them out."""
 
 Entry = dict[str, object]
 
 
 @dataclass(frozen=True)
 class SceneAndScript:
-    """scene: parameter-file text; entries: of a poke script."""
+    """scene: text of a parameter file; entries: the entries of a poke script."""
 
     scene: str
     entries: list[Entry]
 
     @property
     def script(self) -> str:
-        """The entries as a poke script's text, an empty list where nothing acts."""
+        """The poke script as text; an empty list without entries."""
         return script_text(self.entries)
 
 
@@ -58,9 +58,9 @@ class SceneAndScript:
 
 
 def script_of_session(session: RecordedSession) -> SceneAndScript:
-    """The run as a scene and a script; ``simulate --script`` and ``poke_client --reset`` fly it again.
+    """The run as a scene and a script, which ``simulate --script`` and ``poke_client --reset`` reproduce.
 
-    Raises InputError for events that can't be decoded or taken, which is what an incomplete record of the run gives.
+    Raises InputError for events that can't be decoded or applied, as in an incomplete recording of the run.
     """
     writer = _Writer()
     again = writer.again = resimulation(session, writer)
@@ -68,7 +68,7 @@ def script_of_session(session: RecordedSession) -> SceneAndScript:
     again.finish()
     if writer.lines != session.lines:
         raise InputError("events", f"{len(session.events)} lines", "all lines of the log since the start or a reset")
-    # What differs from the defaults, without what belongs to the running node.
+    # Parameters that differ from their defaults, without those of the running node.
     values = {
         name: value
         for name, value in scenario.parameters.named().items()
@@ -80,10 +80,10 @@ def script_of_session(session: RecordedSession) -> SceneAndScript:
 
 
 class _Writer(Observer):
-    """Turns what acts on a body computed anew into script entries.
+    """Converts the events of a resimulation to script entries.
 
-    lines: the log's lines as they come out again. entries: of a script, in the order of acting. again: the simulation;
-    last: its scenario before the latest change.
+    lines: lines of the resimulation's event log. entries: script entries in the order in which they act. again: the
+    resimulation; last: its scenario before the latest change.
     """
 
     takes = frozenset({Applied, Logged})
@@ -97,7 +97,7 @@ class _Writer(Observer):
         self.entries: list[Entry] = []
 
     def on(self, event: Event) -> None:
-        """A wrench or poke takes effect, and its line follows; or anything else has acted."""
+        """Keep the load of a wrench or poke, whose log line follows; convert each log line."""
         if isinstance(event, Applied):
             self._applied = event.load, event.body
         elif isinstance(event, Logged):
@@ -118,7 +118,7 @@ class _Writer(Observer):
         if isinstance(command, WrenchCommand):
             command = _forward(command, *self._applied)
         elif isinstance(command, TieString):
-            # In mesh coordinates, not yet taken onto the surface: that happens again.
+            # In mesh coordinates, not yet projected onto the surface: the script's run projects it again.
             simulation = self.again.simulation
             point = np.zeros(3)
             mesh_point_of(TIE_AXES.index(command.axes), np.array(command.point), simulation.flight, point)
@@ -133,27 +133,29 @@ class _Writer(Observer):
             earlier = before.parameters.named()
             changes = {name: value for name, value in after.parameters.named().items() if value != earlier.get(name)}
         if not changes:
-            # It cut the motion's steps all the same.
+            # A change without effect still ends an integration step, so an entry must do so, too.
             changes = {"poke_duration": after.parameters.poke_duration}
         self.entries.append({"t": time_ns / 1e9, "set": changes})
 
 
 def _forward(command: WrenchCommand, load: Load, body: Body) -> WrenchCommand:
-    """The command as an entry can say it: a push is a force, so an impulse along a normal is given in body axes."""
+    """The command in a form that script entries have: they push with forces only, so an impulse along a normal is
+    converted to body axes.
+    """
     if command.frame.axes != "normal" or not command.frame.impulse:
         return command
     frame = Frame("body", ("point", load.mesh_point), impulse=True)
     return replace(command, frame=frame, force=vector(load.own_force(body)))
 
 
-# From a moment on
+# Branches
 
 
 def branch_at(session: RecordedSession, time_ns: int) -> SceneAndScript:
-    """The scene that begins with the session's state at ``time_ns``, to its last bit, and what still acts there, for
-    the time that is left.
+    """The scene that starts with the session's state at ``time_ns``, bit for bit, and a script of the commands that
+    still act then, with their remaining durations.
 
-    Commands that act at that very time or later are left out. Raises InputError where the session doesn't reach it.
+    Commands that act at ``time_ns`` or later are left out. Raises InputError if the session doesn't reach that time.
     """
     last_ns = max([session.end_ns, *(event_ns for event_ns, _ in session.events)])
     if not 0 <= time_ns <= last_ns:
@@ -168,8 +170,9 @@ def branch_at(session: RecordedSession, time_ns: int) -> SceneAndScript:
 
 
 def recorded_branch(session: RecordedSession, scenario: Scenario, time_ns: int) -> tuple[SceneAndScript, int]:
-    """The same for a session without scene or events, in a scene given with it: the scene that begins with the recorded
-    state at ``time_ns`` or the last one before it, and that state's time [ns]. What acts there isn't known.
+    """The branch of a session without scene or events, whose scene is given: it starts with the recorded state at
+    ``time_ns`` or the last one before. Returns the branch, without script since loads are unknown, and the state's time
+    [ns].
     """
     before = np.flatnonzero(session.times <= time_ns)
     if not len(before) or time_ns > session.end_ns:
@@ -180,7 +183,7 @@ def recorded_branch(session: RecordedSession, scenario: Scenario, time_ns: int) 
 
 
 def _scene(scenario: Scenario, row: StateRow, changes: dict[str, object]) -> Scenario:
-    """The scene that begins with this state."""
+    """The scene that starts with this state."""
     numbers = row.tolist()
     velocities = PROJECTIONS["twist"](numbers)
     values = {
@@ -198,12 +201,13 @@ def _scene(scenario: Scenario, row: StateRow, changes: dict[str, object]) -> Sce
     except InputError as error:
         if error.field != "ghost.integrator":
             raise
-        # The ghost went without the string, which no scene can say.
+        # The ghost's integrator doesn't support the string, and the recorded ghost had none; a scene can't express
+        # that.
         return make_scenario({**values, "ghost.integrator": ""}, mesh)
 
 
 def _string_values(simulation: Simulation) -> dict[str, object]:
-    """The parameters that begin a scene with the string as it is."""
+    """The parameters that start a scene with the present string."""
     tied = simulation.string
     if tied is None:
         return {"string.attached": False, "string.attach": list(simulation.attach)}
@@ -220,8 +224,9 @@ def _string_entries(simulation: Simulation) -> Iterator[Entry]:
     if tied is None:
         return
     if tied.end_ns > now_ns:
-        # A target is reached over the time since the one before it, here since time 0: so when it would have been. As a
-        # parameter, since a target's message would begin a timeout.
+        # The free end takes as long to reach a target as has passed since the target before, here since time 0. Set at
+        # half the remaining time, the target is reached at the original time. As a parameter, since a target message
+        # would start a timeout.
         yield {"t": (tied.end_ns - now_ns) // 2 / 1e9, "set": {"string.target": tied.target.tolist()}}
     if tied.release_ns is not None:
         yield {"t": (tied.release_ns - now_ns) / 1e9, "string": "release"}
@@ -241,7 +246,7 @@ def _load_entries(simulation: Simulation) -> Iterator[Entry]:
         elif surface and load.mesh_point and vector(surface.inward_normal(load.mesh_point)) == load.mesh_normal:
             entry["push"] = load.force[0]
         else:
-            # Along the normal of a mesh that has been changed for another one.
+            # Along the normal of a mesh that was replaced since.
             entry |= {"force": load.own_force(simulation.setup.body).tolist(), "axes": "body"}
         if acting.slot > UNNAMED_SLOT:
             entry["slot"] = slot_name(acting.slot)
@@ -252,7 +257,7 @@ def _load_entries(simulation: Simulation) -> Iterator[Entry]:
 
 
 def _thruster_entries(simulation: Simulation) -> Iterator[Entry]:
-    """What the thrusters push with, and again without those that stop by their least on-time or the timeout."""
+    """The present thruster forces, and an entry at each time at which some stop by minimum on-time or timeout."""
     control, now_ns = simulation.thrusters, simulation.time_ns
     pushes = control.pushes
     if not any(push.force for push in pushes):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Recordings: the MCAP files that we write and that ``ros2 bag record`` writes, alone or in a folder, read up to where
-they were cut, and the runs in them: a reset starts simulated time again, and a recording holds it all in one. What is
-whole of a cut file is written anew.
+"""Reading of MCAP recordings, written by this package or by ``ros2 bag record``, as a file or a folder; truncated files
+are read up to the truncation, and can be repaired. A recording holds one or more runs, separated by resets, at which
+simulated time starts again.
 
-A file is read once for all but states and events, which may be many: they are read again where they are needed.
+States and events may be many: they are read from the file when they are needed. All else is read once.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ except ImportError:
 ROS_PROFILE = "ros2"
 
 MAX_RATIO, SPARE = 200, 64_000_000
-"""Bytes that chunks hold unpacked, for each byte of the file and beyond: our states shrink to a sixteenth, and what is
-made to fill the memory to a thirty thousandth.
+"""Limit of the uncompressed size of all chunks: MAX_RATIO times the file size plus SPARE [bytes]. Our states compress
+by a factor of 16, a decompression bomb by 30,000.
 """
 
 RRD_MAGIC = b"RRF2"
 
 _RECORD_HEAD = struct.Struct("<BQ")
-"""Opcode and length of what follows."""
+"""Opcode and length of a record."""
 
 
 def check_session(path: Path) -> None:
-    """Raise InputError for a session that isn't there, or is an .rrd file, which is never read back."""
+    """Raise InputError if the session doesn't exist or is an .rrd file, which is never read back."""
     if not path.exists():
         raise InputError("session", f"there is no file and no folder {str(path)!r}")
     head = b""
-    # A folder, or what is refused when it is read.
+    # Ignores errors of folders, and of unreadable files, which are refused when they are read.
     with suppress(OSError), open(path, "rb") as stream:
         head = stream.read(len(RRD_MAGIC))
     if head == RRD_MAGIC or path.suffix == ".rrd":
@@ -59,8 +59,8 @@ def check_session(path: Path) -> None:
 
 
 def repair(path: Path, repaired: Path) -> None:
-    """Write a finished file with all that is whole in a recording that was cut. Raises InputError for a place that
-    can't be written to, and for what is no recording or was damaged inside.
+    """Write a complete file with the intact records of a truncated recording. Raises InputError if the output can't be
+    written, or if the input is not a recording or is damaged.
     """
     check_session(path)
     if path.is_dir():
@@ -93,8 +93,8 @@ def repair(path: Path, repaired: Path) -> None:
 
 
 def _whole_records(path: Path) -> Iterator[records.McapRecord]:
-    """The records of a file, chunks opened, up to its end or to where it was cut: then no Footer is among them. Raises
-    InputError for what is no MCAP file, or was damaged inside.
+    """Yield the records of a file, chunks unpacked, up to its end or its truncation; a truncated file gives no Footer.
+    Raises InputError for a file that isn't MCAP or is damaged.
     """
     known: set[int] = set()
     try:
@@ -121,8 +121,8 @@ def _whole_records(path: Path) -> Iterator[records.McapRecord]:
                 yield record
             if footer is not None:
                 yield footer
-        except Exception as error:  # the library lets through whatever cut or damaged bytes lead to
-            # Cut is what isn't as long as it says.
+        except Exception as error:  # the library raises various exceptions for truncated or damaged data
+            # The file is truncated, not damaged, if its last record is shorter than the length that it states.
             stream.seek(end)
             head = stream.read(_RECORD_HEAD.size)
             cut = len(head) < _RECORD_HEAD.size or end + len(head) + _RECORD_HEAD.unpack(head)[1] > path.stat().st_size
@@ -133,13 +133,13 @@ def _whole_records(path: Path) -> Iterator[records.McapRecord]:
 
 
 def _unpacked(reader: StreamReader, left: int) -> Iterator[records.McapRecord]:
-    """The records that are read, chunks opened that hold no more than ``left`` bytes together."""
+    """Yield the reader's records, chunks unpacked; raises ValueError if all chunks together exceed ``left`` bytes."""
     for record in reader.records:
         if not isinstance(record, records.Chunk):
             yield record
             continue
         left -= record.uncompressed_size
-        # The library takes a frame's own word for its size, where that has one.
+        # The library trusts the content size that a zstd frame states, if any, so it must be checked, too.
         if left < 0 or (
             record.compression == "zstd" and zstandard.frame_content_size(record.data) > record.uncompressed_size
         ):
@@ -148,7 +148,7 @@ def _unpacked(reader: StreamReader, left: int) -> Iterator[records.McapRecord]:
 
 
 def _files(path: Path) -> list[Path]:
-    """The files of a bag in their order, which are numbered where it was split; raises InputError."""
+    """The files of a bag in order; those of a split bag are numbered. Raises InputError."""
     if not path.is_dir():
         return [path]
     files = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
@@ -159,7 +159,7 @@ def _files(path: Path) -> list[Path]:
 
 
 def _all_records(path: Path) -> Iterator[tuple[str, str, records.McapRecord]]:
-    """The records of a recording's files in their order: topic and type of a message or channel, and the record."""
+    """Yield the records of all files in order, each as topic and type (of a message or channel) and record."""
     for file in _files(path):
         schemas: dict[int, str] = {}
         channels: dict[int, tuple[str, str]] = {}
@@ -175,20 +175,21 @@ def _all_records(path: Path) -> Iterator[tuple[str, str, records.McapRecord]]:
 
 
 def has_scene(path: Path) -> bool:
-    """Whether a bag contains a scene, as those recorded by this package do; raises InputError."""
+    """Whether a bag contains a scene, as recordings by this package do; raises InputError."""
     return any(
         isinstance(record, records.Message) and topic.rpartition("/")[2] == "scene" and kind == READ["scene"]
         for topic, kind, record in _all_records(path)
     )
 
 
-# What a file holds of a body, but for its states and events
+# Content of a file, without states and events
 
 
 @dataclass
 class _Span:
-    """Messages of a state topic in a row whose stamps don't go back. begin: the number of the first, from 0; back: the
-    stamp went back there. first_ns, end_ns: first and last stamp; states: how many different ones.
+    """Consecutive messages of a state topic whose stamps don't decrease. begin: number of the first message, from 0;
+    back: the place in the file if the stamp decreased there. first_ns, end_ns: first and last stamp; states: number of
+    different stamps.
     """
 
     begin: int
@@ -200,8 +201,8 @@ class _Span:
 
 @dataclass
 class _Cut:
-    """Where a run may begin: log [ns], and how many messages of each state topic and how many events lie before it in
-    the file.
+    """A place in the file where a run may begin. log: log time [ns]; counts: number of messages before it by state
+    topic, and of events.
     """
 
     log: int
@@ -210,10 +211,10 @@ class _Cut:
 
 @dataclass
 class _Body:
-    """Topics below one prefix. names: those declared, without the prefix. scenes: (log [ns], text). spans: by state
-    topic; counts: of messages, by topic; cut: state topics since whose last message a reset has come. undecodable: what
-    is wrong with the first event that can't be decoded; timeouts: of what, as keys of their events; offset: a clock was
-    followed.
+    """Topics with one prefix. names: declared topics, without the prefix. scenes: (log time [ns], text). spans: by
+    state topic; counts: number of messages by topic; cut: state topics without a message since the last reset.
+    undecodable: error of the first event that can't be decoded; timeouts: kinds of timeouts, as keys of their events;
+    offset: the node followed a clock.
     """
 
     names: set[str] = field(default_factory=set)
@@ -227,7 +228,7 @@ class _Body:
     offset: bool = False
 
     def take(self, name: str, topic: str, log: int, data: bytes) -> None:
-        """A message; raises InputError for one that can't be decoded."""
+        """Process a message; raises InputError if it can't be decoded."""
         if name == "scene":
             self.scenes.append((log, read_string(data, topic)))
         elif name == "events":
@@ -239,7 +240,7 @@ class _Body:
         kind, content = "", dict[str, Any]()
         try:
             _, kind, content = decode_event(line, self.counts["events"] + 1)
-        except InputError as error:  # said where this body is the one that counts
+        except InputError as error:  # raised later if this body is the chosen one
             self.undecodable = self.undecodable or error
         if kind == "timeout":
             self.timeouts.update(content)
@@ -263,8 +264,8 @@ class _Body:
 
 @dataclass
 class _Content:
-    """What is whole in a recording: bodies by prefix, types by topic, attachments (name, bytes), metadata by name.
-    complete: it was finished properly.
+    """Intact content of a recording: bodies by prefix, types by topic, attachments (name, bytes), metadata by name.
+    complete: all files were closed properly.
     """
 
     bodies: dict[str, _Body] = field(default_factory=dict)
@@ -295,19 +296,19 @@ def _read(path: Path) -> _Content:
     files = len(_files(path))
     content.complete = footers == files
     if MADE_WITH in content.metadata and files > 1:
-        # Ours are never split: these would be taken for one flight.
+        # Recordings by this package are never split, so these are several flights.
         raise InputError("session", str(path), f"one of the {files} recordings in this folder")
     if not (content.types or content.attachments or content.metadata):
         raise InputError("session", str(path), "a recording with data; this one ends before its first chunk")
     return content
 
 
-# States and events, read again
+# States and events
 
 
 class _Reader:
-    """Messages of one body in a recording, by run. Runs that are read in their order take one pass over the file; what
-    is kept in memory is by how much one topic is ahead of another in it.
+    """Reads messages of one body from a recording, by run. Runs read in order take one pass over the file; memory holds
+    only the messages by which one topic is ahead of another in the file.
 
     names: topics without their prefix, by topic.
     """
@@ -323,11 +324,11 @@ class _Reader:
         self._waiting: dict[str, deque[tuple[str, bytes]]] = {name: deque() for name in self._read}
 
     def states(self, ranges: Mapping[str, range]) -> Iterator[tuple[int, str, list[float]]]:
-        """Stamp [ns], name and row of the messages with these numbers by state topic, in the order of time. Raises
-        InputError for one that can't be decoded.
+        """Stamp [ns], topic name and row of the messages in these ranges of numbers by state topic, in order of time.
+        Raises InputError for a message that can't be decoded.
         """
         self._begin(ranges)
-        # Stable: of one time in the order of the topics.
+        # The merge is stable: messages of the same time are in the order of the topics.
         return heapq.merge(*(self._states(name, len(own)) for name, own in ranges.items()), key=itemgetter(0))
 
     def _states(self, name: str, count: int) -> Iterator[tuple[int, str, list[float]]]:
@@ -336,14 +337,14 @@ class _Reader:
             yield stamp_ns, name, row
 
     def events(self, numbers: range) -> Iterator[tuple[int, str]]:
-        """time_ns and line of the events with these numbers."""
+        """Time [ns] and line of the events with these numbers."""
         self._begin({"events": numbers})
         for number, (topic, data) in enumerate(self._messages("events", len(numbers)), 1):
             line = read_string(data, topic)
             yield decode_event(line, number)[0], line
 
     def _begin(self, ranges: Mapping[str, range]) -> None:
-        """Come to the beginnings of these ranges; ends what was read before."""
+        """Seek to the beginnings of these ranges; invalidates iterators returned before."""
         if any(own.start < self._read[name] - len(self._waiting[name]) for name, own in ranges.items()):
             self._rewind()
         for name, own in ranges.items():
@@ -356,11 +357,11 @@ class _Reader:
         waiting = self._waiting[name]
         for _ in range(count):
             while not waiting:
-                self._read_on()
+                self._read_next()
             yield waiting.popleft()
 
-    def _read_on(self) -> None:
-        """Come to the next message of one of the topics."""
+    def _read_next(self) -> None:
+        """Read the next message of one of the topics."""
         for topic, message_type, record in self._records:
             name = self._names.get(topic)
             if name is None or not isinstance(record, records.Message) or READ[name] != message_type:
@@ -373,7 +374,7 @@ class _Reader:
 
 
 class _RunStates(States):
-    """The states of one run. ranges: the numbers of its messages, by topic; spans: of the whole body."""
+    """The states of one run. ranges: numbers of its messages by topic; spans: spans of the whole body."""
 
     def __init__(self, reader: _Reader, ranges: Mapping[str, range], spans: Mapping[str, list[_Span]]) -> None:
         self._reader = reader
@@ -390,7 +391,7 @@ class _RunStates(States):
 
 
 class _RunEvents:
-    """The events of one run (``recorded_session.Events``). numbers: theirs, among all of the body."""
+    """The events of one run (``recorded_session.Events``). numbers: their numbers among all events of the body."""
 
     def __init__(self, reader: _Reader, numbers: range) -> None:
         self._reader, self._numbers = reader, numbers
@@ -405,13 +406,15 @@ class _RunEvents:
 # Runs
 
 RESET_WINDOW_NS = 1_000_000_000
-"""Topics reach a recorder one by one: a reset's line and the first state after it lie this close in its log."""
+"""Longest time between a reset's event and the first state after it in the log [ns]; topics reach a recorder
+separately.
+"""
 
 
 def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
-    """The runs of one body in a recording, in their order; ``node`` chooses the body where there are several.
+    """The runs of one body in a recording, in order; ``node`` selects the body if there are several.
 
-    Raises InputError for what isn't there, is no recording or holds no body, and for messages that can't be decoded.
+    Raises InputError if the recording doesn't exist, isn't one or has no body, and for messages that can't be decoded.
     """
     path = Path(path)
     check_session(path)
@@ -425,7 +428,7 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
         raise InputError("session", str(path), accepted)
     scenes = sorted(body.scenes, key=itemgetter(0))
     names = [name for name in PROJECTIONS if body.counts[name]]
-    # A topic without messages may be whole: nobody did anything. A latched one is never without.
+    # The topic events may be complete without messages; the latched topic scene always has one.
     there = {"scene": bool(scenes), "events": "events" in body.names, "pose": bool(names)}
     resets = body.resets
     if not body.counts["events"] and names:
@@ -439,15 +442,15 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
         logged_timeouts=body.timeouts,
         folder=path.absolute().parent,
     )
-    # Our own recorder writes all topics in the order in which they were told; another one gets each topic by itself.
+    # Our recorder writes all topics in one order; other recorders receive each topic separately.
     cuts = {name: _cuts(name, body, [] if ours else body.spans[name], resets) for name in names}
     cuts["events"] = [0, *(reset.counts["events"] for reset in resets), body.counts["events"]]
     state_reader = _Reader(path, {f"{prefix}/{name}": name for name in names})
     event_reader = _Reader(path, {f"{prefix}/events": "events"})
     runs = []
     for k, begin in enumerate([None, *(reset.log for reset in resets)]):
-        # The scene in force at a reset; at the recording's own start the first one that it holds. Logged at simulated
-        # time, a run's first scene comes before those that it is changed to at time 0.
+        # The scene at the time of the reset, or the first scene for the start of the recording. Among scenes logged at
+        # the reset's own time, the first is the run's start, and the others are changes at time 0.
         before = [text for log, text in scenes if begin is not None and log < begin]
         at_reset = [text for log, text in scenes if log == begin]
         in_force = [*at_reset[:1], *before[-1:], *(text for _, text in scenes[:1])]
@@ -466,7 +469,7 @@ def read_runs(path: str | Path, node: str = "") -> list[RecordedSession]:
 
 
 def _prefix(content: _Content, path: str, node: str) -> str:
-    """The prefix of the topics' names: the node's name after a slash."""
+    """The prefix of the topic names: a slash and the node's name."""
     flown = sorted(p for p, body in content.bodies.items() if body.names & {"scene", "events"})
     flown = flown or sorted(content.bodies)
     if node:
@@ -483,16 +486,16 @@ def _prefix(content: _Content, path: str, node: str) -> str:
 
 
 def _cuts(name: str, body: _Body, spans: list[_Span], resets: list[_Cut]) -> list[int]:
-    """Where a topic's messages of each run begin, and the end: at the resets' places in the file, or at the restarts of
-    the stamps among ``spans``.
+    """Numbers of a topic's messages at which the runs begin, and their total: at the resets' places in the file, or
+    where the stamps in ``spans`` restart.
     """
     restarts = [(span.begin, span.back.log) for span in spans if span.back]
-    # One each, however late the topic was logged.
+    # One restart per reset, even if the topic was logged late.
     if resets and len(restarts) == len(resets):
         return [0, *(begin for begin, _ in restarts), body.counts[name]]
     cuts = [0]
     for reset in resets:
-        # A reset of a body at time 0 shows in no stamp: there the log decides, where no restart is near.
+        # A reset at time 0 doesn't decrease a stamp: without a restart nearby, the log time decides.
         near = [(abs(log - reset.log), begin) for begin, log in restarts if begin >= cuts[-1]]
         away, begin = min(near, default=(RESET_WINDOW_NS, 0))
         cuts.append(max(cuts[-1], begin if away < RESET_WINDOW_NS else reset.counts[name]))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Verify a recording: check its chain of events, recompute every state bit for bit, and find the first difference. It
-is read as the new computation comes to it, so that memory doesn't grow with it.
+"""Verification of a recording: checks the hash chain of its events, recomputes every state bit for bit, and finds the
+first difference. The recording is read along with the resimulation, so memory doesn't grow with its length.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from .recorded_session import Events, RecordedSession, Resimulation, decode_even
 
 
 class NotVerifiableError(InputError):
-    """The recording holds no start and no reset to compute it from, or no states to compare."""
+    """The recording has no start or reset from which to compute, or no states to compare."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """The first place where the recording and the new computation part. command: the last one that acted before it,
-    with its number from 1; empty where none did, or where the difference is in the commands. tampered: a command was
-    changed after it was recorded, which no machine or version explains.
+    """The first difference between recording and resimulation. command: the last command that acted before it, with its
+    number from 1; empty if none did, or if the difference is in the commands. tampered: a command was changed after it
+    was recorded, which differences of machine or versions can't explain.
     """
 
     time_ns: int
@@ -43,7 +43,7 @@ class Difference:
 
 
 class _BrokenChainError(Exception):
-    """A recorded line doesn't fit its hash: its number, time [ns] and text."""
+    """A recorded event doesn't match its hash. number, time_ns, line: of the event."""
 
     def __init__(self, number: int, time_ns: int, line: str) -> None:
         super().__init__()
@@ -51,10 +51,10 @@ class _BrokenChainError(Exception):
 
 
 class _Recorded:
-    """The recorded lines as the new computation reads them, each checked against the chain.
+    """The recorded events as the resimulation reads them, each checked against the hash chain.
 
-    waiting: (number from 1, time_ns, line) of those that were read and haven't been computed yet. compared: how many
-    were alike.
+    waiting: (number from 1, time_ns, line) of events that were read but not computed yet. compared: number of the last
+    event that was equal.
     """
 
     def __init__(self, events: Events) -> None:
@@ -85,7 +85,7 @@ class _Recorded:
         return None
 
     def last_before(self, time_ns: int) -> str:
-        """The last command that acted before a time, later ones each time, with its number."""
+        """The last command that acted before this time, with its number; call with ascending times."""
         while self._acted and self._acted[0][1] < time_ns:
             number, _, line = self._acted.popleft()
             self._last_before = f"command {number}: {line}"
@@ -93,7 +93,7 @@ class _Recorded:
 
 
 class _Computed(Observer):
-    """Lines that the new computation has told, until they are compared."""
+    """Collects the event lines of the resimulation until they are compared."""
 
     takes = frozenset({Logged})
 
@@ -106,11 +106,11 @@ class _Computed(Observer):
 
 
 def verify(session: RecordedSession, progress: Callable[[float], None] = lambda _: None) -> Difference | None:
-    """Compare the chain of events, every event and every state with a new computation, bit for bit; of one instant the
-    last state of each topic.
+    """Compare every event and every state with a resimulation, bit for bit, and check the events' hash chain. Of states
+    of the same time, the last one of each topic is compared.
 
-    Returns the first difference, or None. Raises InputError for a session that can't be decoded, or lacks what a check
-    needs: the topics named, or its beginning.
+    Returns the first difference, or None. Raises InputError for a session that can't be decoded or is incomplete:
+    topics or its beginning are missing.
     """
     states = session.states
     if not states.topics:
@@ -130,7 +130,9 @@ def verify(session: RecordedSession, progress: Callable[[float], None] = lambda 
 
 
 def _switched_on_at_0(session: RecordedSession) -> bool:
-    """The change that begins a recording is told in it: at time 0 too, behind what was done before."""
+    """Whether the recording was switched on at time 0 after other events. The change that starts a recording is one of
+    its events.
+    """
     for number, (_, line) in enumerate(session.events, 1):
         time_ns, kind, content = decode_event(line, number)
         if time_ns:
@@ -160,7 +162,7 @@ def _first_difference(
             return difference
         if again.simulation.failure and again.simulation.time_ns != time_ns:
             return Difference(time_ns, again.simulation.failure)
-        # At its own time a command acts after the state.
+        # A command acts after the state published at its time.
         command = recorded.last_before(time_ns)
         for name, row in {name: row for _, name, row in published}.items():
             number += 1
@@ -181,8 +183,8 @@ def _first_difference(
 
 
 def made_with_table(session: RecordedSession) -> list[tuple[str, str, str]]:
-    """What the recording says that it was made with, and the same here: (name, recorded, here); "none" where a package
-    isn't installed. Empty for a recording that doesn't say.
+    """Processor and package versions of the recording and of this machine: (name, recorded, here); "none" if a package
+    isn't installed. Empty if the recording doesn't have them.
     """
     here = {"cpu": cpu(), **versions(*(name for name in session.made_with if name != "began"))}
     return [(name, was, here.get(name, "none")) for name, was in session.made_with.items() if name != "began"]
@@ -191,7 +193,7 @@ def made_with_table(session: RecordedSession) -> list[tuple[str, str, str]]:
 def _advance(
     again: Resimulation, time_ns: int, computed: _Computed, recorded: _Recorded
 ) -> tuple[Difference | None, FloatArray]:
-    """The state computed at ``time_ns``, or the first difference in the commands up to there."""
+    """Advance to ``time_ns``; returns the first difference in the commands up to there, or None, and the state row."""
     refused = None
     try:
         row = again.advance(time_ns)
@@ -207,7 +209,9 @@ def _advance(
 
 
 def _difference_now(again: Resimulation, number: int, name: str, recorded: FloatArray, computed: FloatArray) -> str:
-    """See ``_row_difference``. While time stands, states are published behind commands of that instant, too."""
+    """See ``_row_difference``. While paused, states were also published after commands of the same time, so these are
+    applied one by one until a state matches.
+    """
     found = difference = _row_difference(number, name, recorded, computed)
     while difference and again.act_next():
         difference = _row_difference(number, name, recorded, again.simulation.state.row)
@@ -215,7 +219,7 @@ def _difference_now(again: Resimulation, number: int, name: str, recorded: Float
 
 
 def _row_difference(number: int, name: str, recorded: FloatArray, computed: FloatArray) -> str:
-    """How the ``number``-th state differs, by the variable that differs most; empty where it doesn't."""
+    """Describe how the ``number``-th state differs, by the variable that differs most; empty if it doesn't."""
     if name:
         computed = np.array(PROJECTIONS[name](computed.tolist()))
     if computed.tobytes() == recorded.tobytes():

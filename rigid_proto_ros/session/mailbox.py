@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the stepping thread leaves events, and observers whose own thread fetches and writes them in order."""
+"""A queue from the stepping thread to a writing thread, and observers that write events on such a thread, in order."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from contextlib import suppress
 from ..simulation.observer import Event, GhostPublished, Observer, Published
 
 MOST_WAITING = 65536
-"""Events that may wait, a minute of states at 1 kHz. Then the stepping thread waits for the other, which only a run
-faster than real time reaches: the file keeps every state, and memory stays bounded.
+"""Capacity of the queue in events, a minute of states at 1 kHz. When it is full the stepping thread waits, which
+happens only in runs faster than real time: no state is lost, and memory stays bounded.
 """
 
 BATCH = 4096
-"""Events that are fetched at a time."""
+"""Largest number of events taken at a time."""
 
 STALLED_S = 0.9
-"""A write that takes longer is told of: a report comes once a second, and a stalled file is to be told within two."""
+"""A write that takes longer than this [s] is reported; with a report each second, within two seconds."""
 
 LOOK_AGAIN_S = 0.002
-"""How often a producer that found no place looks for one."""
+"""Polling period of a producer that waits for space in the queue [s]."""
 
 PATIENCE_S = 10.0
-"""A writer that fetches nothing for so long, with all places taken or at the end, won't: the simulation goes on, or
-ends, and what waits is lost."""
+"""A consumer that makes no progress for this long [s], while the queue is full or being closed, is considered stuck:
+the simulation continues, or ends, and queued events are lost.
+"""
 
-Noted = tuple[int, Event]
-"""An event and when it was told: the wall's time [ns], as it goes on from when the mailbox was made. It is never set
-back, so that what is sorted by it keeps its order.
+TimedEvent = tuple[int, Event]
+"""An event and the time at which it was queued: the wall time [ns] when the mailbox was made plus the monotonic time
+since, so it never decreases.
 """
 
 _logger = logging.getLogger(__name__)
 
 
 class Mailbox:
-    """One producer, one consumer. ``put`` takes about two microseconds, and holds no lock: a signal's exception may be
-    raised within it, and within a Condition, as of a queue.Queue, that can leave the lock taken for ever.
+    """A queue with one producer and one consumer. ``put`` takes about two microseconds and holds no lock: a signal's
+    exception may be raised within it, and within a Condition, as in queue.Queue, it could leave the lock held forever.
 
-    on_given_up() is called, from the producer's thread, when the consumer is stuck and everything is thrown away from
-    then on.
+    on_given_up() is called on the producer's thread when the consumer is stuck; from then on all events are discarded.
     """
 
     def __init__(self, on_given_up: Callable[[], None] = lambda: None) -> None:
@@ -54,26 +54,26 @@ class Mailbox:
         self._moved_at = time.monotonic()
         self._wall_offset_ns = time.time_ns() - time.monotonic_ns()
         self._idle = False
-        self._waiting: deque[Noted] = deque()
+        self._waiting: deque[TimedEvent] = deque()
         self._wake: queue.SimpleQueue[None] = queue.SimpleQueue()
 
     def put(self, event: Event) -> None:
-        """Take an event; a state, whose row is reused, is copied."""
+        """Queue an event; copies a state's row, which the simulation reuses."""
         if self._given_up or self.closed:
             return
         if isinstance(event, Published | GhostPublished):
             event = type(event)(event.time_ns, event.row.copy())
-        noted = time.monotonic_ns() + self._wall_offset_ns, event
-        if len(self._waiting) >= MOST_WAITING and not self._has_place():
+        timed = time.monotonic_ns() + self._wall_offset_ns, event
+        if len(self._waiting) >= MOST_WAITING and not self._has_space():
             self._given_up = True
             self._on_given_up()
             return
-        self._waiting.append(noted)
+        self._waiting.append(timed)
         if len(self._waiting) >= BATCH:
             self.wake()
 
-    def _has_place(self) -> bool:
-        """Wait for a place; False when there is none within PATIENCE_S."""
+    def _has_space(self) -> bool:
+        """Wait for space in the queue; False if there is none within PATIENCE_S."""
         end_s = time.monotonic() + PATIENCE_S
         while (full := len(self._waiting) >= MOST_WAITING) and time.monotonic() < end_s:
             time.sleep(LOOK_AGAIN_S)
@@ -81,11 +81,11 @@ class Mailbox:
 
     @property
     def waiting(self) -> int:
-        """How many events wait."""
+        """Number of queued events."""
         return len(self._waiting)
 
-    def take(self) -> Iterator[list[Noted]]:
-        """What waits now, not what arrives meanwhile, BATCH events at most a time."""
+    def take(self) -> Iterator[list[TimedEvent]]:
+        """Yield the events queued now, not those that arrive meanwhile, in batches of at most BATCH."""
         rest = len(self._waiting)
         while rest:
             self.moved()
@@ -94,11 +94,11 @@ class Mailbox:
             rest -= count
 
     def moved(self) -> None:
-        """The consumer got something done: as long as it does, a disk is slow, or the machine busy, and no more."""
+        """Record progress of the consumer; while it makes progress it is slow, but not stuck."""
         self._moved_at = time.monotonic()
 
     def wait(self, seconds: float) -> None:
-        """Return after ``seconds``, or at once when the mailbox is filling up, is closed, or on ``wake``."""
+        """Wait for ``seconds``, or until BATCH events are queued, ``close`` or ``wake``."""
         self._idle = True
         with suppress(queue.Empty):
             self._wake.get(timeout=seconds)
@@ -107,7 +107,9 @@ class Mailbox:
 
     @property
     def stalled(self) -> str:
-        """Says that the consumer has got nothing done for longer than STALLED_S; empty while it does, or waits."""
+        """A message if the consumer has made no progress for longer than STALLED_S; empty otherwise or if
+        it is idle.
+        """
         stuck_s = 0.0 if self._idle else time.monotonic() - self._moved_at
         return "" if stuck_s < STALLED_S else f"nothing could be written for {stuck_s:.1f} s"
 
@@ -117,24 +119,24 @@ class Mailbox:
             self._wake.put(None)
 
     def close(self) -> None:
-        """Nothing more is taken; what is inside can still be fetched."""
+        """Refuse further events; queued events can still be taken."""
         self.closed = True
         self.moved()
         self.wake()
 
     def emptied_by(self, thread: threading.Thread) -> bool:
-        """Wait, after ``close``, for the end of the consumer's thread; False when it does nothing for PATIENCE_S."""
+        """After ``close``, wait for the consumer's thread to end; False if it makes no progress for PATIENCE_S."""
         while thread.is_alive() and (rest_s := self._moved_at + PATIENCE_S - time.monotonic()) > 0.0:
             thread.join(rest_s)
         return not thread.is_alive()
 
 
 class WritingObserver(Observer):
-    """An observer that writes what it is told on a thread of its own: every ``period_s``, and at the end. What goes
-    wrong there doesn't reach the flight.
+    """An observer that writes its events on its own thread, every ``period_s`` and at the end. Errors of writing don't
+    affect the simulation.
 
-    place: what it writes to, for its messages. on_error gets one line when it has stopped because nothing can be
-    written, from another thread; ``error`` keeps it. A subclass starts ``_thread`` when it is ready.
+    place: the file or address that it writes to, for messages. on_error(line) is called, on another thread, when
+    writing has failed for good; ``error`` keeps the line. A subclass starts ``_thread`` when it is ready.
     """
 
     purpose = "recording"
@@ -143,11 +145,11 @@ class WritingObserver(Observer):
     def __init__(self, place: str, on_error: Callable[[str], None] | None) -> None:
         self.error = ""
         self.place, self._on_error = place, on_error or _logger.error
-        self._mailbox = Mailbox(lambda: self._tell_end("nothing can be written to the disk any more"))
+        self._mailbox = Mailbox(lambda: self._report_failure("nothing can be written to the disk any more"))
         self._thread = threading.Thread(target=self._write_until_closed, name=self.purpose, daemon=True)
 
     def on(self, event: Event) -> None:
-        """Take an event from the stepping thread; a state is copied."""
+        """Queue an event, on the stepping thread; a state is copied."""
         if type(event) in self.takes:
             self._mailbox.put(event)
 
@@ -157,15 +159,15 @@ class WritingObserver(Observer):
             return
         self._mailbox.close()
         if not self._mailbox.emptied_by(self._thread):
-            self._tell_end("the last states could not be written")
+            self._report_failure("the last states could not be written")
 
     @property
     def stalled(self) -> str:
-        """Says that what is written isn't taken; empty while it is."""
+        """A message if writing is stalled; empty otherwise."""
         stalled = "" if self.error or not self._thread.is_alive() else self._mailbox.stalled
         return stalled and f"{self.purpose} {self.place}: {stalled}"
 
-    def _tell_end(self, reason: str) -> None:
+    def _report_failure(self, reason: str) -> None:
         self.error = ": ".join(filter(None, (f"{self.purpose} stopped", self.place, reason)))
         self._on_error(self.error)
 
@@ -176,7 +178,7 @@ class WritingObserver(Observer):
         while not closing:
             closing = self._mailbox.closed
             try:
-                self._write_what_waits()
+                self._write_waiting()
                 if closing:
                     self._finish()
             except Exception as error:
@@ -184,14 +186,14 @@ class WritingObserver(Observer):
             if not closing:
                 self._mailbox.wait(self.period_s)
 
-    def _write_what_waits(self) -> None:
-        """Write what is in the mailbox, or throw it away where nothing can be written any more."""
+    def _write_waiting(self) -> None:
+        """Write the events in the mailbox, or discard them after a failure."""
         raise NotImplementedError
 
     def _finish(self) -> None:
-        """Everything has been written."""
+        """Close the output, after all events have been written."""
         raise NotImplementedError
 
     def _give_up(self, error: Exception) -> None:
-        """Writing has failed: go on without."""
+        """Handle a failed write: release the output and continue without it."""
         raise NotImplementedError

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The observer that records a flight as an MCAP file: the node's topics as a bag has them, and the mesh's file inside.
+"""The observer that records a flight as an MCAP file: the node's topics, as in a bag, and the mesh file as an
+attachment.
 
-The stepping thread only copies into a mailbox; a thread of our own empties it, and ends a chunk each time, which is on
-disk then. All runs go into one file: a reset begins the next one, as in a bag of the topics.
+The stepping thread only queues events; a writing thread writes them, and ends a chunk each time, so that it is on disk.
+All runs are in one file: a reset starts the next one, as in a bag of the topics.
 """
 
 from __future__ import annotations
@@ -55,21 +56,23 @@ if TYPE_CHECKING:
     from mcap.writer import Writer
 
 DRAWN = (".obj", ".stl", ".glb", ".gltf", ".dae")
-"""Meshes that viewers of bags read."""
+"""Suffixes of mesh files that viewers of bags can read."""
 
 CHUNK_NS = 500_000_000
-"""Simulated time that a chunk holds at most: what a cut inside it loses, also in a run faster than the clock."""
+"""Largest simulated time in a chunk [ns], which is lost if the file is truncated inside it; for runs faster than real
+time.
+"""
 
 
 class McapObserver(WritingObserver):
-    """Records to ``path``; topics are named after the node, frames as its messages name them.
+    """Records to ``path``, with the topic and frame names of the node.
 
-    Messages are logged at the wall's time, as bags have it, or with ``simulated_log`` at simulated time, each run
-    behind the one before. files (name, bytes): meshes at hand, whose own files may be gone. Raises InputError where the
-    file can't be opened.
+    Messages are logged at wall time, as in bags, or with ``simulated_log`` at simulated time, each run after the one
+    before. files: (name, bytes) of available meshes, whose own files may be gone. Raises InputError if the file can't
+    be opened.
     """
 
-    period_s = 0.4  # what kill -9 loses of a recording
+    period_s = 0.4  # the part of a recording that kill -9 loses
     takes = frozenset({Published, Logged, Applied, BodyChanged, SceneChanged, Started, Reset, AccuracyFloor})
 
     def __init__(
@@ -101,8 +104,8 @@ class McapObserver(WritingObserver):
         self._thread.start()
 
     def _begin(self, node_name: str) -> Writer:
-        """The file with its topics declared; raises OSError."""
-        from mcap.writer import Writer  # needed by who records
+        """Start the file and declare its topics; raises OSError."""
+        from mcap.writer import Writer  # imported only when recording
 
         writer = Writer(self._stream)
         writer.start(profile="ros2")
@@ -126,7 +129,7 @@ class McapObserver(WritingObserver):
 
     # The writing thread
 
-    def _write_what_waits(self) -> None:
+    def _write_waiting(self) -> None:
         for events in self._mailbox.take():
             if self._writer is not None:
                 for wall_ns, event in events:
@@ -146,7 +149,7 @@ class McapObserver(WritingObserver):
             self._writer = None
             with suppress(OSError):
                 self._stream.close()
-            self._tell_end(getattr(error, "strerror", None) or f"{type(error).__name__}: {error}")
+            self._report_failure(getattr(error, "strerror", None) or f"{type(error).__name__}: {error}")
 
     def _write(self, writer: Writer, wall_ns: int, event: Event) -> None:
         if isinstance(event, Reset):
@@ -180,7 +183,7 @@ class McapObserver(WritingObserver):
                 self._body = setup.body
                 messages = [("inertia", inertia_bytes(time_ns, self._body_frame, setup.body)), *self._described()]
             case AccuracyFloor(time_ns, floor):
-                # It only rises within a run: the last one says all.
+                # The floor only rises within a run, so the last value is kept.
                 writer.flush()
                 writer.add_metadata(FLOOR.format(self._run), {"time_ns": str(time_ns), "floor": floor})
             case Started(scene=scene) | SceneChanged(scene=scene) if scene != self._scene:
@@ -193,7 +196,7 @@ class McapObserver(WritingObserver):
             self._attach_mesh(writer, log_time, event.scene)
 
     def _find_mesh(self, scene: str) -> None:
-        """Note the URI of the mesh that a scene names, if viewers read it."""
+        """Keep the URI of the scene's mesh if viewers can read it."""
         sha256 = mesh_sha256_of(scene)
         if sha256 == self._mesh_sha256:
             return
@@ -204,21 +207,21 @@ class McapObserver(WritingObserver):
                 self._mesh = path.absolute().as_uri()
 
     def _described(self) -> list[tuple[str, bytes]]:
-        """The body's description, if it is another one than the last."""
-        told = "" if self._body is None else description(self._body_frame, self._body, self._mesh)
-        if told == self._description:
+        """The message of the body's description if it has changed."""
+        text = "" if self._body is None else description(self._body_frame, self._body, self._mesh)
+        if text == self._description:
             return []
-        self._description = told
-        return [("robot_description", cdr.string(told))]
+        self._description = text
+        return [("robot_description", cdr.string(text))]
 
     def _attach_mesh(self, writer: Writer, log_time: int, scene: str) -> None:
-        """The file of the mesh that a scene names, once."""
+        """Attach the file of the scene's mesh, once."""
         sha256 = mesh_sha256_of(scene)
         if not sha256 or sha256 in self._attached:
             return
         self._attached.add(sha256)
         found = mesh_file(scene, self._files)
         if found is not None:
-            # The chunk before it declares the topics: from there on a cut file can be read.
+            # Ends the first chunk, which declares the topics, so that a file truncated later can be read.
             writer.flush()
             writer.add_attachment(0, log_time, found[0], "application/octet-stream", found[1])

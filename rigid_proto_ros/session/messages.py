@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The messages of a session: topics, types, definitions, and their bytes both ways. Knows neither ROS nor files.
+"""The messages of a session: topics, types, definitions, encoding and decoding. Independent of ROS and of files.
 
-A body's states go over ``pose``, ``twist`` and ``odom``; each is a row of doubles behind a stamp. ``PROJECTIONS`` says
-which numbers of a state row a topic carries, computed as the node computes them, so that a recording compares to the
-bit.
+A body's states are published on ``pose``, ``twist`` and ``odom``, each a stamp and a row of doubles. ``PROJECTIONS``
+computes a topic's row from a state row, exactly as the node does, so that a recording compares bit for bit.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ _SEPARATOR = "\n" + "=" * 80 + "\n"
 
 
 def _definition(*parts: str) -> str:
-    """A definition with those of the types inside it behind, as bags keep them."""
+    """A definition followed by those of its nested types, as bags store them."""
     return _SEPARATOR.join(parts) + "\n"
 
 
@@ -61,7 +60,7 @@ DEFINITIONS = {
         "geometry_msgs/TransformStamped[] transforms", _TRANSFORMED, _HEADER, _TIME, _TRANSFORM, _VECTOR, _QUATERNION
     ),
 }
-"""Message definitions (ros2msg) of the topics that we write."""
+"""Message definitions (ros2msg) of the recorded topics."""
 
 TOPICS = {
     "scene": "std_msgs/msg/String",
@@ -73,23 +72,23 @@ TOPICS = {
     "robot_description": "std_msgs/msg/String",
     "/tf": "tf2_msgs/msg/TFMessage",
 }
-"""Topics of a session that we write, below the node's name where they don't begin with /, and their types. The last two
-are for viewers of bags: a session is never read from them.
+"""Recorded topics of a session and their types; topics without a leading / are in the node's private namespace. The
+last two are for viewers of bags and are never read back.
 """
 
 TRANSFORM_NS = 33_333_333
-"""Simulated time, at least, between two transforms of a recording."""
+"""Shortest simulated time between two transforms of a recording [ns]."""
 
 STATE_DEPTH, EVENT_DEPTH = 10, 1000
-"""Messages that the node's publishers of states and of events keep for a slow reader."""
+"""Queue depths of the node's publishers of states and of events."""
 
 LATCHED = frozenset({"scene", "inertia", "robot_description"})
-"""Topics whose last message waits for subscribers that come later."""
+"""Topics whose last message is sent to later subscribers."""
 
 
 def offered_qos(name: str) -> str:
     """Quality of service of a topic's publisher in the node, as rosbag2 writes it into a channel's metadata
-    (``offered_qos_profiles``, format 9, of Jazzy): with it a replay of the bag latches what was latched.
+    (``offered_qos_profiles``, format 9, of Jazzy), so that a replay of the bag latches the same topics.
     """
     depth = 1 if name in LATCHED else STATE_DEPTH if name in PROJECTIONS else EVENT_DEPTH
     durability = "transient_local" if name in LATCHED else "volatile"
@@ -112,31 +111,31 @@ READ = {name: TOPICS[name] for name in ("scene", "events", "pose", "twist")} | {
 """Topics that a session is read from."""
 
 MADE_WITH = "rigid_proto_ros"
-"""Name of the metadata that say which processor and versions recorded."""
+"""Name of the metadata with the processor and the versions of the recording."""
 
 FLOOR = "accuracy_floor of run {}"
-"""Name of the metadata, by the run's number from 0, that say why it is held to less than its accuracy."""
+"""Name of the metadata, by the run's number from 0, with the reason why the run is held to less than its accuracy."""
 
 
 def pose_row(row: list[float]) -> list[float]:
-    """x, y, z, then the attitude xyzw."""
+    """(7,): position, then the attitude xyzw."""
     return row[:7]
 
 
 def twist_row(row: list[float]) -> list[float]:
-    """Velocity of the COM, then angular velocity, both in world axes."""
+    """(6,): velocity of the COM, then angular velocity, both in world axes."""
     return [*row[7:10], *rotate(*row[3:7], *row[10:13])]
 
 
 def odom_row(row: list[float]) -> list[float]:
-    """The pose, then velocity and angular velocity in body axes."""
+    """(13,): the pose, then velocity and angular velocity in body axes."""
     q = row[3:7]
     return [*row[:7], *rotate(-q[0], -q[1], -q[2], q[3], *row[7:10]), *row[10:13]]
 
 
 PROJECTIONS: dict[str, Callable[[list[float]], list[float]]] = {"pose": pose_row, "twist": twist_row, "odom": odom_row}
-"""What each state topic carries of a state row (13 floats), in the order of ``simulation/observer.py``'s
-``STATE_FIELDS``.
+"""Functions from a state row (13 floats, in the order of ``STATE_FIELDS`` in simulation/observer.py) to the row of each
+state topic.
 """
 
 _TWIST_FIELDS = tuple(f"{part}.{axis}" for part in ("linear", "angular") for axis in "xyz")
@@ -146,7 +145,7 @@ FIELDS = {
     "twist": _TWIST_FIELDS,
     "odom": (*STATE_FIELDS[:7], *_TWIST_FIELDS),
 }
-"""Names of the numbers of each projection, and of the state row itself."""
+"""Names of the elements of each topic's row, and of the state row (topic "")."""
 
 _DOUBLES = {"pose": 7, "twist": 6, "odom": cdr.ODOMETRY_DOUBLES}
 
@@ -184,14 +183,14 @@ def _undecodable(topic: str, message_type: str) -> InputError:
 
 
 def inertia_bytes(time_ns: int, body_frame: str, body: Body) -> bytes:
-    """A geometry_msgs/InertiaStamped: COM in scaled mesh coordinates, tensor about it in mesh axes."""
+    """A geometry_msgs/InertiaStamped: COM in scaled mesh coordinates, tensor about the COM in mesh axes."""
     (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = body.inertia.tolist()
     numbers = (body.mass, *body.center_of_mass.tolist(), ixx, ixy, ixz, iyy, iyz, izz)
     return cdr.stamped_doubles(time_ns, f"{body_frame}/mesh", numbers)
 
 
 def transform_bytes(time_ns: int, frames: tuple[str, str], pose: list[float]) -> bytes:
-    """A tf2_msgs/TFMessage of one transform: of the second frame in the first, pose (7,)."""
+    """A tf2_msgs/TFMessage of one transform: pose (7,) of the second frame in the first."""
     layout = cdr.Layout()
     layout.pack("I", 1)
     layout.pack("iI", *divmod(time_ns, 1_000_000_000))
@@ -202,7 +201,7 @@ def transform_bytes(time_ns: int, frames: tuple[str, str], pose: list[float]) ->
 
 
 def description(body_frame: str, body: Body, mesh: str) -> str:
-    """The body as URDF, for viewers: a link at its COM, drawn as the mesh that this URI names, if any."""
+    """The body as URDF, for viewers: a link with its origin at the COM, drawn as the mesh with this URI, if any."""
     (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = body.inertia.tolist()
     name, place = escape(body_frame, {'"': "&quot;"}), " ".join(map(str, (-body.center_of_mass).tolist()))
     scale = " ".join(map(str, body.scale.tolist()))
@@ -219,8 +218,8 @@ def description(body_frame: str, body: Body, mesh: str) -> str:
 
 
 def applied_bytes(time_ns: int, body_frame: str, load: Load, body: Body, attitude: Attitude) -> bytes:
-    """A geometry_msgs/WrenchStamped of a load that began to act while the body lay at ``attitude`` (4,) xyzw: in the
-    body's frame, whose origin is the COM and whose axes are those of the mesh.
+    """A geometry_msgs/WrenchStamped of a load that started to act at ``attitude`` (4,) xyzw, in the body frame: origin
+    at the COM, axes of the mesh.
     """
     force, torque, arm = load.force, load.torque, load.arm(body)
     if load.axes == "world":

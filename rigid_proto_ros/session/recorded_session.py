@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A recorded flight, in memory or in a file; the mesh that it flew, found by its hash; and the flight computed anew
-from its scene and its events, and told to an observer once more.
+"""A recorded flight, in memory or in a file: its states and events, its mesh, found by hash, and its resimulation from
+scene and events, also for an observer.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ from ..simulation.simulation import TIMEOUTS
 from .messages import PROJECTIONS
 
 ROUNDING = 1e-12
-"""What the way of a velocity into a topic's axes and back changes, of it and of 1."""
+"""Tolerance, relative to 1 + |velocity|, of converting a velocity to a topic's axes and back."""
 
 SAME = 1e-6
-"""[m, and of a quaternion's parts] How near a computed state must be to a recorded one to be the same."""
+"""Largest difference between equal poses [m, and of quaternion components]."""
 
 
 class Events(Protocol):
-    """The events of one run, read anew by each pass over them: (time [ns, simulated], line as logged), in order."""
+    """The events of one run in order: (simulated time [ns], line as logged). Each iteration reads them again."""
 
     def __len__(self) -> int: ...
 
@@ -50,12 +50,12 @@ class Events(Protocol):
 
 
 class States:
-    """The states of one run, read anew by each pass over them: time [ns, simulated], topic and row, in the order of
-    time. These are none.
+    """The states of one run in order of time: simulated time [ns], topic and row. Each iteration reads them again. This
+    base class has none.
 
-    Of a recording a row is what the topic published (``messages.PROJECTIONS``); of a run in memory the topic is "" and
-    the row the state's own, in ``simulation/observer.py``'s ``STATE_FIELDS`` order. topics: those with any states;
-    count: how many times there are; first_ns, end_ns: the first and the last.
+    In a recording, a row is what the topic published (``messages.PROJECTIONS``). In a run in memory, the topic is ""
+    and the row is the state row, in the order of ``STATE_FIELDS`` in simulation/observer.py. topics: topics with
+    states; count: number of different times; first_ns, end_ns: first and last time.
     """
 
     topics: tuple[str, ...] = ()
@@ -66,8 +66,8 @@ class States:
 
 
 class StateRows(States):
-    """States, or what one topic published of them, in memory: times (n,) int64 [ns, simulated], ascending, and rows
-    (n, k) float64.
+    """State rows, or the rows of one topic, in memory. times: (n,) int64 [ns, simulated], ascending; rows: (n, k)
+    float64.
     """
 
     def __init__(self, times: IntArray, rows: FloatArray) -> None:
@@ -84,15 +84,14 @@ class StateRows(States):
 
 @dataclass
 class RecordedSession:
-    """One run, as its recording holds it.
+    """One recorded run.
 
-    scene: the parameters at the run's start as a params file. events: (time_ns, JSON line) in order, lines as logged.
-    states: those that were published. complete: the file was finished properly. scenes: the texts of the scene topic
-    from the run's start on, in order. node_name: what stands before the topics' names. missing: topics that a check
-    would need. attachments: (name, bytes) of files inside; made_with: the processor, and versions by package;
-    accuracy_floor: why the motion is held to less than its accuracy, as an .mcap of ours says it; logged_timeouts:
-    of what the events have timeouts (simulation.TIMEOUTS), which those of earlier versions lack; folder: where the
-    session lies.
+    scene: the parameters at the run's start, as a parameter file. events: (time_ns, JSON line) in order, lines as
+    logged. states: the published states. complete: the file was closed properly. scenes: texts of the scene topic since
+    the run's start, in order. node_name: prefix of the topic names. missing: topics that verification needs and the
+    recording lacks. attachments: (name, bytes) of attached files; made_with: the processor, and versions by package;
+    accuracy_floor: why the motion is held to less than its accuracy, if recorded; logged_timeouts: kinds of timeouts
+    with events (simulation.TIMEOUTS), fewer in recordings of earlier versions; folder: the folder of the session.
     """
 
     scene: str = ""
@@ -110,12 +109,12 @@ class RecordedSession:
 
     @property
     def lines(self) -> list[str]:
-        """The event lines as logged, in memory."""
+        """The event lines as logged."""
         return [line for _, line in self.events]
 
     @property
     def mesh_sha256(self) -> str:
-        """Hash of the mesh's file that the run began with; empty without one."""
+        """SHA-256 of the mesh file at the run's start; empty without a mesh."""
         return mesh_sha256_of(self.scene)
 
     @property
@@ -124,18 +123,18 @@ class RecordedSession:
         return self.states.end_ns
 
     def state_rows(self) -> Iterator[tuple[int, FloatArray]]:
-        """Time [ns] and state row (13,) of every state, one after another; of a recording one a time, put together from
-        what was published, in which velocities that weren't are 0.
+        """Yield time [ns] and state row (13,) of every state. A recording gives one row per time, combined from its
+        topics; velocities that weren't published are 0.
         """
         for time_ns, published in groupby(self.states, key=itemgetter(0)):
-            shown = {}
+            rows = {}
             for _, topic, row in published:
                 if topic:
-                    shown[topic] = row
+                    rows[topic] = row
                 else:
                     yield time_ns, np.asarray(row)
-            if "pose" in shown or "odom" in shown:
-                yield time_ns, _put_together(shown)
+            if "pose" in rows or "odom" in rows:
+                yield time_ns, _combined(rows)
 
     @cached_property
     def _rows(self) -> StateRows:
@@ -149,17 +148,17 @@ class RecordedSession:
 
     @property
     def times(self) -> IntArray:
-        """Times (n,) [ns] of ``state_rows``, in memory from then on, as are ``rows``."""
+        """Times (n,) [ns] of ``state_rows``, cached in memory together with ``rows``."""
         return self._rows.times
 
     @property
     def rows(self) -> FloatArray:
-        """State rows (n, 13) of ``state_rows``."""
+        """Rows (n, 13) of ``state_rows``."""
         return self._rows.rows
 
     @cached_property
     def published(self) -> dict[str, StateRows]:
-        """What each topic published, in memory from then on."""
+        """Times and rows by topic, cached in memory."""
         found = {topic: (array("q"), array("d")) for topic in self.states.topics}
         for time_ns, topic, row in self.states:
             found[topic][0].append(time_ns)
@@ -170,23 +169,23 @@ class RecordedSession:
         }
 
 
-def _put_together(shown: dict[str, Sequence[float]]) -> FloatArray:
-    """A state row (13,) from what the topics published of one state."""
+def _combined(rows: dict[str, Sequence[float]]) -> FloatArray:
+    """A state row (13,) from the topics' rows of one state."""
     state = np.zeros(13)
-    if "odom" in shown:
-        odom = shown["odom"]
+    if "odom" in rows:
+        odom = rows["odom"]
         state[:7] = odom[:7]
         state[7:10], state[10:13] = rotate(*odom[3:7], *odom[7:10]), odom[10:13]
-    if "pose" in shown:
-        state[:7] = shown["pose"]
-    if "twist" in shown:
-        twist = shown["twist"]
+    if "pose" in rows:
+        state[:7] = rows["pose"]
+    if "twist" in rows:
+        twist = rows["twist"]
         state[7:10], state[10:13] = twist[:3], rotate_inverse(*state[3:7].tolist(), *twist[3:6])
     return state
 
 
 def decode_event(line: str, number: int) -> tuple[int, str, dict[str, Any]]:
-    """time_ns, kind and content of a line of the event log; raises InputError naming the event by number."""
+    """Time [ns], kind and content of a line of the event log; raises InputError with the event's number."""
     try:
         event = json.loads(line)
         time_ns, kind, content = event["time_ns"], event["kind"], event["content"]
@@ -198,8 +197,8 @@ def decode_event(line: str, number: int) -> tuple[int, str, dict[str, Any]]:
 
 
 def find_mesh(session: RecordedSession, name: str, sha256: str) -> Mesh:
-    """The mesh whose file has this hash: by its name, beside the session, or from the session's attachments. Raises
-    MeshError naming it.
+    """The mesh whose file has this SHA-256: searched by name, then in the session's folder, then in its attachments.
+    Raises MeshError.
     """
     places = [name]
     if session.folder is not None:
@@ -219,17 +218,17 @@ def find_mesh(session: RecordedSession, name: str, sha256: str) -> Mesh:
     )
 
 
-# Computed anew
+# Resimulation
 
 
 def recorded_parameters(session: RecordedSession) -> Parameters:
-    """The parameters that the session began with; those of the default where it has no scene."""
+    """The parameters at the session's start; the defaults if it has no scene."""
     scene = read_scene_text(session.scene, "the recorded scene").values if session.scene else {}
     return Parameters().replaced(scene)
 
 
 def session_scenario(session: RecordedSession) -> Scenario:
-    """The scenario that the session began with; the mesh by name if its content is the same, else the recorded one."""
+    """The scenario at the session's start, with the mesh of the recorded hash (``find_mesh``). Raises InputError."""
     if not session.scene:
         raise InputError("session", "the recording has no scene; give one with --scene FILE")
     values = read_scene_text(session.scene, "the recorded scene").values
@@ -240,42 +239,43 @@ def session_scenario(session: RecordedSession) -> Scenario:
 
 
 def mesh_finder(session: RecordedSession) -> Callable[[str], Mesh | None]:
-    """Called for each change of the mesh, one after another: the mesh of this name that was flown then, as the scenes
-    say, since a file may change while its name stays; None for a name that none speaks of.
+    """A function to call for each change of the mesh, in order: it returns the mesh of this name as recorded at that
+    change, by the hashes in the scenes, since a file's content may change under the same name; None for a name that
+    isn't in any scene.
     """
-    flown: list[tuple[str, str]] = []
+    recorded: list[tuple[str, str]] = []
     for scene in (session.scene, *session.scenes) if session.scenes else ():
         sha256 = mesh_sha256_of(scene)
         named = str(read_scene_text(scene, "a recorded scene").values.get("mesh", "")), sha256
-        if not flown or (sha256 and named != flown[-1]):
-            flown.append(named)
+        if not recorded or (sha256 and named != recorded[-1]):
+            recorded.append(named)
     place = 0
 
     def find(name: str) -> Mesh | None:
         nonlocal place
-        places = [k for k, (other, _) in enumerate(flown) if other == name]
+        places = [k for k, (other, _) in enumerate(recorded) if other == name]
         if not places:
             return None
-        # The next scene of this name, unless the mesh in force is set once more; the last one where scenes are missing.
+        # The next scene of this name, unless the present mesh is set again; the last one if scenes are missing.
         later = [k for k in places if k > place]
         if later and (place not in places or later[0] == place + 1):
             place = later[0]
         elif place not in places:
             place = places[-1]
-        return find_mesh(session, name, flown[place][1])
+        return find_mesh(session, name, recorded[place][1])
 
     return find
 
 
 _Waiting = tuple[int, str, dict[str, Any], Command | None, int]
-"""time_ns, kind, content, command (None for a mark) and number of an event."""
+"""Time [ns], kind, content, command (None for a mark) and number of an event."""
 
 
 def decoded_events(
     event_lines: Iterable[str], frames: tuple[str, str]
 ) -> Iterator[tuple[int, int, str, dict[str, Any], Command | None]]:
-    """Number from 1, time_ns, kind, content and command (None for a mark) of lines of the event log. frames: names of
-    the world's and the body's. Raises InputError for those that can't be decoded.
+    """Yield number from 1, time [ns], kind, content and command (None for a mark) of lines of the event log. frames:
+    names of the world and body frames. Raises InputError for a line that can't be decoded.
     """
     for number, line in enumerate(event_lines, 1):
         time_ns, kind, content = decode_event(line, number)
@@ -289,7 +289,7 @@ def decoded_events(
 
 
 class _Upcoming:
-    """The items of an iterator as a queue, of which only the first one has been made."""
+    """An iterator as a queue of which only the first item is held."""
 
     def __init__(self, items: Iterator[_Waiting]) -> None:
         self._items = items
@@ -308,18 +308,18 @@ class _Upcoming:
 
 
 def _leap_of(kind: str, content: Mapping[str, Any]) -> int:
-    """How far an event of the log took simulated time ahead at once [ns]."""
+    """The forward jump of simulated time by an event of the log [ns], or 0."""
     by_ns = content.get("by_ns", 0) if kind == "jump" else 0
     return max(by_ns, 0) if type(by_ns) is int else 0
 
 
 class Resimulation(ScenarioRun):
-    """A session's simulation; its commands are submitted when their time has come, as they were then. Raises InputError
-    for events that can't be decoded.
+    """Simulates a session again from its events; each command is submitted at its recorded time. Raises InputError for
+    events that can't be decoded.
 
-    event_lines: in the order of time, read as the flight comes to them. mesh_of(name) gives the mesh that a change
-    names, or None to load it. logged_timeouts: of what there are events of timeouts, as those of earlier
-    versions lack some. end_ns: when all events that have been read have acted.
+    event_lines: in order of time, read along with the motion. mesh_of(name): returns the mesh of a change, or None to
+    load it. logged_timeouts: kinds of timeouts that the events include; earlier versions lack some. end_ns: time at
+    which all events read so far have acted.
     """
 
     def __init__(
@@ -336,36 +336,36 @@ class Resimulation(ScenarioRun):
         self.frames = frame_names(scenario.parameters, node_name)
         self._mesh_of = mesh_of
         self.end_ns = 0
-        self._waiting = _Upcoming(self._to_come(event_lines))
+        self._waiting = _Upcoming(self._events_to_apply(event_lines))
 
-    def _to_come(self, event_lines: Iterable[str]) -> Iterator[_Waiting]:
+    def _events_to_apply(self, event_lines: Iterable[str]) -> Iterator[_Waiting]:
         for number, time_ns, kind, content, command in decoded_events(event_lines, self.frames):
-            # A mark is made before what acts at its time, which the recording may not have come to.
+            # A mark precedes the commands of its time, which the recording may not include any more.
             acts = command is not None or kind == "timeout"
             self.end_ns = max(self.end_ns, time_ns + acts + _leap_of(kind, content))
-            # A timeout comes by itself, where it belongs: one that a change brings about comes behind that.
+            # The simulation generates timeouts itself, in the right order.
             if kind != "timeout":
                 yield time_ns, kind, content, command, number
 
     @property
     def all_read(self) -> bool:
-        """Whether no event waits any more."""
+        """Whether all events have been read."""
         return not self._waiting
 
     def finish(self) -> StateRow:
-        """Advance to where all events have acted, at least; returns the state row there."""
+        """Advance until all events have acted; returns the state row there."""
         while not self.all_read:
             self.advance(self.end_ns)
         return self.advance(max(self.end_ns, self.simulation.time_ns))
 
     def advance(self, until_ns: int) -> StateRow:
-        """Advance the body to ``until_ns``; returns its state row, before what acts at that very time.
+        """Advance the body to ``until_ns``; returns its state row, before the commands of that time act.
 
         Raises CommandRefused for a recorded command that can't be taken.
         """
         while self._waiting:
             time_ns, kind, content, command, _ = self._waiting[0]
-            # Marks at the time asked for were made before anything else could act there.
+            # Marks at ``until_ns`` precede the commands of that time.
             made_there = time_ns == until_ns and command is None and not _leap_of(kind, content)
             if time_ns >= until_ns and not made_there:
                 break
@@ -382,11 +382,11 @@ class Resimulation(ScenarioRun):
             else:
                 self.simulation.log(kind, content)
         else:
-            # What acted at one instant acts in the order of the log, whatever rule made it.
+            # Commands of one time act in the order of the log.
             self.take(command, time_ns, (0, number))
 
     def act_next(self) -> bool:
-        """Let the next event of the present instant happen, as it did while time stood; False when there is none."""
+        """Apply the next event of the present time, as recorded while paused; False if there is none."""
         if not self._waiting or self._waiting[0][0] > self.simulation.time_ns or _leap_of(*self._waiting[0][1:3]):
             return False
         self._take_next()
@@ -394,7 +394,7 @@ class Resimulation(ScenarioRun):
         return True
 
     def setup_of(self, command: Change, at_hand: Scenario | None = None) -> Setup:
-        """Put in force what a change says, with the mesh that was flown then."""
+        """Apply a change with the mesh as it was recorded; returns the setup."""
         mesh = self._mesh_of(command.content["mesh"]) if command.content.get("mesh") else None
         if mesh is None:
             return super().setup_of(command, at_hand)
@@ -404,8 +404,8 @@ class Resimulation(ScenarioRun):
 def resimulation(
     session: RecordedSession, observer: Observer | None = None, lines: Iterable[str] | None = None
 ) -> Resimulation:
-    """The session's simulation at its start; raises InputError for events that can't be decoded, when it comes to them.
-    lines: the session's, where somebody else reads them, too.
+    """The session's resimulation, at its start. lines: the session's event lines, if the caller iterates over them
+    itself. Raises InputError, also later on reaching an event that can't be decoded.
     """
     lines = (line for _, line in session.events) if lines is None else lines
     mesh_of, scenario = mesh_finder(session), session_scenario(session)
@@ -413,8 +413,8 @@ def resimulation(
 
 
 def check_playable(session: RecordedSession, given: Scenario | None = None) -> None:
-    """Raise InputError for a session that can't be played: without a scene, unless one is given, or with events that
-    can't be decoded.
+    """Raise InputError for a session that can't be played: it has no scene and none is given, or its events can't be
+    decoded.
     """
     if given is not None:
         return
@@ -426,8 +426,8 @@ def check_playable(session: RecordedSession, given: Scenario | None = None) -> N
 
 
 def _begins_at_start(session: RecordedSession) -> bool:
-    """Whether the flight computed from the start comes to the first recorded state. Of a recording that was begun later
-    it isn't known what a ghost did before.
+    """Whether the resimulation from the start reaches the first recorded state. If not, the recording was started
+    later, and the ghost's earlier motion is unknown.
     """
     time_ns, row = next(session.state_rows(), (0, None))
     if row is None or time_ns == 0:
@@ -440,7 +440,7 @@ def _begins_at_start(session: RecordedSession) -> bool:
 
 
 def _alike(topics: list[str], one: list[float], other: list[float]) -> bool:
-    """Whether these topics would publish the same of both states, but for rounding."""
+    """Whether these topics would publish the same rows for both states, up to rounding."""
     return all(
         abs(a - b) <= ROUNDING * (1.0 + abs(b))
         for topic in topics
@@ -455,10 +455,10 @@ def play(
     progress: Callable[[float, float], None] = lambda _done, _total: None,
     all_events: bool = False,
 ) -> None:
-    """Tell ``observer`` the session from its start to its last state, or with ``all_events`` to its last event;
-    ``progress`` is called with (states told, all states).
+    """Send the session to ``observer``, from its start to its last state, or with ``all_events`` to its last event;
+    progress(sent, total) is called with numbers of states.
 
-    given: the scene of a session that lacks it; then states alone are told. Raises InputError for events that can't be
+    given: the scene of a session that lacks it; then only states are sent. Raises InputError for events that can't be
     decoded, and for a session without a scene.
     """
     again = None
@@ -481,9 +481,9 @@ def play(
         try:
             computed = again.advance(time_ns)
         except InputError:
-            # A command that is refused here: from now on only the recorded states are shown.
+            # A recorded command is refused here: from now on only the recorded states are sent.
             computed = row
-        # A recording holds of a state what was published of it, and no more.
+        # Topics may lack velocities or digits: prefer the computed state if it matches the recorded one.
         again.publish(time_ns, computed if topics and _alike(topics, computed.tolist(), row.tolist()) else row)
     if again is not None and all_events:
         with suppress(InputError):

@@ -116,7 +116,7 @@ ELSEWHERE = """([x, y]) => {
   const { motion, lessons, picture: { eye } } = page, info = motion.body(), { origin, direction } = eye.ray(x, y), hit = motion.firstHit(origin, direction);
   if (!hit) return false; // beside the body it would be watched, which may be the step
   const whole = 2 * info.length, R = motion.snapshot().body.rotation;
-  const near = (lessons.lesson.course.marks ?? []).some((name) => name in info.contacts && Math.hypot(...info.contacts[name].map((c, k) => (c - hit.mesh[k]) * info.scale[k])) < 0.14 * whole);
+  const near = (lessons.lesson.plan.marks ?? []).some((name) => name in info.contacts && Math.hypot(...info.contacts[name].map((c, k) => (c - hit.mesh[k]) * info.scale[k])) < 0.14 * whole);
   const n = [0, 1, 2].map((k) => R[k] * hit.normal[0] + R[3 + k] * hit.normal[1] + R[6 + k] * hit.normal[2]), p = hit.body;
   const lever = Math.hypot(p[1] * n[2] - p[2] * n[1], p[2] * n[0] - p[0] * n[2], p[0] * n[1] - p[1] * n[0]) / whole;
   return !near && lever > 0.1;
@@ -132,7 +132,7 @@ def test_no_step_of_any_lesson_is_ticked_by_pokes_elsewhere(browser: Any, where:
     page.answer((page.lesson.answer + 1) % 3)
     # What is only watched may have happened before time stood.
     first = page.done
-    assert first <= (1 if page.js("page.lessons.lesson.course.steps[0].acts[0].kind") == "again" else 0)
+    assert first <= (1 if page.js("page.lessons.lesson.plan.steps[0].acts[0].kind") == "again" else 0)
     random, around = np.random.default_rng(sum(map(ord, name))), 90.0 * page.js(LARGE)
     pokes = 0
     for _ in range(400):

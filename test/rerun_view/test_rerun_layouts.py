@@ -17,15 +17,15 @@ from rerun_flight import cells
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.rerun_view import observer
-from rigid_proto_ros.rerun_view.layout import TITLES, Finished, Subject, blueprint, value_axis
+from rigid_proto_ros.rerun_view.layout import TITLES, FlightTraits, RunSummary, blueprint, value_axis
 from rigid_proto_ros.scene.scenario import read_scene
 from rigid_proto_ros.simulation.observer import BodyChanged, Published, Started
 
-FINISHED = Finished(10.0, dict.fromkeys(TITLES, (0.0, 1.0)), True)
+FINISHED = RunSummary(10.0, dict.fromkeys(TITLES, (0.0, 1.0)), True)
 """A run in which everything has been plotted."""
 
 
-def views(subject: Subject, finished: Finished | None = None) -> list:
+def views(traits: FlightTraits, finished: RunSummary | None = None) -> list:
     """All views of a layout."""
     found = []
 
@@ -36,40 +36,40 @@ def views(subject: Subject, finished: Finished | None = None) -> list:
         else:
             found.append(part)
 
-    walk(blueprint(subject, finished).root_container)
+    walk(blueprint(traits, finished).root_container)
     return found
 
 
 @pytest.mark.parametrize(
-    "subject, told_by",
+    "traits, expected",
     [
-        (Subject(falls=True), style.POSITION),
-        (Subject(tied=True), style.STRING_LINE_DISTANCE),
-        (Subject(dropped_term=True), style.ANGULAR_MOMENTUM_ANGLE),
-        (Subject(ghost=True), style.GHOST_ANGLE),
-        (Subject(), style.ANGULAR_MOMENTUM),
+        (FlightTraits(falls=True), style.POSITION),
+        (FlightTraits(tied=True), style.STRING_LINE_DISTANCE),
+        (FlightTraits(dropped_term=True), style.ANGULAR_MOMENTUM_ANGLE),
+        (FlightTraits(ghost=True), style.GHOST_ANGLE),
+        (FlightTraits(), style.ANGULAR_MOMENTUM),
     ],
 )
-def test_what_tells_most_of_a_flight_is_plotted(subject: Subject, told_by: str) -> None:
+def test_the_most_informative_plot_of_a_flight_is_shown(traits: FlightTraits, expected: str) -> None:
     for finished in (None, FINISHED):
-        assert [view.origin for view in views(subject, finished)].count("/" + told_by) == 1
+        assert [view.origin for view in views(traits, finished)].count("/" + expected) == 1
 
 
 def test_a_finished_recording_has_no_view_that_shows_nothing() -> None:
-    shown = [view.origin for view in views(Subject(), Finished(10.0, {style.ENERGY: (0.0, 1.0)}, False))]
+    shown = [view.origin for view in views(FlightTraits(), RunSummary(10.0, {style.ENERGY: (0.0, 1.0)}, False))]
     assert {o for o in shown if o.startswith("/plots")} == {"/" + style.ENERGY}
     assert "/" not in shown  # the log of commands
 
 
 @pytest.mark.parametrize("mesh", [True, False])
 def test_a_body_without_a_mesh_is_seen_as_its_box_of_equal_inertia(mesh: bool) -> None:
-    (motion,) = (view for view in views(Subject(mesh=mesh)) if view.name == "Motion")
+    (motion,) = (view for view in views(FlightTraits(mesh=mesh)) if view.name == "Motion")
     assert ("/" + style.INERTIA_BOX in motion.visualizer_overrides) == mesh
     assert "/" + style.INERTIA_ELLIPSOID in motion.visualizer_overrides
 
 
 def test_the_viewers_own_background_is_left_as_it_is() -> None:
-    for view in views(Subject()):
+    for view in views(FlightTraits()):
         assert "Background" not in (getattr(view, "properties", None) or {})
 
 
@@ -108,7 +108,7 @@ ENDS = [(0.0, 5.5), (-6.0, 6.0), (-0.2, 0.9), (0.2, 0.8), (0.98, 1.03), (-3.0, 5
 
 def test_the_plots_of_a_recording_that_was_begun_in_flight_are_as_long_as_it(tmp_path, monkeypatch) -> None:
     made = []
-    monkeypatch.setattr(observer, "blueprint", lambda _, finished: made.append(finished) or blueprint(Subject()))
+    monkeypatch.setattr(observer, "blueprint", lambda _, finished: made.append(finished) or blueprint(FlightTraits()))
     recorder = observer.FileRecorder(str(tmp_path / "late.rrd"))
     recorder.on(Started(flight.SCENE, flight.VERTICES, flight.TRIANGLES, flight.SHA256))
     recorder.on(BodyChanged(1_000_000_000_000, flight.SETUP))
@@ -136,7 +136,7 @@ def test_an_axis_has_two_numbers_that_can_be_read_and_no_curve_on_its_frame(ends
 
 
 def test_a_legend_lies_beside_the_curves_and_never_over_them() -> None:
-    (view,) = [view for view in views(Subject()) if view.origin == "/" + style.ENERGY]
+    (view,) = [view for view in views(FlightTraits()) if view.origin == "/" + style.ENERGY]
     (axis,) = view.properties["TimeAxis"].view_range.as_arrow_array().to_pylist()
     ends = [r["range"]["end"] for r in view.properties["VisibleTimeRanges"].ranges.as_arrow_array().to_pylist()]
     assert all(end == 0 for end in ends), ends  # curves end at the cursor

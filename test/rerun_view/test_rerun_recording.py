@@ -19,7 +19,7 @@ from rigid_proto_ros.base.rotation import matrix_from_quaternion
 from rigid_proto_ros.picture import style
 from rigid_proto_ros.rerun_view import backend
 from rigid_proto_ros.rerun_view.backend import ROS_TIME
-from rigid_proto_ros.rerun_view.layout import Subject, blueprint
+from rigid_proto_ros.rerun_view.layout import FlightTraits, blueprint
 from rigid_proto_ros.rerun_view.observer import FileRecorder
 from rigid_proto_ros.rerun_view.recorders import record
 from rigid_proto_ros.session.mailbox import STALLED_S
@@ -348,7 +348,7 @@ def test_recordings_are_made_and_given_back_one_at_a_time(tmp_path, monkeypatch)
     def fly(name: str) -> None:
         for run in range(5):
             stream = backend.Stream(rr.FileSink(str(tmp_path / f"{name}.rrd")), f"{name}{run}", name)
-            stream.send_layout(blueprint(Subject(), None))
+            stream.send_layout(blueprint(FlightTraits(), None))
             stream.recording.disconnect()
             backend.forget_closed_recordings()
 
