@@ -32,6 +32,8 @@ export interface Declarations {
   /** field of the record SCENE, by the parameter's name */
   readonly fields: Readonly<Record<string, string>>;
   readonly models: readonly string[];
+  /** numbers of those whose moments hold for one ratio of the scale's components */
+  readonly stretched: readonly number[];
   /** order: null of one that chooses its steps, or is exact */
   readonly integrators: readonly { readonly name: string; readonly supports: readonly number[]; readonly order: number | null }[];
   /** doubles of an integrator's workspace */

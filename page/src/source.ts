@@ -65,7 +65,8 @@ export interface Parameter {
 
 /** A body by one of the ways to distribute its mass. Where it has none, `refusal` says why and the numbers are NaN. */
 export interface Model {
-  readonly model: "solid" | "shell" | "points" | "bounding_box" | "explicit";
+  /** one of the choices of inertia_model */
+  readonly model: string;
   readonly massKg: number;
   /** [m, mesh axes after scaling] */
   readonly com: Vec3;

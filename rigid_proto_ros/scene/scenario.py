@@ -61,10 +61,11 @@ class BodyMesh:
         """The numbers with the moments of a model at this scale (3,); raises MeshError."""
         moments, numbers = self.moments.moments(model, scale), new_record(MESH)
         copy_fields(self.numbers, numbers)  # setups keep the present ones
-        copy_fields(moments.record, numbers[model])
-        numbers["known"][INERTIA_MODELS.index(model)] = True
+        number = INERTIA_MODELS.index(model)
+        copy_fields(moments.record, numbers["moments"][number])
+        numbers["known"][number] = True
         if model in STRETCHED:
-            numbers["stretch"] = np.abs(scale) / abs(scale[0])
+            numbers["stretch"][number] = np.abs(scale) / abs(scale[0])
         self.numbers = numbers
         return numbers
 

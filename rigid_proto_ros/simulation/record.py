@@ -30,7 +30,7 @@ from ..base.errors import InputError
 from ..base.vectors import BoolArray, FloatArray, Matrix3, Vector3
 from ..mass import MODEL_COMS
 from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
-from ..mass.moments import MOMENTS
+from ..mass.moments import MODELS, MOMENTS, SOLID, STRETCHED
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import NEARLY, POSSIBLE, judged_tensor
 from ..motion.body import LENGTH, BodyRow, fill_body
@@ -78,22 +78,22 @@ SCENE = record_type(
     ]
 )
 
-SOLID, SHELL, POINTS, BOUNDING_BOX, EXPLICIT = range(5)
-"""Numbers of INERTIA_MODELS; all but the last one are a mesh's."""
+EXPLICIT = len(MODELS)
+"""Number of the explicit one among INERTIA_MODELS; those before are a mesh's."""
 OF_SOLID = MODEL_COMS.index("solid")
 
 MESH = record_type(
     [
         ("has_surface", np.bool_),  # False: there is no mesh
         ("extent", np.float64, 3),  # sides of the bounding box [mesh units]
-        ("solid", MOMENTS),
-        ("shell", MOMENTS),
-        ("points", MOMENTS),
-        ("bounding_box", MOMENTS),
-        ("stretch", np.float64, 3),  # |scale|/|scale_x| for which those of the shell hold
-        ("known", np.uint8, EXPLICIT),  # by the number of the model, whether its moments are there
+        # By the number of the model:
+        ("moments", MOMENTS, len(MODELS)),
+        ("stretch", np.float64, (len(MODELS), 3)),  # |scale|/|scale_x| for which those of STRETCHED hold
+        ("known", np.uint8, len(MODELS)),  # whether they are there
     ]
 )
+
+_IS_STRETCHED = np.array([model in STRETCHED for model in MODELS])
 
 _SUPPORTS = np.array([sum(1 << k for k, need in enumerate(NEEDS) if need in i.supports) for i in INTEGRATORS.values()])
 """By the integrator's number, the bits of what it supports."""
@@ -189,25 +189,13 @@ def explicit_tensor(scene: np.record, inertia: Matrix3) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def _moments_of(mesh: np.record, model: int) -> np.record:
-    moments: np.record = mesh.bounding_box
-    if model == SOLID:
-        moments = mesh.solid
-    elif model == SHELL:
-        moments = mesh.shell
-    elif model == POINTS:
-        moments = mesh.points
-    return moments
-
-
-@njit(error_model="numpy", allocates=False)
 def _are_known(scene: np.record, mesh: np.record, refusal: np.record) -> bool:
     """Whether the moments are there that the scene needs: of its model, and of the solid for a density or its COM."""
     s, model = scene.scale, scene.inertia_model
     fits = mesh.known[model] != 0
-    if model == SHELL:
+    if _IS_STRETCHED[model]:
         for k in range(3):
-            fits = fits and abs(s[k]) / abs(s[0]) == mesh.stretch[k]
+            fits = fits and abs(s[k]) / abs(s[0]) == mesh.stretch[model, k]
     if not fits:
         return refuse(refusal, rf.NO_MOMENTS, model, 0.0, 0.0, 0.0)
     if mesh.known[SOLID] == 0 and (scene.mass == 0.0 or scene.inertia_model_com == OF_SOLID):
@@ -232,17 +220,17 @@ def _spread(
         return 0.0
     s, mass, model = scene.scale, scene.mass, scene.inertia_model
     if mass == 0.0:
-        mass = scene.density * mesh.solid.measure * abs(s[0] * s[1] * s[2])
+        mass = scene.density * mesh.moments[SOLID].measure * abs(s[0] * s[1] * s[2])
         if not 1e-300 < mass < math.inf:
             refuse(refusal, rf.MASS, 0, mass, 0.0, 0.0)
             return 0.0
-    # A shell's moments include the stretch: the uniform part and the mirroring are left.
+    # Moments of STRETCHED include the stretch: the uniform part and the mirroring are left.
     left = local_numbers(3)
     for k in range(3):
-        left[k] = math.copysign(abs(s[0]), s[k]) if model == SHELL else s[k]
-    unit = _moments_of(mesh, model)
+        left[k] = math.copysign(abs(s[0]), s[k]) if _IS_STRETCHED[model] else s[k]
+    unit = mesh.moments[model]
     at_solid = scene.inertia_model_com == OF_SOLID
-    placed, ballast = mesh.solid if at_solid else unit, scene.ballast[: scene.ballasts]
+    placed, ballast = mesh.moments[SOLID] if at_solid else unit, scene.ballast[: scene.ballasts]
     return spread_mass(mass, unit, placed, at_solid, s, left, ballast, com, inertia, moments, axes)
 
 
