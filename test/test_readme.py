@@ -1,26 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""The documents keep their word: commands run, links lead somewhere, tables are the code's, examples are accepted."""
+"""The documents keep their word: links lead somewhere, tables are the code's, examples are accepted; their commands have
+test_shown_commands.py.
+"""
 
 from __future__ import annotations
 
 import re
-import shlex
-import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
-import yaml
-from ros_process import RosProcess
+from test_shown_commands import DOCUMENTS, blocks, words
 
 import docs_tables
 import rigid_proto_ros
 from rigid_proto_ros.base.bundled import example_names, example_path
-from rigid_proto_ros.cli.main import main as rigid_proto
 from rigid_proto_ros.ros import poke_client
-from rigid_proto_ros.scene.command_codec import of_message
 from rigid_proto_ros.scene.scenario import nanoseconds, read_scene
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script, read_script
@@ -29,195 +24,6 @@ SOURCE = Path(rigid_proto_ros.__file__).resolve().parent.parent
 README = SOURCE / "README.md"
 REFERENCE = SOURCE / "docs" / "reference.md"
 pytestmark = pytest.mark.skipif(not README.is_file(), reason="not run from a source tree")
-
-DOCUMENTS = sorted([*SOURCE.glob("*.md"), *SOURCE.glob("docs/**/*.md")]) if README.is_file() else []
-OWN = ("rigid_proto", "poke_client")
-# Installs, and what needs ros2cli: looked at by other tests, or by nobody without a ROS installation.
-NOT_RUN = {
-    "sudo",
-    "source",
-    "cd",
-    "rosdep",
-    "colcon",
-    "pip",
-    "git",
-    "ros2",
-    "python",
-    "rerun",
-    "rigid_body_node",
-    "eval",
-}
-SWEEP = "rigid_proto sweep"
-STAYS_UP = ("rigid_proto up", "rigid_proto workbench")
-
-
-def blocks(path: Path, *languages: str) -> list[str]:
-    """Fenced blocks of a document in one of the languages, without the indentation of a list."""
-    found = re.findall(r"^( *)```(\w+)\n(.*?)^\1```", path.read_text("utf-8"), re.DOTALL | re.MULTILINE)
-    return [
-        "\n".join(line.removeprefix(indent) for line in text.splitlines())
-        for indent, language, text in found
-        if language in languages
-    ]
-
-
-def commands() -> Iterator[str]:
-    """Every command line in a shell block of the documents, in a row of the README's tables, in the head of a script and, for
-    ``ros2``, in a numbered example.
-    """
-    for path in DOCUMENTS:
-        for block in blocks(path, "sh", "bash", "console"):
-            for line in block.splitlines():
-                if line.strip() and not line.startswith("#"):
-                    yield line.strip()
-        if path == README:
-            yield from re.findall(
-                r"^\|.*`((?:rigid_proto|poke_client) [^`]+)` \|$", path.read_text("utf-8"), re.MULTILINE
-            )
-    for name in example_names():
-        for line in example_path(name).read_text("utf-8").splitlines():
-            if re.match(r"#   \S", line):
-                yield line[1:].strip()
-    for path in sorted((SOURCE / "msg_examples").glob("*.sh")):
-        yield from re.findall(r"^ros2 .*$", path.read_text("utf-8"), re.MULTILINE)
-
-
-COMMANDS = sorted(set(commands())) if DOCUMENTS else []
-
-
-def words(command: str) -> list[str]:
-    """A command's words, a comment at its end left out."""
-    return shlex.split(command, comments=True)
-
-
-def of(*programs: str) -> list[str]:
-    return [c for c in COMMANDS if words(c)[0].removeprefix(".venv/bin/") in programs]
-
-
-@pytest.fixture
-def in_a_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder with the scenes and examples beside it, as commands from the repository's root expect."""
-    for name in ("config", "msg_examples"):
-        (tmp_path / name).symlink_to(SOURCE / name)
-    write_robot(tmp_path)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def write_robot(folder: Path) -> None:
-    """The reader's robot.urdf, and urdf/robot.urdf: two boxes of 2700 kg/m³ with the inertials of their shapes."""
-    shapes = {"arm": "<box size='0.3 0.2 0.1'/>", "upper_arm": "<mesh filename='upper_arm.stl'/>"}
-    inertia = "<inertia ixx='{:.17g}' ixy='0' ixz='0' iyy='{:.17g}' iyz='0' izz='{:.17g}'/>".format(
-        *(np.array([0.2**2 + 0.1**2, 0.3**2 + 0.1**2, 0.3**2 + 0.2**2]) * (16.2 / 12.0))
-    )
-    inertial = f"<inertial><mass value='16.2'/>{inertia}</inertial>"
-    links = "".join(
-        f"<link name='{name}'>{inertial}<visual><geometry>{shape}</geometry></visual></link>"
-        for name, shape in shapes.items()
-    )
-    joint = "<joint name='shoulder' type='fixed'><parent link='arm'/><child link='upper_arm'/></joint>"
-    for place in (folder, folder / "urdf"):
-        place.mkdir(exist_ok=True)
-        trimesh.creation.box((0.3, 0.2, 0.1)).export(place / "upper_arm.stl")
-        (place / "robot.urdf").write_text(f"<robot name='r'>{links}{joint}</robot>")
-
-
-def test_every_command_is_of_a_kind_that_some_test_looks_at() -> None:
-    assert len(COMMANDS) > 20
-    for command in COMMANDS:
-        assert words(command)[0].removeprefix(".venv/bin/") in {*OWN, *NOT_RUN, "make"}, command
-
-
-@pytest.mark.parametrize("command", of("make"))
-def test_make_target_exists(command: str) -> None:
-    target = next(word for word in words(command)[1:] if "=" not in word)
-    makefile = (SOURCE / "Makefile").read_text("utf-8")
-    assert re.search(rf"^{re.escape(target)}:", makefile, re.MULTILINE), command
-
-
-def test_make_help_lists_the_targets_that_people_rely_on() -> None:
-    said = subprocess.run(["make", "help"], cwd=SOURCE, capture_output=True, text=True, check=True).stdout
-    promised = "setup run up workbench test lint bench stress soak pictures build clean"
-    assert set(promised.split()) <= {line.split()[0] for line in said.splitlines()}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.stress)])
-def test_rigid_proto_commands_run(
-    in_a_copy: Path,
-    ros_environment: dict[str, str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture,
-    whole: bool,
-) -> None:
-    """Sweeps fly thousands of rows: they are for the long run. A picture and a lesson are made in tests of their own."""
-    pytest.importorskip("rerun")
-    pytest.importorskip("rclpy")
-    monkeypatch.setenv("ROS_DOMAIN_ID", ros_environment["ROS_DOMAIN_ID"])
-    for name in () if whole else ("snapshot", "lesson"):
-        monkeypatch.setattr(f"rigid_proto_ros.cli.{name}.run", lambda args: 0)
-    # As `make run` leaves one.
-    assert rigid_proto(["simulate", "t_handle", "--duration", "1", "--record", "out/session.mcap"]) == 0
-    # In the order of the page: a later one uses the recording of an earlier one.
-    run = [c for c in commands() if words(c)[0].removeprefix(".venv/bin/") == "rigid_proto"]
-    for command in dict.fromkeys(run):
-        if command.startswith(STAYS_UP) or " demo" in command or (not whole and command.startswith(SWEEP)):
-            continue
-        assert rigid_proto(words(command)[1:]) == 0, (command, capsys.readouterr().err)
-
-
-@pytest.mark.slow
-def test_up_gets_ready_and_ends_cleanly(ros_environment: dict[str, str], tmp_path: Path) -> None:
-    """As does the workbench, in test_portable.py."""
-    pytest.importorskip("rclpy")
-    up = RosProcess("rigid_proto", "up", "--viewer", "none", environment=ros_environment, log=tmp_path / "up")
-    try:
-        up.wait_for("is simulating")
-    finally:
-        status = up.end()
-    assert status == 130
-
-
-@pytest.mark.parametrize("command", of("poke_client"))
-def test_poke_client_command_is_read_and_planned(command: str, in_a_copy: Path, capsys: pytest.CaptureFixture) -> None:
-    arguments = words(command)[1:]
-    if arguments == ["--help"]:
-        return
-    assert poke_client.main([*arguments, "--dry-run"] if "--dry-run" not in arguments else arguments) == 0, command
-    assert capsys.readouterr().out
-
-
-def published() -> list[tuple[str, str, str, str]]:
-    """(command, topic, type, message text) of each ``ros2 topic pub``."""
-    found = []
-    for command in of("ros2"):
-        parts = shlex.split(command)
-        if parts[1:3] != ["topic", "pub"] or "string/attach" in command:  # which moves nothing by itself
-            continue
-        arguments = parts[3:]
-        while arguments[0].startswith("--"):
-            arguments = arguments[1:] if arguments[0] == "--once" else arguments[2:]
-        found.append((command, *arguments[:3]))
-    return found
-
-
-@pytest.mark.parametrize("command, topic, type, text", published())
-def test_message_to_publish_is_accepted_and_moves_the_t_handle(command: str, topic: str, type: str, text: str) -> None:
-    pytest.importorskip("rclpy")
-    from rclpy.serialization import serialize_message
-    from ros_client import COMMANDS, filled
-
-    topic = topic.removeprefix("/rigid_body/")
-    message = filled(COMMANDS[topic](), yaml.safe_load(text))
-    assert type == f"geometry_msgs/msg/{COMMANDS[topic].__name__}"
-    run = OfflineRun(read_scene("t_handle", {"initial.angular_velocity": [0.0, 0.0, 0.0]}))
-    run.simulation.submit(of_message(topic, serialize_message(message)))
-    run.advance(nanoseconds(0.5))
-    assert not run.simulation.refused, command
-    state = run.simulation.state
-    size = max(abs(state.linear_velocity).max(), abs(state.angular_velocity).max())
-    # To be seen, and not to be thrown out of sight.
-    assert 0.01 < size < 10.0, command
 
 
 def things_to_try() -> list[str]:

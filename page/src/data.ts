@@ -43,6 +43,8 @@ export interface Declarations {
   /** field of the record SCENE, by the parameter's name */
   readonly fields: Readonly<Record<string, string>>;
   readonly models: readonly string[];
+  /** numbers of the models whose moments hold for one ratio of the scale's components */
+  readonly stretched: readonly number[];
   /** order: null if the integrator is adaptive or exact */
   readonly integrators: readonly { readonly name: string; readonly supports: readonly number[]; readonly order: number | null }[];
   /** doubles of an integrator's workspace */

@@ -7,7 +7,6 @@ import type { Model, Vec3 } from "./source.ts";
 import { words } from "./words.ts";
 import { short } from "./words_numbers.ts";
 
-const MODELS = ["solid", "shell", "points", "bounding_box", "walled", "explicit"] as const;
 /** Of the six numbers of a tensor, xx xy xz yy yz zz, those that are moments, and where each stands among the nine. */
 const NINE = [0, 1, 2, 4, 5, 8] as const, NAMES = ["xx", "xy", "xz", "yy", "yz", "zz"] as const;
 const BALLAST = "ballast.";
@@ -28,7 +27,8 @@ export function bodyCard(desk: Desk): Card {
   const units = choice(w.unit, w.units, (value) => { unit = value ? Number(value) : undefined; });
   const verdict = make("div"), facts = make("p", { class: "note" });
   const mass = numberField(w.fixed, (value) => motion.set({ mass: value }), "kg"), density = numberField(w.dense, (value) => motion.set({ density: value }), "kg/m³");
-  const models = choice(w.model, MODELS.map((model) => [model, w.models[model]!] as const), (model) => {
+  const spreads = motion.parameters().find(({ name }) => name === "inertia_model")?.choices ?? [];
+  const models = choice(w.model, spreads.map((model) => [model, w.models[model] ?? model] as const), (model) => {
     const { massKg, com, scale, inertia } = motion.body();
     // Numbers of one's own begin as those in force, so that nothing leaps.
     const own = { "explicit_inertia.mass": massKg, "explicit_inertia.center_of_mass": com.map((c, k) => c / scale[k]!), "explicit_inertia.tensor": NINE.map((k) => inertia[k]!) };

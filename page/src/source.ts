@@ -66,7 +66,8 @@ export interface Parameter {
 
 /** The body by an inertia model. If the model isn't possible, `refusal` says why and the numbers are NaN. */
 export interface Model {
-  readonly model: "solid" | "shell" | "points" | "bounding_box" | "walled" | "explicit";
+  /** one of the choices of inertia_model */
+  readonly model: string;
   readonly massKg: number;
   /** [m, mesh axes after scaling] */
   readonly com: Vec3;

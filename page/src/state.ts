@@ -194,7 +194,7 @@ export class Observed {
       moments: triple(row, body.MOMENTS),
       axes: [...row.slice(body.AXES, body.AXES + 9)],
       turn: [...row.slice(body.QUATERNION, body.QUATERNION + 4)],
-      volume: surface?.closed === true ? (surface.volume ?? this.#placed.record.solid.measure) * Math.abs(scale[0] * scale[1] * scale[2]) : NaN,
+      volume: surface?.closed === true ? (surface.volume ?? this.#placed.record.moments(0).measure) * Math.abs(scale[0] * scale[1] * scale[2]) : NaN,
       hasParts: surface?.volume !== undefined,
       length: row[body.LENGTH] ?? 1,
       findings: surface?.findings ?? [],
@@ -214,11 +214,11 @@ export class Observed {
       memory.u1(this.#scene.at, Scene.SIZE).set(memory.u1(flown.scene.at, Scene.SIZE));
       this.#scene.inertiaModel = number;
       this.#scene.inertiaModelCom = 0;
-      return [this.#model(model as Model["model"], number, flown)];
+      return [this.#model(model, flown)];
     });
   }
 
-  #model(model: Model["model"], number: number, flown: Flown): Model {
+  #model(model: string, flown: Flown): Model {
     const { body, refusal } = NUMBERS, placed = this.#placed, memory = this.#kernels.memory;
     let made = this.#kernels.makeBody(this.#scene, placed.record, this.#body, this.#refusals.record);
     for (let tries = 0; !made && tries < 2 && this.#refusals.code === refusal.NO_MOMENTS && placed.surface !== null; tries++) {
@@ -228,7 +228,7 @@ export class Observed {
     const none = !made ? this.#refusals.words({ ...flown.values, inertia_model: model }) : "";
     const row = made ? [...memory.f8(this.#body.at, this.#body.n)] : new Array<number>(this.#body.n).fill(NaN);
     return {
-      model: this.#declared.models[number] as Model["model"],
+      model,
       massKg: row[body.MASS] ?? NaN,
       com: triple(row, body.COM),
       moments: triple(row, body.MOMENTS),

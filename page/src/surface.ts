@@ -4,7 +4,7 @@
 
 import type { Declarations } from "./data.ts";
 import { Mesh, NUMBERS } from "./kernels.ts";
-import type { Kernels, Matrix, Memory, Moments, Vector } from "./kernels.ts";
+import type { Kernels, Matrix, Memory, Vector } from "./kernels.ts";
 import { filled, Refused } from "./numbers.ts";
 import type { Finding } from "./source.ts";
 
@@ -136,7 +136,7 @@ export class Surfaces {
       if (mesh.solid === undefined && surplus === 0 && !this.#fill(record, { ...mesh, triangles: enclosing }, 0, memory)) add("zero_volume", "error");
     }
     if (near !== null) {
-      const effect = record.known[0] === 1 ? kernels.effectOfStrips(vertices, separate.edges, near.farthest, record.solid) : -1;
+      const effect = record.known[0] === 1 ? kernels.effectOfStrips(vertices, separate.edges, near.farthest, record.moments(0)) : -1;
       const told = [near.found, Number(near.farthest.toPrecision(2))];
       if (effect >= 0) add("joined_corners", "info", ...told, roundedUp(100 * effect));
       else add("joined_corners_of_open", "info", ...told);
@@ -208,7 +208,7 @@ export class Surfaces {
     return extent;
   }
 
-  /** Add the moments of a model by its number, for a scale where it is the shell's, to a record of the mesh; whether it
+  /** Add the moments of a model by its number, for a scale where it is a stretched one's, to a record of the mesh; whether it
    * has any. */
   provide(record: Mesh, surface: Surface, model: number, scale: Float64Array): boolean {
     const memory = this.#kernels.memory, mark = memory.mark();
@@ -223,17 +223,16 @@ export class Surfaces {
   #fill(record: Mesh, mesh: MeshNumbers, model: number, memory: Memory, scale?: Float64Array): boolean {
     const kernels = this.#kernels, { moments } = NUMBERS;
     const n = mesh.vertices.length / 3;
-    const stretch = memory.numbers(3), sizes = [0, 1, 2].map((k) => Math.abs(scale?.[k] ?? 1));
-    memory.f8(stretch.at, 3).set(this.#declared.models[model] === "shell" ? sizes.map((s) => s / (sizes[0] ?? 1)) : [1, 1, 1]);
+    const isStretched = this.#declared.stretched.includes(model), stretch = memory.numbers(3), sizes = [0, 1, 2].map((k) => Math.abs(scale?.[k] ?? 1));
+    memory.f8(stretch.at, 3).set(isStretched ? sizes.map((s) => s / (sizes[0] ?? 1)) : [1, 1, 1]);
     const used = { at: memory.reserve(n), n };
     const room = memory.numbers(Math.max(moments.ROOM, 3 * n));
     const vertices = vertexMatrix(memory, mesh.vertices), triangles = triangleMatrix(memory, mesh.triangles);
     const starts = integers(memory, mesh.starts ?? new Int32Array(0));
-    const target = momentsOf(record, model);
-    const code = kernels.momentsOf(model, vertices, triangles, starts, stretch, used, room, target);
+    const code = kernels.momentsOf(model, vertices, triangles, starts, stretch, used, room, record.moments(model));
     if (code !== moments.FOUND) return false;
     record.known[model] = 1;
-    if (this.#declared.models[model] === "shell") record.stretch.set(memory.f8(stretch.at, 3));
+    if (isStretched) record.stretch.set(memory.f8(stretch.at, 3), 3 * model);
     return true;
   }
 
@@ -249,20 +248,16 @@ export class Surfaces {
     const corners = kernels.weldTriangles(vertices, triangles, room, welded) === 1 ? welded : triangles;
     const { edges } = this.#connected(corners, n, room);
     const starts = integers(memory, surface.enclosing === surface.triangles ? surface.starts ?? new Int32Array(0) : new Int32Array(0));
-    const code = kernels.wallsOf(vertices, corners, starts, edges, stretch, record.solid, memory.numbers(3 * (n + m)), record.walls);
+    const code = kernels.wallsOf(vertices, corners, starts, edges, stretch, record.moments(0), memory.numbers(3 * (n + m)), record.walls);
     if (code !== NUMBERS.moments.FOUND) return false;
     record.known[model] = 1;
     return true;
   }
 
   #take(record: Mesh, solid: Float64Array): void {
-    record.memory.f8(record.solid.at, solid.length).set(solid);
+    record.memory.f8(record.moments(0).at, solid.length).set(solid);
     record.known[0] = 1;
   }
-}
-
-function momentsOf(record: Mesh, model: number): Moments {
-  return [record.solid, record.shell, record.points, record.boundingBox][model] ?? record.solid;
 }
 
 /** The present surface in the kernels' memory, at a mark; each surface replaces the previous one. */

@@ -28,8 +28,8 @@ function told(make: () => MeshNumbers): unknown {
     try {
       const surface = surfaces.judged(mesh), record = new Mesh(memory);
       memory.u1(record.at, Mesh.SIZE).set(surface.record);
-      const scale = Float64Array.of(1, 1, 1), of = [record.solid, record.shell, record.points, record.boundingBox];
-      const moments = of.map((moment, model) => (surfaces.provide(record, surface, model, scale) ? [...memory.f8(moment.at, 16)] : null));
+      const scale = Float64Array.of(1, 1, 1), of = data.declared.models.slice(0, -1);
+      const moments = of.map((_, model) => (surfaces.provide(record, surface, model, scale) ? [...memory.f8(record.moments(model).at, 16)] : null));
       return { ...numbers, closed: surface.closed, inward: surface.inward, codes: surface.findings.map((each) => each.code), messages: surface.findings.map((each) => each.message), moments, read, judged: performance.now() - began - read };
     } catch (error) {
       if (!(error instanceof Refused)) throw error;

@@ -5,26 +5,40 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..base.command_line import Progress, number_from
-from ..base.errors import InputError
+from ..base.errors import InputError, is_missing
 from ..base.files import check_whole_file
 
 if TYPE_CHECKING:
     from ..export.flight_record import FlightRecord, Source
 
 
-EXPORTS = {
-    "csv": ((".csv",), "write the states as a CSV table"),
-    "parquet": ((".parquet",), "write the states as a Parquet table"),
-    "gltf": ((".glb",), "write the motion for Blender, Unreal, three.js and others that read glTF"),
-    "usd": ((".usda", ".usdc"), "write the motion, with mass properties, for Omniverse, Houdini and others"),
-}
-"""Options that write a file, the extensions of its name, and their help."""
+class Export(NamedTuple):
+    """endings: extensions of the file's name. needs: a module that its writer imports, and the package that has it."""
 
+    endings: tuple[str, ...]
+    help: str
+    needs: tuple[str, str] = ("", "")
+
+
+EXPORTS = {
+    "csv": Export((".csv",), "write the states as a CSV table"),
+    "parquet": Export((".parquet",), "write the states as a Parquet table", ("pyarrow.parquet", "pyarrow")),
+    "gltf": Export((".glb",), "write the motion for Blender, Unreal, three.js and others that read glTF"),
+    "usd": Export(
+        (".usda", ".usdc"),
+        "write the motion, with mass properties, for Omniverse, Houdini and others",
+        ("pxr", "usd-core"),
+    ),
+}
+"""By option what it writes; ``write_exports`` calls the writers."""
+
+TABLES = ("csv", "parquet")
 ANIMATIONS = ("gltf", "usd")
-"""Options to which ``--fps`` applies."""
+"""Options to which ``--fps`` applies; tables have the states of publications."""
 
 DEFAULT_FPS = 30.0
 
@@ -32,8 +46,8 @@ DEFAULT_FPS = 30.0
 def add_exports(parser: argparse.ArgumentParser) -> None:
     """Declare the options that write the motion for other tools."""
     group = parser.add_argument_group("for other tools")
-    for name, (endings, help) in EXPORTS.items():
-        group.add_argument(f"--{name}", metavar=f"FILE{endings[0]}", help=help)
+    for name, export in EXPORTS.items():
+        group.add_argument(f"--{name}", metavar=f"FILE{export.endings[0]}", help=export.help)
     group.add_argument(
         "--fps",
         type=number_from(1e-3, 1e5),
@@ -51,16 +65,14 @@ def check_exports(args: argparse.Namespace) -> None:
     """Check before any work that the files can be written; raises InputError."""
     files = asked(args)
     for name, file in files.items():
-        endings, _ = EXPORTS[name]
+        endings, _, (module, package) = EXPORTS[name]
         if not file.lower().endswith(endings):
             raise InputError(f"--{name}", file, f"a file that ends in {' or '.join(endings)}")
         check_whole_file(f"--{name}", file)
+        if module and (find_spec(module.partition(".")[0]) is None or find_spec(module) is None):
+            raise InputError(f"--{name}", is_missing(package, "export"))
     if args.fps is not None and not set(ANIMATIONS) & set(files):
         raise InputError("--fps", "needs --gltf or --usd")
-    from ..export import check_library
-
-    for name in files:
-        check_library(f"--{name}")
 
 
 def write_exports(
@@ -68,7 +80,7 @@ def write_exports(
 ) -> None:
     """Write the requested files, and ``say`` one line for each; raises InputError."""
     files = asked(args)
-    if "csv" in files or "parquet" in files:
+    if set(TABLES) & set(files):
         from ..export import table
 
         columns = table.state_columns(record)

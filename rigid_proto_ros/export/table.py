@@ -9,7 +9,6 @@ from ..base.files import whole_file
 from ..base.provenance import cpu, versions
 from ..base.vectors import FloatArray
 from ..simulation.quantities import QUANTITIES
-from . import check_library
 from .flight_record import FlightRecord
 
 STATE_COLUMNS = dict(list(QUANTITIES.items())[:13])
@@ -37,7 +36,6 @@ def write_csv(file: str, columns: dict[str, FloatArray]) -> None:
 
 def write_parquet(file: str, columns: dict[str, FloatArray]) -> None:
     """Write a .parquet; its metadata hold the units, the processor and the versions."""
-    check_library("--parquet")
     import pyarrow as pa
     import pyarrow.parquet as pq
 

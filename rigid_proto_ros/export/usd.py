@@ -19,7 +19,6 @@ from ..mass.tensor import principal_axes
 from ..picture import style
 from ..picture.backend import DrawnMesh
 from ..simulation.observer import BodyChanged
-from . import check_library
 from .flight_record import FlightRecord
 from .tracks import BODIES, MESHES, Track, Tracks
 
@@ -34,7 +33,6 @@ def write_usd(file: str, record: FlightRecord, tracks: Tracks, fps: float) -> li
     """Write the body, and ghost and string if there are any, at ``fps`` time codes per second. Returns
     lines to print.
     """
-    check_library("--usd")
     from pxr import Usd, UsdGeom, UsdPhysics
 
     stage = Usd.Stage.CreateInMemory()

@@ -38,6 +38,7 @@ from ..base.compilation import exported, local_matrix, local_numbers, matrix_of,
 from ..base.errors import MeshError
 from ..base.simd import Packed, filled, fused_multiply_add, load, number, store
 from ..base.vectors import BoolArray, FloatArray, IntArray, Points, Triangles, Vector3
+from . import INERTIA_MODELS
 
 SMALL_MESH = 16
 """Up to this many triangles the compensated sums cost less than the call, so they are always used."""
@@ -107,9 +108,9 @@ def _new_moments() -> tuple[FloatArray, np.record]:
     return numbers, record
 
 
-MODELS = ("solid", "shell", "points", "bounding_box")
-"""Those of INERTIA_MODELS that are moments of a mesh by themselves, by their numbers in kernels."""
-SOLID, SHELL, POINTS, BOX = range(4)
+MODELS = INERTIA_MODELS[:-2]
+"""Those that are moments of a mesh by themselves, by their numbers in kernels."""
+SOLID, SHELL, POINTS, BOX = range(len(MODELS))
 STRETCHED = ("shell",)
 """Models whose measure stretches depending on direction, so that a non-uniform scale needs a new pass."""
 
@@ -759,8 +760,7 @@ def mesh_moments(
     starts = np.empty(0, np.int64) if polygon_starts is None else np.ascontiguousarray(polygon_starts, np.int64)
     number = MODELS.index(model)
     numbers, found = _new_moments()
-    used = np.empty(len(vertices) if number in (POINTS, BOX) else 0, np.bool_)
-    room = np.empty(max(ROOM, 3 * len(vertices)) if number in (SOLID, SHELL) else 0)
+    used, room = np.empty(len(vertices), np.bool_), np.empty(max(ROOM, 3 * len(vertices)))
     return _moments(moments_of(number, vertices, triangles, starts, scale, used, room, found), numbers, vertices)
 
 

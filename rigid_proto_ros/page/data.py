@@ -19,6 +19,7 @@ from ..base.library import stamp
 from ..base.vectors import FloatArray, IntArray
 from ..mass import INERTIA_MODELS
 from ..mass.engines import FORMS, SAYS_NO_PRODUCTS, Form
+from ..mass.moments import STRETCHED
 from ..mesh.reading import Mesh, load_mesh
 from ..motion.integrators import INTEGRATORS
 from ..motion.integrators.stepping import ROOM
@@ -56,6 +57,7 @@ def page_data() -> bytes:
         "parameters": [_declared(one) for one in _declarations()],
         "fields": {name: field_of(name) for name in SCENE_PARAMETERS},
         "models": INERTIA_MODELS,
+        "stretched": [INERTIA_MODELS.index(model) for model in STRETCHED],
         "integrators": [
             {"name": name, "supports": _supported(name), "order": one.order} for name, one in INTEGRATORS.items()
         ],

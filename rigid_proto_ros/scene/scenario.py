@@ -62,13 +62,14 @@ class BodyMesh:
         """The numbers with the moments of a model at this scale (3,); raises MeshError."""
         numbers = new_record(MESH)
         copy_fields(self.numbers, numbers)  # setups keep the present ones
+        number = INERTIA_MODELS.index(model)
         if model == "walled":
             copy_fields(self.moments.walls(scale), numbers["walls"])
         else:
-            copy_fields(self.moments.moments(model, scale).record, numbers[model])
-        numbers["known"][INERTIA_MODELS.index(model)] = True
+            copy_fields(self.moments.moments(model, scale).record, numbers["moments"][number])
+        numbers["known"][number] = True
         if model in STRETCHED:
-            numbers["stretch"] = np.abs(scale) / abs(scale[0])
+            numbers["stretch"][number] = np.abs(scale) / abs(scale[0])
         self.numbers = numbers
         return numbers
 

@@ -38,7 +38,7 @@ from ..mass.closed_form import (
     thickest_walls,
     walls_error,
 )
-from ..mass.moments import MOMENTS
+from ..mass.moments import MODELS, MOMENTS, SOLID, STRETCHED
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import NEARLY, POSSIBLE, judged_tensor
 from ..mass.walls import LIMIT, WALLS
@@ -87,23 +87,23 @@ SCENE = record_type(
     ]
 )
 
-SOLID, SHELL, POINTS, BOUNDING_BOX, WALLED, EXPLICIT = range(6)
-"""Numbers of INERTIA_MODELS; all but the last one are a mesh's."""
+WALLED, EXPLICIT = len(MODELS), len(MODELS) + 1
+"""Numbers of the last two INERTIA_MODELS; those before are moments of a mesh by themselves."""
 OF_SOLID = MODEL_COMS.index("solid")
 
 MESH = record_type(
     [
         ("has_surface", np.bool_),  # False: there is no mesh
         ("extent", np.float64, 3),  # sides of the bounding box [mesh units]
-        ("solid", MOMENTS),
-        ("shell", MOMENTS),
-        ("points", MOMENTS),
-        ("bounding_box", MOMENTS),
+        # By the number of the model:
+        ("moments", MOMENTS, len(MODELS)),
+        ("stretch", np.float64, (len(MODELS), 3)),  # |scale|/|scale_x| for which those of STRETCHED hold
         ("walls", WALLS),
-        ("stretch", np.float64, 3),  # |scale|/|scale_x| for which those of the shell hold
         ("known", np.uint8, EXPLICIT),  # by the number of the model, whether its moments are there
     ]
 )
+
+_IS_STRETCHED = np.array([model in STRETCHED for model in MODELS])
 
 _SUPPORTS = np.array([sum(1 << k for k, need in enumerate(NEEDS) if need in i.supports) for i in INTEGRATORS.values()])
 """By the integrator's number, the bits of what it supports."""
@@ -199,25 +199,13 @@ def explicit_tensor(scene: np.record, inertia: Matrix3) -> None:
 
 
 @njit(error_model="numpy", allocates=False)
-def _moments_of(mesh: np.record, model: int) -> np.record:
-    moments: np.record = mesh.bounding_box
-    if model == SOLID:
-        moments = mesh.solid
-    elif model == SHELL:
-        moments = mesh.shell
-    elif model == POINTS:
-        moments = mesh.points
-    return moments
-
-
-@njit(error_model="numpy", allocates=False)
 def _are_known(scene: np.record, mesh: np.record, refusal: np.record) -> bool:
     """Whether the moments are there that the scene needs: of its model, and of the solid for a density or its COM."""
     s, model = scene.scale, scene.inertia_model
     fits = mesh.known[model] != 0
-    if model == SHELL:
+    if _IS_STRETCHED[model]:
         for k in range(3):
-            fits = fits and abs(s[k]) / abs(s[0]) == mesh.stretch[k]
+            fits = fits and abs(s[k]) / abs(s[0]) == mesh.stretch[model, k]
     if not fits:
         return refuse(refusal, rf.NO_MOMENTS, model, 0.0, 0.0, 0.0)
     if model == WALLED:
@@ -250,17 +238,17 @@ def _spread(
     if model == WALLED:
         return _spread_walls(scene, mesh, com, inertia, moments, axes, refusal)
     if mass == 0.0:
-        mass = scene.density * mesh.solid.measure * abs(s[0] * s[1] * s[2])
+        mass = scene.density * mesh.moments[SOLID].measure * abs(s[0] * s[1] * s[2])
         if not 1e-300 < mass < math.inf:
             refuse(refusal, rf.MASS, 0, mass, 0.0, 0.0)
             return 0.0
-    # A shell's moments include the stretch: the uniform part and the mirroring are left.
+    # Moments of STRETCHED include the stretch: the uniform part and the mirroring are left.
     left = local_numbers(3)
     for k in range(3):
-        left[k] = math.copysign(abs(s[0]), s[k]) if model == SHELL else s[k]
-    unit = _moments_of(mesh, model)
+        left[k] = math.copysign(abs(s[0]), s[k]) if _IS_STRETCHED[model] else s[k]
+    unit = mesh.moments[model]
     at_solid = scene.inertia_model_com == OF_SOLID
-    placed, ballast = mesh.solid if at_solid else unit, scene.ballast[: scene.ballasts]
+    placed, ballast = mesh.moments[SOLID] if at_solid else unit, scene.ballast[: scene.ballasts]
     return spread_mass(mass, unit, placed, at_solid, s, left, ballast, com, inertia, moments, axes)
 
 
@@ -276,15 +264,15 @@ def _spread_walls(
 ) -> float:
     """The same of a printed part, whose mass without a given one is that of walls and infill."""
     s, mass, unit = scene.scale, scene.mass, abs(scene.scale[0])
-    t, infill = scene.wall_thickness / unit, scene.infill
-    error = walls_error(mesh.solid, mesh.walls, t, infill)
+    t, infill, solid = scene.wall_thickness / unit, scene.infill, mesh.moments[SOLID]
+    error = walls_error(solid, mesh.walls, t, infill)
     if not error <= LIMIT:
-        largest = unit * thickest_walls(mesh.solid, mesh.walls, infill)
+        largest = unit * thickest_walls(solid, mesh.walls, infill)
         refuse(refusal, rf.WALLS, 0, scene.wall_thickness, largest, error)
         return 0.0
     reference, center, second = local_numbers(3), local_numbers(3), local_numbers(6)
     low, left = local_numbers(3), local_numbers(3)
-    measure = mix_walls(mesh.solid, mesh.walls, t, infill, reference, center, second)
+    measure = mix_walls(solid, mesh.walls, t, infill, reference, center, second)
     if mass == 0.0:
         mass = scene.density * measure * (unit * unit * unit)
         if not 1e-300 < mass < math.inf:
@@ -294,8 +282,8 @@ def _spread_walls(
     for k in range(3):
         left[k], low[k] = math.copysign(unit, s[k]), 0.0
         if at_solid:
-            reference[k], center[k] = mesh.solid.reference[k], mesh.solid.center[k]
-            low[k] = mesh.solid.center_low[k]
+            reference[k], center[k] = solid.reference[k], solid.center[k]
+            low[k] = solid.center_low[k]
     per_measure, ballast = mass / measure, scene.ballast[: scene.ballasts]
     return spread_over(
         mass, per_measure, second, reference, center, low, at_solid, s, left, ballast, com, inertia, moments, axes

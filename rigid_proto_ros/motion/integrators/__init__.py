@@ -12,31 +12,10 @@ Python's division would raise an exception in the middle of it.
 from __future__ import annotations
 
 from ...base.errors import CommandRefused, InputError
-from .. import INTEGRATOR_NAMES
-from .auto import AUTO
-from .free_body import FREE_BODY, FREE_BODY_STRANG
-from .gram_schmidt import EULER, MIDPOINT
+from .. import integrators
 from .integrator import Integrator
-from .lie_midpoint import LIE_MIDPOINT
-from .runge_kutta import DOP853, RK4, SEMI_IMPLICIT_EULER
-from .series import TAYLOR
 
-_INTEGRATORS = {
-    integrator.name: integrator
-    for integrator in (
-        AUTO,
-        EULER,
-        MIDPOINT,
-        SEMI_IMPLICIT_EULER,
-        RK4,
-        LIE_MIDPOINT,
-        DOP853,
-        TAYLOR,
-        FREE_BODY,
-        FREE_BODY_STRANG,
-    )
-}
-INTEGRATORS: dict[str, Integrator] = {name: _INTEGRATORS[name] for name in INTEGRATOR_NAMES}
+INTEGRATORS: dict[str, Integrator] = {one.name: one for one in integrators()}
 """By name, in the order of their numbers in a scene."""
 
 
