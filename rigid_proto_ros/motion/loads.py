@@ -283,9 +283,7 @@ def load_of_bytes(row: bytes) -> Load:
     return Load(named, None if place == AT_COM else point, force, torque, normal if named == "normal" else None)
 
 
-def packed_load(
-    frame: Frame, force: Vector, torque: Vector, contacts: Mapping[str, Vector]
-) -> tuple[bytes, float]:
+def packed_load(frame: Frame, force: Vector, torque: Vector, contacts: Mapping[str, Vector]) -> tuple[bytes, float]:
     """The row of a wrench in a frame, as bytes, and its weight: (Σ|F| + Σ|τ|)(1 + Σ|point|), to be compared with
     ``Body.light``; inf where a vertex, a ray or a normal is still to be resolved. Raises CommandRefused (``frame``,
     ``nonfinite``).

@@ -257,7 +257,7 @@ def _setup(
             new_record(MESH) if body_mesh is None else body_mesh.numbers,
             surface=body_mesh.surface if body_mesh else None,
             mesh_sha256=body_mesh.mesh.sha256 if body_mesh else "",
-            contacts=dict(parameters.contacts),
+            contacts=like[0].contacts if like else dict(parameters.contacts),
             thrusters=thrusters,
             provide=None if body_mesh is None else body_mesh.provide,
             mesh_name=body_mesh.mesh.name if body_mesh else "",

@@ -8,17 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from ..base.compilation import new_record, place_of
 from ..base.errors import CommandRefused, InputError, TensorError
-from ..base.vectors import FloatArray, Points, StateRow, Triangles, Vector, Vector3
+from ..base.vectors import Points, StateRow, Triangles, Vector, Vector3
 from ..mass import INERTIA_MODELS
 from ..mass.properties import scale_vector
 from ..mass.tensor import check_tensor
-from ..motion.body import BODY, LENGTH, Body
+from ..motion.body import LENGTH, Body
 from ..motion.integrators import INTEGRATORS, check_supported
 from ..motion.integrators.integrator import Integrator
 from ..motion.loads import STRING, needs_of_load, packed_load, unresolved
@@ -43,7 +42,7 @@ class Setup:
     """scene: a record SCENE, and mesh: a record MESH, neither ever modified. surface: of the mesh, or None.
     mesh_sha256: equal values mean the same mesh, so that at equal scales a change of COM moves the COM and not the
     mesh. contacts: mesh coordinates by name. thrusters: by name, in its order. flight: FLIGHT at time 0, before its
-    first segment, ``memory`` its memory and ``initial`` (13,) its state row. warnings: about the tensor.
+    first segment, ``integers`` its memory and ``initial`` (13,) its state row. warnings: about the tensor.
     """
 
     scene: np.record
@@ -53,30 +52,11 @@ class Setup:
     contacts: Mapping[str, Vector]
     thrusters: Mapping[str, Thruster]
     flight: np.record
-    memory: FloatArray
+    integers: memoryview
+    initial: StateRow
+    body: Body
+    integrator: Integrator
     warnings: tuple[str, ...] = ()
-
-    # Made when asked for: in a search by many setups most aren't.
-
-    @cached_property
-    def body(self) -> Body:
-        """The body."""
-        return Body(self.memory[_BODY_AT : _BODY_AT + BODY])
-
-    @cached_property
-    def initial(self) -> StateRow:
-        """State at time 0 (13,)."""
-        return self.memory[_ROW_AT : _ROW_AT + 13]
-
-    @cached_property
-    def integers(self) -> memoryview:
-        """The memory as integers."""
-        return self.memory.view(np.int64).data
-
-    @cached_property
-    def integrator(self) -> Integrator:
-        """What ``integrator`` names."""
-        return _INTEGRATORS[int(self.scene["integrator"])]
 
     @property
     def gravity(self) -> Vector3:
@@ -112,7 +92,16 @@ class Setup:
 
 
 _INTEGRATORS = tuple(INTEGRATORS.values())
-_BODY_AT, _ROW_AT = place_of(FLIGHT, "body") // 8, place_of(FLIGHT, "row") // 8
+_INTEGRATOR = place_of(FLIGHT, "integrator") // 8
+
+
+def _numbers_of(field: str) -> slice:
+    """Where a field of FLIGHT is in its memory."""
+    first = place_of(FLIGHT, field) // 8
+    return slice(first, first + FLIGHT[field].itemsize // 8)
+
+
+_BODY, _ROW = _numbers_of("body"), _numbers_of("row")
 
 
 def make_setup(
@@ -138,7 +127,11 @@ def make_setup(
             raise InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
         mesh = provide(INERTIA_MODELS[refusal.detail], scene.scale)
     warnings = _tensor_warnings(scene, refusal, mesh_name) if refusal["code"] == rf.TENSOR else ()
-    return Setup(scene, mesh, surface, mesh_sha256, contacts or {}, thrusters or {}, flight, memory, warnings)
+    # By the memory: fields of a record by name take three times as long.
+    integers, body, initial = memory.view(np.int64).data, memory[_BODY], memory[_ROW]
+    integrator = _INTEGRATORS[integers[_INTEGRATOR]]
+    own = (contacts or {}, thrusters or {}, flight, integers, initial, Body(body), integrator, warnings)
+    return Setup(scene, mesh, surface, mesh_sha256, *own)
 
 
 def _refused_scene(scene: np.record, refusal: np.record, mesh_name: str) -> InputError:
@@ -196,16 +189,15 @@ def packed_of(command: WrenchCommand, setup: Setup) -> tuple[bytes, float]:
     """Row and weight of a command's load (``packed_load``), computed once: it may act many times. Raises
     CommandRefused.
     """
-    packed = command.packed
-    if packed is None:
-        packed = packed_load(command.frame, command.force, command.torque, setup.contacts)
-        if command.frame.point[0] != "contact":
-            command.packed = packed
-    return packed
+    packed, contacts = command.packed, setup.contacts
+    if packed is None or packed[2] is not contacts:
+        packed = (*packed_load(command.frame, command.force, command.torque, contacts), contacts)
+        command.packed = packed
+    return packed[:2]
 
 
 def _load_row(command: WrenchCommand, setup: Setup) -> bytes:
-    row, weight = command.packed or packed_of(command, setup)
+    row, weight = packed_of(command, setup)
     # What most commands are, in a fraction of the time.
     if weight <= setup.body.light and (setup.integrator.supports_loads or command.frame.impulse):
         return row

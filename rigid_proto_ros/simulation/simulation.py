@@ -287,11 +287,7 @@ class Simulation:
         """Log the commands that were applied, and notify the observer of the loads that began and ended."""
         observer, arrays = self.observer, self._arrays
         if not (self._wants_loads or arrays.integers[NOTEWORTHY] or observer.wants(Logged)):
-            for pending in due:
-                self.events.note(pending.time_ns, pending.command)
-            if Acted in observer.takes:
-                for pending in due:
-                    observer.on(Acted(pending.time_ns, pending.command))
+            self._note(due)
             return
         first = arrays.first_due
         for number, (now_ns, what, load_id, row) in enumerate(arrays.last_events()):
@@ -320,6 +316,14 @@ class Simulation:
             else:
                 kind = "impulse" if command.flight_kind == IMPULSE else command.kind
                 self._notify_load(load_id, kind, load_of_bytes(pending.row))
+
+    def _note(self, due: Sequence[Pending]) -> None:
+        """Note commands that were applied, whose lines nobody wants."""
+        for pending in due:
+            self.events.note(pending.time_ns, pending.command)
+        if Acted in self.observer.takes:
+            for pending in due:
+                self.observer.on(Acted(pending.time_ns, pending.command))
 
     def _log_timeout(self, of: str, which: object) -> None:
         if of in self.logged_timeouts:
