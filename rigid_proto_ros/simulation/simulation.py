@@ -265,7 +265,7 @@ class Simulation:
             until_ns = self.thrusters.due_ns
         if not pending or pending[0][0] >= until_ns:
             return until_ns, ()
-        surface, due = self.setup.surface, []
+        surface, due = self.setup.surface, list[Pending]()
         while pending and pending[0][0] < until_ns:
             first = pending[0][-1]
             if first.resolved_on is not surface and not self._is_plain_clear(first.command):
