@@ -131,8 +131,9 @@ class Body:
         """Bound of (Σ|F| + Σ|τ|)(1 + Σ|point|), with point in mesh coordinates, up to which a load stays far below
         MAX_ACCELERATION.
         """
-        largest: float = max(*map(abs, self.scale.tolist()), *map(abs, self.center_of_mass.tolist()))
-        return 0.1 * MAX_ACCELERATION * min(self.mass, float(self.principal_moments[0]) / (1.0 + 3.0 * largest))
+        row: list[float] = self.row.tolist()
+        largest = max(map(abs, (*row[BODY_SCALE : BODY_SCALE + 3], *row[COM : COM + 3])))
+        return 0.1 * MAX_ACCELERATION * min(row[MASS], row[MOMENTS] / (1.0 + 3.0 * largest))
 
     def point(self, mesh_point: Numbers) -> Vector3:
         """Mesh coordinates (3,) to metres from the COM, body axes."""

@@ -283,9 +283,10 @@ def load_of_bytes(row: bytes) -> Load:
     return Load(named, None if place == AT_COM else point, force, torque, normal if named == "normal" else None)
 
 
-def load_bytes(frame: Frame, force: Vector, torque: Vector, contacts: Mapping[str, Vector]) -> bytes:
-    """The row of a wrench in a frame, as bytes; a vertex, a ray and a normal are still to be resolved. Raises
-    CommandRefused (``frame``, ``nonfinite``).
+def packed_load(frame: Frame, force: Vector, torque: Vector, contacts: Mapping[str, Vector]) -> tuple[bytes, float]:
+    """The row of a wrench in a frame, as bytes, and its weight: (Σ|F| + Σ|τ|)(1 + Σ|point|), to be compared with
+    ``Body.light``; inf where a vertex, a ray or a normal is still to be resolved. Raises CommandRefused (``frame``,
+    ``nonfinite``).
     """
     fx, fy, fz = force
     tx, ty, tz = torque
@@ -296,6 +297,7 @@ def load_bytes(frame: Frame, force: Vector, torque: Vector, contacts: Mapping[st
     if axes == "normal" and (fy or fz or tx or ty or tz):
         raise CommandRefused("frame", "wrench", [*force, *torque], "force.x alone in normal axes")
     place, x, y, z, normal = AT_POINT, 0.0, 0.0, 0.0, _ORIGIN
+    weight = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz) if axes != "normal" else math.inf
     if word == "com":
         place = AT_COM
     elif word == "point":
@@ -306,19 +308,8 @@ def load_bytes(frame: Frame, force: Vector, torque: Vector, contacts: Mapping[st
         place, x = AT_VERTEX, frame.point[1]
     elif word == "ray":
         place, (x, y, z), normal = ON_RAY, frame.point[1], frame.point[2]
-    return _ROW.pack(_AXES_NUMBERS[axes], place, x, y, z, fx, fy, fz, tx, ty, tz, *normal)
-
-
-def is_light(row: bytes, body: Body) -> bool:
-    """Whether a load whose row has these bytes needs no look at the surface and stays far below MAX_ACCELERATION. False
-    for numbers that aren't finite.
-    """
-    axes, place, x, y, z, fx, fy, fz, tx, ty, tz, *_ = _ROW.unpack(row)
-    if axes == NORMAL_AXES or place > AT_POINT:
-        return False
-    amount = abs(fx) + abs(fy) + abs(fz) + abs(tx) + abs(ty) + abs(tz)
-    light: bool = amount * (1.0 + abs(x) + abs(y) + abs(z)) <= body.light
-    return light
+    weight = math.inf if place > AT_POINT else weight * (1.0 + abs(x) + abs(y) + abs(z))
+    return _ROW.pack(_AXES_NUMBERS[axes], place, x, y, z, fx, fy, fz, tx, ty, tz, *normal), weight
 
 
 def unresolved(code: int, frame: Frame, vertices: int) -> CommandRefused:

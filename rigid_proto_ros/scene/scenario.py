@@ -99,11 +99,11 @@ class Scenario:
         mesh: a mesh at hand, used instead of loading the one that the parameter names. at_hand: a scenario whose mesh
         is used where it is the one that the parameters ask for.
         """
-        check_values(changes)
-        parameters = self.parameters.replaced(changes)
+        values = with_mass_of_density(check_values(changes))
+        parameters = self.parameters.with_values(values)
         for one in (self, at_hand):
             if mesh is None and one is not None and _made_of(one.parameters) == _made_of(parameters):
-                return build_scenario(parameters, one.body_mesh, (self.setup, {*changes, "mass"}))
+                return build_scenario(parameters, one.body_mesh, (self.setup, values))
         return _of_parameters(parameters, mesh)
 
     @property
@@ -112,15 +112,17 @@ class Scenario:
         return scene_text(self.parameters.named(), self.body_mesh.mesh.sha256 if self.body_mesh else "")
 
 
-def check_values(changes: Mapping[str, object]) -> None:
-    """Raises InputError for what is no change of any scenario in flight: an unknown name, a value of another type or
-    outside its bounds, a parameter that is set at start only.
+def check_values(changes: Mapping[str, object]) -> dict[str, Value]:
+    """The values in their parameters' own types. Raises InputError for what is no change of any scenario in flight: an
+    unknown name, a value of another type or outside its bounds, a parameter that is set at start only.
     """
-    for name, value in convert_all(changes).items():
+    values = convert_all(changes)
+    for name, value in values.items():
         if parameter_named(name).changes == READ_ONLY:
             raise InputError(
                 name, value, "a parameter that can be changed while running; this one is set at start only"
             )
+    return values
 
 
 def scene_text(values: Mapping[str, Value], mesh_sha256: str = "") -> str:
@@ -261,7 +263,7 @@ def _setup(
             new_record(MESH) if body_mesh is None else body_mesh.numbers,
             surface=body_mesh.surface if body_mesh else None,
             mesh_sha256=body_mesh.mesh.sha256 if body_mesh else "",
-            contacts=dict(parameters.contacts),
+            contacts=like[0].contacts if like else dict(parameters.contacts),
             thrusters=thrusters,
             provide=None if body_mesh is None else body_mesh.provide,
             mesh_name=body_mesh.mesh.name if body_mesh else "",

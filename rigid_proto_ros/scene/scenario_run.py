@@ -19,7 +19,7 @@ from typing import Any
 from ..base.command_line import Progress
 from ..base.errors import InputError
 from ..base.vectors import StateRow
-from ..simulation.commands import Change, Command, Listed, TieString
+from ..simulation.commands import Change, Command, Listed, TieString, WrenchCommand
 from ..simulation.observer import (
     Event,
     GhostChanged,
@@ -246,13 +246,13 @@ def notify_start(observer: Observer, scenario: Scenario) -> None:
 
 class OfflineRun(ScenarioRun):
     """A simulation with its script submitted, as fast as the machine goes; ``advance`` takes it from publication to
-    publication.
+    publication. submitted: how many commands since time 0.
     """
 
     def __init__(self, scenario: Scenario, script: Iterable[Command] = (), observer: Observer | None = None) -> None:
         super().__init__(scenario, observer)
         self._is_observed = observer is not None
-        self._submitted = 0
+        self.submitted = 0
         self._rates_ns: list[int] = []  # when the publication rate changes, a heap
         if observer is not None:
             self.announce()
@@ -264,19 +264,28 @@ class OfflineRun(ScenarioRun):
         checked in the scene that those before it in the script have made by then. Takes all, or none and raises
         InputError.
         """
-        for command, scenario in self._all_checked(list(script)):
-            self._submitted += 1
-            when_ns = self.take(command, command.stamp_ns, (0, self._submitted), scenario)
+        commands = list(script)
+        if len(commands) == 1 and isinstance(command := commands[0], WrenchCommand):
+            # Taken or refused as a whole already.
+            try:
+                self.take(command, command.stamp_ns, (0, self.submitted + 1))
+            except InputError as error:
+                raise self._misplaced(command, error) from None
+            self.submitted += 1
+            return
+        for command, scenario in self._all_checked(commands):
+            self.submitted += 1
+            when_ns = self.take(command, command.stamp_ns, (0, self.submitted), scenario)
             if isinstance(command, Change) and "publish_rate" in command.content:
                 heappush(self._rates_ns, when_ns)
 
     def restart(self, scenario: Scenario | None = None) -> None:
         """Begin again at time 0, with another scenario if one is given; what waits is dropped."""
-        if scenario is not None:
+        if scenario is not None and scenario is not self.scenario:
             self.scenario = scenario
             self.publications = Publications(scenario.parameters.publish_rate)
         self.publications.restart()
-        self._submitted = 0
+        self.submitted = 0
         self._rates_ns.clear()
         self.simulation.reset(self.scenario.setup)
         if self._is_observed:
@@ -289,10 +298,13 @@ class OfflineRun(ScenarioRun):
             for each in self.check(commands):
                 taken.append(each)
         except InputError as error:
-            number, at_s = self._submitted + len(taken) + 1, commands[len(taken)].stamp_ns / 1e9
-            place = f"script, command {number} at {at_s:g} s, {error.field}"
-            raise InputError(place, error.received, error.accepted) from None
+            raise self._misplaced(commands[len(taken)], error, len(taken)) from None
         return taken
+
+    def _misplaced(self, command: Command, error: InputError, taken: int = 0) -> InputError:
+        """The error of a command behind so many others of its script."""
+        place = f"script, command {self.submitted + taken + 1} at {command.stamp_ns / 1e9:g} s, {error.field}"
+        return InputError(place, error.received, error.accepted)
 
     def advance(self, until_ns: int) -> bool:
         """Advance the body to ``until_ns``, notifying the observer every publication; False when the motion failed."""

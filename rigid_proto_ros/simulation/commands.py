@@ -95,6 +95,10 @@ class WrenchCommand(Stamped):
     duration_ns: int = field(init=False, compare=False, repr=False)
     flight_kind: int = field(init=False, compare=False, repr=False)
     slot: int = field(init=False, compare=False, repr=False)
+    packed: tuple[bytes, float, Mapping[str, Vector]] | None = field(
+        init=False, default=None, compare=False, repr=False
+    )
+    """Row and weight of its load (``packed_load``), once they are known, and the contacts for which they are."""
 
     def __post_init__(self) -> None:
         frame = self.frame

@@ -48,10 +48,11 @@ one now. END_DUE: end what is due. END_ALL: end all active loads.
 @exported(FLIGHT, [LOAD_ROW], [EVENT], "f8[:]", "i8", "i8", returns="i8")
 def operate(flight: np.record, loads: Records, events: Records, room: FloatArray, what: int, until_ns: int) -> int:
     """Perform an operation on the flight; returns its result."""
+    if what == BEGIN or flight.method == fl.NOT_BEGUN:
+        fl.begin_segment(flight, loads, room)
     if what == FLY:
         return fl.fly(flight, loads, events, room, until_ns)
     if what == BEGIN:
-        fl.begin_segment(flight, loads, room)
         return 0
     if what == CUT:
         fl.cut_segment(flight, loads, room)

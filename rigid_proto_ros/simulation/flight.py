@@ -171,6 +171,9 @@ tensor given in its principal axes, otherwise up to 1.0 times I₃/I₁.
 NEVER = 1 << 62
 """Later than any simulated time [ns]."""
 
+NOT_BEGUN = -1
+"""Method of a flight whose first segment hasn't begun."""
+
 REACHED, FAILED = range(2)
 """Result of a call."""
 

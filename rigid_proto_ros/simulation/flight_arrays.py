@@ -15,16 +15,16 @@ from ..base.errors import CommandRefused
 from ..base.simd import aligned
 from ..base.vectors import Attitude, FloatArray
 from ..motion.integrators.stepping import ROOM
-from ..motion.loads import Load, load_bytes, load_of_bytes
+from ..motion.loads import Load, load_of_bytes
 from ..motion.problem import PROBLEM, VARIABLES
 from ..motion.state import State
 from ..motion.string import StringState, string_of
 from . import flight as fl
 from .commands import HELD_WRENCH, NO_SLOT, Pending, Row, WrenchCommand, row_of
 from .effects import BEGIN, CUT, FINISH, FLY, change, check_change, check_load, command, operate
-from .flight import EVENT, FLIGHT, LOAD_ROW, accelerations_now, note_floors
+from .flight import EVENT, FLIGHT, LOAD_ROW, NOT_BEGUN, accelerations_now, note_floors
 from .refusals import REFUSAL, refused_command
-from .setup import Setup, refused_load
+from .setup import Setup, packed_of, refused_load
 
 FIRST_ROWS = 8
 """Initial number of rows of the tables, which grow as needed."""
@@ -46,7 +46,7 @@ def _numbers(*names: str) -> list[int]:
 _NOW_NS, _START_NS, _ACTING, _DUE, _DUE_END, _EVENTS = _numbers(
     "now_ns", "start_ns", "acting", "due", "due_end", "events"
 )
-NOTEWORTHY, _LOAD_IDS = _numbers("noteworthy", "load_ids")
+NOTEWORTHY, _LOAD_IDS, _METHOD = _numbers("noteworthy", "load_ids", "method")
 _REACHED = fl.REACHED
 
 
@@ -83,6 +83,7 @@ class FlightArrays:
 
     def _allocate(self, rows: int) -> None:
         """Memory for the flight, tables with this number of rows and a workspace."""
+        self._rows = rows
         # In one piece: allocating five arrays of records takes twice as long.
         events = 4 * rows + 4
         loads_at = _FLIGHT_BYTES
@@ -92,7 +93,7 @@ class FlightArrays:
         memory = numbers.view(np.int64).data
         self.integers = memory[: _FLIGHT_BYTES // 8]
         self.row = numbers[_STATE_AT // 8 : _STATE_AT // 8 + 13]
-        self.flight: np.record = np.ndarray(1, FLIGHT, numbers)[0]
+        self._flight: np.record = np.ndarray(1, FLIGHT, numbers)[0]
         self._loads = np.ndarray(rows, LOAD_ROW, numbers, loads_at)
         self._events = np.ndarray(events, EVENT, numbers, events_at)
         self._room = numbers[room_at // 8 :]
@@ -100,7 +101,7 @@ class FlightArrays:
         self._table = as_bytes[loads_at:events_at]
         self._bytes = as_bytes
         self._string = as_bytes[_STRING_AT:_STRING_END]
-        self.call = bound(operate, self.flight, self._loads, self._events, self._room)
+        self.call = bound(operate, self._flight, self._loads, self._events, self._room)
         """Perform an operation, by its number and a time [ns]; returns its result: of END_DUE, whether anything ended.
         """
 
@@ -111,7 +112,7 @@ class FlightArrays:
 
     def _grow(self, rows: int) -> None:
         """Have at least this number of rows; what is there is kept."""
-        if rows <= len(self._loads):
+        if rows <= self._rows:
             return
         numbers, loads, before = self.integers, self._loads, self._room
         self._allocate(rows)
@@ -120,12 +121,18 @@ class FlightArrays:
         self._room[:] = before
 
     def start_over(self, setup: Setup) -> None:
-        """Restart at time 0 as the flight of a setup begins."""
+        """Restart at time 0 as the flight of a setup begins. Its first segment begins with the next operation."""
         numbers = self.integers
         load_ids = numbers[_LOAD_IDS]
         numbers[:] = setup.integers
         numbers[_LOAD_IDS] = load_ids
-        self.call(BEGIN, 0)
+
+    @property
+    def flight(self) -> np.record:
+        """The record of the flight, its segment begun."""
+        if self.integers[_METHOD] == NOT_BEGUN:
+            self.call(BEGIN, 0)
+        return self._flight
 
     def change(self, old: Setup, new: Setup) -> None:
         """Go on as the flight of another setup; raises CommandRefused."""
@@ -149,11 +156,11 @@ class FlightArrays:
     def put(self, rows: Iterable[Row]) -> None:
         """Put commands into the table, after the active loads, to be applied next."""
         first = last = self.first_due = self.integers[_ACTING]
-        table, room = self._table, len(self._loads)
+        table, room = self._table, self._rows
         for time_ns, duration_ns, kind, slot, load in rows:
             if last == room:
                 self._grow(2 * room + 2)
-                table, room = self._table, len(self._loads)
+                table, room = self._table, self._rows
             at = _ROW_BYTES * last
             _pack(table, at, time_ns, duration_ns, kind, slot, 0, 0)
             table[at + _LOAD_AT : at + _LOAD_AT + len(load)] = load
@@ -177,7 +184,7 @@ class FlightArrays:
         """Apply a command of any kind but thrusters and changes of parameters now; raises CommandRefused."""
         sent, surface = pending.command, (setup.mesh, setup.vertices, setup.triangles)
         if isinstance(sent, WrenchCommand) and pending.resolved_on is not setup.surface:
-            pending.row = load_bytes(sent.frame, sent.force, sent.torque, setup.contacts)
+            pending.row, _ = packed_of(sent, setup)
         self.put([row_of(pending)])
         if not command(setup.scene, *surface, self.flight, self._loads, self._events, self._refusal):
             raise refused_load(self._refusal, sent, setup)
@@ -231,6 +238,8 @@ class FlightArrays:
     @property
     def memory(self) -> bytes:
         """A copy of the flight and the rows of the active loads, which lie behind it."""
+        if self.integers[_METHOD] == NOT_BEGUN:
+            self.call(BEGIN, 0)
         return bytes(self._bytes[: _FLIGHT_BYTES + _ROW_BYTES * self.integers[_ACTING]])
 
     @property
@@ -240,8 +249,12 @@ class FlightArrays:
 
     @property
     def state(self) -> State:
-        """The current state."""
-        return State(self.integers[_NOW_NS], self.row.copy())
+        """The current state; another thread may ask for it, and gets that of one time."""
+        numbers = self.integers
+        while True:
+            now_ns, row = numbers[_NOW_NS], self.row.copy()
+            if numbers[_NOW_NS] == now_ns:
+                return State(now_ns, row)
 
     def acting(self) -> Iterator[ActingLoad]:
         """The active loads, in the order in which they began."""

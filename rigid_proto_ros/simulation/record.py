@@ -50,7 +50,7 @@ from ..motion.problem import begin_body
 from ..motion.state import fill_initial_row
 from ..parameters.declarations import PARAMETERS, PATTERNS, Parameter
 from . import refusals as rf
-from .flight import FLIGHT, NEVER
+from .flight import FLIGHT, NEVER, NOT_BEGUN
 from .refusals import REFUSAL, refuse, refuse_tensor
 from .string_control import begins_clear, follows_rates, tie
 
@@ -389,7 +389,7 @@ def begin_with_body(scene: np.record, flight: np.record, refusal: np.record) -> 
     begin_body(flight.common, body, scene, 1.0 if scene.gyroscopic else 0.0)
     set_rules(scene, flight)
     # None yet: the first method that adapts its steps gets a clean workspace, as every other does.
-    flight.method = -1
+    flight.method = NOT_BEGUN
     flight.string_release_ns = NEVER
     for k in range(3):
         flight.string_attach[k] = scene.string_attach[k]

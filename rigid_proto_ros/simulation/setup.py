@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.compilation import new_record, new_records
+from ..base.compilation import new_record, place_of
 from ..base.errors import CommandRefused, InputError, TensorError
-from ..base.vectors import Points, Records, StateRow, Triangles, Vector, Vector3
+from ..base.vectors import Points, StateRow, Triangles, Vector, Vector3
 from ..mass import INERTIA_MODELS
 from ..mass.properties import scale_vector
 from ..mass.tensor import check_tensor
@@ -21,7 +21,7 @@ from ..mass.walls import refused_walls
 from ..motion.body import LENGTH, Body
 from ..motion.integrators import INTEGRATORS, check_supported
 from ..motion.integrators.integrator import Integrator
-from ..motion.loads import STRING, is_light, load_bytes, needs_of_load, unresolved
+from ..motion.loads import STRING, needs_of_load, packed_load, unresolved
 from ..motion.surface import Surface
 from . import refusals as rf
 from .commands import IMPULSE, Command, MoveString, ThrusterCommand, WrenchCommand
@@ -42,8 +42,8 @@ Provider = Callable[[str, Vector3], np.record]
 class Setup:
     """scene: a record SCENE, and mesh: a record MESH, neither ever modified. surface: of the mesh, or None.
     mesh_sha256: equal values mean the same mesh, so that at equal scales a change of COM moves the COM and not the
-    mesh. contacts: mesh coordinates by name. thrusters: by name, in its order. flights (1,): FLIGHT at time 0, before
-    its first segment, ``initial`` (13,) its state row and ``integers`` its memory. warnings: about the tensor.
+    mesh. contacts: mesh coordinates by name. thrusters: by name, in its order. flight: FLIGHT at time 0, before its
+    first segment, ``integers`` its memory and ``initial`` (13,) its state row. warnings: about the tensor.
     """
 
     scene: np.record
@@ -52,26 +52,12 @@ class Setup:
     mesh_sha256: str
     contacts: Mapping[str, Vector]
     thrusters: Mapping[str, Thruster]
-    flights: Records
+    flight: np.record
+    integers: memoryview
+    initial: StateRow
+    body: Body
+    integrator: Integrator
     warnings: tuple[str, ...] = ()
-    body: Body = field(init=False)
-    initial: StateRow = field(init=False)
-    integrator: Integrator = field(init=False)
-    integers: memoryview = field(init=False)
-
-    def __post_init__(self) -> None:
-        # By the array: fields of a record by name take three times as long.
-        flights = self.flights
-        object.__setattr__(self, "body", Body(flights["body"][0]))
-        object.__setattr__(self, "initial", flights["row"][0])
-        object.__setattr__(self, "integrator", _INTEGRATORS[int(flights["integrator"][0])])
-        object.__setattr__(self, "integers", self.flights.view(np.uint8).view(np.int64).data)
-
-    @property
-    def flight(self) -> np.record:
-        """The flight at time 0."""
-        found: np.record = self.flights[0]
-        return found
 
     @property
     def gravity(self) -> Vector3:
@@ -107,6 +93,16 @@ class Setup:
 
 
 _INTEGRATORS = tuple(INTEGRATORS.values())
+_INTEGRATOR = place_of(FLIGHT, "integrator") // 8
+
+
+def _numbers_of(field: str) -> slice:
+    """Where a field of FLIGHT is in its memory."""
+    first = place_of(FLIGHT, field) // 8
+    return slice(first, first + FLIGHT[field].itemsize // 8)
+
+
+_BODY, _ROW = _numbers_of("body"), _numbers_of("row")
 
 
 def make_setup(
@@ -123,15 +119,20 @@ def make_setup(
     lacks the moments of a model that the scene needs.
     """
     mesh = new_record(MESH) if mesh is None else mesh
-    flights, refusal = new_records(1, FLIGHT), new_record(REFUSAL)
-    while not begin(scene, mesh, flights[0], refusal):
+    memory, refusal = np.zeros(FLIGHT.itemsize // 8), new_record(REFUSAL)
+    flight: np.record = np.ndarray(1, FLIGHT, memory)[0]
+    while not begin(scene, mesh, flight, refusal):
         if refusal["code"] != rf.NO_MOMENTS:
             raise _refused_scene(scene, refusal, mesh_name)
         if provide is None:
             raise InputError("mesh", "a mesh is needed, unless inertia_model is explicit")
         mesh = provide(INERTIA_MODELS[refusal.detail], scene.scale)
     warnings = _tensor_warnings(scene, refusal, mesh_name) if refusal["code"] == rf.TENSOR else ()
-    return Setup(scene, mesh, surface, mesh_sha256, contacts or {}, thrusters or {}, flights, warnings)
+    # By the memory: fields of a record by name take three times as long.
+    integers, body, initial = memory.view(np.int64).data, memory[_BODY], memory[_ROW]
+    integrator = _INTEGRATORS[integers[_INTEGRATOR]]
+    own = (contacts or {}, thrusters or {}, flight, integers, initial, Body(body), integrator, warnings)
+    return Setup(scene, mesh, surface, mesh_sha256, *own)
 
 
 def _refused_scene(scene: np.record, refusal: np.record, mesh_name: str) -> InputError:
@@ -187,10 +188,21 @@ def check_command(command: Command, setup: Setup) -> bytes:
     return b""
 
 
+def packed_of(command: WrenchCommand, setup: Setup) -> tuple[bytes, float]:
+    """Row and weight of a command's load (``packed_load``), computed once: it may act many times. Raises
+    CommandRefused.
+    """
+    packed, contacts = command.packed, setup.contacts
+    if packed is None or packed[2] is not contacts:
+        packed = (*packed_load(command.frame, command.force, command.torque, contacts), contacts)
+        command.packed = packed
+    return packed[:2]
+
+
 def _load_row(command: WrenchCommand, setup: Setup) -> bytes:
-    row = load_bytes(command.frame, command.force, command.torque, setup.contacts)
-    # What most commands are, in a third of the time.
-    if is_light(row, setup.body) and (setup.integrator.supports_loads or command.frame.impulse):
+    row, weight = packed_of(command, setup)
+    # What most commands are, in a fraction of the time.
+    if weight <= setup.body.light and (setup.integrator.supports_loads or command.frame.impulse):
         return row
     refusal, found = new_record(REFUSAL), bytearray(row)
     load = np.frombuffer(found)

@@ -41,7 +41,7 @@ from .commands import (
     row_of,
     slot_name,
 )
-from .effects import APPLY, CUT, END_ALL, END_DUE, FINISH
+from .effects import APPLY, CUT, END_ALL, END_DUE, FINISH, FLY
 from .flight_arrays import NOTEWORTHY, ActingLoad, FlightArrays
 from .observer import (
     AccuracyFloor,
@@ -64,6 +64,7 @@ from .setup import Setup, check_command, check_thrust
 from .thrusters import ThrusterControl
 
 _UNTIL_REPLACED_NS = fl.NEVER >> 1
+_RESET: tuple[str, dict[str, Any]] = ("reset", {})
 
 
 TIMEOUTS = frozenset({"slot", "thrusters", "string"})
@@ -76,14 +77,13 @@ FLOOR_PERIOD_NS = 50_000_000
 class Simulation:
     """Simulation of one body under commands.
 
-    Not thread-safe: a single owner submits and advances. ``time_ns`` and ``state`` are those of the last advance.
+    Not thread-safe but for ``state``: a single owner submits and advances. ``time_ns`` is that of the last advance.
     ``refused`` counts refusals by reason, ``refusals`` has the text of the last one of each; ``failure`` says why the
     motion stopped, or is empty. ``listed``: place in its list of the command being applied, if it is an entry of one.
     ``logged_timeouts``: of which things a timeout is logged, by the keys of its event.
     """
 
     time_ns: int
-    state: State
     _acted_ns: int
 
     def __init__(self, setup: Setup, observer: Observer | None = None) -> None:
@@ -96,7 +96,7 @@ class Simulation:
         self.listed: Listed | None = None
         self.logged_timeouts: Collection[str] = TIMEOUTS
         self._arrays = FlightArrays()
-        self._told_string = b""
+        self.thrusters = ThrusterControl(setup.thrusters)
         self.watch(observer or Observer())
         self._start_over()
 
@@ -107,6 +107,7 @@ class Simulation:
         self.observer = observer
         self._wants_loads = not observer.takes.isdisjoint((Applied, LoadBegan, LoadEnded))
         self._told_floor, self._next_floor_ns = "", 0
+        self._told_string = self._arrays.string_bytes
 
     def introduce(self, observer: Observer) -> None:
         """Notify an observer that joins a running simulation of the body, the active loads and the string."""
@@ -143,9 +144,10 @@ class Simulation:
 
     def _notify_string(self) -> None:
         """Notify the observer of the string if it has changed since the last notification."""
-        arrays = self._arrays
-        told, self._told_string = self._told_string, arrays.string_bytes
-        if told != self._told_string and StringChanged in self.observer.takes:
+        if StringChanged not in self.observer.takes:
+            return
+        told, self._told_string = self._told_string, self._arrays.string_bytes
+        if told != self._told_string:
             self.observer.on(self._string_as_tied())
 
     def log(self, kind: str, content: dict[str, Any]) -> None:
@@ -179,10 +181,9 @@ class Simulation:
                 if not self.change_waits(when_ns):
                     raise
         self._arrivals += 1
-        pending = Pending(when_ns, command, order_of(command, listed, self._arrivals), listed)
-        if row:
-            pending.row, pending.resolved_on = row, self.setup.surface
-        self._push(pending)
+        order = order_of(command, listed, self._arrivals)
+        pending = Pending(when_ns, command, order, listed, row, self.setup.surface if row else False)
+        heappush(self._pending, (when_ns, order, pending))
         return when_ns
 
     def change_waits(self, until_ns: int) -> bool:
@@ -208,19 +209,26 @@ class Simulation:
         """Restart at time 0 in the initial state (of a new setup, if given), without active loads and scheduled
         commands; counters are kept.
         """
+        before, new = self.setup, setup or self.setup
+        if not self.observer.takes:
+            # Nobody is told of anything, and a reset of such a simulation is most of what a short one costs.
+            self.setup = new
+            self.events.reset()
+            self._start_over()
+            self.events.note(0, _RESET)
+            return
         if self._wants_loads:
             self._arrays.call(END_ALL, 0)
             self._notify([])
         self.notify_floor(at_end=True)
-        before = self.setup
-        self.setup = setup or self.setup
+        self.setup = new
         # A run begins with its mesh, of which a recording says so at once.
         self._tell_of_mesh(before)
         self.observer.on(Reset())
         self.events.reset()
         self._start_over()
         self.log("reset", {})
-        if self.setup is not before:
+        if new is not before:
             self.announce()
 
     # Main loop
@@ -240,14 +248,13 @@ class Simulation:
             # 1. Commands that are plain loads are passed to the compiled flight.
             event_ns, due = self._hand_over(until_ns)
             # 2. The flight advances from event to event, up to until_ns or to an event that needs Python code.
-            if not arrays.fly(event_ns):
+            if arrays.call(FLY, event_ns) != fl.REACHED:
                 return self._stop_in_last_good_state(due)
             if due or self._wants_loads or arrays.integers[NOTEWORTHY]:
                 self._notify(due)
             self.time_ns = event_ns
-            self.state = state = State(event_ns, arrays.row.copy())
             if event_ns == until_ns:
-                return state
+                return arrays.state
             # 3. That event is applied, and a new segment begins with the loads active now.
             self._act()
 
@@ -259,11 +266,8 @@ class Simulation:
         if not pending or pending[0][0] >= until_ns:
             return until_ns, ()
         surface, due = self.setup.surface, list[Pending]()
-        while pending:
-            entry = pending[0]
-            if entry[0] >= until_ns:
-                break
-            first = entry[-1]
+        while pending and pending[0][0] < until_ns:
+            first = pending[0][-1]
             if first.resolved_on is not surface and not self._is_plain_clear(first.command):
                 until_ns = first.time_ns
                 # All commands with the same time are applied together.
@@ -282,10 +286,8 @@ class Simulation:
     def _notify(self, due: Sequence[Pending]) -> None:
         """Log the commands that were applied, and notify the observer of the loads that began and ended."""
         observer, arrays = self.observer, self._arrays
-        if not (self._wants_loads or observer.wants(Logged) or arrays.integers[NOTEWORTHY]):
-            for pending in due:
-                self.events.note(pending.time_ns, pending.command)
-            self._tell_acted(due)
+        if not (self._wants_loads or arrays.integers[NOTEWORTHY] or observer.wants(Logged)):
+            self._note(due)
             return
         first = arrays.first_due
         for number, (now_ns, what, load_id, row) in enumerate(arrays.last_events()):
@@ -315,7 +317,10 @@ class Simulation:
                 kind = "impulse" if command.flight_kind == IMPULSE else command.kind
                 self._notify_load(load_id, kind, load_of_bytes(pending.row))
 
-    def _tell_acted(self, due: Sequence[Pending]) -> None:
+    def _note(self, due: Sequence[Pending]) -> None:
+        """Note commands that were applied, whose lines nobody wants."""
+        for pending in due:
+            self.events.note(pending.time_ns, pending.command)
         if Acted in self.observer.takes:
             for pending in due:
                 self.observer.on(Acted(pending.time_ns, pending.command))
@@ -351,7 +356,6 @@ class Simulation:
         self.log("jump", {"by_ns": by_ns})
         self.time_ns += by_ns
         self._arrays.leap(self.time_ns)
-        self.state = self._arrays.state
         due = []
         while self._pending and self._pending[0][0] <= self.time_ns:
             due.append(heappop(self._pending)[-1])
@@ -423,7 +427,6 @@ class Simulation:
             self._log_command(command)
         else:
             arrays.apply(pending, self.setup)
-            self.state = arrays.state
             if isinstance(command, WrenchCommand | ClearWrench):
                 self._notify([pending])
                 if isinstance(command, ClearWrench):
@@ -456,7 +459,7 @@ class Simulation:
         """Switch to another setup in flight."""
         old = self.setup
         self._arrays.change(old, new)
-        self.setup, self.state = new, self._arrays.state
+        self.setup = new
         self.thrusters.change(self._timeout_ns, self.time_ns)
         # The string's arm depends on the body, though it may be tied as before.
         self._told_string = self._told_string and b"on another body"
@@ -476,8 +479,8 @@ class Simulation:
         self.listed = None
         self.failure = ""
         self.time_ns, self._acted_ns = 0, -1
-        self.state = State(0, self.setup.initial.copy())
-        self.thrusters = ThrusterControl(self.setup.thrusters)
+        if self.setup.thrusters or self.thrusters.pushes:
+            self.thrusters = ThrusterControl(self.setup.thrusters)
         self._arrays.start_over(self.setup)
         self._told_string = b""
         self._told_floor, self._next_floor_ns = "", 0
@@ -490,7 +493,7 @@ class Simulation:
         for pending in due[acted:]:
             self._push(pending)
         self._notify(due[:acted])
-        self.time_ns, self.state = arrays.time_ns, arrays.state
+        self.time_ns = arrays.time_ns
         when = f"{int(self.flight.committed_ns) * 1e-9:.9g} s"
         self.failure = f"the motion passed {MAX_SPEED:g}, was not finite or too fast for any step after {when}"
         if self.string is not None and self.string.bilateral and self.string.rest_length:
@@ -499,6 +502,11 @@ class Simulation:
         return self.state
 
     # Observables at the time of the last advance
+
+    @property
+    def state(self) -> State:
+        """The state, an object of the caller's own."""
+        return self._arrays.state
 
     @property
     def acting(self) -> list[ActingLoad]:

@@ -23,7 +23,10 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from numbers import Real
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import CommandRefused, InputError
 from ..base.yaml_text import plain
@@ -35,7 +38,9 @@ from ..scene.sensitivity import sensitivity_of
 from ..simulation.commands import Command, nanoseconds
 from ..simulation.observer import Observer
 from ..simulation.quantities import DIFFERENCES
-from .workers import cores
+from .study import make_study
+from .table import chunks
+from .workers import Threads, cores
 
 Scene = Scenario
 """A checked scene. It can be flown any number of times, and goes to other processes."""
@@ -45,6 +50,8 @@ Commands = tuple[Command, ...]
 
 MOST_GIVEN = 100_000
 """Commands of a flight that are kept for ``Flight.sensitivity``: some tens of megabytes."""
+
+_MAX_TIME_NS = nanoseconds(MAX_TIME_S)
 
 Value = TypeVar("Value")
 Result = TypeVar("Result")
@@ -81,7 +88,8 @@ class Flight:
         self._observer = observer
         self._scene = scene
         self._run = OfflineRun(scene, observer=observer)
-        self._given: list[tuple[int, Command]] = []  # and when they act
+        self._simulation = self._run.simulation
+        self._given: list[tuple[int, Commands]] = []  # and when they were
 
     def __enter__(self) -> Flight:
         return self
@@ -101,46 +109,50 @@ class Flight:
         """Let an entry of a poke script, or one that ``read_command`` has read, act now, after those given before; with
         ``t`` at that time [s, simulated] or later. Raises InputError for one that can't be taken.
         """
-        commands = entry if isinstance(entry, tuple) else read_command(entry, self._run.simulation.time_ns)
-        self._run.submit(commands)
-        if len(self._given) <= MOST_GIVEN:
-            now_ns = self._run.simulation.time_ns
-            self._given += [(max(now_ns, command.stamp_ns), command) for command in commands]
+        run, now_ns = self._run, self._simulation.time_ns
+        commands = entry if isinstance(entry, tuple) else read_command(entry, now_ns)
+        run.submit(commands)
+        if run.submitted <= MOST_GIVEN:
+            self._given.append((now_ns, commands))
 
     def step(self, seconds: float) -> State:
         """Simulate so long, and return the state at the end. Raises InputError for no such time, when the motion fails,
         or when a command is refused as it comes to act.
         """
-        simulation = self._run.simulation
+        simulation = self._simulation
         # A difference of two times may be a rounding below 0.
         step_ns = nanoseconds(seconds) if isinstance(seconds, (float, Real)) and abs(seconds) <= MAX_TIME_S else -1
         if step_ns < 0:
             raise InputError("step", seconds, f"a number of seconds from 0 to {MAX_TIME_S:g}")
         until_ns = simulation.time_ns + step_ns
-        if until_ns > MAX_TIME_S * 1e9:
+        if until_ns > _MAX_TIME_NS:
             raise InputError("step", seconds, f"a step that ends by {MAX_TIME_S:g} s of simulated time")
-        before = dict(simulation.refused)
-        if not self._run.advance(until_ns):
+        before = simulation.refused.copy()
+        if self._observer is None:
+            state = simulation.advance(until_ns)
+        else:
+            self._run.advance(until_ns)
+            state = simulation.state
+        if simulation.failure:
             raise InputError("step", simulation.failure)
         if simulation.refused != before:
             new = {reason: count - before.get(reason, 0) for reason, count in simulation.refused.items()}
             texts = [f"{count} {reason}, {simulation.refusals[reason]}" for reason, count in new.items() if count]
             raise CommandRefused("schedule", "command", f"refused when it was due to act: {'; '.join(texts)}")
-        return self.sample()
+        return state
 
     def sample(self) -> State:
         """The state now: time_ns, position, orientation_xyzw, linear_velocity, angular_velocity, angular_velocity_body;
         before what was commanded at this very time has acted.
         """
-        state = self._run.simulation.state
-        return State(state.time_ns, state.row.copy())  # the caller's own: arrays are changed in place
+        return self._simulation.state
 
     @property
     def accuracy_floor(self) -> str:
         """Why, since time 0, rounding and not the accuracy asked for has set what the motion errs; empty where it
         hasn't.
         """
-        return self._run.simulation.accuracy_floor
+        return self._simulation.accuracy_floor
 
     def sensitivity(self) -> dict[str, float]:
         """How far the present state is from that of a second flight, ten times as accurate, which this simulates from
@@ -149,12 +161,16 @@ class Flight:
         Raises InputError where nothing more accurate can be asked for, the motion failed, or more than MOST_GIVEN
         commands were given, which aren't kept.
         """
-        if len(self._given) > MOST_GIVEN:
+        if self._run.submitted > MOST_GIVEN:
             raise InputError("sensitivity", "more commands", f"a flight of at most {MOST_GIVEN} commands")
-        given = [replace(command, stamp_ns=when_ns) for when_ns, command in self._given]
-        found = sensitivity_of(self._run.simulation, self._scene, given)
+        given = [
+            replace(command, stamp_ns=max(now_ns, command.stamp_ns))
+            for now_ns, commands in self._given
+            for command in commands
+        ]
+        found = sensitivity_of(self._simulation, self._scene, given)
         if found["attitude"] is None:
-            raise InputError("sensitivity", self._run.simulation.failure or "a second flight that stops")
+            raise InputError("sensitivity", self._simulation.failure or "a second flight that stops")
         return {name: found[name] for name in DIFFERENCES}
 
     def close(self) -> None:
@@ -162,6 +178,19 @@ class Flight:
         if self._observer is not None:
             self._run.end()
             self._observer.close()
+
+
+def fly_study(spec: Mapping[str, object]) -> dict[str, NDArray[Any]]:
+    """All rows of a study, which is given as its file says it, on all cores: the columns of its table by name. Rows
+    that differ in numbers alone are flown without any Python code in between. Raises InputError.
+    """
+    study = make_study(plain(spec))
+    workers = Threads(study)
+    try:
+        parts = [chunk.columns for chunk in chunks(study, 0, workers)]
+    finally:
+        workers.close()
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def fly_all(function: Callable[[Value], Result], values: Iterable[Value], workers: int = 0) -> Iterator[Result]:

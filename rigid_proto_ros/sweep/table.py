@@ -101,7 +101,7 @@ def run_study(
                 for k in range(old.num_row_groups):
                     writer.write_table(old.read_row_group(k))
         try:
-            for chunk in _chunks(study, counts["rows_done"], workers):
+            for chunk in chunks(study, counts["rows_done"], workers):
                 writer.write_table(as_arrow(chunk))
                 counts["rows_done"] += len(chunk)
                 counts["rows_by_simulation"] += chunk.simulated
@@ -131,7 +131,7 @@ def run_study(
     return metadata
 
 
-def _chunks(study: Study, first: int, workers: Workers) -> Iterator[Chunk]:
+def chunks(study: Study, first: int, workers: Workers) -> Iterator[Chunk]:
     """The chunks of rows from ``first`` on, in their order; two for each worker are under way."""
     commands = len(expand_script(study.script, "script"))
     most = min(CHUNK_ROWS, CHUNK_COMMANDS // max(1, commands))

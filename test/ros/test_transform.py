@@ -46,7 +46,8 @@ def test_the_transform_is_the_pose(monkeypatch):
     )
     states.configure(Parameters(publish_tf=True))
     state = State(3_000_000_007, np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.9, 0, 0, 0, 0, 0, 0]))
-    run.simulation.state = state
+    run.simulation.advance(state.time_ns)
+    run.simulation._arrays.row[:] = state.row
     states.pack_all(run)
     assert not published
     assert states.find_subscribers()

@@ -10,7 +10,7 @@ from rigid_proto_ros.base.errors import InputError
 from rigid_proto_ros.cli.main import main
 from rigid_proto_ros.scene.scenario_run import OfflineRun
 from rigid_proto_ros.scene.script import parse_script
-from rigid_proto_ros.sweep.flights import Flight, fly_all, load_scene, read_command
+from rigid_proto_ros.sweep.flights import Flight, fly_all, fly_study, load_scene, read_command
 
 SCRIPT = [
     {"t": 0.0, "at": "tip", "push": 0.05, "duration": 0.2},
@@ -117,6 +117,54 @@ def test_of_an_entry_that_is_refused_nothing_acts() -> None:
     flight.command({"set": {"integrator": "auto"}})
     flight.step(0.1)
     assert flight._run.simulation.attach == (0.0, 0.0, 0.0)
+
+
+def test_a_study_from_python_has_the_bits_of_flights_one_by_one_and_a_row_that_fails_its_reason() -> None:
+    poke, masses = {"t": 0.2, "at": "tip", "force": [0.05, 0.0, 0.0]}, np.array([0.1, 0.15, 1e30, 0.2])
+    measure = {"final": ["position", "orientation"]}
+    spec = {"scene": "t_handle", "duration": 0.5, "script": [poke], "vary": {"mass": {"list": masses}}}
+    table = fly_study({**spec, "measure": measure})
+    assert table["mass"].tolist() == masses.tolist() and table["failure"].tolist() == [None] * 4
+    flight, read = Flight(load_scene("t_handle")), read_command(poke)
+    for row, mass in enumerate(masses):
+        flight.reset(load_scene("t_handle", {"mass": mass}))
+        flight.command(read)
+        reached = flight.step(0.5).row[:7].tolist()
+        names = [*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "xyzw")]
+        assert [table[name][row] for name in names] == reached
+    spins = {"initial.angular_velocity": {"list": [[0.0, 0.0, 1.0], [1e99, 1e99, 1e99]]}}
+    good, failed = fly_study({**spec, "vary": spins, "measure": measure})["failure"]
+    assert good is None and "too fast" in failed
+    with pytest.raises(InputError, match="there is no parameter 'mas'"):
+        fly_study({**spec, "vary": {"mas": {"list": [1.0]}}})
+
+
+def test_a_scene_with_changes_is_the_scene_loaded_with_them_and_leaves_the_first_one_as_it_was() -> None:
+    """What a change leaves as it was is shared; what follows from it, a mass set by the density too, is made anew."""
+    scene, poke = load_scene("t_handle", {"mass": 0.3}), read_command({"at": "tip", "force": [0.05, 0.0, 0.0]})
+
+    def flown(one) -> bytes:
+        flight = Flight(one)
+        flight.command(poke)
+        return flight.step(1.0).row.tobytes()
+
+    before = flown(scene)
+    for changes in (
+        {"mass": 0.2},
+        {"density": 500},
+        {"scale": [2, 1.0, 1.0]},
+        {"initial.angular_velocity": (1, 2.0, 3.0), "linear_damping": "0.1"},
+        {"ballast.nut": [0.01, 0.0, 0.0, 0.02]},
+        {"inertia_model": "explicit", "explicit_inertia.tensor": [1e-4, 0.0, 0.0, 1e-4, 0.0, 1.5e-4]},
+        {"integrator": "dop853", "step": 0.002},
+    ):
+        changed = scene.with_changes(changes)
+        loaded = load_scene("t_handle", changes if "density" in changes else {"mass": 0.3, **changes})
+        assert flown(changed) == flown(loaded) != before and changed.parameters == loaded.parameters
+    assert flown(scene) == before
+    for wrong in ({"mass": float("nan")}, {"mass": -1.0}, {"scale": [1.0, float("inf"), 1.0]}, {"mass": True}):
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            scene.with_changes(wrong)
 
 
 def test_commands_are_checked_under_the_changes_that_wait_before_them() -> None:
