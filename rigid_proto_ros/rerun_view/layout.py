@@ -68,7 +68,7 @@ HIDDEN = (style.BOUNDING_BOX, style.INERTIA_BOX, style.INERTIA_ELLIPSOID, style.
 class Subject:
     """What a flight is about, so what is shown of it. reach [m]: how far about the COM it is to be seen. ghost:
     another body beside it. falls: under gravity, on no string. tied: to one. dropped_term: its motion lacks ω × Iω.
-    mesh: it has one.
+    rotor: it has a flywheel. mesh: it has one.
     """
 
     reach: float = 1.0
@@ -77,6 +77,7 @@ class Subject:
     falls: bool = False
     tied: bool = False
     dropped_term: bool = False
+    rotor: bool = False
 
     @property
     def plots(self) -> list[str]:
@@ -118,7 +119,8 @@ def blueprint(subject: Subject, finished: Finished | None = None) -> Any:
         if finished is None or style.COMMANDED in finished.plotted:
             below.append(_plot(style.COMMANDED, finished))
     row_shares = [4, 1]
-    if subject.ghost or not (subject.dropped_term or subject.tied or subject.falls):
+    free = not (subject.dropped_term or subject.tied or subject.falls)
+    if (subject.ghost or free) and not subject.rotor:
         # It turns freely. Beside the commands there is more room than above the plots.
         below = [_poinsot_view(), *([rrb.Vertical(*below)] if below else [])]
         row_shares = [3, 2]

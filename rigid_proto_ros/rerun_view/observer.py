@@ -187,6 +187,7 @@ class RerunObserver(WritingObserver):
             falls=bool(np.any(setup.gravity)) and not tied,
             tied=tied,
             dropped_term=not setup.scene.gyroscopic,
+            rotor=bool(setup.flight.has_rotor),
         )
         if not subject.falls:
             # Below a body that falls it would look like ground.
