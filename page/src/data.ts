@@ -12,7 +12,7 @@ export interface Words {
   readonly mass: string;
   readonly orientation: string;
   readonly rate: readonly string[];
-  readonly magnitude: string;
+  readonly magnitude: readonly string[];
   readonly pull: string;
   readonly freeEnd: string;
   readonly integrator: string;

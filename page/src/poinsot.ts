@@ -4,7 +4,7 @@
 // L . omega = 2 T. The touching point's path on the ellipsoid is the polhode, that on the plane the herpolhode. Rays from
 // the centre through them make two cones, of the body and of space; the first rolls on the second.
 
-import type { BodyInfo, Flying, Snapshot, Vec3 } from "./source.ts";
+import type { BodyInfo, Flying, Motion, Snapshot, Vec3 } from "./source.ts";
 
 /** Relative change of L beyond which another herpolhode begins. */
 const SAME = 2e-3;
@@ -27,10 +27,14 @@ export interface Construction {
 
 const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
-/** Of a body at one instant, drawn beside a body of this size [m]; null where it doesn't spin. */
-export function construction({ row, omega, momentum }: Flying, { moments, axes }: BodyInfo, size: number): Construction | null {
+/** Whether a flywheel turns in the body, or is driven. */
+export const hasFlywheel = (motion: Motion): boolean =>
+  [...motion.snapshot().body.rotor, ...(motion.values()["rotor.torque"] as readonly number[])].some((x) => x !== 0);
+
+/** Of a body at one instant, drawn beside a body of this size [m]; null where it doesn't spin, or has a flywheel. */
+export function construction({ row, omega, momentum, rotor }: Flying, { moments, axes }: BodyInfo, size: number): Construction | null {
   const twice = dot(omega, momentum), l = Math.hypot(...momentum), [I1, I2] = moments;
-  if (!(twice > 0 && l > 0 && I1 > 0)) return null;
+  if (!(twice > 0 && l > 0 && I1 > 0) || rotor.some((h) => h !== 0)) return null;
   const w = [0, 1, 2].map((k) => axes[k]! * row[10]! + axes[3 + k]! * row[11]! + axes[6 + k]! * row[12]!) as unknown as Vec3;
   const mean = Math.sqrt(I1 * I2), longest = MEAN * Math.sqrt(mean / I1), scale = size * (longest > LONGEST ? LONGEST / longest : 1) * MEAN;
   const unit = scale * Math.sqrt(mean / twice);

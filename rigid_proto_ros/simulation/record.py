@@ -31,10 +31,11 @@ from ..base.rotation import norm
 from ..base.vectors import BoolArray, FloatArray, Matrix3, Vector, Vector3
 from ..mass import MODEL_COMS
 from ..mass.closed_form import given_mass, is_plainly_good, spread_mass
-from ..mass.moments import MOMENTS as MODEL_MOMENTS
+from ..mass.moments import MOMENTS
 from ..mass.properties import SCALE_LIMITS
 from ..mass.tensor import NEARLY, POSSIBLE, judged_tensor
-from ..motion.body import LENGTH, MASS, MAX_ACCELERATION, MOMENTS, BodyRow, fill_body, rotor_rate
+from ..motion.body import LENGTH, MASS, MAX_ACCELERATION, BodyRow, fill_body, rotor_rate
+from ..motion.body import MOMENTS as BODY_MOMENTS
 from ..motion.integrators import INTEGRATORS
 from ..motion.integrators.auto import FASTEST
 from ..motion.integrators.series_steps import degree_for
@@ -88,10 +89,10 @@ MESH = record_type(
     [
         ("has_surface", np.bool_),  # False: there is no mesh
         ("extent", np.float64, 3),  # sides of the bounding box [mesh units]
-        ("solid", MODEL_MOMENTS),
-        ("shell", MODEL_MOMENTS),
-        ("points", MODEL_MOMENTS),
-        ("bounding_box", MODEL_MOMENTS),
+        ("solid", MOMENTS),
+        ("shell", MOMENTS),
+        ("points", MOMENTS),
+        ("bounding_box", MOMENTS),
         ("stretch", np.float64, 3),  # |scale|/|scale_x| for which those of the shell hold
         ("known", np.uint8, EXPLICIT),  # by the number of the model, whether its moments are there
     ]
@@ -325,8 +326,8 @@ def takes_rotor(scene: np.record, body: BodyRow, h: Vector, refusal: np.record) 
         return True
     if not meets(scene, NEED_ROTOR, refusal):
         return False
-    if not driven / body[MOMENTS] <= MAX_ACCELERATION:
-        return refuse(refusal, rf.MAGNITUDE, rf.OF_ROTOR, 0.0, driven / body[MOMENTS], body[MASS])
+    if not driven / body[BODY_MOMENTS] <= MAX_ACCELERATION:
+        return refuse(refusal, rf.MAGNITUDE, rf.OF_ROTOR, 0.0, driven / body[BODY_MOMENTS], body[MASS])
     rate = rotor_rate(body, h)
     return scene.integrator != rf.AUTO or follows(rf.ROTOR_MOMENTUM, turns, turns / rate * FASTEST, rate, refusal)
 
